@@ -1,0 +1,1 @@
+"""The engine process: sources, tracker and log, served to clients."""

@@ -1,0 +1,72 @@
+"""What the engine tells its clients about itself a few times a second, beside the stream of hand states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+NodeWord = Literal["silent", "starting", "ready", "streaming", "fault"]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeStatus:
+    """One node as the master sees it. `lost` counts gaps in the sequence; `dropped` rejected datagrams by reason."""
+
+    node_id: int
+    name: str
+    state: NodeWord
+    text_datagrams: bool
+    rate_hz: float
+    received: int
+    lost: int
+    dropped: dict[str, int]
+    clock_offset_s: float | None
+    clock_bound_s: float | None
+    clock_round_trip_s: float | None
+    message: str = ""  # the node's own words when in fault, or why it is silent
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """One sentence for the operator: what is wrong, where, and what to do."""
+
+    level: Literal["info", "warning", "error"]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class LatencySummary:
+    """Median and 99th percentile over the last seconds, s."""
+
+    p50_s: float
+    p99_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class EngineStatus:
+    """The engine itself. `condition` is a `Condition` value; `latency` is by `LATENCY_STAGES`."""
+
+    t_master_ns: int
+    pid: int
+    session: int
+    running: bool
+    condition: str
+    rig_name: str
+    rig_path: str
+    state_rate_hz: float
+    nodes: tuple[NodeStatus, ...]
+    advice: tuple[Advice, ...]
+    latency: dict[str, LatencySummary] = field(default_factory=dict)
+    log_path: str = ""  # empty when nothing is recorded
+    log_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Preview:
+    """A small picture of one camera for people: JPEG bytes, with the frame's full size in px."""
+
+    camera: str
+    t_master_ns: int
+    width: int
+    height: int
+    jpeg: bytes

@@ -1,0 +1,25 @@
+"""Every error the master raises on purpose. A message says what was wrong, in which file or node, and what to do."""
+
+
+class RhotError(Exception):
+    """Root of all errors of this package; commands print it and exit with code 2."""
+
+
+class RigError(RhotError):
+    """A rig, hand or motion file is missing, unreadable, or says something that cannot be."""
+
+
+class SourceError(RhotError):
+    """A port is taken or a node cannot be reached."""
+
+
+class RecordingError(RhotError):
+    """A log cannot be read or written."""
+
+
+class SimulatorError(RhotError):
+    """The digital twin cannot do what was asked."""
+
+
+class EngineError(RhotError):
+    """The engine cannot be started, reached, or refused a command."""

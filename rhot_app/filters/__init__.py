@@ -1,0 +1,1 @@
+"""Filters over many channels at once."""

@@ -1,0 +1,1 @@
+"""Frames, the camera model, triangulation, rolling-shutter time."""

@@ -1,0 +1,1 @@
+"""The hand: anatomy, kinematics, limits, inverse kinematics. Palm frame: see `skeleton`."""

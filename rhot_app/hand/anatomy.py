@@ -1,0 +1,76 @@
+"""The anatomy of one hand: bone lengths, radii, joint limits, marker places. File format ``rhot-hand`` (docs/hand.md).
+
+Millimetres and degrees in the file, because people measure and edit them; metres and radians in every array.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from rhot_app.errors import RigError
+from rhot_app.hand.skeleton import FINGERS
+from rhot_node.files import read_document, write_document
+
+FORMAT = "rhot-hand"
+VERSION = 1
+
+Millimetres = Annotated[float, Meta(gt=0, le=400)]
+LimitDeg = tuple[float, float]
+
+
+class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One finger. Its base joint (MCP; the thumb's CMC) sits at `base_mm` in the palm frame of a right hand.
+
+    `base_rotation_deg` are the angles (about z, then y, then x; intrinsic) that turn the palm frame into the
+    finger's neutral frame, whose x runs along the first bone at zero angles and whose y is the flexion axis's
+    opposite. `bones_mm`: proximal, medial, distal (thumb: metacarpal, proximal, distal), joint to joint, the last
+    one to the end of the soft tip. `radii_mm`: of the three segments. `limits_deg`: (low, high) for the finger's
+    angles in the order of `skeleton.ANGLES`: five for the thumb, four for the others.
+    `marker_mm`: distance of the painted marker's centre from the last joint, along the distal bone.
+    """
+
+    base_mm: tuple[float, float, float]
+    bones_mm: tuple[Millimetres, Millimetres, Millimetres]
+    radii_mm: tuple[Millimetres, Millimetres, Millimetres]
+    limits_deg: tuple[LimitDeg, ...]
+    marker_mm: Millimetres
+    base_rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A hand. `fingers` has exactly the five names of `skeleton.FINGERS`."""
+
+    side: Literal["right", "left"]
+    fingers: dict[str, FingerAnatomy]
+    wrist_breadth_mm: Millimetres = 58.0
+    wrist_thickness_mm: Millimetres = 40.0
+    palm_thickness_mm: Millimetres = 28.0
+    name: str = ""
+    format: Literal["rhot-hand"] = FORMAT
+    version: Literal[1] = VERSION
+
+    def __post_init__(self) -> None:
+        if set(self.fingers) != set(FINGERS):
+            raise ValueError(f"fingers must be exactly {', '.join(FINGERS)}; got {', '.join(sorted(self.fingers))}")
+        for name, finger in self.fingers.items():
+            expected = 5 if name == "thumb" else 4
+            if len(finger.limits_deg) != expected:
+                raise ValueError(f"fingers.{name}.limits_deg needs {expected} pairs, got {len(finger.limits_deg)}")
+            if any(low > high for low, high in finger.limits_deg):
+                raise ValueError(f"fingers.{name}.limits_deg has a lower limit above its upper one")
+            if finger.marker_mm > finger.bones_mm[2]:
+                raise ValueError(f"fingers.{name}.marker_mm lies beyond the fingertip")
+
+
+def load_hand(path: Path) -> HandAnatomy:
+    """Read and validate a hand file; raises RigError naming file and field."""
+    return read_document(path, HandAnatomy, format_name=FORMAT, version=VERSION, error=RigError)
+
+
+def save_hand(path: Path, hand: HandAnatomy) -> None:
+    """Write a hand file atomically; raises OSError."""
+    write_document(path, hand)

@@ -1,0 +1,132 @@
+"""The rig: everything the master knows about cameras, markers, hand and filters, in one JSON file (``rhot-rig``).
+
+docs/rig.md describes the format. Nothing else on the master is configured anywhere else.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from rhot_app.errors import RigError
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_node.files import decode_document, read_document, write_document
+from rhot_node.markers import MarkerSet
+
+FORMAT = "rhot-rig"
+VERSION = 1
+
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+Port = Annotated[int, Meta(ge=0, le=65535)]
+Pixels = Annotated[int, Meta(ge=16, le=16384)]
+Name = Annotated[str, Meta(min_length=1, max_length=64)]
+
+
+class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Pinhole with OpenCV's distortion (k1, k2, p1, p2, k3); pixels, (0, 0) at the centre of the top-left pixel."""
+
+    width: Pixels
+    height: Pixels
+    fx: Positive
+    fy: Positive
+    cx: float
+    cy: float
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class CameraPose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """world_from_camera: unit quaternion wxyz and translation in metres (the camera's centre in the rig frame)."""
+
+    rotation_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    translation_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        norm = sum(q * q for q in self.rotation_wxyz)
+        if not 0.998 < norm < 1.002:
+            raise ValueError(f"rotation_wxyz is not a unit quaternion (its squared norm is {norm:.4f})")
+
+
+class RigNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One camera node: how to reach it and how its camera looks at the world."""
+
+    node_id: Annotated[int, Meta(ge=1, le=2**32 - 1)]
+    name: Name
+    intrinsics: Intrinsics
+    pose: CameraPose = CameraPose()
+    address: str = "127.0.0.1"
+    udp_port: Port = 47800  # the node's: start, stop, clock
+    control_port: Port = 47801  # the node's: settings, state, stills
+    preview_port: Port = 47802  # the node's: preview stream
+    data_port: Port = 0  # the master's: observations; 0 takes any free port and tells the node
+    text_datagrams: bool = False  # accept the thesis's text datagrams on data_port (untrusted)
+    time_offset_s: float = 0.0  # calibrated correction added to this camera's times
+
+
+class Broadcast(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where start and stop are broadcast, besides being sent to every node's own address."""
+
+    address: str = "255.255.255.255"
+    port: Port = 47799
+
+
+class OneEuroSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """1-euro filter (Casiez 2012): min cutoff Hz, beta in Hz per (unit/s), derivative cutoff Hz."""
+
+    min_cutoff_hz: Positive
+    beta: NotNegative
+    derivative_cutoff_hz: Positive = 1.0
+
+
+class FilterSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Filters before depth (pixels) and after (metres); `markers` overrides both for single marker ids."""
+
+    enabled: bool = True
+    pixel: OneEuroSettings = OneEuroSettings(min_cutoff_hz=4.0, beta=0.5, derivative_cutoff_hz=8.0)
+    position: OneEuroSettings = OneEuroSettings(min_cutoff_hz=2.0, beta=400.0, derivative_cutoff_hz=8.0)
+    pixel_markers: dict[str, OneEuroSettings] = {}
+    position_markers: dict[str, OneEuroSettings] = {}
+
+
+class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The whole rig."""
+
+    name: Name
+    nodes: Annotated[tuple[RigNode, ...], Meta(min_length=1, max_length=16)]
+    markers: MarkerSet
+    hand: HandAnatomy
+    filters: FilterSettings = FilterSettings()
+    broadcast: Broadcast = Broadcast()
+    format: Literal["rhot-rig"] = FORMAT
+    version: Literal[1] = VERSION
+
+    def __post_init__(self) -> None:
+        for what, values in (("node_id", [node.node_id for node in self.nodes]),
+                             ("name", [node.name for node in self.nodes]),
+                             ("data_port", [node.data_port for node in self.nodes if node.data_port])):
+            doubled = [value for value in values if values.count(value) > 1]
+            if doubled:
+                raise ValueError(f"two nodes have the same {what} {doubled[0]!r}; each node needs its own")
+        known = set(self.markers.ids)
+        for field in ("pixel_markers", "position_markers"):
+            unknown = sorted(set(getattr(self.filters, field)) - known)
+            if unknown:
+                raise ValueError(f"filters.{field} names a marker {unknown[0]!r} that the marker set does not have")
+
+
+def load_rig(path: Path) -> Rig:
+    """Read and validate a rig file; raises RigError naming file and field."""
+    return read_document(path, Rig, format_name=FORMAT, version=VERSION, error=RigError)
+
+
+def parse_rig(data: bytes, where: str) -> Rig:
+    """Decode a rig document; `where` begins every error message. Raises RigError."""
+    return decode_document(data, Rig, format_name=FORMAT, version=VERSION, where=where, error=RigError)
+
+
+def save_rig(path: Path, rig: Rig) -> None:
+    """Write a rig file atomically; raises OSError, the old file then stays as it was."""
+    write_document(path, rig)

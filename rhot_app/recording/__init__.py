@@ -1,0 +1,1 @@
+"""The raw log of all datagrams, written and read."""

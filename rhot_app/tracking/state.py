@@ -1,0 +1,68 @@
+"""The frozen state that the tracker publishes: one instant of the hand, with what is known and how well."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.uint8]
+
+
+class Knowledge(enum.IntEnum):
+    """How a value came to be known; shown alike everywhere (solid, translucent, hatched)."""
+
+    MEASURED = 0  # seen by enough cameras at this instant
+    INFERRED = 1  # follows from measured values through the model, or from a half-hidden sight
+    GUESSED = 2  # the images do not determine it; prior or last value
+    UNKNOWN = 3  # nothing to say; the value is NaN
+
+
+class Condition(enum.Enum):
+    """The one word the operator reads from two metres away."""
+
+    IDLE = "IDLE"
+    SEARCHING = "SEARCHING"
+    TRACKING = "TRACKING"
+    PARTIAL = "PARTIAL"
+    LOST = "LOST"
+    FAULT = "FAULT"
+
+
+LATENCY_STAGES: tuple[str, ...] = ("detect", "network", "pair", "triangulate", "filter", "solve", "publish",
+                                   "receive_to_state")
+"""Stages of a state's way, in order. `publish` and `receive_to_state` of a state are those of the one before it,
+because they are only known once a state has left."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandState:
+    """One instant. M markers, C cameras; joints and angles as in `rhot_app.hand.skeleton`.
+
+    World frame is the rig frame, metres. Unknown values are NaN. Times are master monotonic ns.
+    """
+
+    sequence: int
+    t_master_ns: int  # the instant the state describes
+    t_receive_ns: int  # kernel receive time of the datagram that completed it
+    condition: Condition
+    marker_ids: tuple[str, ...]
+    marker_positions: Array  # (M, 3) m, filtered
+    marker_raw_positions: Array  # (M, 3) m, triangulated, unfiltered
+    marker_covariances: Array  # (M, 3, 3) m^2, of the unfiltered position
+    marker_knowledge: Codes  # (M,) Knowledge
+    camera_names: tuple[str, ...]
+    camera_pixels: Array  # (C, M, 2) px, last observation; NaN when lost
+    camera_flags: NDArray[np.uint16]  # (C, M) MarkerFlag
+    joint_positions: Array  # (21, 3) m
+    joint_knowledge: Codes  # (21,)
+    fingertip_positions: Array  # (5, 3) m, solved end effectors: the marker's place on the distal phalanx
+    angles: Array  # (21,) rad
+    angle_knowledge: Codes  # (21,)
+    world_from_palm: Array  # (4, 4)
+    palm_knowledge: Knowledge
+    epipolar_error_px: Array  # (M,) rms distance of the rays' points from the reprojected marker, px
+    latency_s: dict[str, float]  # by LATENCY_STAGES

@@ -1,0 +1,51 @@
+"""What every tracker takes and gives, so that the engine need not know which one runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.tracking.state import HandState
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraObservations:
+    """One frame of one camera, in master time. M markers in the rig's order.
+
+    `camera`: index into the rig's nodes. `t_row0_master_ns`: mid-exposure of row 0; a marker at raw pixel row y was
+    seen at `t_row0_master_ns + y * row_time_ns`. `clock_bound_s`: half-width of the clock offset's error.
+    """
+
+    camera: int
+    t_row0_master_ns: int
+    row_time_ns: int
+    clock_bound_s: float
+    t_receive_ns: int
+    detect_s: float  # frame available to datagram sent, on the node
+    network_s: float  # datagram sent to kernel receive, by the clock model; may be negative within the bound
+    pixels: Array  # (M, 2) raw px, NaN when lost
+    covariances: Array  # (M, 2, 2) px^2
+    diameters: Array  # (M,) px
+    qualities: Array  # (M,)
+    flags: NDArray[np.uint16]  # (M,) MarkerFlag
+
+
+class Tracker(Protocol):
+    """Fed with every frame as it arrives, asked for a state when one may be due. One thread only."""
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in. Cheap: called for every datagram even when flooded."""
+        ...
+
+    def solve(self) -> HandState | None:
+        """The state at the newest instant that is due and not yet published, or None."""
+        ...
+
+    def reset(self) -> None:
+        """Forget everything: a new session, or a node's clock was set."""
+        ...

@@ -1,0 +1,47 @@
+"""The camera interface: where real cameras, recordings and the digital twin enter a node."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from rhot_node.detect.image import YuvImage
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One image with its time.
+
+    `t_node_ns`: mid-exposure of row 0, node clock. `t_available_node_ns`: when the whole frame could be read.
+    `number` counts the camera's frames; a gap means dropped frames. The image may be a view of a buffer that is
+    reused: it is valid until the next `read`.
+    """
+
+    image: YuvImage
+    number: int
+    t_node_ns: int
+    t_available_node_ns: int
+    exposure_ns: int
+    row_time_ns: int
+
+
+class Camera(Protocol):
+    """An open camera. Constructors open it and raise CameraError with a remedy."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px; constant while open."""
+        ...
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The next frame; None when none came within `timeout_s`. Raises CameraError when the camera is gone
+        or changed its size, and EndOfRecording when a finite recording is over."""
+        ...
+
+    def close(self) -> None:
+        """Release the device. May be called twice."""
+        ...
+
+
+class EndOfRecording(Exception):  # noqa: N818 - an end, not an error
+    """A finite source (file, folder) has no more frames."""

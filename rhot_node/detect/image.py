@@ -1,0 +1,59 @@
+"""The image a detector works on: planar YUV420, full-range BT.601, as a Pi camera delivers it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Plane = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class YuvImage:
+    """Three planes: `y` (H, W), `u` = Cb and `v` = Cr (H/2, W/2), uint8, H and W even.
+
+    A chroma sample (x, y) lies at luma 2 (x, y) + 0.5: it is the mean of a 2x2 block.
+    """
+
+    y: Plane
+    u: Plane
+    v: Plane
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px."""
+        return self.y.shape[1], self.y.shape[0]
+
+
+def from_i420(buffer: Plane, width: int, height: int) -> YuvImage:
+    """View a packed I420 buffer (Y, then U, then V; 1.5 * width * height bytes) as an image, without a copy."""
+    flat = buffer.reshape(-1)
+    luma, chroma = width * height, width * height // 4
+    return YuvImage(
+        flat[:luma].reshape(height, width),
+        flat[luma:luma + chroma].reshape(height // 2, width // 2),
+        flat[luma + chroma:luma + 2 * chroma].reshape(height // 2, width // 2),
+    )
+
+
+def from_bgr(bgr: Plane) -> YuvImage:
+    """Convert (H, W, 3) BGR; an odd last row or column is cut off.
+
+    OpenCV's own I420 conversion takes the chroma of one pixel of each 2x2 block, half a pixel off; this averages.
+    """
+    height, width = bgr.shape[0] & ~1, bgr.shape[1] & ~1
+    bgr = bgr[:height, :width]
+    luma = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
+    half = cv2.cvtColor(cv2.resize(bgr, (width // 2, height // 2), interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2YCrCb)
+    return YuvImage(luma, np.ascontiguousarray(half[:, :, 2]), np.ascontiguousarray(half[:, :, 1]))
+
+
+def to_bgr(image: YuvImage) -> Plane:
+    """(H, W, 3) BGR of an image, for people and for the reference detector; chroma is interpolated linearly."""
+    size = image.size
+    chroma = [cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR) for plane in (image.v, image.u)]
+    bgr = cv2.cvtColor(cv2.merge([image.y, *chroma]), cv2.COLOR_YCrCb2BGR)
+    return np.asarray(bgr, dtype=np.uint8)

@@ -1,0 +1,25 @@
+"""Every error a node raises on purpose. A message says what was wrong, where, and what to do next."""
+
+
+class NodeError(Exception):
+    """Root of all errors of this package; commands print it and exit with code 2."""
+
+
+class SettingsError(NodeError):
+    """A settings or marker file is missing, unreadable, or says something that cannot be."""
+
+
+class CameraError(NodeError):
+    """A camera or recording cannot be opened, stopped delivering, or changed its image size."""
+
+
+class LinkError(NodeError):
+    """A network port cannot be opened or an address is not usable."""
+
+
+class WireError(NodeError):
+    """A datagram is not one of ours. `reason` is a short key for counting, such as 'magic' or 'length'."""
+
+    def __init__(self, reason: str, detail: str = "") -> None:
+        super().__init__(f"{reason}: {detail}" if detail else reason)
+        self.reason = reason

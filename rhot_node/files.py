@@ -1,0 +1,81 @@
+"""JSON files that people edit: read with errors that name file and field, written all at once or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+T = TypeVar("T")
+
+
+def resource_path(*parts: str) -> Path:
+    """Path of a file that ships with the project, e.g. ``resource_path("markers", "rhot6.json")``."""
+    return Path(str(files("resources").joinpath(*parts)))
+
+
+def decode_document(data: bytes, kind: type[T], *, format_name: str, version: int, where: str,
+                    error: type[Exception]) -> T:
+    """Decode one versioned JSON document into the msgspec type `kind`.
+
+    The document is an object whose ``format`` and ``version`` fields must equal the arguments; they are checked
+    before anything else so that a wrong file is named as such. `where` (usually the path) begins every message.
+
+    Raises `error` with a sentence that names the place and the field.
+    """
+    try:
+        raw: Any = json.loads(data)
+    except (UnicodeDecodeError, json.JSONDecodeError) as exc:
+        raise error(f"{where}: not valid JSON ({exc}). Is the file complete?") from exc
+    if not isinstance(raw, dict) or raw.get("format") != format_name:
+        found = raw.get("format") if isinstance(raw, dict) else type(raw).__name__
+        raise error(f'{where}: this is not a "{format_name}" file (its "format" is {found!r}).')
+    if raw.get("version") != version:
+        raise error(f"{where}: version {raw.get('version')!r} of {format_name} is not supported; "
+                    f"this program reads version {version}.")
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except msgspec.ValidationError as exc:
+        raise error(f"{where}: {exc}") from exc
+
+
+def read_document(path: Path, kind: type[T], *, format_name: str, version: int, error: type[Exception]) -> T:
+    """Read and decode `path` as `decode_document` does; a missing or unreadable file is an `error` too."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as exc:
+        raise error(f"{path}: no such file.") from exc
+    except OSError as exc:
+        raise error(f"{path}: cannot be read ({exc.strerror}).") from exc
+    return decode_document(data, kind, format_name=format_name, version=version, where=str(path), error=error)
+
+
+def write_document(path: Path, document: Any) -> None:
+    """Write a msgspec document as indented JSON, atomically: a reader sees the old file or the new one, whole."""
+    write_atomically(path, msgspec.json.format(msgspec.json.encode(document), indent=2) + b"\n")
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write `data` to a temporary file beside `path`, flush it to disk, then rename it over `path`.
+
+    Raises OSError when the folder is missing or not writable; `path` is then unchanged.
+    """
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
+        Path(name).chmod(mode)
+        Path(name).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(name).unlink()
+        raise

@@ -1,0 +1,120 @@
+"""Marker sets: which markers exist, what colour each has, where on the hand it sits, what shape it has.
+
+The file format (``rhot-markers``, JSON) is described in docs/markers.md.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from rhot_node.errors import SettingsError
+from rhot_node.files import decode_document, read_document, write_document
+
+FORMAT = "rhot-markers"
+VERSION = 1
+
+Byte = Annotated[int, Meta(ge=0, le=255)]
+Positive = Annotated[float, Meta(gt=0)]
+MarkerId = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[A-Za-z0-9_.-]+$")]
+
+Shape = Literal["disc", "sphere", "capsule", "band", "blob"]
+
+
+class ChromaModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A colour as the detector sees it: a sector of the chroma plane, full-range BT.601 (JPEG) YCbCr.
+
+    `cb` and `cr` are the marker's mean chroma minus 128, -128..127. A pixel belongs to the marker when its
+    chroma angle atan2(cr, cb) is within `hue_tolerance_deg` of the marker's and its magnitude is at least
+    `magnitude_min` (grey levels); luma outside `luma_min..luma_max` is ignored (black noise, burnt highlights).
+    """
+
+    cb: Annotated[float, Meta(ge=-128, le=128)]
+    cr: Annotated[float, Meta(ge=-128, le=128)]
+    hue_tolerance_deg: Annotated[float, Meta(gt=0, le=90)] = 14.0
+    magnitude_min: Annotated[float, Meta(ge=4, le=180)] = 24.0
+    luma_min: Byte = 12
+    luma_max: Byte = 250
+
+    @property
+    def magnitude(self) -> float:
+        """Chroma magnitude of the marker's mean colour, grey levels."""
+        return math.hypot(self.cb, self.cr)
+
+    @property
+    def hue_rad(self) -> float:
+        """Chroma angle atan2(cr, cb), rad."""
+        return math.atan2(self.cr, self.cb)
+
+
+class RangeModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The thesis's colour model: lower and upper bounds in HSV (OpenCV: H 0..179) or RGB.
+
+    In HSV a lower hue above the upper one means a range across red: ``[170, ...]`` to ``[8, ...]``.
+    """
+
+    space: Literal["hsv", "rgb"]
+    lower: tuple[Byte, Byte, Byte]
+    upper: tuple[Byte, Byte, Byte]
+
+
+class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One marker. Sizes are read by the master only; a node works without them."""
+
+    id: MarkerId
+    chroma: ChromaModel
+    display_rgb: tuple[Byte, Byte, Byte]
+    role: str | None = None  # place on the hand, e.g. "thumb_tip", "wrist"; None: a free point
+    shape: Shape = "blob"
+    range: RangeModel | None = None  # for the reference detector; derived from `chroma` when absent
+    radius_mm: Positive | None = None
+    length_mm: Positive | None = None
+
+
+class MarkerSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An ordered set of markers; a marker's index in it is its number on the wire."""
+
+    markers: Annotated[tuple[Marker, ...], Meta(min_length=1, max_length=64)]
+    name: str = ""
+    format: Literal["rhot-markers"] = FORMAT
+    version: Literal[1] = VERSION
+
+    def __post_init__(self) -> None:
+        ids = [marker.id for marker in self.markers]
+        doubled = sorted({name for name in ids if ids.count(name) > 1})
+        if doubled:
+            raise ValueError(f"marker id {doubled[0]!r} is used more than once; every id must be unique")
+        for marker in self.markers:
+            if marker.chroma.magnitude < 4:
+                raise ValueError(f"marker {marker.id!r} has no colour (cb and cr are both near 0); "
+                                 "grey, black and white cannot be told from the room")
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Marker ids in wire order."""
+        return tuple(marker.id for marker in self.markers)
+
+    @property
+    def checksum(self) -> int:
+        """CRC-32 of the ids in order: node and master compare it to notice that they use different sets."""
+        return zlib.crc32("\n".join(self.ids).encode())
+
+
+def load_markers(path: Path) -> MarkerSet:
+    """Read a marker file; raises SettingsError naming file and field."""
+    return read_document(path, MarkerSet, format_name=FORMAT, version=VERSION, error=SettingsError)
+
+
+def parse_markers(data: bytes, where: str) -> MarkerSet:
+    """Decode a marker document from bytes; `where` names its origin in errors. Raises SettingsError."""
+    return decode_document(data, MarkerSet, format_name=FORMAT, version=VERSION, where=where, error=SettingsError)
+
+
+def save_markers(path: Path, markers: MarkerSet) -> None:
+    """Write a marker file atomically; raises OSError."""
+    write_document(path, markers)

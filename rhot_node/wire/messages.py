@@ -1,0 +1,134 @@
+"""The messages of the wire as frozen values. No bytes and no sockets here."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+TAG_LENGTH = 16  # bytes reserved for an authentication tag at the end of a datagram
+
+
+class NodeState(enum.IntEnum):
+    """Life of a node: it starts, is ready, streams between start and stop, and says so when something broke."""
+
+    STARTING = 0
+    READY = 1
+    STREAMING = 2
+    FAULT = 3
+
+
+class MarkerFlag(enum.IntFlag):
+    """What a node noticed about one marker."""
+
+    LOST = 1  # not found in this frame; x and y are NaN
+    PARTIAL = 2  # smaller or otherwise shaped than the last frames say: half hidden; covariance widened
+    EDGE = 4  # touches the image border
+    AMBIGUOUS = 8  # another blob of the same colour is as plausible
+    ACQUIRED = 16  # found by full search, not by prediction: the first frame of a track
+    REFERENCE = 32  # measured by the thesis's pipeline
+
+
+NO_FLAGS = MarkerFlag(0)
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerObservation:
+    """One marker in one frame. Pixels: (0, 0) is the centre of the top-left pixel, raw (distorted) image.
+
+    `diameter` is the equivalent diameter sqrt(4 area / pi), px. `cov_xx, cov_xy, cov_yy` is the covariance of
+    (x, y), px^2. `quality` 0..1.
+    """
+
+    index: int
+    x: float
+    y: float
+    diameter: float
+    cov_xx: float
+    cov_xy: float
+    cov_yy: float
+    quality: float
+    flags: MarkerFlag = NO_FLAGS
+
+    @property
+    def found(self) -> bool:
+        """True unless the marker is stated as lost."""
+        return not self.flags & MarkerFlag.LOST
+
+
+@dataclass(frozen=True, slots=True)
+class Observations:
+    """All markers of one frame.
+
+    `t_frame_node_ns`: mid-exposure of row 0, node clock; a marker at row y is later by y * `row_time_ns`.
+    `t_send_node_ns`: when the datagram was handed to the socket. `processing_ns`: from frame available to then.
+    """
+
+    node_id: int
+    session: int
+    sequence: int
+    t_frame_node_ns: int
+    t_send_node_ns: int
+    processing_ns: int
+    exposure_ns: int
+    row_time_ns: int
+    width: int
+    height: int
+    frame_number: int
+    marker_checksum: int
+    markers: tuple[MarkerObservation, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ClockRequest:
+    """Master to node: first half of a four-timestamp exchange."""
+
+    node_id: int
+    session: int
+    sequence: int
+    t1_master_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class ClockReply:
+    """Node to master: the request's t1 again, the node's receive and send times, and what the node is doing.
+
+    `boot_id` changes whenever the daemon starts, so that the master forgets the old clock at once.
+    """
+
+    node_id: int
+    session: int
+    sequence: int
+    t1_master_ns: int
+    t2_node_ns: int
+    t3_node_ns: int
+    boot_id: int
+    state: NodeState
+
+
+@dataclass(frozen=True, slots=True)
+class StartEntry:
+    """One node's part of a start message: where to stream to and when to begin on its own clock (0: at once)."""
+
+    node_id: int
+    data_port: int
+    t_start_node_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Master to all nodes: stream in `session`. A node without an entry ignores it. node_id in the header is 0."""
+
+    session: int
+    sequence: int
+    entries: tuple[StartEntry, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Master to all nodes: stop streaming `session` (0: whatever session)."""
+
+    session: int
+    sequence: int
+
+
+Message = Observations | ClockRequest | ClockReply | Start | Stop
