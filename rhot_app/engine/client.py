@@ -1,0 +1,123 @@
+"""The engine as its clients see it: states, status and previews to poll, commands to give.
+
+For the app, for commands and for tests; imports neither Qt nor the tracker.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import msgspec
+import zmq
+
+from rhot_app.engine.codec import TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, Published, decode
+from rhot_app.engine.directory import EngineDirectory, default_directory
+from rhot_app.engine.status import EngineStatus
+from rhot_app.errors import EngineError
+from rhot_app.tracking.state import HandState
+
+VANISHED_S = 1.0
+"""An engine publishes its status ten times a second; after this long without one it is gone."""
+
+_RECEIVE_QUEUE = 2000  # messages a slow client may fall behind before the oldest are dropped
+
+
+class EngineClient:
+    """Connection to the engine in `directory`. May be made before the engine starts and outlives its restarts.
+
+    One thread only. `state` and `status` are the newest of each kind that `poll` has seen.
+    """
+
+    def __init__(self, directory: Path | None = None, *, states: bool = True) -> None:
+        """Connect; no message is exchanged yet. `states` False leaves the stream of hand states out."""
+        self.directory = EngineDirectory((directory or default_directory()).absolute())
+        self.state: HandState | None = None
+        self.status: EngineStatus | None = None
+        self._heard_at = -1e9
+        self._context = zmq.Context()
+        self._stream = self._context.socket(zmq.SUB)
+        self._stream.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE)
+        self._stream.setsockopt(zmq.LINGER, 0)
+        self._stream.setsockopt(zmq.RECONNECT_IVL, 50)
+        self._stream.setsockopt(zmq.RECONNECT_IVL_MAX, 200)
+        for topic in (TOPIC_STATUS, TOPIC_PREVIEW, *((TOPIC_STATE,) if states else ())):
+            self._stream.setsockopt(zmq.SUBSCRIBE, topic)
+        self._stream.connect(self.directory.events)
+        if states:
+            self._stream.connect(self.directory.states)
+
+    def poll(self, timeout_s: float = 0.0) -> list[Published]:
+        """Everything that arrived since the last call, oldest first; waits up to `timeout_s` when there is nothing.
+
+        Raises EngineError when the engine is of another version.
+        """
+        if timeout_s > 0.0:
+            self._stream.poll(round(1e3 * timeout_s))
+        messages: list[Published] = []
+        while True:
+            try:
+                topic, payload = self._stream.recv_multipart(zmq.DONTWAIT)
+            except zmq.Again:
+                return messages
+            message = decode(topic, payload)
+            if isinstance(message, HandState):
+                self.state = message
+            elif isinstance(message, EngineStatus):
+                self.status = message
+                self._heard_at = time.monotonic()
+            messages.append(message)
+
+    @property
+    def connected(self) -> bool:
+        """Whether a status came within the last second (by what `poll` has seen)."""
+        return time.monotonic() - self._heard_at < VANISHED_S
+
+    def command(self, name: str, *, timeout_s: float = 3.0, **arguments: Any) -> dict[str, Any]:
+        """Give one command and wait for its answer; docs/engine.md lists them.
+
+        Returns the answer's fields. Raises EngineError with the engine's own sentence when it refuses, or when it
+        does not answer within `timeout_s`.
+        """
+        socket = self._context.socket(zmq.REQ)
+        socket.setsockopt(zmq.LINGER, 0)
+        try:
+            socket.connect(self.directory.commands)
+            socket.send(msgspec.json.encode({"command": name, **arguments}))
+            if not socket.poll(round(1e3 * timeout_s)):
+                raise EngineError(f"the engine in {self.directory.path} did not answer {name!r} within {timeout_s:g} s; "
+                                  "is it running? Start it with `rhot engine --rig FILE`.")
+            frames = socket.recv_multipart()
+        finally:
+            socket.close()
+        return _read_answer(frames)
+
+    def close(self) -> None:
+        """Disconnect. May be called twice."""
+        with contextlib.suppress(zmq.ZMQError):
+            self._stream.close(0)
+            self._context.destroy(0)
+
+    def __enter__(self) -> EngineClient:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+
+def _read_answer(frames: list[bytes]) -> dict[str, Any]:
+    """An answer is one JSON frame; bytes (a picture) follow in a second frame and take the name it announces."""
+    try:
+        answer: dict[str, Any] = msgspec.json.decode(frames[0], type=dict[str, Any])
+    except msgspec.MsgspecError as exc:
+        raise EngineError(f"the engine's answer cannot be read ({exc}); restart engine and app.") from exc
+    if not answer.pop("ok", False):
+        raise EngineError(str(answer.get("error", "the engine refused without a reason")))
+    attachment = answer.pop("attachment", None)
+    if attachment is not None and len(frames) > 1:
+        answer[str(attachment)] = frames[1]
+    return answer

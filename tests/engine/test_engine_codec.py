@@ -1,0 +1,75 @@
+"""What the engine publishes comes back as it was sent."""
+
+import dataclasses
+import time
+
+import numpy as np
+import pytest
+
+from rhot_app.engine import codec
+from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, Preview
+from rhot_app.errors import EngineError
+from rhot_app.tracking.state import LATENCY_STAGES, Condition, HandState, Knowledge
+
+
+def make_state(markers: int = 6, cameras: int = 2) -> HandState:
+    rng = np.random.default_rng(1)
+    pixels = rng.normal(size=(cameras, markers, 2))
+    pixels[0, 1] = np.nan
+    return HandState(
+        sequence=7, t_master_ns=123456789012, t_receive_ns=123456999999, condition=Condition.PARTIAL,
+        marker_ids=tuple(f"m{k}" for k in range(markers)), marker_positions=rng.normal(size=(markers, 3)),
+        marker_raw_positions=rng.normal(size=(markers, 3)), marker_covariances=rng.normal(size=(markers, 3, 3)),
+        marker_knowledge=np.full(markers, Knowledge.INFERRED, np.uint8),
+        camera_names=tuple(f"camera {k}" for k in range(cameras)), camera_pixels=pixels,
+        camera_flags=np.ones((cameras, markers), np.uint16), joint_positions=rng.normal(size=(21, 3)),
+        joint_knowledge=np.zeros(21, np.uint8), fingertip_positions=rng.normal(size=(5, 3)),
+        angles=rng.normal(size=21), angle_knowledge=np.zeros(21, np.uint8), world_from_palm=np.eye(4)[::-1],
+        palm_knowledge=Knowledge.GUESSED, epipolar_error_px=np.zeros(markers),
+        latency_s=dict.fromkeys(LATENCY_STAGES, 1e-4))
+
+
+def assert_same(got: HandState, sent: HandState) -> None:
+    for field in dataclasses.fields(HandState):
+        a, b = getattr(got, field.name), getattr(sent, field.name)
+        if isinstance(b, np.ndarray):
+            assert a.dtype == b.dtype, field.name
+            np.testing.assert_array_equal(a, b, err_msg=field.name)
+        else:
+            assert a == b and type(a) is type(b), field.name
+
+
+@pytest.mark.parametrize(("markers", "cameras"), [(6, 2), (1, 1), (64, 16)])
+def test_state_round_trip(markers: int, cameras: int) -> None:
+    state = make_state(markers, cameras)
+    back = codec.decode(codec.TOPIC_STATE, codec.encode(state))
+    assert isinstance(back, HandState)
+    assert_same(back, state)
+
+
+def test_state_encodes_fast() -> None:
+    state = make_state()
+    times = []
+    for _ in range(300):
+        begin = time.perf_counter()
+        codec.encode(state)
+        times.append(time.perf_counter() - begin)
+    assert np.median(times) < 120e-6
+
+
+def test_status_and_preview_round_trip() -> None:
+    node = NodeStatus(1, "left", "streaming", False, 120.0, 10, 1, {"magic": 2}, 1.5, 1e-4, 2e-4)
+    status = EngineStatus(1, 2, 3, True, "TRACKING", "rig", "/rig.json", 118.0, (node,), (Advice("info", "ok"),),
+                          {"solve": LatencySummary(1e-4, 2e-4)})
+    assert codec.decode(codec.TOPIC_STATUS, codec.encode(status)) == status
+    preview = Preview("left", 5, 640, 480, b"\xff\xd8")
+    assert codec.decode(codec.TOPIC_PREVIEW, codec.encode(preview)) == preview
+
+
+@pytest.mark.parametrize(("topic", "payload"), [
+    (b"other", b""), (codec.TOPIC_STATE, b""), (codec.TOPIC_STATE, b"\x80"), (codec.TOPIC_STATUS, b"\xc1"),
+    (codec.TOPIC_STATE, codec.encode(make_state())[:-5]),
+])
+def test_foreign_bytes_are_refused(topic: bytes, payload: bytes) -> None:
+    with pytest.raises(EngineError):
+        codec.decode(topic, payload)
