@@ -1,0 +1,255 @@
+"""Messages to bytes and back, as docs/wire.md lays them out: little-endian, versioned, nothing implausible accepted."""
+
+from __future__ import annotations
+
+import math
+from struct import Struct
+from struct import error as struct_error
+
+from rhot_node.errors import WireError
+from rhot_node.wire.messages import (
+    ClockReply,
+    ClockRequest,
+    MarkerFlag,
+    MarkerObservation,
+    Message,
+    NodeState,
+    Observations,
+    Start,
+    StartEntry,
+    Stop,
+)
+
+MAGIC = b"RHOT"
+VERSION = 1
+FLAG_TAGGED = 1  # bit 0 of the header's flags: an authentication tag of TAG_LENGTH bytes ends the datagram
+
+TYPE_OBSERVATIONS = 1
+TYPE_CLOCK_REQUEST = 2
+TYPE_CLOCK_REPLY = 3
+TYPE_START = 4
+TYPE_STOP = 5
+
+MARKERS_MAX = 64
+IMAGE_SIZE_MAX = 16384  # px
+IMAGE_MARGIN = 64.0  # px; the centre of a marker cut by the border may lie this far outside
+COVARIANCE_MAX = 1e8  # px^2; also keeps the determinant finite in single precision
+TIME_MAX_NS = 1 << 62  # the difference of two times must fit 64 bits
+FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
+
+_HEADER = Struct("<4sBBHIQI")
+_OBSERVATIONS = Struct("<qqIIIHHIIB3s")
+_MARKER = Struct("<HHfffffff")
+_CLOCK_REQUEST = Struct("<q")
+_CLOCK_REPLY = Struct("<qqqIB3s")
+_START = Struct("<B3s")
+_START_ENTRY = Struct("<IHHq")
+
+_ZEROS = b"\0\0\0"
+_LOST = int(MarkerFlag.LOST)
+_FLAGS = tuple(MarkerFlag(bits) for bits in range(2 * int(max(MarkerFlag))))  # building one takes a microsecond
+_STATES = {int(state): state for state in NodeState}
+
+
+def encode(message: Message) -> bytes:
+    """The datagram that says `message`.
+
+    Raises WireError 'range' when a value does not fit its field. It does not check plausibility: `decode` does.
+    """
+    try:
+        match message:
+            case Observations():
+                return _encode_observations(message)
+            case ClockRequest():
+                return (_header(TYPE_CLOCK_REQUEST, message.node_id, message.session, message.sequence)
+                        + _CLOCK_REQUEST.pack(message.t1_master_ns))
+            case ClockReply():
+                return (_header(TYPE_CLOCK_REPLY, message.node_id, message.session, message.sequence)
+                        + _CLOCK_REPLY.pack(message.t1_master_ns, message.t2_node_ns, message.t3_node_ns,
+                                            message.boot_id, message.state, _ZEROS))
+            case Start():
+                return _encode_start(message)
+            case Stop():
+                return _header(TYPE_STOP, 0, message.session, message.sequence)
+    except (struct_error, OverflowError) as exc:
+        raise WireError("range", f"{type(message).__name__}: {exc}") from exc
+
+
+def decode(data: bytes | bytearray | memoryview) -> Message:
+    """The message of one datagram. Raises WireError, and nothing else, whatever the bytes are.
+
+    Reasons: length, magic, version, tag, flags, type, header, reserved, count, index, time, size, marker, range.
+    """
+    if len(data) < _HEADER.size:
+        raise WireError("length", f"{len(data)} bytes, a header has {_HEADER.size}")
+    magic, version, kind, flags, node_id, session, sequence = _HEADER.unpack_from(data)
+    if magic != MAGIC:
+        raise WireError("magic", repr(magic))
+    if version != VERSION:
+        raise WireError("version", f"{version}, this program speaks {VERSION}")
+    if flags & ~FLAG_TAGGED:
+        raise WireError("flags", f"unknown header flags {flags:#06x}")
+    if flags & FLAG_TAGGED:
+        raise WireError("tag", "tagged, but no key is known")
+    decoder = _DECODERS.get(kind)
+    if decoder is None:
+        raise WireError("type", str(kind))
+    return decoder(memoryview(data)[_HEADER.size:], node_id, session, sequence)
+
+
+def _header(kind: int, node_id: int, session: int, sequence: int) -> bytes:
+    return _HEADER.pack(MAGIC, VERSION, kind, 0, node_id, session, sequence)
+
+
+def _encode_observations(message: Observations) -> bytes:
+    parts = [
+        _header(TYPE_OBSERVATIONS, message.node_id, message.session, message.sequence),
+        _OBSERVATIONS.pack(message.t_frame_node_ns, message.t_send_node_ns, message.processing_ns,
+                           message.exposure_ns, message.row_time_ns, message.width, message.height,
+                           message.frame_number, message.marker_checksum, len(message.markers), _ZEROS),
+    ]
+    for m in message.markers:
+        bits = int(m.flags)
+        if bits & _LOST:
+            parts.append(_MARKER.pack(m.index, bits, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0))
+        else:
+            parts.append(_MARKER.pack(m.index, bits, m.x, m.y, m.diameter, m.cov_xx, m.cov_xy, m.cov_yy,
+                                      m.quality))
+    return b"".join(parts)
+
+
+def _encode_start(message: Start) -> bytes:
+    parts = [_header(TYPE_START, 0, message.session, message.sequence), _START.pack(len(message.entries), _ZEROS)]
+    parts.extend(_START_ENTRY.pack(entry.node_id, entry.data_port, 0, entry.t_start_node_ns)
+                 for entry in message.entries)
+    return b"".join(parts)
+
+
+def _expect_length(payload: memoryview, expected: int) -> None:
+    if len(payload) != expected:
+        raise WireError("length", f"payload of {len(payload)} bytes where {expected} belong")
+
+
+def _expect_node(node_id: int) -> None:
+    if node_id == 0:
+        raise WireError("header", "node id 0 in a message of or to one node")
+
+
+def _expect_everybody(node_id: int) -> None:
+    if node_id != 0:
+        raise WireError("header", f"node id {node_id} in a message to all nodes")
+
+
+def _expect_session(session: int) -> None:
+    if session == 0:
+        raise WireError("header", "session 0 names no session")
+
+
+def _expect_zeros(reserved: bytes) -> None:
+    if reserved != _ZEROS:
+        raise WireError("reserved", "reserved bytes are not zero")
+
+
+def _expect_time(*times_ns: int) -> None:
+    for time_ns in times_ns:
+        if not -TIME_MAX_NS < time_ns < TIME_MAX_NS:
+            raise WireError("time", f"{time_ns} ns")
+
+
+def _decode_observations(payload: memoryview, node_id: int, session: int, sequence: int) -> Observations:
+    if len(payload) < _OBSERVATIONS.size:
+        raise WireError("length", f"payload of {len(payload)} bytes, observations begin with {_OBSERVATIONS.size}")
+    (t_frame, t_send, processing, exposure, row_time, width, height, frame_number, checksum, count,
+     reserved) = _OBSERVATIONS.unpack_from(payload)
+    if count > MARKERS_MAX:
+        raise WireError("count", f"{count} markers, at most {MARKERS_MAX}")
+    _expect_length(payload, _OBSERVATIONS.size + count * _MARKER.size)
+    _expect_node(node_id)
+    _expect_session(session)
+    _expect_zeros(reserved)
+    _expect_time(t_frame, t_send)
+    if not 0 <= t_send - t_frame <= FRAME_AGE_MAX_NS:
+        raise WireError("time", f"sent {(t_send - t_frame) / 1e9:.3f} s after its exposure")
+    if not (0 < width <= IMAGE_SIZE_MAX and 0 < height <= IMAGE_SIZE_MAX):
+        raise WireError("size", f"{width} x {height} px")
+    markers = _decode_markers(payload[_OBSERVATIONS.size:], width, height)
+    return Observations(node_id, session, sequence, t_frame, t_send, processing, exposure, row_time, width, height,
+                        frame_number, checksum, markers)
+
+
+def _decode_markers(payload: memoryview, width: int, height: int) -> tuple[MarkerObservation, ...]:
+    markers = []
+    x_max, y_max, diameter_max = width - 1 + IMAGE_MARGIN, height - 1 + IMAGE_MARGIN, 2.0 * max(width, height)
+    for position, fields in enumerate(_MARKER.iter_unpack(payload)):
+        index, bits, x, y, diameter, xx, xy, yy, quality = fields
+        if index != position:
+            raise WireError("index", f"marker {index} at position {position}")
+        if bits >= len(_FLAGS):
+            raise WireError("flags", f"unknown marker flags {bits:#06x}")
+        if bits & _LOST:
+            if x == x or y == y or fields[4:] != (0.0, 0.0, 0.0, 0.0, 0.0):
+                raise WireError("marker", f"marker {index} is lost and yet has values")
+            x = y = math.nan  # one NaN object, so that equal messages compare equal
+        elif not (-IMAGE_MARGIN <= x <= x_max and -IMAGE_MARGIN <= y <= y_max
+                  and 0.0 < diameter <= diameter_max and 0.0 <= quality <= 1.0
+                  and 0.0 <= xx <= COVARIANCE_MAX and 0.0 <= yy <= COVARIANCE_MAX
+                  and xy * xy <= xx * yy * (1.0 + 1e-6) + 1e-30):  # room for rounding to single precision
+            raise WireError("marker", f"marker {index} is not plausible: {fields[2:]}")
+        markers.append(MarkerObservation(index, x, y, diameter, xx, xy, yy, quality, _FLAGS[bits]))
+    return tuple(markers)
+
+
+def _decode_clock_request(payload: memoryview, node_id: int, session: int, sequence: int) -> ClockRequest:
+    _expect_length(payload, _CLOCK_REQUEST.size)
+    _expect_node(node_id)
+    (t1,) = _CLOCK_REQUEST.unpack(payload)
+    _expect_time(t1)
+    return ClockRequest(node_id, session, sequence, t1)
+
+
+def _decode_clock_reply(payload: memoryview, node_id: int, session: int, sequence: int) -> ClockReply:
+    _expect_length(payload, _CLOCK_REPLY.size)
+    _expect_node(node_id)
+    t1, t2, t3, boot_id, state, reserved = _CLOCK_REPLY.unpack(payload)
+    _expect_zeros(reserved)
+    _expect_time(t1, t2, t3)
+    if t3 < t2:
+        raise WireError("time", "replied before the request came")
+    if state not in _STATES:
+        raise WireError("range", f"node state {state}")
+    return ClockReply(node_id, session, sequence, t1, t2, t3, boot_id, _STATES[state])
+
+
+def _decode_start(payload: memoryview, node_id: int, session: int, sequence: int) -> Start:
+    if len(payload) < _START.size:
+        raise WireError("length", f"payload of {len(payload)} bytes, a start begins with {_START.size}")
+    count, reserved = _START.unpack_from(payload)
+    _expect_length(payload, _START.size + count * _START_ENTRY.size)
+    _expect_everybody(node_id)
+    _expect_session(session)
+    _expect_zeros(reserved)
+    entries = []
+    for entry_id, port, zero, t_start in _START_ENTRY.iter_unpack(payload[_START.size:]):
+        _expect_node(entry_id)
+        _expect_time(t_start)
+        if port == 0 or zero != 0:
+            raise WireError("range", f"entry of node {entry_id}: port {port}, reserved {zero}")
+        entries.append(StartEntry(entry_id, port, t_start))
+    if len({entry.node_id for entry in entries}) != count:
+        raise WireError("index", "a node has two entries")
+    return Start(session, sequence, tuple(entries))
+
+
+def _decode_stop(payload: memoryview, node_id: int, session: int, sequence: int) -> Stop:
+    _expect_length(payload, 0)
+    _expect_everybody(node_id)
+    return Stop(session, sequence)
+
+
+_DECODERS = {
+    TYPE_OBSERVATIONS: _decode_observations,
+    TYPE_CLOCK_REQUEST: _decode_clock_request,
+    TYPE_CLOCK_REPLY: _decode_clock_reply,
+    TYPE_START: _decode_start,
+    TYPE_STOP: _decode_stop,
+}
