@@ -88,8 +88,8 @@ class EngineClient:
             socket.connect(self.directory.commands)
             socket.send(msgspec.json.encode({"command": name, **arguments}))
             if not socket.poll(round(1e3 * timeout_s)):
-                raise EngineError(f"the engine in {self.directory.path} did not answer {name!r} within {timeout_s:g} s; "
-                                  "is it running? Start it with `rhot engine --rig FILE`.")
+                raise EngineError(f"the engine in {self.directory.path} gave no answer to {name!r} in {timeout_s:g} s. "
+                                  "Is it running? Start it with `rhot engine --rig FILE`.")
             frames = socket.recv_multipart()
         finally:
             socket.close()

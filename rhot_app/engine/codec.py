@@ -57,7 +57,7 @@ def decode(topic: bytes, payload: bytes) -> Published:
     if decoder is None:
         raise EngineError(f"the engine published an unknown topic {topic!r}; is it of another version?")
     try:
-        return decoder.decode(payload)  # type: ignore[no-any-return]
+        return decoder.decode(payload)
     except (msgspec.MsgspecError, TypeError, ValueError, KeyError) as exc:
         raise EngineError(f"the engine's {topic.decode()} message cannot be read ({exc}); "
                           "is it of another version? Restart engine and app.") from exc

@@ -15,7 +15,7 @@ from rhot_app.tracking.state import LATENCY_STAGES, Condition, HandState, Knowle
 def make_state(markers: int = 6, cameras: int = 2) -> HandState:
     rng = np.random.default_rng(1)
     pixels = rng.normal(size=(cameras, markers, 2))
-    pixels[0, 1] = np.nan
+    pixels[0, 0] = np.nan
     return HandState(
         sequence=7, t_master_ns=123456789012, t_receive_ns=123456999999, condition=Condition.PARTIAL,
         marker_ids=tuple(f"m{k}" for k in range(markers)), marker_positions=rng.normal(size=(markers, 3)),
