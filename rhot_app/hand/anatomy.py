@@ -26,8 +26,7 @@ class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One finger. Its base joint (MCP; the thumb's CMC) sits at `base_mm` in the palm frame of a right hand.
 
     `base_rotation_deg` are the angles (about z, then y, then x; intrinsic) that turn the palm frame into the
-    finger's neutral frame, whose x runs along the first bone at zero angles and whose y is the flexion axis's
-    opposite. `bones_mm`: proximal, medial, distal (thumb: metacarpal, proximal, distal), joint to joint, the last
+    finger's neutral frame, whose x runs along the first bone at zero angles and about whose y it flexes. `bones_mm`: proximal, medial, distal (thumb: metacarpal, proximal, distal), joint to joint, the last
     one to the end of the soft tip. `radii_mm`: of the three segments. `limits_deg`: (low, high) for the finger's
     angles in the order of `skeleton.ANGLES`: five for the thumb, four for the others.
     `marker_mm`: distance of the painted marker's centre from the last joint, along the distal bone.

@@ -1,0 +1,113 @@
+"""Forward kinematics of a Denavit-Hartenberg tree and its analytic Jacobian (Rehg 1995, eq. 2.2, 2.15 and 2.16).
+
+The numba functions know rows and points only; `forward` and `jacobian` speak of hands.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.model import HandModel
+from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
+
+Array = NDArray[np.float64]
+
+TWIST = 6
+"""Columns of a Jacobian before the angles: palm translation (3, m), then palm rotation (3, rad) about the palm
+frame's own origin, both along the world's axes."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandPoints:
+    """Where a posed hand is, world frame, m."""
+
+    joints: Array  # (21, 3) in the order of skeleton.JOINTS
+    marker_centres: Array  # (5, 3) in the order of skeleton.FINGERS
+
+
+def forward(model: HandModel, pose: HandPose) -> HandPoints:
+    """Joints and marker centres of the hand in `pose`."""
+    frames, points = empty_frames(model.dh), np.empty((len(model.dh.point_row), 3))
+    forward_arrays(model.dh, pose.world_from_palm, pose.angles, frames, points)
+    return HandPoints(points[:len(JOINTS)], points[len(JOINTS):])
+
+
+def jacobian(model: HandModel, pose: HandPose) -> Array:
+    """(26, 3, 27): change of the 21 joints and 5 marker centres, m, per palm twist (see TWIST) and 21 angles."""
+    frames, points = empty_frames(model.dh), np.empty((len(model.dh.point_row), 3))
+    forward_arrays(model.dh, pose.world_from_palm, pose.angles, frames, points)
+    out = np.empty((len(points), 3, TWIST + len(ANGLES)))
+    jacobian_arrays(model.dh, pose.world_from_palm, frames, points, out)
+    return out
+
+
+def empty_frames(dh: DhArrays) -> Array:
+    """Room for the (R, 3, 4) world frames of every row that `forward_arrays` fills."""
+    return np.empty((len(dh.parent), 3, 4))
+
+
+@njit(cache=True)
+def forward_arrays(dh: DhArrays, world_from_root: Array, angles: Array, frames: Array, points: Array) -> None:
+    """Fill `frames` (R, 3, 4) world_from_row and `points` (P, 3) m, for `world_from_root` (4, 4) and `angles`."""
+    for row in range(dh.parent.shape[0]):
+        theta = dh.theta[row]
+        if dh.angle[row] >= 0:
+            theta += dh.sign[row] * angles[dh.angle[row]]
+        c, s = math.cos(theta), math.sin(theta)
+        ca, sa = dh.cos_alpha[row], dh.sin_alpha[row]
+        base = world_from_root if dh.parent[row] < 0 else frames[dh.parent[row]]
+        for i in range(3):
+            x = base[i, 0] * c + base[i, 1] * s
+            y = base[i, 1] * c - base[i, 0] * s
+            z = base[i, 2]
+            frames[row, i, 0] = x
+            frames[row, i, 1] = y * ca + z * sa
+            frames[row, i, 2] = z * ca - y * sa
+            frames[row, i, 3] = base[i, 3] + dh.a[row] * x + dh.d[row] * z
+    for point in range(dh.point_row.shape[0]):
+        base = world_from_root if dh.point_row[point] < 0 else frames[dh.point_row[point]]
+        offset = dh.point_offset[point]
+        for i in range(3):
+            points[point, i] = base[i, 3] + base[i, 0] * offset[0] + base[i, 1] * offset[1] + base[i, 2] * offset[2]
+
+
+@njit(cache=True)
+def jacobian_arrays(dh: DhArrays, world_from_root: Array, frames: Array, points: Array, out: Array) -> None:
+    """Fill `out` (P, 3, 6 + angles) from what `forward_arrays` filled; columns as `jacobian` says.
+
+    A row's angle turns everything behind it about the z axis of the row's parent frame (Rehg eq. 2.16).
+    """
+    out[:] = 0.0
+    for point in range(points.shape[0]):
+        px, py, pz = points[point]
+        for i in range(3):
+            out[point, i, i] = 1.0
+        _add_turn(out[point], 3, 1.0, 0.0, 0.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
+                  pz - world_from_root[2, 3])
+        _add_turn(out[point], 4, 0.0, 1.0, 0.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
+                  pz - world_from_root[2, 3])
+        _add_turn(out[point], 5, 0.0, 0.0, 1.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
+                  pz - world_from_root[2, 3])
+        row = dh.point_row[point]
+        while row >= 0:
+            parent = dh.parent[row]
+            if dh.angle[row] >= 0:
+                base = world_from_root if parent < 0 else frames[parent]
+                sign = dh.sign[row]
+                _add_turn(out[point], TWIST + dh.angle[row], sign * base[0, 2], sign * base[1, 2], sign * base[2, 2],
+                          px - base[0, 3], py - base[1, 3], pz - base[2, 3])
+            row = parent
+
+
+@njit(cache=True)
+def _add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float, ry: float, rz: float) -> None:
+    """Add axis x lever to a column: the velocity of a point at `lever` from an axis of unit angular speed."""
+    out[0, column] += ay * rz - az * ry
+    out[1, column] += az * rx - ax * rz
+    out[2, column] += ax * ry - ay * rx
