@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from struct import Struct
 from struct import error as struct_error
 
@@ -246,7 +247,7 @@ def _decode_stop(payload: memoryview, node_id: int, session: int, sequence: int)
     return Stop(session, sequence)
 
 
-_DECODERS = {
+_DECODERS: dict[int, Callable[[memoryview, int, int, int], Message]] = {
     TYPE_OBSERVATIONS: _decode_observations,
     TYPE_CLOCK_REQUEST: _decode_clock_request,
     TYPE_CLOCK_REPLY: _decode_clock_reply,

@@ -1,0 +1,168 @@
+"""Frames over a Unix socket: how a live twin, in another process, acts as a camera.
+
+The twin listens on a Unix stream socket and sends, per frame, a header of 40 bytes (`pack_header`) and the packed
+I420 bytes. The node connects, so that the twin need not know when nodes start or come back.
+"""
+
+from __future__ import annotations
+
+import select
+import socket
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from struct import Struct
+
+import numpy as np
+
+from rhot_node.capture.camera import Frame
+from rhot_node.clock import NodeClock
+from rhot_node.detect.image import from_i420
+from rhot_node.errors import CameraError
+
+MAGIC = b"RYUV"
+VERSION = 1
+CONNECT_S = 5.0  # how long to wait for the twin to listen and to send its first frame
+SILENCE_S = 3.0  # after this long without a frame the twin counts as gone
+CATCH_UP_FRAMES = 8  # waiting frames thrown away in one read, at most; a flood must not keep us here
+
+_HEADER = Struct("<4sHHIIqII8x")
+HEADER_BYTES = _HEADER.size
+
+
+@dataclass(frozen=True, slots=True)
+class StreamHeader:
+    """What precedes each frame. `t_mid_row0_host_ns`: mid-exposure of row 0, host monotonic clock."""
+
+    width: int
+    height: int
+    number: int
+    t_mid_row0_host_ns: int
+    exposure_ns: int
+    row_time_ns: int
+
+    @property
+    def frame_bytes(self) -> int:
+        """Bytes of the packed I420 frame that follows."""
+        return self.width * self.height * 3 // 2
+
+
+def pack_header(header: StreamHeader) -> bytes:
+    """The 40 bytes before a frame: magic, width u16, height u16, version u32, number u32, time i64, exposure u32,
+    row time u32, 8 zero bytes; little-endian. Raises struct.error when a value does not fit."""
+    return _HEADER.pack(MAGIC, header.width, header.height, VERSION, header.number, header.t_mid_row0_host_ns,
+                        header.exposure_ns, header.row_time_ns)
+
+
+def unpack_header(data: bytes | bytearray | memoryview) -> StreamHeader:
+    """Inverse of `pack_header`; raises CameraError when these are not the bytes of a header."""
+    magic, width, height, version, number, t_mid, exposure, row_time = _HEADER.unpack(data)
+    if magic != MAGIC or version != VERSION:
+        raise CameraError(f"the stream does not speak {MAGIC.decode()} version {VERSION} (it begins {bytes(magic)!r}, "
+                          f"version {version}). Are twin and node of the same release?")
+    if width == 0 or height == 0 or width % 2 or height % 2:
+        raise CameraError(f"the stream sends frames of {width} x {height} px; both must be even.")
+    return StreamHeader(width, height, number, t_mid, exposure, row_time)
+
+
+class StreamCamera:
+    """A live twin as a camera. When several frames wait, only the newest is used; the number shows the gap."""
+
+    def __init__(self, path: Path, clock: NodeClock, *, connect_s: float = CONNECT_S,
+                 silence_s: float = SILENCE_S) -> None:
+        """Connect and receive the first frame; raises CameraError when there is none within `connect_s`."""
+        self._path = path
+        self._clock = clock
+        self._silence_s = silence_s
+        self._socket = _connect(path, time.monotonic() + connect_s)
+        self._poll = select.poll()
+        self._poll.register(self._socket, select.POLLIN)
+        self._header_buffer = bytearray(HEADER_BYTES)
+        self._heard_s = time.monotonic()
+        self._size = (0, 0)
+        self._pixels = np.empty(0, dtype=np.uint8)
+        try:
+            if not self._waiting(connect_s):
+                raise CameraError(f"{path}: connected, but no frame came within {connect_s:.0f} s. "
+                                  "Does the twin still run?")
+            self._pending: Frame | None = self._receive()
+        except CameraError:
+            self.close()
+            raise
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px."""
+        return self._size
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The newest frame. Raises CameraError when the twin is gone, silent or changes its image size."""
+        frame, self._pending = self._pending, None
+        if frame is None and self._waiting(timeout_s):
+            frame = self._receive()
+        if frame is None:
+            if time.monotonic() - self._heard_s > self._silence_s:
+                raise CameraError(f"{self._path}: no frame for {self._silence_s:.0f} s. Does the twin still run?")
+            return None
+        for _ in range(CATCH_UP_FRAMES):
+            if not self._waiting(0.0):
+                break
+            frame = self._receive()
+        return frame
+
+    def close(self) -> None:
+        """Disconnect."""
+        self._socket.close()
+
+    def _waiting(self, timeout_s: float) -> bool:
+        return bool(self._poll.poll(timeout_s * 1000.0))
+
+    def _receive(self) -> Frame:
+        self._fill(memoryview(self._header_buffer))
+        header = unpack_header(self._header_buffer)
+        size = (header.width, header.height)
+        if not self._pixels.size:
+            self._size = size
+            self._pixels = np.empty(header.frame_bytes, dtype=np.uint8)
+        elif size != self._size:
+            raise CameraError(f"{self._path}: the image size changed from {self._size[0]} x {self._size[1]} to "
+                              f"{size[0]} x {size[1]} px.")
+        self._fill(self._pixels.data)
+        self._heard_s = time.monotonic()
+        return Frame(
+            image=from_i420(self._pixels, *size),
+            number=header.number,
+            t_node_ns=self._clock.from_host_ns(header.t_mid_row0_host_ns),
+            t_available_node_ns=self._clock.now_ns(),
+            exposure_ns=header.exposure_ns,
+            row_time_ns=header.row_time_ns,
+        )
+
+    def _fill(self, view: memoryview) -> None:
+        """Receive exactly `view`; the rest of a frame that has begun must follow within the silence limit."""
+        position = 0
+        try:
+            while position < len(view):
+                count = self._socket.recv_into(view[position:])
+                if count == 0:
+                    raise CameraError(f"{self._path}: the twin closed the stream.")
+                position += count
+        except TimeoutError as exc:
+            raise CameraError(f"{self._path}: the stream stopped in the middle of a frame.") from exc
+        except OSError as exc:
+            raise CameraError(f"{self._path}: the stream broke ({exc.strerror}).") from exc
+
+
+def _connect(path: Path, deadline_s: float) -> socket.socket:
+    while True:
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            connection.connect(str(path))
+            connection.settimeout(SILENCE_S)
+            return connection
+        except OSError as exc:
+            connection.close()
+            if time.monotonic() >= deadline_s:
+                reason = exc.strerror or str(exc)
+                raise CameraError(f"{path}: no twin listens here ({reason}). Start the simulator first.") from exc
+            time.sleep(0.05)

@@ -1,0 +1,244 @@
+"""Recordings of raw YUV420 frames with their times (``rhot-yuv``): written by the twin, played in real time.
+
+A recording is a folder with ``recording.json`` (`YuvHeader`) and ``frames.i420``: packed I420 frames, one after the
+other. docs/node.md describes it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import mmap
+import time
+from bisect import bisect_right
+from pathlib import Path
+from types import TracebackType
+from typing import Annotated, Final, Literal, Self
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from rhot_node.capture.camera import EndOfRecording, Frame
+from rhot_node.capture.pace import NS_PER_S, available_delay_ns, sleep_until
+from rhot_node.clock import NodeClock
+from rhot_node.detect.image import Plane, from_i420
+from rhot_node.errors import CameraError
+from rhot_node.files import read_document, write_document
+
+FORMAT: Final = "rhot-yuv"
+VERSION: Final = 1
+HEADER_NAME = "recording.json"
+FRAMES_NAME = "frames.i420"
+
+Pixels = Annotated[int, Meta(ge=2, le=16384, multiple_of=2)]
+Duration = Annotated[int, Meta(ge=0, le=2**32 - 1)]
+
+
+class YuvHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """``recording.json``. `times_ns`: mid-exposure of row 0 of each frame since the recording's start, increasing."""
+
+    width: Pixels
+    height: Pixels
+    exposure_ns: Duration
+    row_time_ns: Duration
+    times_ns: list[int]
+    format: Literal["rhot-yuv"] = FORMAT
+    version: Literal[1] = VERSION
+
+    def __post_init__(self) -> None:
+        if any(later <= earlier for earlier, later in zip(self.times_ns, self.times_ns[1:], strict=False)):
+            raise ValueError("times_ns must increase from frame to frame")
+
+    @property
+    def frame_bytes(self) -> int:
+        """Bytes of one packed I420 frame."""
+        return self.width * self.height * 3 // 2
+
+    @property
+    def period_ns(self) -> int:
+        """Typical time from frame to frame, ns; 1/30 s for a single frame."""
+        if len(self.times_ns) < 2:
+            return NS_PER_S // 30
+        return int(np.median(np.diff(self.times_ns)))
+
+
+class YuvWriter:
+    """Writes a recording. It can be opened only after `close`: the header is written last, all at once."""
+
+    def __init__(self, folder: Path, width: int, height: int, exposure_ns: int, row_time_ns: int) -> None:
+        """Create `folder` when absent; an older recording in it is replaced. Raises OSError, ValueError."""
+        if width % 2 or height % 2:
+            raise ValueError(f"a YUV420 frame needs an even width and height, not {width} x {height}")
+        self._header = YuvHeader(width, height, exposure_ns, row_time_ns, [])
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / HEADER_NAME).unlink(missing_ok=True)
+        self._file = (folder / FRAMES_NAME).open("wb")
+
+    def append(self, t_ns: int, i420: Plane) -> None:
+        """Add a frame: mid-exposure of row 0 since the recording's start, ns, and W * H * 3/2 bytes of packed I420."""
+        if i420.dtype != np.uint8 or i420.size != self._header.frame_bytes:
+            raise ValueError(f"a frame has {self._header.frame_bytes} uint8 values, not {i420.size} {i420.dtype}")
+        times = self._header.times_ns
+        if times and t_ns <= times[-1]:
+            raise ValueError(f"frame times must increase: {t_ns} after {times[-1]} ns")
+        self._file.write(np.ascontiguousarray(i420).data)
+        times.append(int(t_ns))
+
+    def close(self) -> None:
+        """Write the header; the recording is then complete. May be called twice."""
+        if not self._file.closed:
+            self._file.close()
+            write_document(self._folder / HEADER_NAME, self._header)
+
+    def abandon(self) -> None:
+        """Stop writing and leave no recording behind."""
+        self._file.close()
+        with contextlib.suppress(OSError):
+            (self._folder / FRAMES_NAME).unlink()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.abandon()
+
+
+class YuvRecording:
+    """A recording as a camera: frame k is available at T0 + times[k] + exposure/2 + readout, host monotonic time.
+
+    T0 is the time of opening, or the integer (host monotonic ns) in `start_file` once that file exists; until then
+    frame 0 is repeated at the recording's rate, a scene that stands still. A reader that comes late gets the newest
+    frame; the frame number shows the gap. Frames are views of the mapped file, without a copy.
+    """
+
+    def __init__(self, folder: Path, clock: NodeClock, start_file: Path | None = None) -> None:
+        """Open `folder`; raises CameraError naming what is wrong with which file."""
+        self._header = read_header(folder)
+        self._map = _map_frames(folder / FRAMES_NAME, self._header)
+        self._frames = np.frombuffer(self._map, dtype=np.uint8).reshape(-1, self._header.frame_bytes)
+        self._clock = clock
+        self._start_file = start_file
+        self._opened_ns = time.monotonic_ns()
+        self._t0_ns: int | None = None if start_file else self._opened_ns
+        self._delay_ns = available_delay_ns(self._header.exposure_ns, self._header.row_time_ns, self._header.height)
+        self._next = 0  # index of the next frame of the recording
+        self._base = 0  # number of frame 0
+        self._next_still = 0  # index of the next repetition of frame 0 before the start
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px."""
+        return self._header.width, self._header.height
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The next frame, waiting for its time. Raises EndOfRecording, or CameraError for a bad start file."""
+        deadline_ns = time.monotonic_ns() + round(timeout_s * NS_PER_S)
+        if self._t0_ns is None and self._start_file is not None:
+            self._t0_ns = read_start_file(self._start_file)
+        if self._next == 0 and self._start_file is not None:
+            period = self._header.period_ns
+            newest = (time.monotonic_ns() - self._delay_ns - self._opened_ns) // period
+            index = max(self._next_still, newest)
+            t_mid = self._opened_ns + index * period
+            if self._t0_ns is None or t_mid < self._t0_ns + self._header.times_ns[0] - period // 2:
+                return self._read_still(index, t_mid, deadline_ns)
+        return self._read_playing(self._t0_ns or 0, deadline_ns)
+
+    def rewind(self) -> None:
+        """Play again, without a pause after the last frame."""
+        times = self._header.times_ns
+        end_ns = (self._t0_ns or 0) + times[-1] + self._header.period_ns - times[0]
+        self._t0_ns = max(end_ns, time.monotonic_ns())
+        self._start_file = None
+        self._base += len(times)
+        self._next = 0
+
+    def close(self) -> None:
+        """Unmap the file, unless somebody still looks at a frame; the last view then unmaps it."""
+        self._frames = np.empty((0, 0), dtype=np.uint8)
+        with contextlib.suppress(BufferError):
+            self._map.close()
+
+    def _read_still(self, index: int, t_mid_ns: int, deadline_ns: int) -> Frame | None:
+        if not _wait(t_mid_ns + self._delay_ns, deadline_ns):
+            return None
+        self._next_still = index + 1
+        self._base = self._next_still
+        return self._frame(0, index, t_mid_ns)
+
+    def _read_playing(self, t0_ns: int, deadline_ns: int) -> Frame | None:
+        times = self._header.times_ns
+        if self._next >= len(times):
+            raise EndOfRecording
+        newest = bisect_right(times, time.monotonic_ns() - t0_ns - self._delay_ns) - 1
+        index = max(self._next, newest)
+        t_mid = t0_ns + times[index]
+        if not _wait(t_mid + self._delay_ns, deadline_ns):
+            return None
+        self._next = index + 1
+        return self._frame(index, self._base + index, t_mid)
+
+    def _frame(self, index: int, number: int, t_mid_ns: int) -> Frame:
+        header = self._header
+        return Frame(
+            image=from_i420(self._frames[index], header.width, header.height),
+            number=number,
+            t_node_ns=self._clock.from_host_ns(t_mid_ns),
+            t_available_node_ns=self._clock.from_host_ns(t_mid_ns + self._delay_ns),
+            exposure_ns=header.exposure_ns,
+            row_time_ns=header.row_time_ns,
+        )
+
+
+def read_header(folder: Path) -> YuvHeader:
+    """The header of the recording in `folder`; raises CameraError when it is missing, wrong or empty."""
+    if not folder.is_dir():
+        raise CameraError(f"{folder}: no such folder; a yuv recording is a folder with {HEADER_NAME}.")
+    path = folder / HEADER_NAME
+    header = read_document(path, YuvHeader, format_name=FORMAT, version=VERSION, error=CameraError)
+    if not header.times_ns:
+        raise CameraError(f"{path}: the recording has no frames. Record it again.")
+    return header
+
+
+def read_start_file(path: Path) -> int | None:
+    """Host monotonic ns in a start file, None while it does not exist; write it elsewhere and rename it to `path`."""
+    try:
+        text = path.read_text(encoding="ascii", errors="replace").strip()
+    except FileNotFoundError:
+        return None
+    except OSError as exc:
+        raise CameraError(f"{path}: the start file cannot be read ({exc.strerror}).") from exc
+    if not text:
+        return None
+    try:
+        return int(text)
+    except ValueError as exc:
+        raise CameraError(f"{path}: a start file holds one integer, host monotonic ns, not {text[:40]!r}.") from exc
+
+
+def _map_frames(path: Path, header: YuvHeader) -> mmap.mmap:
+    """Map the frames privately: views are ordinary writable arrays, the file is never changed."""
+    expected = header.frame_bytes * len(header.times_ns)
+    try:
+        size = path.stat().st_size
+        if size != expected:
+            raise CameraError(f"{path}: {size} bytes, but {len(header.times_ns)} frames of {header.width} x "
+                              f"{header.height} px need {expected}. The recording is incomplete; record it again.")
+        with path.open("rb") as file:
+            frames = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
+    except OSError as exc:
+        raise CameraError(f"{path}: cannot be opened ({exc.strerror}).") from exc
+    frames.madvise(mmap.MADV_SEQUENTIAL)
+    return frames
+
+
+def _wait(due_ns: int, deadline_ns: int) -> bool:
+    """Sleep until `due_ns`, at most until `deadline_ns`; True when it is due."""
+    sleep_until(min(due_ns, deadline_ns))
+    return due_ns <= deadline_ns

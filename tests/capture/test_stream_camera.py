@@ -1,0 +1,198 @@
+"""The live twin's socket: frames, latest wins, and what happens when the twin goes away."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rhot_node.capture.stream import (
+    HEADER_BYTES,
+    StreamCamera,
+    StreamHeader,
+    pack_header,
+    unpack_header,
+)
+from rhot_node.clock import NodeClock
+from rhot_node.errors import CameraError
+
+WIDTH, HEIGHT = 64, 48
+
+
+def frame_bytes(number: int, width: int = WIDTH, height: int = HEIGHT) -> bytes:
+    header = StreamHeader(width, height, number, 1_000_000 * number, 4_000_000, 48_000)
+    return pack_header(header) + bytes([number % 256]) * header.frame_bytes
+
+
+class Twin:
+    """A listening socket that gives each connection to `serve`."""
+
+    def __init__(self, path: Path, serve: Callable[[socket.socket], None]) -> None:
+        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.listener.bind(str(path))
+        self.listener.listen()
+        self.serve = serve
+        self.thread = threading.Thread(target=self._run, daemon=True)
+        self.thread.start()
+
+    def _run(self) -> None:
+        connection, _ = self.listener.accept()
+        with connection:
+            self.serve(connection)
+
+    def close(self) -> None:
+        self.listener.close()
+        self.thread.join(2.0)
+
+
+@pytest.fixture
+def twin(tmp_path: Path) -> Iterator[Callable[[Callable[[socket.socket], None]], Path]]:
+    twins: list[Twin] = []
+
+    def start(serve: Callable[[socket.socket], None]) -> Path:
+        twins.append(Twin(tmp_path / "twin.sock", serve))
+        return tmp_path / "twin.sock"
+
+    yield start
+    for each in twins:
+        each.close()
+
+
+def test_header_is_forty_bytes_and_survives_the_way() -> None:
+    header = StreamHeader(640, 480, 7, 123_456_789_012, 4_000_000, 48_000)
+    data = pack_header(header)
+    assert len(data) == HEADER_BYTES == 40
+    assert data[:12] == b"RYUV" + bytes.fromhex("8002 e001 01000000")
+    assert unpack_header(data) == header
+
+
+@pytest.mark.parametrize("data", [b"JUNK" + bytes(36), b"RYUV" + bytes(36),
+                                  pack_header(StreamHeader(3, 2, 0, 0, 0, 0))])
+def test_a_foreign_header_is_refused(data: bytes) -> None:
+    with pytest.raises(CameraError):
+        unpack_header(data)
+
+
+def test_frames_arrive_with_times_in_the_nodes_clock(twin: Callable[..., Path]) -> None:
+    go_on = threading.Event()
+
+    def serve(connection: socket.socket) -> None:
+        connection.sendall(frame_bytes(1))
+        go_on.wait(5)
+        connection.sendall(frame_bytes(2))
+        time.sleep(0.4)
+
+    clock = NodeClock(offset_ns=10**12)
+    camera = StreamCamera(twin(serve), clock)
+    assert camera.size == (WIDTH, HEIGHT)
+    first = camera.read(1.0)
+    assert first is not None and first.number == 1 and (first.image.v == 1).all()
+    assert first.t_node_ns == 10**12 + 1_000_000
+    assert (first.exposure_ns, first.row_time_ns) == (4_000_000, 48_000)
+    assert abs(first.t_available_node_ns - clock.now_ns()) < 10**9
+    assert camera.read(0.01) is None
+    go_on.set()
+    second = camera.read(1.0)
+    assert second is not None and second.number == 2 and (second.image.y == 2).all()
+    camera.close()
+
+
+def test_the_newest_of_several_waiting_frames_wins(twin: Callable[..., Path]) -> None:
+    sent = threading.Event()
+
+    def serve(connection: socket.socket) -> None:
+        for number in range(5):
+            connection.sendall(frame_bytes(number))
+        sent.set()
+        time.sleep(0.4)
+
+    camera = StreamCamera(twin(serve), NodeClock())
+    assert sent.wait(2)
+    frame = camera.read(1.0)
+    assert frame is not None and frame.number == 4 and (frame.image.y == 4).all()
+
+
+def test_a_flood_does_not_keep_the_reader_for_ever(twin: Callable[..., Path]) -> None:
+    def serve(connection: socket.socket) -> None:
+        number = 0
+        try:
+            while True:
+                connection.sendall(frame_bytes(number))
+                number += 1
+        except OSError:
+            return
+
+    camera = StreamCamera(twin(serve), NodeClock())
+    began = time.monotonic()
+    for _ in range(5):
+        assert camera.read(1.0) is not None
+    assert time.monotonic() - began < 1.0
+    camera.close()
+
+
+def test_waits_for_a_twin_that_starts_later(twin: Callable[..., Path], tmp_path: Path) -> None:
+    def serve(connection: socket.socket) -> None:
+        connection.sendall(frame_bytes(1))
+        time.sleep(0.4)
+
+    threading.Timer(0.3, lambda: twin(serve)).start()
+    camera = StreamCamera(tmp_path / "twin.sock", NodeClock(), connect_s=3.0)
+    assert camera.read(0.1) is not None
+
+
+def test_no_twin_is_an_error_with_a_remedy(tmp_path: Path) -> None:
+    with pytest.raises(CameraError, match="Start the simulator"):
+        StreamCamera(tmp_path / "nobody.sock", NodeClock(), connect_s=0.1)
+
+
+def test_a_twin_that_never_sends_is_an_error(twin: Callable[..., Path]) -> None:
+    with pytest.raises(CameraError, match="no frame came"):
+        StreamCamera(twin(lambda connection: time.sleep(0.4)), NodeClock(), connect_s=0.2)
+
+
+def test_closing_in_the_middle_of_a_frame_is_an_error(twin: Callable[..., Path]) -> None:
+    def serve(connection: socket.socket) -> None:
+        connection.sendall(frame_bytes(1) + frame_bytes(2)[:1000])
+
+    camera = StreamCamera(twin(serve), NodeClock())
+    with pytest.raises(CameraError, match="closed"):
+        for _ in range(3):
+            camera.read(1.0)
+
+
+def test_silence_is_an_error(twin: Callable[..., Path]) -> None:
+    def serve(connection: socket.socket) -> None:
+        connection.sendall(frame_bytes(1))
+        time.sleep(0.6)
+
+    camera = StreamCamera(twin(serve), NodeClock(), silence_s=0.2)
+    assert camera.read(1.0) is not None
+    with pytest.raises(CameraError, match="no frame for"):
+        for _ in range(10):
+            camera.read(0.1)
+
+
+def test_a_changed_image_size_is_an_error(twin: Callable[..., Path]) -> None:
+    def serve(connection: socket.socket) -> None:
+        connection.sendall(frame_bytes(1) + frame_bytes(2, width=32))
+        time.sleep(0.4)
+
+    camera = StreamCamera(twin(serve), NodeClock())
+    with pytest.raises(CameraError, match="size changed from 64 x 48 to 32 x 48"):
+        for _ in range(3):
+            camera.read(0.5)
+
+
+def test_frames_can_be_read_as_arrays_of_the_ordinary_kind(twin: Callable[..., Path]) -> None:
+    def serve(connection: socket.socket) -> None:
+        connection.sendall(frame_bytes(1))
+        time.sleep(0.4)
+
+    frame = StreamCamera(twin(serve), NodeClock()).read(1.0)
+    assert frame is not None
+    assert type(frame.image.u) is np.ndarray and frame.image.u.flags.writeable
