@@ -80,7 +80,11 @@ class Observations:
 
 @dataclass(frozen=True, slots=True)
 class ClockRequest:
-    """Master to node: first half of a four-timestamp exchange."""
+    """Master to node: first half of a four-timestamp exchange.
+
+    `session` is the one the master runs, 0 when none: a streaming node that hears no request of its session for
+    some seconds takes its master for gone.
+    """
 
     node_id: int
     session: int
@@ -92,7 +96,8 @@ class ClockRequest:
 class ClockReply:
     """Node to master: the request's t1 again, the node's receive and send times, and what the node is doing.
 
-    `boot_id` changes whenever the daemon starts, so that the master forgets the old clock at once.
+    `sequence` and `t1_master_ns` are the request's. `session` is the one the node is in, 0 when none: it differs from
+    the master's when a start message was lost or another master took over. `boot_id` changes whenever the daemon starts, so that the master forgets the old clock at once.
     """
 
     node_id: int
@@ -116,7 +121,11 @@ class StartEntry:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Master to all nodes: stream in `session`. A node without an entry ignores it. node_id in the header is 0."""
+    """Master to all nodes: stream in `session`. A node without an entry ignores it. node_id in the header is 0.
+
+    Every start after a stop needs a new session: a node does not take up one that was stopped or replaced, because
+    the network may deliver a start late or twice.
+    """
 
     session: int
     sequence: int

@@ -154,7 +154,7 @@ def test_a_shortened_recording_is_refused(tmp_path: Path) -> None:
 def test_a_broken_header_is_named(tmp_path: Path, old: str, new: str) -> None:
     path = record(tmp_path, 3) / HEADER_NAME
     path.write_text(path.read_text().replace(old, new, 1))
-    with pytest.raises(CameraError, match="recording.json"):
+    with pytest.raises(CameraError, match=HEADER_NAME):
         YuvRecording(tmp_path, NodeClock())
 
 
