@@ -1,0 +1,99 @@
+"""Rules that every file keeps: it says what it is, it is one thing, and nothing in it is left for later."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("rhot_node", "rhot_app")
+COMFORTABLE_LINES = 300
+MOST_LINES = 450
+LEFT_FOR_LATER = re.compile(r"\b(?:TO" r"DO|FIX" r"ME|XX" r"X|NotImplemented" r"Error)\b")
+
+
+def sources(*folders: str) -> list[Path]:
+    """All Python files below the given folders of the project."""
+    return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
+
+
+def tracked_text() -> Iterator[tuple[Path, str]]:
+    """Every text file of the project, by git where there is a repository, else by folder."""
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    names = listed.stdout.splitlines() or [str(path.relative_to(ROOT)) for path in sources(*PACKAGES, "tests")]
+    for name in names:
+        path = ROOT / name
+        if path.is_file() and path.suffix in {".py", ".md", ".toml", ".in", ".json", ""}:
+            yield path, path.read_text(encoding="utf-8")
+
+
+def test_every_module_says_what_it_is() -> None:
+    silent = [str(path.relative_to(ROOT)) for path in sources(*PACKAGES, "tests", "benchmarks", "resources")
+              if path.stat().st_size and not ast.get_docstring(ast.parse(path.read_text()))]
+    assert not silent, f"no module docstring: {', '.join(silent)}"
+
+
+def undocumented(path: Path) -> Iterator[str]:
+    """Public classes, functions and methods of a file that have no docstring."""
+    def visit(body: list[ast.stmt], prefix: str) -> Iterator[str]:
+        for node in body:
+            if not isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) or node.name.startswith("_"):
+                continue
+            if not ast.get_docstring(node) and not _is_exempt(node):
+                yield f"{path.relative_to(ROOT)}:{node.lineno} {prefix}{node.name}"
+            if isinstance(node, ast.ClassDef):
+                yield from visit(node.body, f"{prefix}{node.name}.")
+    yield from visit(ast.parse(path.read_text()).body, "")
+
+
+def _is_exempt(node: ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """A method named by Qt's own interface (camelCase) or a property's setter is described where it is defined."""
+    if isinstance(node, ast.ClassDef):
+        return False
+    names = {ast.unparse(decorator).rpartition(".")[2] for decorator in node.decorator_list}
+    return bool(names & {"setter", "overload"}) or bool(re.match(r"[a-z]+[A-Z]", node.name))
+
+
+def test_every_public_name_is_described() -> None:
+    missing = [name for path in sources(*PACKAGES) for name in undocumented(path)]
+    assert not missing, "\n".join(missing)
+
+
+def test_a_file_is_one_thing() -> None:
+    lengths = {path.relative_to(ROOT): len(path.read_text().splitlines())
+               for path in sources(*PACKAGES, "tests", "benchmarks")}
+    for path, lines in lengths.items():
+        if lines > COMFORTABLE_LINES:
+            warnings.warn(f"{path} has {lines} lines; does it do two things?", stacklevel=1)
+    long = [f"{path}: {lines} lines" for path, lines in lengths.items() if lines > MOST_LINES]
+    assert not long, "\n".join(long)
+
+
+def test_nothing_is_left_for_later() -> None:
+    found = [f"{path.relative_to(ROOT)}: {match.group()}" for path, text in tracked_text() if path.suffix == ".py"
+             for match in LEFT_FOR_LATER.finditer(text)]
+    assert not found, "\n".join(found)
+
+
+def test_links_between_documents_lead_somewhere() -> None:
+    broken = []
+    for path, text in tracked_text():
+        if path.suffix != ".md":
+            continue
+        for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+            if "://" not in target and not target.startswith("mailto:") and not (path.parent / target).exists():
+                broken.append(f"{path.relative_to(ROOT)} -> {target}")
+    assert not broken, "\n".join(broken)
+
+
+@pytest.mark.parametrize("folder", ["tests"])
+def test_test_files_have_unique_names(folder: str) -> None:
+    names = [path.name for path in (ROOT / folder).rglob("test_*.py")]
+    doubled = sorted({name for name in names if names.count(name) > 1})
+    assert not doubled, f"pytest would import only one of each: {', '.join(doubled)}"
