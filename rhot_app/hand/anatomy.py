@@ -6,7 +6,7 @@ Millimetres and degrees in the file, because people measure and edit them; metre
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 from msgspec import Meta
@@ -15,8 +15,8 @@ from rhot_app.errors import RigError
 from rhot_app.hand.skeleton import FINGERS
 from rhot_node.files import read_document, write_document
 
-FORMAT = "rhot-hand"
-VERSION = 1
+FORMAT: Final = "rhot-hand"
+VERSION: Final = 1
 
 Millimetres = Annotated[float, Meta(gt=0, le=400)]
 LimitDeg = tuple[float, float]
@@ -26,9 +26,10 @@ class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One finger. Its base joint (MCP; the thumb's CMC) sits at `base_mm` in the palm frame of a right hand.
 
     `base_rotation_deg` are the angles (about z, then y, then x; intrinsic) that turn the palm frame into the
-    finger's neutral frame, whose x runs along the first bone at zero angles and about whose y it flexes. `bones_mm`: proximal, medial, distal (thumb: metacarpal, proximal, distal), joint to joint, the last
-    one to the end of the soft tip. `radii_mm`: of the three segments. `limits_deg`: (low, high) for the finger's
-    angles in the order of `skeleton.ANGLES`: five for the thumb, four for the others.
+    finger's neutral frame, whose x runs along the first bone at zero angles and about whose y it flexes.
+    `bones_mm`: proximal, medial, distal (thumb: metacarpal, proximal, distal), joint to joint, the last one to the
+    end of the soft tip. `radii_mm`: of the three segments. `limits_deg`: (low, high) for the finger's angles in the
+    order of `skeleton.ANGLES`: five for the thumb, four for the others.
     `marker_mm`: distance of the painted marker's centre from the last joint, along the distal bone.
     """
 
