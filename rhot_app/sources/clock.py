@@ -42,14 +42,35 @@ class Exchange:
         return self.delay_ns / 2 + rate * abs(t_master_ns - self.t_master_ns)
 
 
+@dataclass(frozen=True, slots=True)
+class ClockEstimate:
+    """Offset (node - master) at `t_master_ns` with the half-width that holds there, and the drift to carry it on."""
+
+    t_master_ns: int
+    offset_ns: float
+    half_width_ns: float
+    drift: float
+
+    def bound_s(self, t_master_ns: int) -> float:
+        """Half-width at another time, s. The drift carried on may itself be wrong, so both rates widen it."""
+        age_ns = abs(t_master_ns - self.t_master_ns)
+        return 1e-9 * (self.half_width_ns + (DRIFT_ALLOWANCE + abs(self.drift)) * age_ns)
+
+    def to_master_ns(self, t_node_ns: int) -> int:
+        """Master time at which the node's clock showed `t_node_ns`."""
+        # Solved about the reference time: offsets of hours times a rate must not lose nanoseconds.
+        elapsed_node_ns = t_node_ns - self.t_master_ns - round(self.offset_ns)
+        return self.t_master_ns + round(elapsed_node_ns / (1.0 + self.drift))
+
+
 class NodeClockModel:
-    """Offset of one node's clock, and times converted by it. Not thread-safe: one writer; reading is atomic."""
+    """What is known of one node's clock. One thread writes; any may read."""
 
     def __init__(self) -> None:
         self._boot_id: int | None = None
         self._window: deque[Exchange] = deque()
         self._history: deque[Exchange] = deque()
-        self._estimate: _Estimate | None = None
+        self._estimate: ClockEstimate | None = None
         self.resets = 0
 
     def add(self, t1_master_ns: int, t2_node_ns: int, t3_node_ns: int, t4_master_ns: int, boot_id: int) -> bool:
@@ -79,22 +100,11 @@ class NodeClockModel:
         self._boot_id = None
         self.resets += 1
 
-    def valid_at(self, t_master_ns: int) -> bool:
-        """Whether times may be converted: enough exchanges agree, and the last ones are not too old."""
+    def estimate_at(self, t_master_ns: int) -> ClockEstimate | None:
+        """The estimate, fit to convert times around `t_master_ns`; None while too few exchanges agree or the last is
+        too long ago. Safe to call from another thread: what it returns does not change."""
         estimate = self._estimate
-        return estimate is not None and estimate.bound_s(t_master_ns) <= _WIDEST_BOUND_S
-
-    def to_master_ns(self, t_node_ns: int) -> int:
-        """Master time at which the node's clock showed `t_node_ns`. Raises ValueError when not `valid_at` any time."""
-        estimate = self._estimate
-        if estimate is None:
-            raise ValueError("the clock has not been exchanged yet")
-        return estimate.to_master_ns(t_node_ns)
-
-    def bound_at(self, t_master_ns: int) -> float:
-        """Half-width, s, of the interval around the estimate that holds the true offset; infinite when unknown."""
-        estimate = self._estimate
-        return float("inf") if estimate is None else estimate.bound_s(t_master_ns)
+        return estimate if estimate is not None and estimate.bound_s(t_master_ns) <= _WIDEST_BOUND_S else None
 
     @property
     def bound_s(self) -> float | None:
@@ -139,27 +149,7 @@ class NodeClockModel:
             self._history.popleft()
 
 
-@dataclass(frozen=True, slots=True)
-class _Estimate:
-    """Offset at `t_master_ns` with the half-width that holds there, and the drift to carry it on."""
-
-    t_master_ns: int
-    offset_ns: float
-    half_width_ns: float
-    drift: float
-
-    def bound_s(self, t_master_ns: int) -> float:
-        """Half-width at another time. The drift carried on may itself be wrong, so both rates widen it."""
-        age_ns = abs(t_master_ns - self.t_master_ns)
-        return 1e-9 * (self.half_width_ns + (DRIFT_ALLOWANCE + abs(self.drift)) * age_ns)
-
-    def to_master_ns(self, t_node_ns: int) -> int:
-        # Solved about the reference time: offsets of hours times a rate must not lose nanoseconds.
-        elapsed_node_ns = t_node_ns - self.t_master_ns - round(self.offset_ns)
-        return self.t_master_ns + round(elapsed_node_ns / (1.0 + self.drift))
-
-
-def _estimate(window: deque[Exchange], history: deque[Exchange], now_ns: int) -> _Estimate:
+def _estimate(window: deque[Exchange], history: deque[Exchange], now_ns: int) -> ClockEstimate:
     drift = _measure_drift(history)
     allowance = DRIFT_WANDER if drift is not None else DRIFT_ALLOWANCE
     rate = drift or 0.0
@@ -168,7 +158,7 @@ def _estimate(window: deque[Exchange], history: deque[Exchange], now_ns: int) ->
     low = max(sample.offset_ns - sample.half_width_ns(now_ns) for sample in window)
     high = min(sample.offset_ns + sample.half_width_ns(now_ns) for sample in window)
     offset = min(max(offset, low), high) if low <= high else 0.5 * (low + high)
-    return _Estimate(now_ns, offset, max(high - offset, offset - low, 0.0) + _STEP_SLACK_NS, rate)
+    return ClockEstimate(now_ns, offset, max(high - offset, offset - low, 0.0) + _STEP_SLACK_NS, rate)
 
 
 def _measure_drift(history: deque[Exchange]) -> float | None:

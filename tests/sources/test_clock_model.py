@@ -35,7 +35,14 @@ def exchange(model: NodeClockModel, clock: NodeClock, t1: int, delay: Delay, rng
 
 
 def error_s(model: NodeClockModel, clock: NodeClock, t_master_ns: int) -> float:
-    return abs(model.to_master_ns(clock.from_host_ns(t_master_ns)) - t_master_ns) * 1e-9
+    estimate = model.estimate_at(t_master_ns)
+    assert estimate is not None
+    return abs(estimate.to_master_ns(clock.from_host_ns(t_master_ns)) - t_master_ns) * 1e-9
+
+
+def bound_s(model: NodeClockModel, t_master_ns: int) -> float:
+    estimate = model.estimate_at(t_master_ns)
+    return float("inf") if estimate is None else estimate.bound_s(t_master_ns)
 
 
 @pytest.mark.parametrize("delay", [symmetric, jittered, asymmetric])
@@ -45,15 +52,15 @@ def test_error_stays_within_bound(delay: Delay, offset_h: float, drift_ppm: floa
     start = 10**15
     clock = NodeClock(round(offset_h * 3600e9), drift_ppm, start)
     model = NodeClockModel()
-    for k in range(900):
+    for k in range(300):
         t1 = start + k * PERIOD_NS
         _, t4 = exchange(model, clock, t1, delay, rng)
-        if model.valid_at(t4):
+        if model.estimate_at(t4):
             for t in (t4, t4 + 50_000_000, t4 + 100_000_000, t4 - 30_000_000):
-                assert error_s(model, clock, t) <= model.bound_at(t)
-    assert model.valid_at(t4)
+                assert error_s(model, clock, t) <= bound_s(model, t)
+    assert model.estimate_at(t4) is not None
     assert model.resets == 0
-    assert model.bound_at(t4) < (3e-3 if delay is asymmetric else 0.4e-3)
+    assert bound_s(model, t4) < (3e-3 if delay is asymmetric else 0.4e-3)
 
 
 def test_symmetric_delay_gives_tens_of_microseconds() -> None:
@@ -73,9 +80,9 @@ def test_silence_widens_the_bound_until_nothing_is_converted() -> None:
     for k in range(100):
         _, t4 = exchange(model, clock, 10**12 + k * PERIOD_NS, symmetric, rng)
     later = t4 + 60 * 10**9
-    assert error_s(model, clock, later) <= model.bound_at(later)
-    assert model.valid_at(later)
-    assert not model.valid_at(t4 + 3600 * 10**9)
+    assert error_s(model, clock, later) <= bound_s(model, later)
+    assert model.estimate_at(later) is not None
+    assert model.estimate_at(t4 + 3600 * 10**9) is None
 
 
 @pytest.mark.parametrize("step_ns", [5_000_000, -5_000_000, 3600 * 10**9, -(10**12)])
@@ -88,11 +95,11 @@ def test_clock_step_resets_at_once_and_is_right_again(step_ns: int) -> None:
     clock = NodeClock(10**13 + step_ns, 20.0, 0)
     changed, t4 = exchange(model, clock, 10**12 + 60 * PERIOD_NS, jittered, rng)
     assert changed
-    assert not model.valid_at(t4)
+    assert model.estimate_at(t4) is None
     for k in range(61, 64):
         _, t4 = exchange(model, clock, 10**12 + k * PERIOD_NS, jittered, rng)
-    assert model.valid_at(t4)
-    assert error_s(model, clock, t4) <= model.bound_at(t4)
+    assert model.estimate_at(t4) is not None
+    assert error_s(model, clock, t4) <= bound_s(model, t4)
 
 
 def test_new_boot_resets() -> None:
@@ -103,7 +110,7 @@ def test_new_boot_resets() -> None:
         exchange(model, clock, 10**12 + k * PERIOD_NS, symmetric, rng, boot_id=1)
     changed, t4 = exchange(model, clock, 10**12 + 5 * PERIOD_NS, symmetric, rng, boot_id=2)
     assert changed
-    assert not model.valid_at(t4)
+    assert model.estimate_at(t4) is None
 
 
 def test_impossible_exchanges_are_ignored() -> None:
@@ -112,4 +119,4 @@ def test_impossible_exchanges_are_ignored() -> None:
     assert not model.add(100, 0, 500, 200, 1)  # the node thought longer than the exchange took
     assert not model.add(0, 0, 0, 2 * 10**9, 1)  # two seconds on the way
     assert model.offset_s is None
-    assert model.bound_at(0) == float("inf")
+    assert bound_s(model, 0) == float("inf")

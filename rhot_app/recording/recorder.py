@@ -1,0 +1,95 @@
+"""Writes the raw log in a thread of its own, so that a slow disk never delays a sample."""
+
+from __future__ import annotations
+
+import contextlib
+import struct
+import threading
+import time
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from rhot_app.errors import RecordingError
+from rhot_app.project import Rig
+from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
+
+QUEUE_LIMIT = 65_536
+"""Records that may wait for the disk: six seconds of a 10,000 datagrams/s flood."""
+
+_FLUSH_S = 0.2
+
+
+class Recorder:
+    """One log being written. `put` never blocks and never raises; `failure` says why recording ended early."""
+
+    def __init__(self, path: Path, rig: Rig, about: dict[str, Any] | None = None) -> None:
+        """Create the file. Raises RecordingError when it exists already or cannot be written."""
+        self.path = path
+        self.bytes_written = 0
+        self.failure = ""
+        self._queue: SimpleQueue[Record] = SimpleQueue()
+        self._missed = 0
+        self._ending = threading.Event()
+        try:
+            self._file = path.open("xb", buffering=0)
+            self._write(encode_header(rig, about or {}))
+        except FileExistsError as exc:
+            raise RecordingError(f"{path}: exists already; a log is never written over. Choose another name.") from exc
+        except OSError as exc:
+            raise RecordingError(f"{path}: cannot be written ({exc.strerror}).") from exc
+        self._thread = threading.Thread(target=self._run, name="record", daemon=True)
+        self._thread.start()
+
+    @property
+    def recording(self) -> bool:
+        """Whether records are still taken."""
+        return not self.failure and not self._ending.is_set()
+
+    def put(self, kind: RecordKind, node_id: int, t_master_ns: int, data: bytes) -> None:
+        """Take one record; when the disk is too slow it is left out and the gap is recorded."""
+        if not self.recording:
+            return
+        if self._queue.qsize() >= QUEUE_LIMIT:
+            self._missed += 1
+            return
+        self._queue.put(Record(kind, node_id, t_master_ns, data))
+
+    def step(self, timeout_s: float) -> None:
+        """Write what waits; wait up to `timeout_s` for the first record."""
+        parts: list[bytes] = []
+        with contextlib.suppress(Empty):
+            parts.append(encode_record(self._queue.get(timeout=timeout_s)))
+            while len(parts) < 4096:
+                parts.append(encode_record(self._queue.get_nowait()))
+        if self._missed:
+            missed, self._missed = self._missed, 0
+            parts.append(encode_record(Record(RecordKind.GAP, 0, time.monotonic_ns(), struct.pack("<I", missed))))
+        if not parts:
+            return
+        try:
+            self._write(b"".join(parts))
+        except OSError as exc:
+            self.failure = (f"Recording to {self.path} has stopped: {exc.strerror}. Tracking goes on. "
+                            "Make room or choose another disk, then start a new recording.")
+
+    def close(self) -> None:
+        """Write what waits and close the file. May be called twice."""
+        self._ending.set()
+        self._thread.join()
+        self._file.close()
+
+    def _write(self, data: bytes) -> None:
+        """Write all bytes; a raw file may take only a part of them at a time."""
+        view = memoryview(data)
+        while view:
+            written = self._file.write(view)
+            self.bytes_written += written
+            view = view[written:]
+
+    def _run(self) -> None:
+        while not self._ending.is_set() and not self.failure:
+            self.step(_FLUSH_S)
+            time.sleep(0.02)  # gather a batch: one write for many records, and the lock of the interpreter left alone
+        while not self.failure and self._queue.qsize():
+            self.step(0.0)

@@ -1,0 +1,199 @@
+"""The master's command socket: clock requests to every node, start and stop, and the nodes' answers."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import logging
+import socket
+import threading
+import time
+from collections import deque
+
+from rhot_app.project import Rig
+from rhot_app.recording.raw_log import RecordKind
+from rhot_app.sources.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
+from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.tap import Tap
+from rhot_node.errors import WireError
+from rhot_node.wire.codec import decode, encode
+from rhot_node.wire.messages import ClockReply, Start, StartEntry, Stop
+
+REQUEST_NS = 100_000_000
+"""Each node is asked for its time ten times a second."""
+
+EAGER_NS = 25_000_000
+"""... and four times as often until its clock is known, so that it can be used soon after it appears."""
+
+RECENT = 40
+"""Requests and replies per node that are kept for a recording that begins later: two seconds."""
+
+_RESOLVE_S = 2.0  # between tries to find the address of a node that is named, not numbered
+_DATAGRAM_MAX = 2048
+
+log = logging.getLogger(__name__)
+
+
+class NodeLinks:
+    """Talks to all nodes of a rig. `step` waits for answers and sends what is due; `start_thread` runs it."""
+
+    def __init__(self, rig: Rig, links: list[NodeLink], data_ports: list[int]) -> None:
+        """`links` and `data_ports` in the order of the rig's nodes. Text nodes are not spoken to."""
+        self._tap: Tap | None = None
+        self._recent: deque[tuple[RecordKind, int, int, bytes]] = deque(maxlen=RECENT * len(links))
+        self.broadcast_failure = ""
+        self._links = {link.node.node_id: link for link in links if not link.node.text_datagrams}
+        self._entries = tuple(StartEntry(link.node.node_id, port, 0)
+                              for link, port in zip(links, data_ports, strict=True) if not link.node.text_datagrams)
+        self._broadcast = (rig.broadcast.address, rig.broadcast.port)
+        self._addresses: dict[int, str | None] = {}
+        self._due_ns = dict.fromkeys(self._links, 0)
+        self._session = 0
+        self._sequence = 0
+        self._lock = threading.Lock()
+        self._ending = threading.Event()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._socket.bind(("", 0))
+        ask_for_times(self._socket)
+        self._kernel_time = KernelTime()
+        self._thread = threading.Thread(target=self._run, name="links", daemon=True)
+
+    def start(self, session: int) -> None:
+        """Tell every node to stream `session`, by broadcast (RHOT 7.1) and each at its own address."""
+        with self._lock:
+            self._session = session
+            now_ns = time.monotonic_ns()
+            datagram = self._start_datagram(now_ns)
+            self._send_broadcast(datagram)
+            for link in self._links.values():
+                link.started(now_ns)
+                self._send(link, datagram)
+
+    def stop(self) -> None:
+        """Tell every node to stop streaming our session, twice, because nobody asks again."""
+        with self._lock:
+            session, self._session = self._session, 0
+            if not session:
+                return
+            self._sequence += 1
+            datagram = encode(Stop(session, self._sequence))
+            self._note(RecordKind.STOP, 0, time.monotonic_ns(), datagram)
+            for _ in range(2):
+                self._send_broadcast(datagram)
+                for link in self._links.values():
+                    self._send(link, datagram)
+
+    def record_to(self, tap: Tap | None) -> None:
+        """Hand every command datagram to `tap` from now on: first the running session and the last exchanges,
+        without which a recording that begins now could not tell the nodes' times."""
+        with self._lock:
+            if tap is not None:
+                if self._session:
+                    tap.put(RecordKind.START, 0, time.monotonic_ns(), self._encode_start())
+                for record in list(self._recent):
+                    tap.put(*record)
+            self._tap = tap
+
+    def step(self, timeout_s: float) -> None:
+        """Wait up to `timeout_s` for one answer, take in all that wait, then send what is due."""
+        self._socket.settimeout(timeout_s)
+        try:
+            self._receive(0)
+            while True:
+                self._receive(socket.MSG_DONTWAIT)
+        except (TimeoutError, BlockingIOError):
+            pass
+        except OSError as exc:  # an unreachable host answers with an ICMP error on some systems
+            log.debug("command socket: %s", exc)
+        now_ns = time.monotonic_ns()
+        with self._lock:
+            for node_id, link in self._links.items():
+                if self._session and link.wants_start(self._session, now_ns):
+                    datagram = self._start_datagram(now_ns)
+                    link.started(now_ns)
+                    self._send(link, datagram)
+                if now_ns >= self._due_ns[node_id]:
+                    self._ask(link, now_ns)
+
+    def start_thread(self) -> None:
+        """Find the addresses of named nodes and run `step` until `close`."""
+        self._thread.start()
+        for link in self._links.values():
+            with contextlib.suppress(ValueError):
+                self._addresses[link.node.node_id] = str(ipaddress.ip_address(link.node.address))
+        named = [link for link in self._links.values() if link.node.node_id not in self._addresses]
+        if named:
+            threading.Thread(target=self._resolve, args=(named,), name="resolve", daemon=True).start()
+
+    def close(self) -> None:
+        """End the threads and close the socket. May be called twice."""
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._socket.close()
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            self.step(0.02)
+
+    def _receive(self, flags: int) -> None:
+        data, ancillary, _, _ = self._socket.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE, flags)
+        t_receive_ns = self._kernel_time.receive_time_ns(ancillary)
+        try:
+            reply = decode(data)
+        except WireError as exc:
+            log.debug("command socket: %s", exc)
+            return
+        link = self._links.get(reply.node_id) if isinstance(reply, ClockReply) else None
+        if link is not None and isinstance(reply, ClockReply):
+            self._note(RecordKind.CLOCK_REPLY, reply.node_id, t_receive_ns, data)
+            link.take_reply(reply, t_receive_ns)
+
+    def _ask(self, link: NodeLink, now_ns: int) -> None:
+        known = link.clock.estimate_at(now_ns) is not None or link.silent(now_ns)
+        self._due_ns[link.node.node_id] = now_ns + (REQUEST_NS if known else EAGER_NS)
+        t1_ns = time.monotonic_ns()
+        datagram = encode(link.request(self._session, t1_ns))
+        self._send(link, datagram)
+        self._note(RecordKind.CLOCK_REQUEST, link.node.node_id, t1_ns, datagram)
+
+    def _encode_start(self) -> bytes:
+        self._sequence += 1
+        return encode(Start(self._session, self._sequence, self._entries))
+
+    def _start_datagram(self, now_ns: int) -> bytes:
+        datagram = self._encode_start()
+        self._note(RecordKind.START, 0, now_ns, datagram)
+        return datagram
+
+    def _send(self, link: NodeLink, datagram: bytes) -> None:
+        address = self._addresses.get(link.node.node_id)
+        if address is not None:
+            try:
+                self._socket.sendto(datagram, (address, link.node.udp_port))
+            except OSError as exc:  # unreachable now; the node is shown as silent until it answers
+                log.debug("node %s: %s", link.node.name, exc)
+
+    def _send_broadcast(self, datagram: bytes) -> None:
+        try:
+            self._socket.sendto(datagram, self._broadcast)
+            self.broadcast_failure = ""
+        except OSError as exc:  # every node is told at its own address too
+            self.broadcast_failure = f"broadcast to {self._broadcast[0]}: {exc.strerror}"
+            log.info("%s", self.broadcast_failure)
+
+    def _note(self, kind: RecordKind, node_id: int, t_master_ns: int, data: bytes) -> None:
+        if kind in (RecordKind.CLOCK_REQUEST, RecordKind.CLOCK_REPLY):
+            self._recent.append((kind, node_id, t_master_ns, data))
+        if self._tap is not None:
+            self._tap.put(kind, node_id, t_master_ns, data)
+
+    def _resolve(self, links: list[NodeLink]) -> None:
+        """Look up named nodes, again and again: a node that appears later or moves is found."""
+        while not self._ending.is_set():
+            for link in links:
+                with contextlib.suppress(OSError):
+                    self._addresses[link.node.node_id] = socket.gethostbyname(link.node.address)
+            found = all(self._addresses.get(link.node.node_id) for link in links)
+            self._ending.wait(_RESOLVE_S if not found else 10 * _RESOLVE_S)

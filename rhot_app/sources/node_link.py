@@ -1,0 +1,91 @@
+"""What the master knows of one node from its answers: its clock, what it does, and whether it needs a start.
+
+No sockets. Live links and replayed logs feed the same object.
+"""
+
+from __future__ import annotations
+
+from rhot_app.project import Rig
+from rhot_app.sources.clock import NodeClockModel
+from rhot_app.sources.door import NodeDoor
+from rhot_node.wire.messages import ClockReply, ClockRequest, NodeState
+
+SILENT_NS = 700_000_000
+"""A node that neither answers nor sends for so long is called silent."""
+
+RESTART_NS = 250_000_000
+"""A start is repeated no sooner than this: the node needs a moment to say that it streams."""
+
+PENDING_MAX = 64  # requests that may still be answered
+
+
+class NodeLink:
+    """One node: requests out, replies in. One thread writes; status may be read from any."""
+
+    def __init__(self, rig: Rig, camera: int) -> None:
+        """`camera` is the node's index in the rig."""
+        self.node = rig.nodes[camera]
+        self.clock = NodeClockModel()
+        self.door = NodeDoor(rig, camera, self.clock)
+        self.state: NodeState | None = None
+        self.session = 0  # the node's own word
+        self.clock_changes = 0  # boots and steps: what the tracker knows of this node's times is void
+        self.unexpected_replies = 0
+        self._boot_id: int | None = None
+        self._sequence = 0
+        self._pending: dict[int, int] = {}
+        self._last_reply_ns: int | None = None
+        self._last_start_ns: int | None = None
+
+    def request(self, session: int, t1_master_ns: int) -> ClockRequest:
+        """The next clock request, to be sent now."""
+        self._sequence = (self._sequence + 1) & 0xFFFFFFFF
+        request = ClockRequest(self.node.node_id, session, self._sequence, t1_master_ns)
+        self.sent(request)
+        return request
+
+    def sent(self, request: ClockRequest) -> None:
+        """Remember a request, so that only its own answer is believed."""
+        self._pending[request.sequence] = request.t1_master_ns
+        while len(self._pending) > PENDING_MAX:
+            del self._pending[next(iter(self._pending))]
+
+    def take_reply(self, reply: ClockReply, t4_master_ns: int) -> bool:
+        """Take a reply in that the kernel received at `t4_master_ns`. False when it answers no question of ours."""
+        t1_master_ns = self._pending.pop(reply.sequence, None)
+        if t1_master_ns is None or t1_master_ns != reply.t1_master_ns:
+            self.unexpected_replies += 1
+            return False
+        if self.clock.add(t1_master_ns, reply.t2_node_ns, reply.t3_node_ns, t4_master_ns, reply.boot_id):
+            self.clock_changes += 1
+        if reply.boot_id != self._boot_id:
+            self._boot_id = reply.boot_id
+            self.door.sequence.restart()  # a daemon that starts anew counts from 0 again
+        self.state = reply.state
+        self.session = reply.session
+        self._last_reply_ns = t4_master_ns
+        return True
+
+    def wants_start(self, session: int, now_ns: int) -> bool:
+        """Whether the node answers but does not stream `session`, and was not told so just now."""
+        if self.node.text_datagrams or self.silent(now_ns):
+            return False
+        if self._last_start_ns is not None and now_ns - self._last_start_ns < RESTART_NS:
+            return False
+        elsewhere = self.state is NodeState.STREAMING and self.session != session
+        return elsewhere or self.state is NodeState.READY
+
+    def started(self, now_ns: int) -> None:
+        """A start was sent: if the node was not streaming, its sequence begins anew."""
+        self._last_start_ns = now_ns
+        self.door.sequence.restart()
+
+    def silent(self, now_ns: int) -> bool:
+        """Whether neither an answer nor an accepted datagram came lately."""
+        heard_ns = max(self._last_reply_ns or 0, self.door.last_t_receive_ns)
+        return heard_ns == 0 or now_ns - heard_ns > SILENT_NS
+
+    @property
+    def heard(self) -> bool:
+        """Whether the node has ever answered or sent."""
+        return self._last_reply_ns is not None or self.door.last_t_receive_ns > 0

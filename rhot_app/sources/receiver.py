@@ -1,0 +1,141 @@
+"""One node's data socket and the thread that drains it through the node's door."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import struct
+import threading
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+
+from rhot_app.errors import SourceError
+from rhot_app.sources.door import NodeDoor, Verified
+from rhot_app.sources.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
+from rhot_app.tracking.tracker import CameraObservations
+
+RECEIVE_BUFFER = 4 << 20
+"""Bytes asked of the kernel: half a second of a 10,000 datagrams/s flood (each costs the kernel ~800 bytes)."""
+
+BURST = 256
+"""Datagrams taken at once before the newest are handed on."""
+
+NEWEST = 8
+"""Of one burst at most so many are handed on: when flooded, count everything, track the newest."""
+
+QUEUE_LIMIT = 256  # frames that may wait for the tracker; then the oldest go
+
+DATAGRAM_MAX = 4096  # bytes; 64 markers need 2.1 kB, and a longer datagram is refused for its length
+
+SO_RCVBUFFORCE = 33
+_WAIT = struct.pack("@ll", 0, 200_000)  # a blocked read returns after 0.2 s to see whether it shall end
+
+DatagramTap = Callable[[int, bytes], None]
+"""``tap(t_receive_ns, data)``: sees every datagram before it is judged."""
+
+
+class FrameQueue:
+    """Frames on their way from the receivers to the tracker: many writers, one reader, bounded, never blocking."""
+
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[CameraObservations] = SimpleQueue()
+        self.overrun = 0  # frames thrown away because the tracker could not keep up
+
+    def __len__(self) -> int:
+        """Frames that wait now."""
+        return self._queue.qsize()
+
+    def put(self, frame: CameraObservations) -> None:
+        """Add a frame; the oldest goes when too many wait."""
+        if self._queue.qsize() >= QUEUE_LIMIT:
+            with contextlib.suppress(Empty):
+                self._queue.get_nowait()
+                self.overrun += 1
+        self._queue.put(frame)
+
+    def take(self, timeout_s: float) -> list[CameraObservations]:
+        """All waiting frames, oldest first; waits up to `timeout_s` for the first one."""
+        frames: list[CameraObservations] = []
+        with contextlib.suppress(Empty):
+            frames.append(self._queue.get(timeout=timeout_s) if timeout_s > 0.0 else self._queue.get_nowait())
+            while True:
+                frames.append(self._queue.get_nowait())
+        return frames
+
+
+def open_data_socket(port: int, node_name: str) -> socket.socket:
+    """A bound UDP socket (0: any free port) with a large buffer and kernel times. Raises SourceError."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        sock.bind(("", port))
+    except OSError as exc:
+        sock.close()
+        raise SourceError(f"node {node_name}: UDP port {port} cannot be opened ({exc.strerror}). Stop the program that "
+                          "uses it, or give the node another data_port in the rig (0 takes any free one).") from exc
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BUFFER)
+    except OSError:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _WAIT)
+    ask_for_times(sock)
+    return sock
+
+
+def granted_buffer(sock: socket.socket) -> int:
+    """Bytes of receive buffer the kernel granted, counted as they are asked for (it reports twice that)."""
+    return sock.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
+
+
+class NodeReceiver:
+    """Drains one data socket in bursts. `step` is one burst; `start` runs it in a thread until `close`."""
+
+    def __init__(self, sock: socket.socket, door: NodeDoor, frames: FrameQueue, name: str) -> None:
+        self.door = door
+        self.tap: DatagramTap | None = None
+        self.port: int = sock.getsockname()[1]
+        self.buffer_bytes = granted_buffer(sock)
+        self.skipped = 0  # verified and counted, but not tracked because newer ones had come already
+        self._socket = sock
+        self._frames = frames
+        self._kernel_time = KernelTime()
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"receive {name}", daemon=True)
+
+    @property
+    def overflowed(self) -> int:
+        """Datagrams that the kernel dropped because the receive buffer was full."""
+        return self._kernel_time.overflowed
+
+    def step(self) -> int:
+        """Wait for a datagram (at most 0.2 s), take all that wait, hand on the newest; returns how many came."""
+        verified: list[Verified] = []
+        count, flags = 0, 0
+        with contextlib.suppress(BlockingIOError):
+            while count < BURST:
+                data, ancillary, _, _ = self._socket.recvmsg(DATAGRAM_MAX, ANCILLARY_SIZE, flags)
+                t_receive_ns = self._kernel_time.receive_time_ns(ancillary)
+                count, flags = count + 1, socket.MSG_DONTWAIT
+                if self.tap is not None:
+                    self.tap(t_receive_ns, data)
+                frame = self.door.verify(data, t_receive_ns)
+                if frame is not None:
+                    verified.append(frame)
+        self.skipped += max(0, len(verified) - NEWEST)
+        for frame in verified[-NEWEST:]:
+            self._frames.put(self.door.convert(frame))
+        return count
+
+    def start(self) -> None:
+        """Receive in a thread of its own."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread and close the port. May be called twice."""
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._socket.close()
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            self.step()

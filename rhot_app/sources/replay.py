@@ -1,0 +1,150 @@
+"""A raw log as a source: its records go through the same links and doors that live nodes go through."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+from rhot_app.errors import RecordingError
+from rhot_app.project import Rig
+from rhot_app.recording.raw_log import LogReader, Record, RecordKind
+from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.receiver import FrameQueue, NodeReceiver
+from rhot_app.sources.tap import Tap
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.errors import WireError
+from rhot_node.wire.codec import decode
+from rhot_node.wire.messages import ClockReply, ClockRequest, Start
+
+_WAITING_MAX = 64  # frames that may wait for the tracker when replaying as fast as it can
+
+
+class LogDoor:
+    """Takes records in the order written and gives the frames that live nodes would have given."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.links = tuple(NodeLink(rig, camera) for camera in range(len(rig.nodes)))
+        self.unknown_nodes = 0  # records of nodes that the rig does not have
+        self.gaps = 0  # records that the disk was too slow for
+        self.starts = 0
+        self._by_id = {link.node.node_id: link for link in self.links}
+        for link in self.links:
+            if link.node.text_datagrams:
+                link.door.expect_session(1)
+
+    def feed(self, record: Record) -> CameraObservations | None:
+        """Take one record in; a frame when it holds one that is admitted."""
+        if record.kind is RecordKind.DATAGRAM:
+            link = self._by_id.get(record.node_id)
+            if link is not None:
+                return link.door.admit(record.data, record.t_master_ns)
+            self.unknown_nodes += 1
+        elif record.kind is RecordKind.GAP:
+            self.gaps += int.from_bytes(record.data[:4], "little")
+        else:
+            self._feed_command(record)
+        return None
+
+    def _feed_command(self, record: Record) -> None:
+        try:
+            message = decode(record.data)
+        except WireError:
+            return
+        if isinstance(message, Start):
+            self.starts += 1
+            for link in self.links:
+                if not link.node.text_datagrams:
+                    link.door.expect_session(message.session)
+        elif isinstance(message, ClockRequest | ClockReply):
+            asked = self._by_id.get(message.node_id)
+            if asked is not None and isinstance(message, ClockRequest):
+                asked.sent(message)
+            elif asked is not None and isinstance(message, ClockReply):
+                asked.take_reply(message, record.t_master_ns)
+
+
+class LogReplay:
+    """`ObservationSource` of a log. `speed` 1 is real time; None is as fast as the tracker takes the frames."""
+
+    live = False
+
+    def __init__(self, path: Path, rig: Rig, speed: float | None = 1.0) -> None:
+        """Open the log; raises RecordingError when it is none."""
+        self.frames = FrameQueue()
+        self.receivers: tuple[NodeReceiver, ...] = ()
+        self._reader = LogReader(path)
+        self._speed = speed
+        self._door = LogDoor(rig)
+        self.links = self._door.links
+        self._notice = ""
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="replay", daemon=True)
+
+    @property
+    def changes(self) -> int:
+        """Sessions in the log so far, and clocks that were set."""
+        return self._door.starts + sum(link.clock_changes for link in self.links)
+
+    def notices(self) -> list[str]:
+        """That the log is over, broken or torn."""
+        return [self._notice] if self._notice else []
+
+    def configure(self, rig: Rig) -> None:
+        """Go on with another calibration."""
+        for camera, link in enumerate(self.links):
+            link.node = rig.nodes[camera]
+            link.door.configure(rig, camera)
+
+    def start(self, session: int) -> None:
+        """Begin to replay; the log brings its own sessions, so `session` is not looked at."""
+        if not self._thread.ident:
+            self._thread.start()
+
+    def stop(self) -> None:
+        """End the replay."""
+        self._ending.set()
+
+    def record_to(self, tap: Tap | None) -> None:
+        """Raises RecordingError: a copy of the log's file is the recording."""
+        if tap is not None:
+            raise RecordingError(f"a replay is not recorded; copy {self._reader.path} instead.")
+
+    def close(self) -> None:
+        """End the thread and close the file."""
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._reader.close()
+
+    def _run(self) -> None:
+        try:
+            self._play(self._reader)
+        except RecordingError as exc:
+            self._notice = str(exc)
+            return
+        torn = self._reader.torn_bytes
+        self._notice = ("The log is over." if not torn else
+                        f"The log is over; its last {torn} bytes are torn (the program died while writing).")
+
+    def _play(self, records: Iterable[Record]) -> None:
+        first_ns: int | None = None
+        begun_ns = time.monotonic_ns()
+        for record in records:
+            if first_ns is None and record.kind is RecordKind.DATAGRAM:
+                first_ns, begun_ns = record.t_master_ns, time.monotonic_ns()
+            if self._wait(record.t_master_ns - first_ns if first_ns is not None else 0, begun_ns):
+                return
+            frame = self._door.feed(record)
+            if frame is not None:
+                self.frames.put(frame)
+
+    def _wait(self, elapsed_log_ns: int, begun_ns: int) -> bool:
+        """Wait until the record is due; True when the replay shall end."""
+        if self._speed is None:
+            while len(self.frames) > _WAITING_MAX and not self._ending.wait(0.001):
+                pass
+            return self._ending.is_set()
+        wait_s = 1e-9 * (begun_ns + elapsed_log_ns / self._speed - time.monotonic_ns())
+        return self._ending.wait(wait_s) if wait_s > 0.0 else self._ending.is_set()

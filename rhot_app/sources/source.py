@@ -1,0 +1,58 @@
+"""Where frames come from: live nodes or a log, the same to the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from rhot_app.project import Rig
+from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.receiver import FrameQueue, NodeReceiver
+from rhot_app.sources.tap import Tap
+
+
+class ObservationSource(Protocol):
+    """Delivers verified frames of all cameras of a rig into `frames`, from threads of its own."""
+
+    frames: FrameQueue
+    links: Sequence[NodeLink]  # in the order of the rig's nodes
+    receivers: Sequence[NodeReceiver]  # likewise; none in a replay
+    live: bool  # whether receive times are of this moment, so that latency means something
+
+    @property
+    def changes(self) -> int:
+        """Grows whenever a node's clock was set or a session began: the tracker must then forget."""
+        ...
+
+    def notices(self) -> list[str]:
+        """Sentences about the source itself, such as the end of a log."""
+        ...
+
+    def configure(self, rig: Rig) -> None:
+        """Go on with another rig whose nodes are reached the same way (`same_network`)."""
+        ...
+
+    def start(self, session: int) -> None:
+        """Have the nodes stream in `session` (not 0)."""
+        ...
+
+    def stop(self) -> None:
+        """Have the nodes stop."""
+        ...
+
+    def record_to(self, tap: Tap | None) -> None:
+        """Hand every datagram and clock exchange to `tap` from now on, beginning with what a replay needs to know."""
+        ...
+
+    def close(self) -> None:
+        """End all threads and close all ports. May be called twice."""
+        ...
+
+
+def same_network(one: Rig, other: Rig) -> bool:
+    """Whether both rigs reach the same nodes in the same way, so that no port need be opened anew."""
+    def network(rig: Rig) -> list[tuple[object, ...]]:
+        return [(rig.broadcast.address, rig.broadcast.port),
+                *((node.node_id, node.address, node.udp_port, node.data_port, node.text_datagrams)
+                  for node in rig.nodes)]
+    return network(one) == network(other)

@@ -1,0 +1,82 @@
+"""Live nodes: a port and a thread for each, one more for clocks, start and stop."""
+
+from __future__ import annotations
+
+import contextlib
+
+from rhot_app.project import Rig
+from rhot_app.recording.raw_log import RecordKind
+from rhot_app.sources.links import NodeLinks
+from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.receiver import DatagramTap, FrameQueue, NodeReceiver, open_data_socket
+from rhot_app.sources.tap import Tap
+
+
+class UdpNodes:
+    """`ObservationSource` of the rig's nodes. Receives as soon as it is made; admits frames once started."""
+
+    live = True
+
+    def __init__(self, rig: Rig) -> None:
+        """Open all ports. Raises SourceError when one is taken; nothing stays open then."""
+        self.frames = FrameQueue()
+        self.links = tuple(NodeLink(rig, camera) for camera in range(len(rig.nodes)))
+        self._starts = 0
+        with contextlib.ExitStack() as stack:
+            sockets = []
+            for node in rig.nodes:
+                sockets.append(open_data_socket(node.data_port, node.name))
+                stack.callback(sockets[-1].close)
+            self.receivers = tuple(NodeReceiver(sock, link.door, self.frames, link.node.name)
+                                   for sock, link in zip(sockets, self.links, strict=True))
+            self._commands = NodeLinks(rig, list(self.links), [receiver.port for receiver in self.receivers])
+            stack.pop_all()
+        for receiver in self.receivers:
+            receiver.start()
+        self._commands.start_thread()
+
+    @property
+    def changes(self) -> int:
+        """Starts so far, and clocks that were set or came anew."""
+        return self._starts + sum(link.clock_changes for link in self.links)
+
+    def notices(self) -> list[str]:
+        """A live source has nothing to say about itself: its links and receivers do."""
+        return []
+
+    def configure(self, rig: Rig) -> None:
+        """Expect what `rig` says about markers and images; the network is as it was."""
+        for camera, link in enumerate(self.links):
+            link.node = rig.nodes[camera]
+            link.door.configure(rig, camera)
+
+    def start(self, session: int) -> None:
+        """Admit `session` and tell every node to stream it."""
+        for link in self.links:
+            link.door.expect_session(session)
+        self._starts += 1
+        self._commands.start(session)
+
+    def stop(self) -> None:
+        """Tell every node to stop, and admit nothing more."""
+        self._commands.stop()
+        for link in self.links:
+            link.door.expect_session(0)
+
+    def record_to(self, tap: Tap | None) -> None:
+        """Tap all sockets; None ends it."""
+        for link, receiver in zip(self.links, self.receivers, strict=True):
+            receiver.tap = None if tap is None else _datagram_tap(tap, link.node.node_id)
+        self._commands.record_to(tap)
+
+    def close(self) -> None:
+        """Close all ports."""
+        self._commands.close()
+        for receiver in self.receivers:
+            receiver.close()
+
+
+def _datagram_tap(tap: Tap, node_id: int) -> DatagramTap:
+    def put(t_receive_ns: int, data: bytes) -> None:
+        tap.put(RecordKind.DATAGRAM, node_id, t_receive_ns, data)
+    return put
