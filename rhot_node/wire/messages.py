@@ -97,7 +97,8 @@ class ClockReply:
     """Node to master: the request's t1 again, the node's receive and send times, and what the node is doing.
 
     `sequence` and `t1_master_ns` are the request's. `session` is the one the node is in, 0 when none: it differs from
-    the master's when a start message was lost or another master took over. `boot_id` changes whenever the daemon starts, so that the master forgets the old clock at once.
+    the master's when a start message was lost or another master took over. `boot_id` changes whenever the daemon
+    starts, so that the master forgets the old clock at once.
     """
 
     node_id: int

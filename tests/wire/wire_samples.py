@@ -1,0 +1,61 @@
+"""One message of every kind, whose bytes lie in tests/packets. Values are exact in single precision."""
+
+from __future__ import annotations
+
+import math
+
+from rhot_node.wire.messages import (
+    NO_FLAGS,
+    ClockReply,
+    ClockRequest,
+    MarkerFlag,
+    MarkerObservation,
+    Message,
+    NodeState,
+    Observations,
+    Start,
+    StartEntry,
+    Stop,
+)
+
+SESSION = 0x1122334455667788
+FRAME_NS = 3_600_000_000_000
+RHOT6_CHECKSUM = 0xC0FFEE01
+
+
+def lost(index: int) -> MarkerObservation:
+    return MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+
+
+def found(index: int, x: float, y: float, flags: MarkerFlag = NO_FLAGS) -> MarkerObservation:
+    return MarkerObservation(index, x, y, 16.0, 0.0009765625, -0.000244140625, 0.001953125, 0.875, flags)
+
+
+def observations(markers: tuple[MarkerObservation, ...], sequence: int = 7) -> Observations:
+    return Observations(
+        node_id=2, session=SESSION, sequence=sequence, t_frame_node_ns=FRAME_NS,
+        t_send_node_ns=FRAME_NS + 27_000_000, processing_ns=1_500_000, exposure_ns=4_000_000, row_time_ns=48_000,
+        width=640, height=480, frame_number=41, marker_checksum=RHOT6_CHECKSUM, markers=markers)
+
+
+SIX = tuple(found(i, 100.5 + 64.25 * i, 200.125 - 8.5 * i) for i in range(6))
+
+SAMPLES: dict[str, Message] = {
+    "observations_six": observations(SIX),
+    "observations_some_lost": observations(
+        (SIX[0], lost(1), found(2, -3.5, 479.25, MarkerFlag.EDGE | MarkerFlag.PARTIAL), lost(3),
+         found(4, 12.0, 13.0, MarkerFlag.AMBIGUOUS | MarkerFlag.ACQUIRED), found(5, 0.0, 0.0, MarkerFlag.REFERENCE))),
+    "observations_all_lost": observations(tuple(lost(i) for i in range(6))),
+    "observations_two": observations((SIX[0], lost(1))),
+    "observations_none": observations(()),
+    "observations_sixty_four": observations(tuple(found(i, 8.0 * i, 4.0 * i) for i in range(64)), 2**32 - 1),
+    "clock_request": ClockRequest(2, SESSION, 99, 7_200_000_000_123),
+    "clock_request_idle": ClockRequest(2**32 - 1, 0, 0, -5),
+    "clock_reply_streaming": ClockReply(2, SESSION, 99, 7_200_000_000_123, FRAME_NS + 1, FRAME_NS + 20_001, 0xB007_B007,
+                                        NodeState.STREAMING),
+    "clock_reply_fault": ClockReply(2, 0, 0, -5, -1_000, -900, 1, NodeState.FAULT),
+    "start_two": Start(SESSION, 3, (StartEntry(1, 50001, FRAME_NS + 250_000_000), StartEntry(2, 50002, 0))),
+    "start_nobody": Start(SESSION, 4, ()),
+    "stop": Stop(SESSION, 5),
+    "stop_any": Stop(0, 6),
+}
