@@ -1,0 +1,98 @@
+"""FABRIK for a free chain, exactly as published: Aristidou and Lasenby 2011; RHOT 2.2.7, eq. 2.25 to 2.28."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ChainSolution:
+    """`joints` (n+1, 3) in the unit of the input; `residual`: distance of the last joint from the target."""
+
+    joints: Array
+    iterations: int
+    residual: float
+    reached: bool
+
+
+def solve_chain(joints: ArrayLike, target: ArrayLike, *, tolerance: float = 1e-4,
+                max_iterations: int = 100) -> ChainSolution:
+    """Move the last joint of a chain to `target`, keeping its first joint and its bone lengths.
+
+    `joints` (n+1, 3) is the start pose, root first, n >= 1 bones; `target` (3,) and `tolerance` in the same unit
+    (the default means 0.1 mm when that is the metre). A chain already within tolerance is returned as it is. A
+    target farther than the chain is long stretches the chain straight towards it, without iterating. Otherwise each
+    iteration is a backward pass, from the last joint set on the target, and a forward pass, from the root; then the
+    tolerance is checked. A straight chain whose target lies on its own line cannot bend and is not `reached`.
+
+    Raises ValueError for wrong shapes, numbers that are not finite, a negative tolerance or no iterations.
+    """
+    start = np.ascontiguousarray(joints, dtype=np.float64)
+    goal = np.ascontiguousarray(target, dtype=np.float64)
+    if start.ndim != 2 or start.shape[1] != 3 or start.shape[0] < 2:
+        raise ValueError(f"joints must have shape (n+1, 3) with at least one bone, not {start.shape}")
+    if goal.shape != (3,):
+        raise ValueError(f"target must have shape (3,), not {goal.shape}")
+    if not (np.isfinite(start).all() and np.isfinite(goal).all()):
+        raise ValueError("joints and target must be finite numbers")
+    if not tolerance >= 0:
+        raise ValueError(f"tolerance must be zero or positive, not {tolerance}")
+    if max_iterations < 1:
+        raise ValueError(f"max_iterations must be at least 1, not {max_iterations}")
+    solved = start.copy()
+    iterations = solve_chain_arrays(solved, goal, float(tolerance), int(max_iterations))
+    residual = float(np.linalg.norm(solved[-1] - goal))
+    return ChainSolution(solved, iterations, residual, residual <= tolerance)
+
+
+@njit(cache=True)
+def solve_chain_arrays(joints: Array, target: Array, tolerance: float, max_iterations: int) -> int:
+    """`solve_chain` in place, without its checks; returns the iterations done."""
+    bones = joints.shape[0] - 1
+    if _distance(joints[bones], target) <= tolerance:
+        return 0
+    lengths = np.empty(bones)
+    directions = np.empty((bones, 3))  # the last one known of each bone, for when its two joints coincide
+    for k in range(bones):
+        lengths[k] = _distance(joints[k], joints[k + 1])
+        directions[k, 0], directions[k, 1], directions[k, 2] = 1.0, 0.0, 0.0
+        if lengths[k] > 0.0:
+            directions[k] = (joints[k + 1] - joints[k]) / lengths[k]
+    if _distance(joints[0], target) > lengths.sum():
+        for k in range(bones):
+            _place(joints[k], target, lengths[k], directions[k], 1.0, joints[k + 1])
+        return 0
+    root = joints[0].copy()
+    for iteration in range(1, max_iterations + 1):
+        joints[bones] = target
+        for k in range(bones - 1, -1, -1):
+            _place(joints[k + 1], joints[k], lengths[k], directions[k], -1.0, joints[k])
+        joints[0] = root
+        for k in range(bones):
+            _place(joints[k], joints[k + 1], lengths[k], directions[k], 1.0, joints[k + 1])
+        if _distance(joints[bones], target) <= tolerance:
+            return iteration
+    return max_iterations
+
+
+@njit(cache=True)
+def _place(fixed: Array, towards: Array, length: float, direction: Array, sign: float, out: Array) -> None:
+    """Put `out` at `length` from `fixed` on the line to `towards` (eq. 2.28); keep `direction`, times `sign`."""
+    distance = _distance(fixed, towards)
+    if distance > 1e-15 * length:
+        for i in range(3):
+            direction[i] = sign * (towards[i] - fixed[i]) / distance
+    for i in range(3):
+        out[i] = fixed[i] + sign * length * direction[i]
+
+
+@njit(cache=True)
+def _distance(a: Array, b: Array) -> float:
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
