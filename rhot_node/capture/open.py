@@ -1,0 +1,77 @@
+"""Camera specs, as typed behind ``--camera``: which backend opens what."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from rhot_node.capture.camera import Camera
+from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, PacedCamera, VideoFile
+from rhot_node.capture.stream import StreamCamera
+from rhot_node.capture.webcam import Webcam
+from rhot_node.capture.yuv import YuvRecording
+from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings
+from rhot_node.errors import CameraError
+
+SPEC_HELP = """camera specs:
+  0, 1, ...             the webcam /dev/video0, /dev/video1, ...
+  /dev/videoN           a webcam by its device
+  FILE or FOLDER        a video file, an image, or a folder of images in the order of their names; a video plays at its
+                        own rate, images at the settings' fps; with ?rate=max behind it, as fast as possible
+  yuv:FOLDER            a recording of raw YUV420 frames with their times, played in real time from now on, or, with
+                        ?start=FILE behind it, from the instant in FILE (integer ns, monotonic clock) once it exists
+  stream:SOCKET         a live twin that sends frames over this Unix socket"""
+
+
+def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera:
+    """Open what `spec` names (see SPEC_HELP). Raises CameraError saying what is wrong and what to do."""
+    if re.fullmatch(r"\d{1,3}", spec):
+        return Webcam(f"/dev/video{spec}", settings, clock)
+    if spec.startswith("/dev/"):
+        return Webcam(spec, settings, clock)
+    if spec.startswith("stream:"):
+        return StreamCamera(Path(spec.removeprefix("stream:")), clock)
+    if spec.startswith("yuv:"):
+        name, options = _split_options(spec.removeprefix("yuv:"), spec, "start")
+        return YuvRecording(Path(name), clock, Path(options["start"]) if "start" in options else None)
+    name, options = _split_options(spec, spec, "rate")
+    if options.get("rate", "max") != "max":
+        raise CameraError(f"camera {spec!r}: the only rate is max; without it a file plays at its own.")
+    return _files(Path(name), spec, settings, clock, rate_max="rate" in options)
+
+
+def takes_settings(spec: str) -> bool:
+    """Whether camera settings mean anything to this source; a recording or twin brings its own."""
+    return not spec.startswith(("yuv:", "stream:"))
+
+
+def _files(path: Path, spec: str, settings: CameraSettings, clock: NodeClock, *, rate_max: bool) -> Camera:
+    source: ImageSource
+    if path.is_dir():
+        images = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in IMAGE_SUFFIXES)
+        if not images:
+            raise CameraError(f"{path}: a folder without images ({', '.join(sorted(IMAGE_SUFFIXES))}). "
+                              "A yuv recording is opened as yuv:FOLDER.")
+        source = ImageFiles(images)
+    elif not path.exists():
+        raise CameraError(f"camera {spec!r}: no such file or folder. See rhot-node --help for what a camera may be.")
+    elif path.suffix.lower() in IMAGE_SUFFIXES:
+        source = ImageFiles([path])
+    else:
+        source = VideoFile(path)
+    return PacedCamera(source, str(path), settings, clock, rate_max=rate_max)
+
+
+def _split_options(text: str, spec: str, *known: str) -> tuple[str, dict[str, str]]:
+    """Cut ``name?key=value&key=value``; raises CameraError for a key that is not `known`."""
+    name, _, query = text.partition("?")
+    options: dict[str, str] = {}
+    for item in filter(None, query.split("&")):
+        key, equals, value = item.partition("=")
+        if key not in known or not equals or not value:
+            raise CameraError(f"camera {spec!r}: option {item!r} is not known; this source takes ?{known[0]}=...")
+        options[key] = value
+    if not name:
+        raise CameraError(f"camera {spec!r}: it names no file.")
+    return name, options

@@ -1,0 +1,189 @@
+"""Video files and image folders as cameras: played at their own rate, or as fast as they are asked for."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+from rhot_node.capture.camera import EndOfRecording, Frame
+from rhot_node.capture.pace import NS_PER_S, available_delay_ns, sleep_until
+from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings
+from rhot_node.detect.image import Plane, YuvImage, from_bgr
+from rhot_node.errors import CameraError
+
+IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm", ".webp"})
+
+
+class ImageSource(Protocol):
+    """Images in order, of a file; knows nothing of time."""
+
+    fps: float | None  # the file's own rate, None when it has none
+
+    def advance(self) -> bool:
+        """Go to the next image (to the first one at first); False when there is none."""
+        ...
+
+    def image(self) -> Plane:
+        """The current image, (H, W, 3) BGR. Raises CameraError when it cannot be decoded."""
+        ...
+
+    def rewind(self) -> None:
+        """Go before the first image."""
+        ...
+
+    def close(self) -> None:
+        """Close the file."""
+        ...
+
+
+class ImageFiles:
+    """Image files, one after the other."""
+
+    fps: float | None = None
+
+    def __init__(self, paths: list[Path]) -> None:
+        self._paths = paths
+        self._index = -1
+
+    def advance(self) -> bool:
+        """Go to the next file."""
+        if self._index + 1 >= len(self._paths):
+            return False
+        self._index += 1
+        return True
+
+    def image(self) -> Plane:
+        """Decode the current file."""
+        path = self._paths[self._index]
+        image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        if image is None:
+            raise CameraError(f"{path}: not an image that can be decoded. Remove or replace it.")
+        return np.asarray(image, dtype=np.uint8)
+
+    def rewind(self) -> None:
+        """Go before the first file."""
+        self._index = -1
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+class VideoFile:
+    """A video file, through OpenCV."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._capture = self._open()
+        fps = self._capture.get(cv2.CAP_PROP_FPS)
+        self.fps: float | None = fps if 0.1 < fps < 1000 else None
+
+    def advance(self) -> bool:
+        """Go to the next frame without decoding it into an image."""
+        return bool(self._capture.grab())
+
+    def image(self) -> Plane:
+        """The current frame."""
+        ok, image = self._capture.retrieve()
+        if not ok or image is None:
+            raise CameraError(f"{self._path}: a frame cannot be decoded. Is the file complete?")
+        return np.asarray(image, dtype=np.uint8)
+
+    def rewind(self) -> None:
+        """Open the file again: seeking is not exact in every container."""
+        self._capture.release()
+        self._capture = self._open()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._capture.release()
+
+    def _open(self) -> cv2.VideoCapture:
+        capture = cv2.VideoCapture(str(self._path))
+        if not capture.isOpened():
+            capture.release()
+            raise CameraError(f"{self._path}: not a video that can be decoded. Convert it, e.g. to H.264 in MP4.")
+        return capture
+
+
+class PacedCamera:
+    """A file as a camera. Frame k is exposed at T0 + k / rate, T0 being the first read; a reader that comes late
+    gets the newest frame. As fast as possible (`rate_max`), every frame is delivered and has just been exposed."""
+
+    def __init__(self, source: ImageSource, where: str, settings: CameraSettings, clock: NodeClock, *,
+                 rate_max: bool = False) -> None:
+        """Decode the first image to learn the size; raises CameraError when there is none."""
+        self._source = source
+        self._where = where
+        self._clock = clock
+        self._rate_max = rate_max
+        self._exposure_ns = settings.exposure_ns
+        self._row_time_ns = settings.row_time_ns
+        self._period_ns = round(NS_PER_S / (source.fps or settings.fps))
+        self._t0_ns: int | None = None
+        self._number = 0  # of the frame at which the source stands
+        if not source.advance():
+            raise CameraError(f"{where}: it has no frames.")
+        self._pending: YuvImage | None = from_bgr(source.image())
+        self._size = self._pending.size
+        self._delay_ns = available_delay_ns(self._exposure_ns, self._row_time_ns, self._size[1])
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px."""
+        return self._size
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The next frame at its time. Raises EndOfRecording, or CameraError when a file is broken."""
+        now_ns = time.monotonic_ns()
+        if self._rate_max:
+            return self._deliver(self._upcoming(0), now_ns - self._delay_ns)
+        if self._t0_ns is None:
+            self._t0_ns = now_ns - self._delay_ns
+        deadline_ns = now_ns + round(timeout_s * NS_PER_S)
+        image = self._upcoming((now_ns - self._delay_ns - self._t0_ns) // self._period_ns)
+        t_mid_ns = self._t0_ns + self._number * self._period_ns
+        due_ns = t_mid_ns + self._delay_ns
+        sleep_until(min(due_ns, deadline_ns))
+        return self._deliver(image, t_mid_ns) if due_ns <= deadline_ns else None
+
+    def rewind(self) -> None:
+        """Play again from the first frame; numbers and times go on."""
+        self._source.rewind()
+        self._pending = None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._source.close()
+
+    def _upcoming(self, newest: int) -> YuvImage:
+        """Decode the next image, or image `newest` when that is later; it stays until it is delivered."""
+        if self._pending is None:
+            if not self._source.advance():
+                raise EndOfRecording
+            self._number += 1
+        while self._number < newest and self._source.advance():
+            self._number += 1
+            self._pending = None
+        if self._pending is None:
+            self._pending = from_bgr(self._source.image())
+        if self._pending.size != self._size:
+            width, height = self._pending.size
+            raise CameraError(f"{self._where}: frame {self._number} has {width} x {height} px, the first one has "
+                              f"{self._size[0]} x {self._size[1]}. All frames must have one size.")
+        return self._pending
+
+    def _deliver(self, image: YuvImage, t_mid_ns: int) -> Frame:
+        self._pending = None
+        return Frame(
+            image=image,
+            number=self._number,
+            t_node_ns=self._clock.from_host_ns(t_mid_ns),
+            t_available_node_ns=self._clock.from_host_ns(t_mid_ns + self._delay_ns),
+            exposure_ns=self._exposure_ns,
+            row_time_ns=self._row_time_ns,
+        )

@@ -1,0 +1,135 @@
+"""Webcams through OpenCV (V4L2), with every automatic mode off."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+
+from rhot_node.capture.camera import Frame
+from rhot_node.capture.latest import LatestGrabber
+from rhot_node.capture.pace import available_delay_ns
+from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings
+from rhot_node.detect.image import Plane, from_bgr
+from rhot_node.errors import CameraError
+
+log = logging.getLogger(__name__)
+
+FIRST_FRAME_S = 5.0
+SILENCE_S = 3.0
+V4L2_EXPOSURE_MANUAL = 1
+V4L2_EXPOSURE_UNIT_US = 100.0
+
+
+class Capture(Protocol):
+    """The part of cv2.VideoCapture that is used."""
+
+    def isOpened(self) -> bool: ...  # noqa: N802 - OpenCV's name
+    def set(self, propId: int, value: float) -> bool: ...  # noqa: N803 - OpenCV's name
+    def read(self) -> tuple[bool, Any]: ...
+    def release(self) -> None: ...
+
+
+def open_v4l2(device: str) -> Capture:
+    """Open a device path with OpenCV; whether that worked is asked with isOpened."""
+    return cv2.VideoCapture(device, cv2.CAP_V4L2)
+
+
+class Webcam:
+    """A webcam. It cannot say when a frame was exposed: mid-exposure of row 0 is taken to be the time at which the
+    read returned, less the readout of the frame (rows x row time) and half the exposure; transfer time adds to that."""
+
+    def __init__(self, device: str, settings: CameraSettings, clock: NodeClock,
+                 open_capture: Callable[[str], Capture] = open_v4l2) -> None:
+        """Open ``/dev/videoN`` and wait for a first frame. Raises CameraError when absent, busy or silent."""
+        if not Path(device).exists():
+            present = ", ".join(sorted(str(path) for path in Path("/dev").glob("video*"))) or "none"
+            raise CameraError(f"{device}: no such camera (present: {present}). Is it plugged in?")
+        capture = open_capture(device)
+        if not capture.isOpened():
+            capture.release()
+            raise CameraError(f"{device}: the camera cannot be opened. Does another program use it, and may you read "
+                              "it (group video)?")
+        self.refused = tuple(configure(capture, settings))
+        for name in self.refused:
+            log.warning("%s: the camera does not take the setting %s", device, name)
+        self._device = device
+        self._exposure_ns = settings.exposure_ns
+        self._row_time_ns = settings.row_time_ns
+        self._grabber = LatestGrabber(lambda: _read(capture), capture.release, clock)
+        first = self._grabber.take(FIRST_FRAME_S)
+        if first is None:
+            self.close()
+            raise CameraError(f"{device}: opened, but no frame came within {FIRST_FRAME_S:.0f} s. Plug it in again.")
+        self._size = from_bgr(first.image).size
+        if self._size != (settings.width, settings.height):
+            log.warning("%s: delivers %d x %d px instead of %d x %d", device, *self._size, settings.width,
+                        settings.height)
+        self._delay_ns = available_delay_ns(self._exposure_ns, self._row_time_ns, self._size[1])
+        self._heard_s = time.monotonic()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px, as the camera delivers it."""
+        return self._size
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The newest frame. Raises CameraError when the camera is gone, silent, or changed its image size."""
+        grabbed = self._grabber.take(timeout_s)
+        if grabbed is None:
+            if self._grabber.failed:
+                raise CameraError(f"{self._device}: the camera stopped delivering frames. Is it still plugged in?")
+            if time.monotonic() - self._heard_s > SILENCE_S:
+                raise CameraError(f"{self._device}: no frame for {SILENCE_S:.0f} s. Is the camera still plugged in?")
+            return None
+        self._heard_s = time.monotonic()
+        image = from_bgr(grabbed.image)
+        if image.size != self._size:
+            raise CameraError(f"{self._device}: the image size changed from {self._size[0]} x {self._size[1]} to "
+                              f"{image.size[0]} x {image.size[1]} px.")
+        return Frame(
+            image=image,
+            number=grabbed.number,
+            t_node_ns=grabbed.t_return_node_ns - self._delay_ns,
+            t_available_node_ns=grabbed.t_return_node_ns,
+            exposure_ns=self._exposure_ns,
+            row_time_ns=self._row_time_ns,
+        )
+
+    def close(self) -> None:
+        """Release the device."""
+        self._grabber.close()
+
+
+def configure(capture: Capture, settings: CameraSettings) -> list[str]:
+    """Turn automatic modes off, then set what is given; returns the names of what the driver refused.
+
+    Exposure goes in V4L2's 100 us; gain, saturation, brightness, contrast and colour gains in the driver's own units.
+    """
+    wanted: list[tuple[str, int, float | None]] = [
+        ("width", cv2.CAP_PROP_FRAME_WIDTH, settings.width),
+        ("height", cv2.CAP_PROP_FRAME_HEIGHT, settings.height),
+        ("fps", cv2.CAP_PROP_FPS, settings.fps),
+        ("one buffer", cv2.CAP_PROP_BUFFERSIZE, 1),
+        ("automatic exposure off", cv2.CAP_PROP_AUTO_EXPOSURE, V4L2_EXPOSURE_MANUAL),
+        ("automatic white balance off", cv2.CAP_PROP_AUTO_WB, 0),
+        ("exposure_us", cv2.CAP_PROP_EXPOSURE, max(1.0, round(settings.exposure_us / V4L2_EXPOSURE_UNIT_US))),
+        ("gain", cv2.CAP_PROP_GAIN, settings.gain),
+        ("saturation", cv2.CAP_PROP_SATURATION, settings.saturation),
+        ("brightness", cv2.CAP_PROP_BRIGHTNESS, settings.brightness),
+        ("contrast", cv2.CAP_PROP_CONTRAST, settings.contrast),
+        ("red_gain", cv2.CAP_PROP_WHITE_BALANCE_RED_V, settings.red_gain),
+        ("blue_gain", cv2.CAP_PROP_WHITE_BALANCE_BLUE_U, settings.blue_gain),
+    ]
+    return [name for name, prop, value in wanted if value is not None and not capture.set(prop, value)]
+
+
+def _read(capture: Capture) -> Plane | None:
+    ok, image = capture.read()
+    return np.asarray(image, dtype=np.uint8) if ok and image is not None else None

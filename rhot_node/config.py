@@ -1,0 +1,125 @@
+"""A node's settings: one JSON file (``rhot-node``), described in docs/node.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from rhot_node.clock import NodeClock
+from rhot_node.errors import SettingsError
+from rhot_node.files import decode_document, read_document, write_document
+from rhot_node.markers import MarkerSet
+
+FORMAT: Final = "rhot-node"
+VERSION: Final = 1
+
+Port = Annotated[int, Meta(ge=0, le=65535)]
+Pixels = Annotated[int, Meta(ge=16, le=16384, multiple_of=2)]
+Gain = Annotated[float, Meta(gt=0, le=1000)]
+
+
+class CameraSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the camera is told, automatic modes off. None leaves a value as the camera has it (RHOT 7.1)."""
+
+    width: Pixels = 640
+    height: Pixels = 480
+    fps: Annotated[float, Meta(gt=0, le=1000)] = 30.0
+    exposure_us: Annotated[float, Meta(gt=0, le=1_000_000)] = 4000.0
+    gain: Gain | None = None
+    saturation: float | None = None
+    brightness: float | None = None
+    contrast: float | None = None
+    red_gain: Gain | None = None
+    blue_gain: Gain | None = None
+    row_time_us: Annotated[float, Meta(ge=0, le=1000)] = 0.0  # for cameras that cannot tell; 0: all rows at once
+
+    @property
+    def exposure_ns(self) -> int:
+        """Exposure time, ns."""
+        return round(self.exposure_us * 1000)
+
+    @property
+    def row_time_ns(self) -> int:
+        """Time from row to row, ns."""
+        return round(self.row_time_us * 1000)
+
+
+class ClockSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How far the node's clock is off; for simulated nodes on one machine, whose clocks must disagree."""
+
+    offset_s: Annotated[float, Meta(ge=-1e8, le=1e8)] = 0.0
+    drift_ppm: Annotated[float, Meta(ge=-1000, le=1000)] = 0.0
+
+    def clock(self, t_host_ns: int) -> NodeClock:
+        """The clock whose drift begins at `t_host_ns`."""
+        return NodeClock(round(self.offset_s * 1e9), self.drift_ppm, t_host_ns)
+
+
+class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Everything a node is told. A port of 0 takes any free one."""
+
+    node_id: Annotated[int, Meta(ge=1, le=2**32 - 1)]
+    name: Annotated[str, Meta(min_length=1, max_length=64)]
+    markers: MarkerSet
+    bind_address: str = "0.0.0.0"
+    udp_port: Port = 47800
+    control_port: Port = 47801
+    preview_port: Port = 47802
+    broadcast_port: Annotated[int, Meta(ge=1, le=65535)] | None = 47799
+    detector: Literal["fast", "reference"] = "fast"
+    camera: CameraSettings = CameraSettings()
+    preview_hz: Annotated[float, Meta(gt=0, le=30)] = 4.0
+    clock: ClockSettings = ClockSettings()
+    format: Literal["rhot-node"] = FORMAT
+    version: Literal[1] = VERSION
+
+    def __post_init__(self) -> None:
+        if self.control_port and self.control_port == self.preview_port:
+            raise ValueError(f"control_port and preview_port are both {self.control_port}; each needs its own")
+        if self.udp_port and self.udp_port == self.broadcast_port:
+            raise ValueError(f"udp_port and broadcast_port are both {self.udp_port}; each needs its own")
+
+
+RESTART_FIELDS = ("node_id", "bind_address", "udp_port", "control_port", "preview_port", "broadcast_port", "clock")
+"""Settings that a running daemon cannot change."""
+
+
+def load_settings(path: Path) -> NodeSettings:
+    """Read a settings file; raises SettingsError naming file and field."""
+    return read_document(path, NodeSettings, format_name=FORMAT, version=VERSION, error=SettingsError)
+
+
+def parse_settings(data: bytes, where: str) -> NodeSettings:
+    """Decode a settings document; `where` begins every error message. Raises SettingsError."""
+    return decode_document(data, NodeSettings, format_name=FORMAT, version=VERSION, where=where, error=SettingsError)
+
+
+def save_settings(path: Path, settings: NodeSettings) -> None:
+    """Write a settings file atomically; raises OSError, the old file then stays as it was."""
+    write_document(path, settings)
+
+
+def changed_settings(settings: NodeSettings, changes: dict[str, Any]) -> NodeSettings:
+    """`settings` with `changes` laid over them: objects merge field by field, everything else is replaced.
+
+    Raises SettingsError when the result is not valid as a whole.
+    """
+    merged = _merged(msgspec.to_builtins(settings), changes)
+    try:
+        return msgspec.convert(merged, NodeSettings)
+    except msgspec.ValidationError as exc:
+        raise SettingsError(f"new settings: {exc}") from exc
+
+
+def needs_restart(old: NodeSettings, new: NodeSettings) -> list[str]:
+    """Names of the changed settings that take effect only when the daemon starts again."""
+    return [name for name in RESTART_FIELDS if getattr(old, name) != getattr(new, name)]
+
+
+def _merged(old: Any, new: Any) -> Any:
+    if isinstance(old, dict) and isinstance(new, dict):
+        return {**old, **{key: _merged(old.get(key), value) for key, value in new.items()}}
+    return new
