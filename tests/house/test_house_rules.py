@@ -53,9 +53,11 @@ def undocumented(path: Path) -> Iterator[str]:
 
 
 def _is_exempt(node: ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
-    """A method named by Qt's own interface (camelCase) or a property's setter is described where it is defined."""
+    """Described elsewhere: Qt's own names (camelCase), setters, and a protocol's bare members (by its class)."""
     if isinstance(node, ast.ClassDef):
         return False
+    if ast.unparse(node.body[-1]) == "...":
+        return True
     names = {ast.unparse(decorator).rpartition(".")[2] for decorator in node.decorator_list}
     return bool(names & {"setter", "overload"}) or bool(re.match(r"[a-z]+[A-Z]", node.name))
 
