@@ -1,0 +1,107 @@
+"""The rows of the panels as text: nodes, markers and joint angles, with units and the right number of digits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rhot_app.engine.status import NodeStatus
+from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look
+
+DASH = "–"
+
+
+@dataclass(frozen=True, slots=True)
+class NodeRow:
+    """One node: its look and three short lines, and what the node itself says."""
+
+    name: str
+    look: Look
+    rate: str
+    losses: str
+    clock: str
+    message: str
+    tooltip: str
+
+
+def node_row(node: NodeStatus) -> NodeRow:
+    """Text of one node's card."""
+    look = NODES.get(node.state, Look(node.state, "octagon", "fault", "This state is not known to this version."))
+    dropped = sum(node.dropped.values())
+    losses = f"{node.lost} lost" + (f", {dropped} rejected" if dropped else "")
+    reasons = "".join(f"\n  {count} × {reason}" for reason, count in sorted(node.dropped.items()))
+    tooltip = f"{look.meaning}\n{node.received} datagrams received." + (f"\nRejected:{reasons}" if reasons else "")
+    return NodeRow(
+        name=node.name, look=look, rate=f"{node.rate_hz:.0f} /s" if node.rate_hz > 0 else DASH, losses=losses,
+        clock=clock_text(node), message=node.message,
+        tooltip=tooltip + ("\nSends the thesis's text datagrams: untrusted." if node.text_datagrams else ""),
+    )
+
+
+def clock_text(node: NodeStatus) -> str:
+    """Bound of the clock offset, e.g. "clock ± 0.08 ms"; text nodes have no clock."""
+    if node.text_datagrams:
+        return "no clock (text)"
+    if node.clock_bound_s is None:
+        return "clock unknown"
+    return f"clock ± {node.clock_bound_s * 1e3:.2f} ms"
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerRow:
+    """One marker: its state, how its position is known, and where it is."""
+
+    name: str
+    look: Look
+    knowledge: Look
+    position: str
+    detail: str
+
+
+def marker_rows(state: HandState) -> list[MarkerRow]:
+    """Rows of all markers, in the rig's order."""
+    rows = []
+    for index, name in enumerate(state.marker_ids):
+        known = KNOWLEDGE[Knowledge(int(state.marker_knowledge[index]))]
+        rows.append(MarkerRow(name, marker_look(state, index), known, position_text(state.marker_positions[index]),
+                              marker_detail(state, index)))
+    return rows
+
+
+def position_text(position: np.ndarray) -> str:
+    """Rig-frame position in mm, e.g. "12, -40, 603 mm"."""
+    if not np.isfinite(position).all():
+        return DASH
+    return ", ".join(f"{value * 1e3:.0f}" for value in position) + " mm"
+
+
+def marker_detail(state: HandState, marker: int) -> str:
+    """Tooltip of one marker: position, its standard deviation per axis, epipolar error."""
+    lines = [f"x, y, z: {position_text(state.marker_positions[marker])}"]
+    variances = np.diagonal(state.marker_covariances[marker])
+    if np.isfinite(variances).all() and (variances >= 0).all():
+        lines.append("± " + ", ".join(f"{math.sqrt(v) * 1e3:.2f}" for v in variances) + " mm (one sigma)")
+    if np.isfinite(state.epipolar_error_px[marker]):
+        lines.append(f"epipolar error {state.epipolar_error_px[marker]:.2f} px")
+    return "\n".join(lines)
+
+
+def angle_text(angle_rad: float) -> str:
+    """Angle in whole degrees with its sign, e.g. "-12°"."""
+    return f"{round(math.degrees(angle_rad))}°" if math.isfinite(angle_rad) else DASH
+
+
+def short_name(marker: str) -> str:
+    """Marker id as people say it: "thumb_tip" is "thumb tip"."""
+    return marker.replace("_", " ")
+
+
+def bytes_text(count: int) -> str:
+    """File size for people, e.g. "3.2 MB"."""
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            return f"{count / size:.1f} {unit}"
+    return f"{count} B"

@@ -1,0 +1,62 @@
+"""A ring of time-stamped rows for a plot, with honest gaps and a text form for the clipboard."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Series:
+    """The last `capacity` rows of `len(names)` columns. A pause longer than `gap_s` becomes a row of NaN.
+
+    Times are master monotonic ns; a row older than the last one is ignored.
+    """
+
+    def __init__(self, names: tuple[str, ...], capacity: int = 900, gap_s: float = 1.0) -> None:
+        self.names = names
+        self._gap_ns = round(gap_s * 1e9)
+        self._times = np.zeros(capacity, dtype=np.int64)
+        self._rows = np.full((capacity, len(names)), np.nan)
+        self._count = 0
+
+    def __len__(self) -> int:
+        return min(self._count, len(self._times))
+
+    def clear(self) -> None:
+        """Forget every row."""
+        self._count = 0
+
+    def append(self, t_ns: int, row: Array) -> None:
+        """Add one row (columns,); NaN where there is no value."""
+        if self._count:
+            last = int(self._times[(self._count - 1) % len(self._times)])
+            if t_ns <= last:
+                return
+            if t_ns - last > self._gap_ns:
+                self._put(last + 1, np.full(len(self.names), np.nan))
+        self._put(t_ns, row)
+
+    def _put(self, t_ns: int, row: Array) -> None:
+        slot = self._count % len(self._times)
+        self._times[slot] = t_ns
+        self._rows[slot] = row
+        self._count += 1
+
+    def window(self, now_ns: int, span_s: float) -> tuple[Array, Array]:
+        """Rows of the last `span_s` seconds, oldest first: seconds before now (n,), all <= 0, and values (n, columns)."""
+        n = len(self)
+        order = np.arange(self._count - n, self._count) % len(self._times)
+        seconds = (self._times[order] - now_ns) * 1e-9
+        inside = seconds >= -span_s
+        return seconds[inside], self._rows[order][inside]
+
+
+def to_csv(seconds: Array, rows: Array, names: tuple[str, ...], unit: str) -> str:
+    """Comma-separated text with a heading; times in s before now, an empty field where there is no value."""
+    head = ",".join(["time [s]", *(f"{name} [{unit}]" if unit else name for name in names)])
+    lines = [head]
+    for t, row in zip(seconds, rows, strict=True):
+        lines.append(",".join([f"{t:.3f}", *("" if np.isnan(value) else f"{value:.6g}" for value in row)]))
+    return "\n".join(lines) + "\n"

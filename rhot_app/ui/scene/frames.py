@@ -1,0 +1,47 @@
+"""From the rig frame (OpenCV: x right, y down, z away from the camera) to the screen's world (z up)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.project import CameraPose, Intrinsics
+
+Array = NDArray[np.float64]
+
+DISPLAY_FROM_RIG: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""Rotation: right stays right, away from the camera becomes +y, up becomes +z."""
+
+
+def to_display(points: Array) -> Array:
+    """Rig-frame points or directions (..., 3) in the scene's frame, same unit."""
+    return np.asarray(points @ DISPLAY_FROM_RIG.T)
+
+
+def rotation_of(wxyz: tuple[float, float, float, float]) -> Array:
+    """(3, 3) rotation of a unit quaternion wxyz."""
+    w, x, y, z = np.asarray(wxyz, dtype=np.float64) / np.linalg.norm(wxyz)
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])
+
+
+def frustum_lines(intrinsics: Intrinsics, pose: CameraPose, depth_m: float) -> Array:
+    """A camera's field of view up to `depth_m` as line segments (20, 3), pairs of ends, scene frame, m.
+
+    Four edges from the centre to the corners, the far rectangle, and a small roof over its top edge that says where
+    the picture's up is. Distortion is left out: at this size it cannot be seen.
+    """
+    u = np.array([-0.5, intrinsics.width - 0.5, intrinsics.width - 0.5, -0.5])
+    v = np.array([-0.5, -0.5, intrinsics.height - 0.5, intrinsics.height - 0.5])
+    corners = depth_m * np.stack([(u - intrinsics.cx) / intrinsics.fx, (v - intrinsics.cy) / intrinsics.fy,
+                                  np.ones(4)], axis=1)
+    roof = 0.5 * (corners[0] + corners[1]) + np.array([0.0, -0.18 * np.ptp(corners[:, 1]), 0.0])
+    centre = np.zeros(3)
+    segments = [end for corner in corners for end in (centre, corner)]
+    segments += [end for k in range(4) for end in (corners[k], corners[(k + 1) % 4])]
+    segments += [corners[0], roof, roof, corners[1]]
+    in_rig = np.array(segments) @ rotation_of(pose.rotation_wxyz).T + np.asarray(pose.translation_m)
+    return to_display(in_rig)

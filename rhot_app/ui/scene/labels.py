@@ -1,0 +1,81 @@
+"""Texts in the scene: each is drawn once into a small picture and then only placed, because text is slow in OpenGL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QMatrix4x4, QPainter, QPixmap
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class TextStyle:
+    """How a label looks: colour, smaller than the window's font or not, and a plate under it or none ("")."""
+
+    colour: str
+    small: bool = True
+    plate: str = ""
+
+
+class LabelPainter:
+    """Paints labels at places of the scene, centred, `lift` px above the place."""
+
+    def __init__(self) -> None:
+        self._pictures: dict[tuple[str, TextStyle, str, float], QPixmap] = {}
+
+    def clear(self) -> None:
+        """Forget the pictures, e.g. when colours change."""
+        self._pictures.clear()
+
+    def paint(self, painter: QPainter, matrix: QMatrix4x4, size: tuple[int, int], places: Array, texts: list[str],
+              style: TextStyle, lift: float = 0.0) -> None:
+        """Labels `texts` at `places` (N, 3) m; one behind the eye or without a place is left out.
+
+        `matrix` is projection times view, `size` the widget's in device-independent px.
+        """
+        if not texts:
+            return
+        rows = np.array(matrix.copyDataTo()).reshape(4, 4)
+        clip = np.column_stack([places, np.ones(len(places))]) @ rows.T
+        for (x, y, _, w), text in zip(clip, texts, strict=True):
+            if not w > 0.0:
+                continue
+            picture = self._picture(text, style, painter)
+            width, height = picture.deviceIndependentSize().width(), picture.deviceIndependentSize().height()
+            at = QPointF((x / w + 1) * 0.5 * size[0] - 0.5 * width, (1 - y / w) * 0.5 * size[1] - 0.5 * height - lift)
+            painter.drawPixmap(at, picture)
+
+    def _picture(self, text: str, style: TextStyle, painter: QPainter) -> QPixmap:
+        ratio = painter.device().devicePixelRatioF()
+        font = QFont(painter.font())
+        if style.small:
+            font.setPointSizeF(max(font.pointSizeF() - 1.5, 8.0))
+        key = (text, style, font.key(), ratio)
+        if key not in self._pictures:
+            self._pictures[key] = _draw(text, style, font, ratio)
+        return self._pictures[key]
+
+
+def _draw(text: str, style: TextStyle, font: QFont, ratio: float) -> QPixmap:
+    metrics = QFontMetricsF(font)
+    box = QRectF(0, 0, np.ceil(metrics.horizontalAdvance(text)) + 10, np.ceil(metrics.height()) + 2)
+    picture = QPixmap(round(box.width() * ratio), round(box.height() * ratio))
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(picture)
+    painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.TextAntialiasing)
+    if style.plate:
+        ground = QColor(style.plate)
+        ground.setAlpha(190)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(ground)
+        painter.drawRoundedRect(box, 4, 4)
+    painter.setFont(font)
+    painter.setPen(QColor(style.colour))
+    painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+    painter.end()
+    return picture

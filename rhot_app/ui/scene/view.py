@@ -1,0 +1,172 @@
+"""The scene's widget: hand, markers, cameras and floor; orbit, pan, zoom; F frames the hand, Home resets the view."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from pyqtgraph.opengl import GLLinePlotItem, GLViewWidget
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent, QPainter, QVector3D
+from PySide6.QtWidgets import QWidget
+
+from rhot_app.project import Rig
+from rhot_app.tracking.state import HandState
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.rows import short_name
+from rhot_app.ui.scene import stage
+from rhot_app.ui.scene.actors import Actors
+from rhot_app.ui.scene.frames import frustum_lines, to_display
+from rhot_app.ui.scene.labels import LabelPainter, TextStyle
+
+Array = NDArray[np.float64]
+
+_FIELD_OF_VIEW_DEG = 50.0
+_FRUSTUM_M = 0.09
+_HOME_DISTANCE_M = 1.15
+_HOME_CENTRE_M = (0.0, 0.42, -0.03)
+_HOME_AZIMUTH_DEG = -62.0
+_HOME_ELEVATION_DEG = 20.0
+_FRAMED_DISTANCE_M = 0.42
+
+
+class SceneView(GLViewWidget):  # type: ignore[misc]
+    """`show_rig` sets what does not move, `show_state` poses the rest.
+
+    Left drag turns, middle drag or Ctrl + left drag moves, the wheel zooms, the arrow keys turn.
+    """
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("scene")
+        self.setMinimumSize(320, 200)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("Three-dimensional scene of the hand and the cameras")
+        self._scheme = scheme
+        self._rig: Rig | None = None
+        self._state: HandState | None = None
+        self._actors: Actors | None = None
+        self._labels = LabelPainter()
+        self._show_labels = True
+        self._show_clouds = True
+        self._cameras: list[tuple[str, Array]] = []
+        self._rebuild()
+        self.reset_view()
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        self._rebuild()
+
+    def show_rig(self, rig: Rig | None) -> None:
+        """Another rig: other cameras, markers and hand. None shows the empty floor."""
+        self._rig = rig
+        self._state = None
+        self._rebuild()
+
+    def show_state(self, state: HandState | None) -> None:
+        """Pose hand and markers; None hides them."""
+        self._state = state
+        self._pose()
+        self.update()
+
+    def show_names(self, visible: bool) -> None:
+        """Marker names beside the markers, or not."""
+        self._show_labels = visible
+        self.update()
+
+    def show_clouds(self, visible: bool) -> None:
+        """Clouds of the markers' covariance, or not."""
+        self._show_clouds = visible
+        if self._actors is not None:
+            self._actors.show_clouds = visible
+        self.show_state(self._state)
+
+    def reset_view(self) -> None:
+        """Back to the view from above and behind the cameras."""
+        self.setCameraParams(fov=_FIELD_OF_VIEW_DEG, center=QVector3D(*_HOME_CENTRE_M), distance=_HOME_DISTANCE_M,
+                             azimuth=_HOME_AZIMUTH_DEG, elevation=_HOME_ELEVATION_DEG)
+        self.update()
+
+    def frame_hand(self) -> None:
+        """Bring the hand into the middle, near enough to see every finger; without a hand, reset the view."""
+        joints = self._state.joint_positions if self._state is not None else np.full((1, 3), np.nan)
+        joints = joints[np.isfinite(joints).all(axis=1)]
+        if not len(joints):
+            self.reset_view()
+            return
+        middle = to_display(0.5 * (joints.min(axis=0) + joints.max(axis=0)))
+        self.setCameraParams(center=QVector3D(*(float(v) for v in middle)), distance=_FRAMED_DISTANCE_M)
+        self.update()
+
+    def keyPressEvent(self, ev: QKeyEvent) -> None:  # noqa: N802
+        """The arrow keys turn the view; every other key goes to the window's shortcuts."""
+        if ev.key() in self.noRepeatKeys:
+            super().keyPressEvent(ev)
+        else:
+            ev.ignore()
+
+    def paintGL(self) -> None:  # noqa: N802
+        """The scene, then the labels over it in one painter."""
+        super().paintGL()
+        painter = QPainter(self)
+        painter.setFont(self.font())
+        self._paint_labels(painter)
+        painter.end()
+
+    def _rebuild(self) -> None:
+        """New items for another rig or scheme; never while the hand moves."""
+        self.clear()
+        self._labels.clear()
+        self.setBackgroundColor(pg.mkColor(self._scheme.scene))
+        self._cameras = []
+        self._add_stage()
+        self._actors = None
+        if self._rig is not None:
+            self._add_cameras(self._rig)
+            self._actors = Actors(self._rig, self._scheme)
+            self._actors.show_clouds = self._show_clouds
+            for item in self._actors.items:
+                self.addItem(item)
+        self._pose()
+        self.update()
+
+    def _pose(self) -> None:
+        if self._actors is None:
+            return
+        if self._state is None:
+            self._actors.hide()
+        else:
+            self._actors.pose(self._state)
+
+    def _add_lines(self, segments: Array, colour: Array | str, width: float = 1.0, depth: int = -10) -> None:
+        item = GLLinePlotItem(pos=segments, color=colour if isinstance(colour, np.ndarray) else pg.mkColor(colour),
+                              width=width, mode="lines", antialias=True, glOptions="translucent")
+        item.setDepthValue(depth)
+        self.addItem(item)
+
+    def _add_stage(self) -> None:
+        segments, strong = stage.floor_lines()
+        self._add_lines(segments[~strong], self._scheme.grid)
+        self._add_lines(np.concatenate([segments[strong], stage.height_lines()]), self._scheme.grid_strong)
+        axes, colours = stage.axis_lines()
+        self._add_lines(axes, colours, width=2.0, depth=-5)
+
+    def _add_cameras(self, rig: Rig) -> None:
+        frusta = [frustum_lines(node.intrinsics, node.pose, _FRUSTUM_M) for node in rig.nodes]
+        self._add_lines(np.concatenate(frusta), self._scheme.frustum, width=1.5, depth=-5)
+        self._cameras = [(node.name, lines[-2]) for node, lines in zip(rig.nodes, frusta, strict=True)]
+
+    def _paint_labels(self, painter: QPainter) -> None:
+        matrix = self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()
+        size = (self.width(), self.height())
+        muted, plain = TextStyle(self._scheme.muted), TextStyle(self._scheme.text)
+        for labels, style in ((stage.tick_labels(), muted), (stage.axis_labels(), plain)):
+            self._labels.paint(painter, matrix, size, np.array([label.place for label in labels]),
+                               [label.text for label in labels], style)
+        self._labels.paint(painter, matrix, size, np.array([place for _, place in self._cameras]),
+                           [name for name, _ in self._cameras], muted, lift=10.0)
+        if self._state is not None and self._show_labels:
+            style = TextStyle(self._scheme.text, small=False, plate=self._scheme.scene)
+            self._labels.paint(painter, matrix, size, to_display(self._state.marker_positions),
+                               [short_name(name) for name in self._state.marker_ids], style, lift=24.0)
