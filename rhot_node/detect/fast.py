@@ -1,0 +1,167 @@
+"""The fast detector: predicted windows for tracked markers, one pass over the frame for all lost ones.
+
+Works on the planes of a YUV420 image as the camera delivers them, in one thread.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_node.detect import measure as m
+from rhot_node.detect import position as p
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.labels import acquisition_table, directions, sector_table
+from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN, Searcher
+from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, Track, lost_observation
+from rhot_node.markers import MarkerSet
+from rhot_node.wire.messages import MarkerFlag, MarkerObservation
+
+Blobs = NDArray[np.float64]
+
+AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
+AS_PLAUSIBLE = 0.5  # merit of a second blob, as a fraction of the best, that makes the choice ambiguous
+NOISE_START = 1.5  # grey levels of chroma noise, until the first frames have told
+NOISE_MIN = 0.5  # quantisation alone leaves 0.3
+NOISE_GAIN = 0.1
+
+
+class FastDetector:
+    """Finds every marker of a set in one YUV420 image after the other; see `rhot_node.detect.detector.Detector`."""
+
+    def __init__(self, markers: MarkerSet) -> None:
+        self._markers = markers.markers
+        self._directions = directions(markers)
+        self._sector = sector_table(markers)
+        limits = np.array([(mark.chroma.luma_min, mark.chroma.luma_max) for mark in self._markers], dtype=np.uint8)
+        self._searcher = Searcher(acquisition_table(markers), limits)
+        self._request = np.zeros(m.REQUEST_COLUMNS)
+        self._row = np.zeros(m.MEASURE_COLUMNS)
+        self._scratch = m.Scratch(0, 0)
+        self._tracks: list[Track] = []
+        self._noise_variance = NOISE_START**2
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all tracks: the next frame is searched as a whole."""
+        self._tracks = [Track(marker.shape) for marker in self._markers]
+
+    def warm(self) -> None:
+        """Compile everything now, so that the first frame is not late by seconds."""
+        detector = FastDetector(MarkerSet(markers=self._markers))
+        image = YuvImage(np.full((64, 64), 128, np.uint8), np.full((32, 32), 128, np.uint8),
+                         np.full((32, 32), 128, np.uint8))
+        chroma = self._markers[0].chroma
+        image.u[10:20, 8:24] = min(max(round(128 + chroma.cb), 0), 255)
+        image.v[10:20, 8:24] = min(max(round(128 + chroma.cr), 0), 255)
+        detector._tracks[0].shape = "band"
+        detector.detect(image)
+        detector.detect(image)
+
+    def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """One observation per marker, in the order of the marker set; lost markers are stated as lost."""
+        self._fit_scratch(image)
+        found: dict[int, MarkerObservation] = {}
+        lost = []
+        for index, track in enumerate(self._tracks):
+            if track.alive and self._measure(image, index, track.request(self._request)):
+                found[index] = track.observe(index, self._row, self._noise, MarkerFlag(0))
+            else:
+                lost.append(index)
+        if lost:
+            self._acquire(image, lost, found)
+        return tuple(found[index] for index in range(len(self._tracks)))
+
+    def all_blobs(self, image: YuvImage) -> list[list[MarkerObservation]]:
+        """Every blob of every marker's colour, largest first, without regard to tracks; a list per marker."""
+        self._fit_scratch(image)
+        everything: list[list[MarkerObservation]] = []
+        blobs = self._search(image, range(len(self._markers))).copy()
+        for index, marker in enumerate(self._markers):
+            own = []
+            for blob in blobs[blobs[:, LABEL] == index + 1]:
+                if self._measure(image, index, self._blob_request(index, blob)):
+                    own.append(Track(marker.shape).observe(index, self._row, self._noise, MarkerFlag.ACQUIRED))
+            everything.append(sorted(own, key=lambda seen: -seen.diameter))
+        return everything
+
+    @property
+    def _noise(self) -> float:
+        return max(math.sqrt(self._noise_variance), NOISE_MIN)
+
+    def _fit_scratch(self, image: YuvImage) -> None:
+        if self._scratch.mask.shape != image.u.shape:
+            self._scratch = m.Scratch(*image.u.shape)
+            self.reset()
+
+    def _measure(self, image: YuvImage, index: int, request: NDArray[np.float64]) -> bool:
+        """Measure marker `index` into `self._row`; the paint's noise is learnt on the way."""
+        row = self._row
+        if not m.measure(image.u, image.v, self._sector, index + 1, self._directions[index], request,
+                         self._scratch.arrays, row):
+            return False
+        if row[m.NOISE_COUNT] >= 4:
+            gain = NOISE_GAIN * min(1.0, row[m.NOISE_COUNT] / 50.0)
+            self._noise_variance += gain * (row[m.NOISE_SUM] / row[m.NOISE_COUNT] - self._noise_variance)
+        return True
+
+    def _acquire(self, image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
+        """Search the whole frame for the lost markers and state each as found or lost."""
+        blobs = self._search(image, lost).copy()
+        for index in lost:
+            track = self._tracks[index]
+            best, flags = self._best_blob(index, blobs[blobs[:, LABEL] == index + 1])
+            if best is not None and self._measure(image, index, self._blob_request(index, best)):
+                self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
+                found[index] = track.observe(index, self._row, self._noise, flags)
+            else:
+                track.lose()
+                found[index] = lost_observation(index)
+
+    def _search(self, image: YuvImage, indices: list[int] | range) -> Blobs:
+        wanted = np.zeros(len(self._markers) + 1, dtype=np.bool_)
+        wanted[np.asarray(indices, dtype=np.intp) + 1] = True
+        return self._searcher.find(image.y, image.u, image.v, wanted, AREA_MIN)
+
+    def _best_blob(self, index: int, blobs: Blobs) -> tuple[Blobs | None, MarkerFlag]:
+        """The blob that is the marker: by motion and size while it is remembered, else by colour, area and form."""
+        flags = MarkerFlag.ACQUIRED
+        if len(blobs) == 0:
+            return None, flags
+        track = self._tracks[index]
+        if track.remembered:
+            costs = np.array([track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
+                              for blob in blobs])
+            order = np.argsort(costs)
+            doubtful = len(blobs) > 1 and costs[order[1]] < costs[order[0]] + RIVAL_MARGIN
+        else:
+            merits = self._merits(index, blobs)
+            order = np.argsort(-merits)
+            doubtful = len(blobs) > 1 and merits[order[1]] > AS_PLAUSIBLE * merits[order[0]]
+        return blobs[order[0]], flags | MarkerFlag.AMBIGUOUS if doubtful else flags
+
+    def _merits(self, index: int, blobs: Blobs) -> NDArray[np.float64]:
+        """(N,) area, as far as compact, of the marker's own hue, and not cut by the frame's border."""
+        chroma = self._markers[index].chroma
+        box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)
+        away = np.angle(np.exp(1j * (np.arctan2(blobs[:, SUM_V], blobs[:, SUM_U]) - chroma.hue_rad)))
+        match = np.exp(-(away / math.radians(chroma.hue_tolerance_deg)) ** 2)
+        height, width = self._scratch.mask.shape
+        cut = ((blobs[:, X_MIN] == 0) | (blobs[:, Y_MIN] == 0)
+               | (blobs[:, X_MAX] == width - 1) | (blobs[:, Y_MAX] == height - 1))
+        return np.asarray(blobs[:, AREA] ** 2 / box * match * np.where(cut, 0.5, 1.0))
+
+    def _blob_request(self, index: int, blob: Blobs) -> NDArray[np.float64]:
+        request = self._request
+        area = blob[AREA]
+        direction = self._directions[index]
+        request[m.PX], request[m.PY] = blob[SUM_X] / area, blob[SUM_Y] / area
+        request[m.HALF_X] = max(blob[X_MAX] - request[m.PX], request[m.PX] - blob[X_MIN]) + MARGIN
+        request[m.HALF_Y] = max(blob[Y_MAX] - request[m.PY], request[m.PY] - blob[Y_MIN]) + MARGIN
+        request[m.SIGMA] = 1.0 + 0.25 * math.sqrt(area)
+        request[m.AREA_REF] = area
+        request[m.LEVEL_REF] = (blob[SUM_U] * direction[0] + blob[SUM_V] * direction[1]) / area
+        request[m.IS_BAND] = self._markers[index].shape == "band"
+        return request

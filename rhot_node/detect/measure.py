@@ -1,0 +1,186 @@
+"""Measure one marker in a window: choose the component that belongs to the prediction, and place it to sub-pixel.
+
+All coordinates are chroma pixels.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from rhot_node.detect.coverage import PAD, chroma_noise, classify, unmix
+from rhot_node.detect.position import RESULT_COLUMNS, band_center, centroid
+from rhot_node.detect.window import (
+    AREA,
+    COMPONENT_COLUMNS,
+    COMPONENTS_MAX,
+    SUM_X,
+    SUM_Y,
+    X_MAX,
+    X_MIN,
+    Y_MAX,
+    Y_MIN,
+    interior_level,
+    segment,
+)
+
+# Columns of a request: where the marker is expected, how far to look, how big and how saturated it was.
+PX, PY, HALF_X, HALF_Y, SIGMA, AREA_REF, LEVEL_REF, IS_BAND = range(8)
+REQUEST_COLUMNS = 8
+# Columns of a result, after those of rhot_node.detect.position.
+LEVEL, AT_BORDER, FRAGMENTS, COST, RIVAL_COST, NOISE_SUM, NOISE_COUNT = range(RESULT_COLUMNS, RESULT_COLUMNS + 7)
+MEASURE_COLUMNS = RESULT_COLUMNS + 7
+
+ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
+LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed one is used for another attempt
+SHRINK_SIGMA = 0.6  # of the log area, towards smaller: hidden markers are common
+GROW_SIGMA = 0.35  # and towards larger: markers do not grow in one frame
+FRAGMENT_REACH = 1.0  # diameters from the prediction within which pieces of a marker are put together
+FRAGMENT_AREA = 1.2  # of the expected area: more is another object
+
+
+class Scratch:
+    """Planes and tables that `measure` works in, for chroma planes of one size."""
+
+    def __init__(self, height: int, width: int) -> None:
+        self.mask = np.zeros((height, width), dtype=np.int16)
+        self.kind = np.zeros((height, width), dtype=np.uint8)
+        self.coverage = np.zeros((height, width), dtype=np.float32)
+        self.gain = np.zeros((height, width), dtype=np.float32)
+        self.stack = np.zeros(height * width, dtype=np.int32)
+        self.components = np.zeros((COMPONENTS_MAX, COMPONENT_COLUMNS))
+        self.own = np.zeros(COMPONENTS_MAX, dtype=np.bool_)
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """In the order `measure` takes them."""
+        return self.mask, self.kind, self.coverage, self.gain, self.stack, self.components, self.own
+
+
+@njit(cache=True)
+def measure(u, v, sector, label, direction, request, scratch, result):  # type: ignore[no-untyped-def]
+    """Fill `result` (MEASURE_COLUMNS) for the marker `label`; False when the window does not show it."""
+    mask, kind, coverage, gain, stack, components, own = scratch
+    level = request[LEVEL_REF]
+    half_x, half_y = request[HALF_X], request[HALF_Y]
+    found = False
+    for attempt in range(ATTEMPTS):
+        window = _clamp(request[PX] - half_x, request[PX] + half_x, request[PY] - half_y, request[PY] + half_y, u)
+        if window[0] > window[1] or window[2] > window[3]:
+            return False
+        count = segment(u, v, sector, label, direction, level, window, mask, stack, components)
+        if count == 0:
+            if attempt > 0:
+                return False
+            level *= 0.6  # a lamp went out?
+            continue
+        best = _choose(components, count, request, own, result)
+        found = True
+        here = interior_level(u, v, direction, components[best], best, mask)
+        if here > 0.0 and abs(here / level - 1.0) > LEVEL_TOLERANCE:
+            level = here
+        elif _cut_by_window(components[best], window, u):
+            half_x = half_x + 0.5 * (window[1] - window[0] + 1)
+            half_y = half_y + 0.5 * (window[3] - window[2] + 1)
+        else:
+            break
+        if attempt + 1 < ATTEMPTS:
+            found = False
+    if not found:
+        return False
+    return _place(u, v, window, count, level, request, scratch, result)
+
+
+@njit(cache=True)
+def _place(u, v, window, count, level, request, scratch, result):  # type: ignore[no-untyped-def]
+    """Coverage, position and noise of the components marked in `own`."""
+    mask, kind, coverage, gain, stack, components, own = scratch
+    x0 = y0 = 1e9
+    x1 = y1 = -1.0
+    for number in range(count):
+        if own[number]:
+            x0, x1 = min(x0, components[number, X_MIN]), max(x1, components[number, X_MAX])
+            y0, y1 = min(y0, components[number, Y_MIN]), max(y1, components[number, Y_MAX])
+    region = _clamp(x0 - PAD, x1 + PAD, y0 - PAD, y1 + PAD, u)
+    _clear_beyond(region, window, mask)
+    classify(region, own, mask, kind, stack)
+    unmix(u, v, region, level, kind, coverage, gain)
+    if not centroid(region, coverage, gain, result):
+        return False
+    at_border = x0 == 0 or y0 == 0 or x1 == u.shape[1] - 1 or y1 == u.shape[0] - 1
+    if request[IS_BAND] > 0.0 and not at_border:
+        band_center(region, coverage, gain, result)
+    result[LEVEL] = level
+    result[AT_BORDER] = 1.0 if at_border else 0.0
+    result[NOISE_SUM], result[NOISE_COUNT] = chroma_noise(u, v, region, kind)
+    return True
+
+
+@njit(cache=True)
+def _clamp(x0, x1, y0, y1, plane):  # type: ignore[no-untyped-def]
+    height, width = plane.shape
+    return (max(int(np.floor(x0)), 0), min(int(np.ceil(x1)), width - 1),
+            max(int(np.floor(y0)), 0), min(int(np.ceil(y1)), height - 1))
+
+
+@njit(cache=True)
+def _clear_beyond(region, window, mask):  # type: ignore[no-untyped-def]
+    """The mask outside the window is from some other marker: nothing of this one is there."""
+    for row in range(region[2], region[3] + 1):
+        for column in range(region[0], region[1] + 1):
+            if row < window[2] or row > window[3] or column < window[0] or column > window[1]:
+                mask[row, column] = 0
+
+
+@njit(cache=True)
+def _cut_by_window(component, window, plane):  # type: ignore[no-untyped-def]
+    """Does the component reach a side of the window that is not the frame's border?"""
+    height, width = plane.shape
+    return ((component[X_MIN] == window[0] and window[0] > 0)
+            or (component[X_MAX] == window[1] and window[1] < width - 1)
+            or (component[Y_MIN] == window[2] and window[2] > 0)
+            or (component[Y_MAX] == window[3] and window[3] < height - 1))
+
+
+@njit(cache=True)
+def _cost(component, request):  # type: ignore[no-untyped-def]
+    """How far a component is from the hypothesis, in squared standard deviations of motion and size."""
+    dx = component[SUM_X] / component[AREA] - request[PX]
+    dy = component[SUM_Y] / component[AREA] - request[PY]
+    size = np.log(component[AREA] / request[AREA_REF])
+    size /= GROW_SIGMA if size > 0.0 else SHRINK_SIGMA
+    return (dx * dx + dy * dy) / request[SIGMA] ** 2 + size * size
+
+
+@njit(cache=True)
+def _choose(components, count, request, own, result):  # type: ignore[no-untyped-def]
+    """Mark the component nearest to the hypothesis, and its fragments, in `own`; return the former.
+
+    Pieces of a marker that a finger crosses count as one, as long as they are together no larger than the marker was.
+    """
+    best = 0
+    best_cost = np.inf
+    for number in range(count):
+        own[number] = False
+        cost = _cost(components[number], request)
+        if cost < best_cost:
+            best, best_cost = number, cost
+    own[best] = True
+    total = components[best, AREA]
+    reach = FRAGMENT_REACH * np.sqrt(4.0 / np.pi * request[AREA_REF])
+    fragments = 1
+    rival_cost = np.inf
+    for number in range(count):
+        if number == best:
+            continue
+        component = components[number]
+        away = np.hypot(component[SUM_X] / component[AREA] - request[PX],
+                        component[SUM_Y] / component[AREA] - request[PY])
+        if away < reach and total + component[AREA] <= FRAGMENT_AREA * request[AREA_REF]:
+            own[number] = True
+            total += component[AREA]
+            fragments += 1
+        else:
+            rival_cost = min(rival_cost, _cost(component, request))
+    result[COST], result[RIVAL_COST], result[FRAGMENTS] = best_cost, rival_cost, fragments
+    return best

@@ -1,0 +1,170 @@
+"""The track of one marker: what the last frames say about where it is, how big it is and how it looks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_node.detect import measure as m
+from rhot_node.detect import position as p
+from rhot_node.markers import Shape
+from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
+
+Row = NDArray[np.float64]
+
+MEMORY_FRAMES = 40  # how long a lost marker's motion and size are held against candidates
+VELOCITY_GAIN = 0.7
+REFERENCE_GAIN = 0.3  # per frame: an approach of 5 % area per frame leaves the reference 17 % behind
+HIDDEN_DECAY = 0.985  # per frame: what looks hidden for long is believed to be that small
+PARTIAL_AREA = 0.75  # of the reference
+JUMP_AREA = 1.8  # of the reference: something else joined the marker
+RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
+FLOOR_VARIANCE = 4e-4  # px^2: sampling and shading leave about 0.02 px
+NOISE_INFLATION = 1.2  # paint and surroundings are themselves means of few noisy pixels
+MARGIN = 5.0  # chroma px around a resting marker
+
+CHROMA_TO_LUMA = 2.0
+SITING = 0.5  # chroma (x, y) lies at luma 2 (x, y) + 0.5
+
+
+@dataclass(slots=True)
+class Track:
+    """State between frames; chroma pixels."""
+
+    shape: Shape
+    alive: bool = False
+    missed: int = MEMORY_FRAMES
+    x: float = 0.0
+    y: float = 0.0
+    vx: float = 0.0  # px per frame
+    vy: float = 0.0
+    area: float = 0.0  # reference
+    extent: float = 0.0  # length along the major axis
+    level: float = 0.0
+    fitted: bool = False  # a band's curvature is known
+    sag_x: float = 0.0  # from a band's centre to its centroid
+    sag_y: float = 0.0
+
+    @property
+    def remembered(self) -> bool:
+        """Is the last sight recent enough to judge candidates by?"""
+        return self.missed < MEMORY_FRAMES
+
+    def request(self, out: Row) -> Row:
+        """Where to look in the next frame: constant velocity, with a margin that grows with speed and size."""
+        speed = math.hypot(self.vx, self.vy)
+        half = 0.5 * self.extent + MARGIN + 0.15 * self.extent + 0.75 * speed
+        out[m.PX] = self.x + self.vx + self.sag_x
+        out[m.PY] = self.y + self.vy + self.sag_y
+        out[m.HALF_X] = out[m.HALF_Y] = half
+        out[m.SIGMA] = 1.5 + 0.15 * self.extent + 0.4 * speed
+        out[m.AREA_REF], out[m.LEVEL_REF] = self.area, self.level
+        out[m.IS_BAND] = self.shape == "band"
+        return out
+
+    def candidate_cost(self, x: float, y: float, area: float) -> float:
+        """How badly a blob of a full search fits the last sight, in squared standard deviations."""
+        gap = self.missed + 1
+        reach = self.extent + gap * (3.0 + 0.75 * math.hypot(self.vx, self.vy))
+        hold = min(gap, 4)  # a velocity says little after a few frames
+        away = math.hypot(x - self.x - hold * self.vx, y - self.y - hold * self.vy) / reach
+        size = math.log(area / self.area) / (0.35 + 0.02 * gap)
+        return away * away + size * size
+
+    def lose(self) -> None:
+        """Not in this frame."""
+        self.alive = False
+        self.missed = min(self.missed + 1, MEMORY_FRAMES)
+
+    def observe(self, index: int, row: Row, noise: float, flags: MarkerFlag) -> MarkerObservation:
+        """Judge a measured row by the last frames, state it as an observation and take it into the track.
+
+        `noise`: standard deviation of the chroma noise, grey levels.
+        """
+        known = self.remembered and self.area > 0.0
+        ratio = row[p.AREA] / self.area if known else 1.0
+        extent = math.sqrt(12.0 * row[p.VAR_MAJOR])
+        flags |= self._judge(row, ratio, known)
+        x, y = float(row[p.X]), float(row[p.Y])
+        bias = self._plausible_bias(row, ratio, extent, flags)
+        if self.shape == "band" and not row[p.FIT]:
+            x, y = x - self.sag_x, y - self.sag_y
+            bias = math.hypot(bias, 0.5 * math.hypot(self.sag_x, self.sag_y) if self.fitted else 0.3 * extent)
+        self._update(row, x, y, extent, ratio, known, flags)
+        return _observation(index, row, x, y, bias, noise, ratio, flags)
+
+    def _judge(self, row: Row, ratio: float, known: bool) -> MarkerFlag:
+        flags = NO_FLAGS
+        if row[m.AT_BORDER]:
+            flags |= MarkerFlag.EDGE
+        elongated = self.shape == "sphere" and row[p.VAR_MAJOR] > 1.7 * row[p.VAR_MINOR] + 1.0
+        broken = self.shape == "band" and self.fitted and not row[p.FIT]
+        if ratio < PARTIAL_AREA or row[m.FRAGMENTS] > 1 or elongated or (broken and ratio < 0.93):
+            flags |= MarkerFlag.PARTIAL
+        if row[m.RIVAL_COST] < row[m.COST] + RIVAL_MARGIN or (known and ratio > JUMP_AREA):
+            flags |= MarkerFlag.AMBIGUOUS
+        return flags
+
+    def _plausible_bias(self, row: Row, ratio: float, extent: float, flags: MarkerFlag) -> float:
+        """Standard deviation, chroma px, of how far what is hidden or mistaken may have drawn the centroid."""
+        bias = 0.0
+        whole = max(extent, self.extent)
+        if flags & MarkerFlag.PARTIAL:
+            bias = 0.5 * max(1.0 - ratio, 0.1) * whole
+        if flags & MarkerFlag.EDGE:
+            bias = max(bias, 0.15 * whole)
+        if flags & MarkerFlag.AMBIGUOUS:
+            bias = max(bias, 0.3 * extent)
+        return bias
+
+    def _update(self, row: Row, x: float, y: float, extent: float, ratio: float, known: bool,
+                flags: MarkerFlag) -> None:
+        gap = self.missed + 1
+        if known:
+            gain = VELOCITY_GAIN if self.alive else 1.0
+            self.vx += gain * ((x - self.x) / gap - self.vx)
+            self.vy += gain * ((y - self.y) / gap - self.vy)
+        else:
+            self.vx = self.vy = 0.0
+        self.x, self.y, self.level = x, y, float(row[m.LEVEL])
+        if not known:
+            self.area, self.extent = float(row[p.AREA]), extent
+        elif flags & (MarkerFlag.PARTIAL | MarkerFlag.EDGE) and ratio < 1.0:
+            self.area *= HIDDEN_DECAY
+        else:
+            self.area += REFERENCE_GAIN * (float(row[p.AREA]) - self.area)
+            self.extent = extent
+        if not known:
+            self.fitted, self.sag_x, self.sag_y = False, 0.0, 0.0
+        if row[p.FIT]:
+            sag = 0.25 * math.pi * row[p.SAG]
+            self.fitted, self.sag_x, self.sag_y = True, -row[p.AXIS_Y] * sag, row[p.AXIS_X] * sag
+        self.alive, self.missed = True, 0
+
+
+def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: float, ratio: float,
+                 flags: MarkerFlag) -> MarkerObservation:
+    scale = CHROMA_TO_LUMA**2 * NOISE_INFLATION * noise**2
+    widened = FLOOR_VARIANCE + (CHROMA_TO_LUMA * bias) ** 2
+    area = float(row[p.AREA])
+    quality = min(1.0, row[m.LEVEL] / (15.0 * noise)) * min(1.0, area / 12.0)
+    if flags & MarkerFlag.PARTIAL:
+        quality *= min(ratio, 0.8)
+    if flags & MarkerFlag.EDGE:
+        quality *= 0.7
+    if flags & MarkerFlag.AMBIGUOUS:
+        quality *= 0.5
+    return MarkerObservation(
+        index=index, x=CHROMA_TO_LUMA * x + SITING, y=CHROMA_TO_LUMA * y + SITING,
+        diameter=CHROMA_TO_LUMA * math.sqrt(4.0 * area / math.pi),
+        cov_xx=scale * float(row[p.COV_XX]) + widened, cov_xy=scale * float(row[p.COV_XY]),
+        cov_yy=scale * float(row[p.COV_YY]) + widened, quality=float(quality), flags=flags)
+
+
+def lost_observation(index: int) -> MarkerObservation:
+    """A marker that is stated as lost."""
+    nan = math.nan
+    return MarkerObservation(index, nan, nan, 0.0, nan, nan, nan, 0.0, MarkerFlag.LOST)
