@@ -5,17 +5,19 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import logging
+import secrets
 import socket
 import threading
 import time
 from collections import deque
+from collections.abc import Iterable
 
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind
-from rhot_app.sources.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.tap import Tap
 from rhot_node.errors import WireError
+from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import ClockReply, Start, StartEntry, Stop
 
@@ -34,6 +36,11 @@ _DATAGRAM_MAX = 2048
 log = logging.getLogger(__name__)
 
 
+def new_session() -> int:
+    """A session number that no node has seen."""
+    return secrets.randbits(62) | 1
+
+
 class NodeLinks:
     """Talks to all nodes of a rig. `step` waits for answers and sends what is due; `start_thread` runs it."""
 
@@ -43,12 +50,11 @@ class NodeLinks:
         self._recent: deque[tuple[RecordKind, int, int, bytes]] = deque(maxlen=RECENT * len(links))
         self.broadcast_failure = ""
         self._links = {link.node.node_id: link for link in links if not link.node.text_datagrams}
-        self._entries = tuple(StartEntry(link.node.node_id, port, 0)
-                              for link, port in zip(links, data_ports, strict=True) if not link.node.text_datagrams)
+        self._entries = {link.node.node_id: StartEntry(link.node.node_id, port, 0)
+                         for link, port in zip(links, data_ports, strict=True) if not link.node.text_datagrams}
         self._broadcast = (rig.broadcast.address, rig.broadcast.port)
         self._addresses: dict[int, str | None] = {}
         self._due_ns = dict.fromkeys(self._links, 0)
-        self._session = 0
         self._sequence = 0
         self._lock = threading.Lock()
         self._ending = threading.Event()
@@ -62,35 +68,38 @@ class NodeLinks:
     def start(self, session: int) -> None:
         """Tell every node to stream `session`, by broadcast (RHOT 7.1) and each at its own address."""
         with self._lock:
-            self._session = session
             now_ns = time.monotonic_ns()
-            datagram = self._start_datagram(now_ns)
+            datagram = self._encode_start(session, self._entries.values())
+            self._note(RecordKind.START, 0, now_ns, datagram)
             self._send_broadcast(datagram)
             for link in self._links.values():
-                link.started(now_ns)
+                link.want(session, now_ns)
                 self._send(link, datagram)
 
     def stop(self) -> None:
-        """Tell every node to stop streaming our session, twice, because nobody asks again."""
+        """Tell every node to stop what it streams for us, twice, because nobody asks again."""
         with self._lock:
-            session, self._session = self._session, 0
-            if not session:
-                return
-            self._sequence += 1
-            datagram = encode(Stop(session, self._sequence))
-            self._note(RecordKind.STOP, 0, time.monotonic_ns(), datagram)
-            for _ in range(2):
-                self._send_broadcast(datagram)
-                for link in self._links.values():
-                    self._send(link, datagram)
+            now_ns = time.monotonic_ns()
+            for session in {link.wanted for link in self._links.values() if link.wanted}:
+                self._sequence += 1
+                datagram = encode(Stop(session, self._sequence))
+                self._note(RecordKind.STOP, 0, now_ns, datagram)
+                for _ in range(2):
+                    self._send_broadcast(datagram)
+                    for link in self._links.values():
+                        self._send(link, datagram)
+            for link in self._links.values():
+                link.want(0, now_ns)
 
     def record_to(self, tap: Tap | None) -> None:
         """Hand every command datagram to `tap` from now on: first the running session and the last exchanges,
         without which a recording that begins now could not tell the nodes' times."""
         with self._lock:
             if tap is not None:
-                if self._session:
-                    tap.put(RecordKind.START, 0, time.monotonic_ns(), self._encode_start())
+                for node_id, link in self._links.items():
+                    if link.wanted:
+                        datagram = self._encode_start(link.wanted, [self._entries[node_id]])
+                        tap.put(RecordKind.START, node_id, time.monotonic_ns(), datagram)
                 for record in list(self._recent):
                     tap.put(*record)
             self._tap = tap
@@ -109,10 +118,8 @@ class NodeLinks:
         now_ns = time.monotonic_ns()
         with self._lock:
             for node_id, link in self._links.items():
-                if self._session and link.wants_start(self._session, now_ns):
-                    datagram = self._start_datagram(now_ns)
-                    link.started(now_ns)
-                    self._send(link, datagram)
+                if link.wants_start(now_ns):
+                    self._start_again(link, now_ns)
                 if now_ns >= self._due_ns[node_id]:
                     self._ask(link, now_ns)
 
@@ -154,18 +161,22 @@ class NodeLinks:
         known = link.clock.estimate_at(now_ns) is not None or link.silent(now_ns)
         self._due_ns[link.node.node_id] = now_ns + (REQUEST_NS if known else EAGER_NS)
         t1_ns = time.monotonic_ns()
-        datagram = encode(link.request(self._session, t1_ns))
+        datagram = encode(link.request(t1_ns))
         self._send(link, datagram)
         self._note(RecordKind.CLOCK_REQUEST, link.node.node_id, t1_ns, datagram)
 
-    def _encode_start(self) -> bytes:
-        self._sequence += 1
-        return encode(Start(self._session, self._sequence, self._entries))
+    def _start_again(self, link: NodeLink, now_ns: int) -> None:
+        """A node that starts anew or was without us for long takes no old session up: it gets one of its own."""
+        session = new_session()
+        log.info("node %s is started again, session %d", link.node.name, session)
+        datagram = self._encode_start(session, [self._entries[link.node.node_id]])
+        self._note(RecordKind.START, link.node.node_id, now_ns, datagram)
+        link.want(session, now_ns)
+        self._send(link, datagram)
 
-    def _start_datagram(self, now_ns: int) -> bytes:
-        datagram = self._encode_start()
-        self._note(RecordKind.START, 0, now_ns, datagram)
-        return datagram
+    def _encode_start(self, session: int, entries: Iterable[StartEntry]) -> bytes:
+        self._sequence += 1
+        return encode(Start(session, self._sequence, tuple(entries)))
 
     def _send(self, link: NodeLink, datagram: bytes) -> None:
         address = self._addresses.get(link.node.node_id)

@@ -29,6 +29,7 @@ class NodeLink:
         self.door = NodeDoor(rig, camera, self.clock)
         self.state: NodeState | None = None
         self.session = 0  # the node's own word
+        self.wanted = 0  # the session we told it to stream; 0: none
         self.clock_changes = 0  # boots and steps: what the tracker knows of this node's times is void
         self.unexpected_replies = 0
         self._boot_id: int | None = None
@@ -36,11 +37,13 @@ class NodeLink:
         self._pending: dict[int, int] = {}
         self._last_reply_ns: int | None = None
         self._last_start_ns: int | None = None
+        self._ready_since_ns: int | None = None
+        self._was_ours = False
 
-    def request(self, session: int, t1_master_ns: int) -> ClockRequest:
-        """The next clock request, to be sent now."""
+    def request(self, t1_master_ns: int) -> ClockRequest:
+        """The next clock request, to be sent now; it tells the node which session its master runs."""
         self._sequence = (self._sequence + 1) & 0xFFFFFFFF
-        request = ClockRequest(self.node.node_id, session, self._sequence, t1_master_ns)
+        request = ClockRequest(self.node.node_id, self.wanted, self._sequence, t1_master_ns)
         self.sent(request)
         return request
 
@@ -63,29 +66,42 @@ class NodeLink:
             self.door.sequence.restart()  # a daemon that starts anew counts from 0 again
         self.state = reply.state
         self.session = reply.session
+        self._was_ours |= self.wanted != 0 and reply.session == self.wanted
+        if reply.state is not NodeState.READY or not self.wanted:
+            self._ready_since_ns = None
+        elif self._ready_since_ns is None:
+            self._ready_since_ns = t4_master_ns
         self._last_reply_ns = t4_master_ns
         return True
 
-    def wants_start(self, session: int, now_ns: int) -> bool:
-        """Whether the node answers but does not stream `session`, and was not told so just now."""
-        if self.node.text_datagrams or self.silent(now_ns):
+    def want(self, session: int, now_ns: int) -> None:
+        """We are telling the node to stream `session` now (0: nothing), and admit only that."""
+        self.wanted = session
+        self._was_ours = False
+        self._last_start_ns = now_ns
+        self.door.expect_session(session)
+
+    def wants_start(self, now_ns: int) -> bool:
+        """Whether the node answers but does not stream for us, and was not told so just now.
+
+        A node that left our session for another master's is not fought for: the last start wins.
+        """
+        if not self.wanted or self.node.text_datagrams or self.silent(now_ns):
             return False
         if self._last_start_ns is not None and now_ns - self._last_start_ns < RESTART_NS:
             return False
-        elsewhere = self.state is NodeState.STREAMING and self.session != session
-        return elsewhere or self.state is NodeState.READY
+        return self.state is NodeState.READY or (self.streams_elsewhere and not self._was_ours)
 
-    def started(self, now_ns: int) -> None:
-        """A start was sent: if the node was not streaming, its sequence begins anew."""
-        self._last_start_ns = now_ns
-        self.door.sequence.restart()
+    @property
+    def streams_elsewhere(self) -> bool:
+        """Whether the node streams, but not the session that we want."""
+        return self.wanted != 0 and self.state is NodeState.STREAMING and self.session != self.wanted
+
+    def not_started_s(self, now_ns: int) -> float:
+        """How long the node has been ready although it was told to stream, s."""
+        return 0.0 if self._ready_since_ns is None else 1e-9 * (now_ns - self._ready_since_ns)
 
     def silent(self, now_ns: int) -> bool:
         """Whether neither an answer nor an accepted datagram came lately."""
         heard_ns = max(self._last_reply_ns or 0, self.door.last_t_receive_ns)
         return heard_ns == 0 or now_ns - heard_ns > SILENT_NS
-
-    @property
-    def heard(self) -> bool:
-        """Whether the node has ever answered or sent."""
-        return self._last_reply_ns is not None or self.door.last_t_receive_ns > 0

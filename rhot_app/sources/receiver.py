@@ -11,8 +11,8 @@ from queue import Empty, SimpleQueue
 
 from rhot_app.errors import SourceError
 from rhot_app.sources.door import NodeDoor, Verified
-from rhot_app.sources.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 
 RECEIVE_BUFFER = 4 << 20
 """Bytes asked of the kernel: half a second of a 10,000 datagrams/s flood (each costs the kernel ~800 bytes)."""

@@ -54,9 +54,9 @@ class LogDoor:
             return
         if isinstance(message, Start):
             self.starts += 1
-            for link in self.links:
-                if not link.node.text_datagrams:
-                    link.door.expect_session(message.session)
+            for entry in message.entries:
+                if (started := self._by_id.get(entry.node_id)) is not None:
+                    started.door.expect_session(message.session)
         elif isinstance(message, ClockRequest | ClockReply):
             asked = self._by_id.get(message.node_id)
             if asked is not None and isinstance(message, ClockRequest):

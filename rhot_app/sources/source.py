@@ -14,10 +14,25 @@ from rhot_app.sources.tap import Tap
 class ObservationSource(Protocol):
     """Delivers verified frames of all cameras of a rig into `frames`, from threads of its own."""
 
-    frames: FrameQueue
-    links: Sequence[NodeLink]  # in the order of the rig's nodes
-    receivers: Sequence[NodeReceiver]  # likewise; none in a replay
-    live: bool  # whether receive times are of this moment, so that latency means something
+    @property
+    def frames(self) -> FrameQueue:
+        """Where the frames go."""
+        ...
+
+    @property
+    def links(self) -> Sequence[NodeLink]:
+        """What is known of each node, in the order of the rig's nodes."""
+        ...
+
+    @property
+    def receivers(self) -> Sequence[NodeReceiver]:
+        """Likewise; none in a replay."""
+        ...
+
+    @property
+    def live(self) -> bool:
+        """Whether receive times are of this moment, so that latency means something."""
+        ...
 
     @property
     def changes(self) -> int:

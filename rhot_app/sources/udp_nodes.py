@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind
@@ -53,7 +54,7 @@ class UdpNodes:
     def start(self, session: int) -> None:
         """Admit `session` and tell every node to stream it."""
         for link in self.links:
-            link.door.expect_session(session)
+            link.want(session, time.monotonic_ns())
         self._starts += 1
         self._commands.start(session)
 
@@ -61,7 +62,7 @@ class UdpNodes:
         """Tell every node to stop, and admit nothing more."""
         self._commands.stop()
         for link in self.links:
-            link.door.expect_session(0)
+            link.want(0, time.monotonic_ns())
 
     def record_to(self, tap: Tap | None) -> None:
         """Tap all sockets; None ends it."""

@@ -1,0 +1,72 @@
+"""The ``rhot`` command: hands each subcommand to the room it belongs to."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from types import ModuleType
+
+from rhot_app.errors import RhotError
+from rhot_node.errors import NodeError
+
+
+@dataclass(frozen=True, slots=True)
+class Subcommand:
+    """A subcommand and the module that has its ``add_arguments(parser)`` and ``run(args) -> int``."""
+
+    module: str
+    summary: str
+
+
+APP = "rhot_app.ui.app"
+SUBCOMMANDS = {
+    "demo": Subcommand("rhot_app.ui.demo_command", "open the app on the simulated rig"),
+    "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
+    "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
+    "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
+    "evaluate": Subcommand("rhot_app.engine.evaluate_command", "run twin nodes against the engine, compare with truth"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns its exit code: 2 for a mistake that has a sentence, 130 when interrupted."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        return _run(arguments)
+    except (RhotError, NodeError) as exc:
+        print(f"rhot: {exc}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _run(arguments: list[str]) -> int:
+    name = next((argument for argument in arguments if not argument.startswith("-")), None)
+    chosen = SUBCOMMANDS.get(name or "")
+    parser = argparse.ArgumentParser(
+        prog="rhot", description="Track a hand with two or more cheap cameras. Without a command: open the app.")
+    parser.add_argument("--version", action="version", version=f"rhot {version('rhot')}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    for key, subcommand in SUBCOMMANDS.items():
+        room = commands.add_parser(key, help=subcommand.summary, description=f"{subcommand.summary.capitalize()}.")
+        if subcommand is chosen:  # only this one's room is imported: help stays fast
+            _load(subcommand.module).add_arguments(room)
+    app = _load(APP) if chosen is None and not {"-h", "--help", "--version"} & set(arguments) else None
+    if app is not None:
+        app.add_arguments(parser)
+    args = parser.parse_args(arguments)
+    module = app if chosen is None else _load(chosen.module)
+    assert module is not None
+    return int(module.run(args))
+
+
+def _load(name: str) -> ModuleType:
+    return importlib.import_module(name)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

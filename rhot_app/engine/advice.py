@@ -1,0 +1,154 @@
+"""What is wrong, where, and what to do, in sentences; each is gone from the next status when it is mended. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rhot_app.engine.node_meter import Recent
+from rhot_app.engine.status import Advice, NodeStatus
+
+UNSEEN_S = 3.0
+"""A marker that one camera has not seen for so long is worth a sentence."""
+
+WIDE_BOUND_S = 2e-3
+"""At 2 m/s a clock wrong by this much moves a marker by 4 mm."""
+
+MANY_LOST = 0.05
+_RECENT_MIN = 5  # refusals within two seconds that are not chance
+
+_REFUSALS = {
+    "marker_set": ("error", "Node {name} uses another marker set than the rig; give both the same marker file."),
+    "image_size": ("error", "Node {name} sends images of {size} px, but the rig's intrinsics are for {expected} px; "
+                            "set the node's camera or calibrate it for this size."),
+    "time": ("warning", "Node {name} sends frames with impossible times; its clock may have been set. "
+                        "If this does not end, restart the node."),
+    "foreign_node": ("warning", "Another node sends to the port of {name}; check the node ids and data ports."),
+    "version": ("error", "Node {name} speaks another version of the wire; install the same version here and there."),
+    "tag": ("error", "Node {name} signs its datagrams, but this master does not know its key; pair them."),
+    "jump": ("warning", "Node {name} jumped in its sequence numbers; if this does not end, restart the node."),
+    "kernel_overflow": ("warning", "The kernel drops datagrams of node {name}: this computer is too busy to read "
+                                   "them. Close other programs, or allow a larger buffer with "
+                                   "`sudo sysctl -w net.core.rmem_max=8388608`."),
+}
+_MALFORMED = frozenset({"magic", "length", "type", "flags", "header", "reserved", "count", "index", "size", "marker",
+                        "range", "text", "kind"})
+
+
+@dataclass(frozen=True, slots=True)
+class NodeFacts:
+    """One node at this moment: what clients see, and what happened in the last two seconds."""
+
+    status: NodeStatus
+    recent: Recent
+    address: str
+    udp_port: int
+    expected_size: tuple[int, int]
+    sent_size: tuple[int, int] | None
+    buffer_bytes: int | None  # None: a replay
+    wanted_buffer_bytes: int
+    unseen_s: Sequence[float]  # per marker, since this camera last saw it
+    streams_elsewhere: bool  # for another master
+    not_started_s: float  # how long the node has been ready although it was told to start
+
+
+def node_advice(facts: NodeFacts, marker_ids: Sequence[str], running: bool, *, sight: bool = True) -> list[Advice]:
+    """All sentences about one node; `sight` False leaves out what its camera does not see."""
+    found = [*_state_advice(facts, running), *_buffer_advice(facts)]
+    if facts.status.state == "streaming":
+        found += [*_refusal_advice(facts), *_link_advice(facts, running)]
+        if running and sight and facts.recent.accepted:
+            found += _sight_advice(facts, marker_ids)
+    return found
+
+
+def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool) -> list[Advice]:
+    """The one sentence that replaces all others about sight when no camera sees anything."""
+    seconds = min((min(facts.unseen_s) for facts in all_facts), default=0.0)
+    if running and seconds > UNSEEN_S and any(facts.recent.accepted for facts in all_facts):
+        return [Advice("warning", f"No camera has seen a marker for {seconds:.0f} s. Hold the hand into both pictures; "
+                                  "if the markers are visible there, calibrate their colours.")]
+    return []
+
+
+def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
+    status = facts.status
+    name = status.name
+    if facts.buffer_bytes is None:
+        return []
+    if status.state == "silent" and status.text_datagrams:
+        return [Advice("info", f"Node {name}: no text datagrams come in; send them to its data port.")]
+    if status.state == "silent":
+        return [Advice("error", f"Node {name} does not answer at {facts.address}:{facts.udp_port}. Is it switched on, "
+                                "is rhot-node running there, and does the rig name the right address?")]
+    if status.state == "fault":
+        return [Advice("error", f"Node {name}: {status.message or 'it reports a fault; look at its log.'}")]
+    if running and status.state == "ready" and facts.not_started_s > 1.0:
+        return [Advice("warning", f"Node {name} is ready but does not follow the start; press Stop and Start. "
+                                  "If that does not help, restart the node.")]
+    if facts.streams_elsewhere:
+        return [Advice("warning", f"Node {name} streams for another master; stop that one, or press Stop and Start "
+                                  "here to take the node back.")]
+    if status.text_datagrams:
+        return [Advice("info", f"Node {name} sends text datagrams: untrusted, without times, so fast movements are "
+                               "less exact.")]
+    return []
+
+
+def _buffer_advice(facts: NodeFacts) -> list[Advice]:
+    if facts.buffer_bytes is None or facts.buffer_bytes >= facts.wanted_buffer_bytes:
+        return []
+    return [Advice("warning", f"Node {facts.status.name}: the system grants a receive buffer of "
+                              f"{facts.buffer_bytes // 1024} KiB only, so a busy moment may lose datagrams. Run "
+                              f"`sudo sysctl -w net.core.rmem_max={facts.wanted_buffer_bytes}` and start again.")]
+
+
+def _refusal_advice(facts: NodeFacts) -> list[Advice]:
+    found = []
+    dropped = facts.recent.dropped
+    for reason, (level, sentence) in _REFUSALS.items():
+        if dropped.get(reason, 0) >= _RECENT_MIN:
+            size = "{} x {}".format(*facts.sent_size) if facts.sent_size else "another size"
+            found.append(Advice(level, sentence.format(  # type: ignore[arg-type]
+                name=facts.status.name, size=size, expected="{} x {}".format(*facts.expected_size))))
+    malformed = sum(count for reason, count in dropped.items() if reason in _MALFORMED)
+    if malformed >= _RECENT_MIN:
+        hint = ("they are not \"x,y;x,y;...\" with one pair per marker" if facts.status.text_datagrams
+                else "if an original RHOT node sends text, set text_datagrams for it in the rig")
+        found.append(Advice("warning", f"Node {facts.status.name}: {malformed / 2:.0f} datagrams/s are not of this "
+                                       f"protocol and are ignored; {hint}."))
+    return found
+
+
+def _link_advice(facts: NodeFacts, running: bool) -> list[Advice]:
+    found = []
+    status, recent = facts.status, facts.recent
+    name = status.name
+    total = recent.accepted + recent.lost
+    if total >= 20 and recent.lost > MANY_LOST * total:
+        found.append(Advice("warning", f"Node {name}: {100 * recent.lost / total:.0f} % of the datagrams are lost. "
+                                       "Use a cable instead of wireless, or a lower frame rate."))
+    if recent.skipped:
+        found.append(Advice("warning", f"Node {name} floods this computer with {status.rate_hz:.0f} datagrams/s; only "
+                                       "the newest are tracked. Lower its frame rate."))
+    if running and not status.text_datagrams:
+        if status.clock_bound_s is None:
+            found.append(Advice("info", f"Node {name}: waiting for its clock."))
+        elif status.clock_bound_s > WIDE_BOUND_S:
+            found.append(Advice("warning", f"Node {name}: its clock is known to ±{1e3 * status.clock_bound_s:.1f} ms "
+                                           "only, so fast movements blur. Use a cable instead of wireless."))
+    return found
+
+
+def _sight_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:
+    unseen = [(seconds, marker) for seconds, marker in zip(facts.unseen_s, marker_ids, strict=True)
+              if seconds > UNSEEN_S]
+    if not unseen:
+        return []
+    name, seconds = facts.status.name, max(seconds for seconds, _ in unseen)
+    if len(unseen) == len(marker_ids):
+        return [Advice("warning", f"Camera {name} has seen no marker for {min(s for s, _ in unseen):.0f} s: hold the "
+                                  "hand into its picture, or calibrate the colours.")]
+    names = ", ".join(marker for _, marker in unseen[:3]) + (" and others" if len(unseen) > 3 else "")
+    return [Advice("warning", f"Camera {name} has not seen {names} for {seconds:.0f} s: hidden, outside its picture, "
+                              "or the light has changed. Turn the hand, or calibrate the colours.")]

@@ -1,0 +1,50 @@
+"""``rhot engine``: the engine as a process of its own, with or without a screen nearby.
+
+What tracks is imported when it runs, so that ``--help`` is there at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+from pathlib import Path
+
+from rhot_app.engine.directory import default_directory
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot engine``."""
+    parser.add_argument("--rig", type=Path, required=True, metavar="FILE", help="the rig file (rhot-rig, JSON)")
+    parser.add_argument("--log", type=Path, metavar="FILE", help="write the raw log of all datagrams to this new file")
+    parser.add_argument("--start", action="store_true", help="tell the nodes to stream at once")
+    add_serving_arguments(parser)
+    parser.add_argument("--json", action="store_true",
+                        help="print one JSON object on standard output when ready: pid, directory, rig")
+
+
+def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of every command that serves states to clients."""
+    parser.add_argument("--directory", type=Path, metavar="DIR",
+                        help=f"private directory of the engine's sockets (default {default_directory()})")
+    parser.add_argument("--verbose", action="store_true", help="log what happens on standard error")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the engine until SIGTERM, SIGINT or the command ``quit``."""
+    from rhot_app.engine.serve import serving
+    from rhot_app.project import load_rig
+    from rhot_app.sources.udp_nodes import UdpNodes
+
+    logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
+    rig = load_rig(args.rig)
+    with serving(rig, args.rig.absolute(), UdpNodes, args.directory) as (engine, server, directory):
+        if args.log is not None:
+            engine.record(args.log.absolute())
+        if args.start:
+            engine.start()
+        if args.json:
+            print(json.dumps({"pid": os.getpid(), "directory": str(directory.path), "rig": rig.name}), flush=True)
+        server.run()
+    return 0

@@ -1,0 +1,126 @@
+"""Commands of clients: one JSON object in, one out. docs/engine.md lists them. No sockets here."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from rhot_app.engine.core import Engine
+from rhot_app.errors import EngineError, RhotError
+from rhot_app.project import parse_rig
+from rhot_node.errors import NodeError
+
+Arguments = dict[str, Any]
+Answer = dict[str, Any]
+
+
+def parse(data: bytes) -> tuple[str, Arguments]:
+    """Name and arguments of a command; raises EngineError when the bytes are none."""
+    try:
+        arguments = msgspec.json.decode(data, type=dict[str, Any])
+    except msgspec.MsgspecError as exc:
+        raise EngineError(f"a command is a JSON object; this is not one ({exc}).") from exc
+    name = arguments.pop("command", None)
+    if not isinstance(name, str):
+        raise EngineError('a command needs a "command" field with its name.')
+    return name, arguments
+
+
+def refusal(error: Exception) -> Answer:
+    """The answer that says why a command was not carried out."""
+    return {"ok": False, "error": str(error)}
+
+
+class Commands:
+    """Carries out the commands that the engine answers at once."""
+
+    def __init__(self, engine: Engine, *, quit_: Callable[[], None], preview: Callable[[bool], None]) -> None:
+        self._engine = engine
+        self._quit = quit_
+        self._preview = preview
+        self._table: dict[str, Callable[[Arguments], Answer]] = {
+            "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
+            "record": self._record, "record_stop": self._record_stop, "rig": self._rig, "set_rig": self._set_rig,
+            "save_rig": self._save_rig, "preview": self._set_preview, "quit": self._end,
+        }
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All commands that `answer` knows."""
+        return tuple(self._table)
+
+    def answer(self, name: str, arguments: Arguments) -> Answer:
+        """Carry out one command; whatever is wrong with it becomes a sentence."""
+        action = self._table.get(name)
+        if action is None:
+            return refusal(EngineError(f"there is no command {name!r}; there are {', '.join(sorted(self._table))}, "
+                                       "node and still."))
+        try:
+            return {"ok": True, **action(arguments)}
+        except (RhotError, NodeError) as exc:
+            return refusal(exc)
+
+    def _hello(self, arguments: Arguments) -> Answer:
+        engine = self._engine
+        return {"program": "rhot", "version": version("rhot"), "pid": os.getpid(), "running": engine.running,
+                "rig_name": engine.rig.name, "rig_path": str(engine.rig_path or "")}
+
+    def _status(self, arguments: Arguments) -> Answer:
+        return {"status": msgspec.to_builtins(self._engine.status())}
+
+    def _start(self, arguments: Arguments) -> Answer:
+        return {"session": self._engine.start()}
+
+    def _stop(self, arguments: Arguments) -> Answer:
+        self._engine.stop()
+        return {}
+
+    def _record(self, arguments: Arguments) -> Answer:
+        path = _path(arguments)
+        if path is None:
+            raise EngineError('record needs the "path" of the log to write.')
+        self._engine.record(path)
+        return {"path": str(path)}
+
+    def _record_stop(self, arguments: Arguments) -> Answer:
+        path = self._engine.record_stop()
+        return {"path": "" if path is None else str(path)}
+
+    def _rig(self, arguments: Arguments) -> Answer:
+        return {"document": msgspec.to_builtins(self._engine.rig), "path": str(self._engine.rig_path or "")}
+
+    def _set_rig(self, arguments: Arguments) -> Answer:
+        document = arguments.get("document")
+        if not isinstance(document, dict):
+            raise EngineError('set_rig needs a "document": the whole rig as an object.')
+        self._engine.set_rig(parse_rig(msgspec.json.encode(document), "the new rig"))
+        return {}
+
+    def _save_rig(self, arguments: Arguments) -> Answer:
+        return {"path": str(self._engine.save_rig(_path(arguments)))}
+
+    def _set_preview(self, arguments: Arguments) -> Answer:
+        on = arguments.get("on")
+        if not isinstance(on, bool):
+            raise EngineError('preview needs "on": true or false.')
+        self._preview(on)
+        return {}
+
+    def _end(self, arguments: Arguments) -> Answer:
+        self._quit()
+        return {}
+
+
+def _path(arguments: Arguments) -> Path | None:
+    """The absolute path in a command. The engine's working directory is not the client's, so it must be absolute."""
+    path = arguments.get("path")
+    if path is None:
+        return None
+    if not isinstance(path, str) or not path.startswith("/"):
+        raise EngineError(f'"path" must be an absolute path, not {path!r}.')
+    return Path(path)

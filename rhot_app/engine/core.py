@@ -1,0 +1,178 @@
+"""The engine: one rig, its source, tracker and log; started, stopped and changed by commands. No sockets to clients.
+
+`step` is the pipeline's and belongs to one thread; everything else is called by another one (the server's).
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from rhot_app.engine.observer import NodeMessage, Observer
+from rhot_app.engine.pipeline import Pipeline, PublishState, Work
+from rhot_app.engine.status import Advice, EngineStatus
+from rhot_app.engine.warm_up import warm_up
+from rhot_app.errors import EngineError
+from rhot_app.project import Rig, save_rig
+from rhot_app.recording.recorder import Recorder
+from rhot_app.sources.links import new_session
+from rhot_app.sources.source import ObservationSource, same_network
+from rhot_app.tracking.state import HandState
+from rhot_app.tracking.tracker import Tracker
+
+MakeSource = Callable[[Rig], ObservationSource]
+MakeTracker = Callable[[Rig], Tracker]
+
+
+class Engine:
+    """Everything between the nodes and the clients."""
+
+    def __init__(self, rig: Rig, rig_path: Path | None, make_source: MakeSource, make_tracker: MakeTracker,
+                 publish: PublishState, node_message: NodeMessage = lambda node_id: "") -> None:
+        """Open the source and warm the tracker up; raises SourceError when a port is taken."""
+        self.rig = rig
+        self.rig_path = rig_path
+        self.running = False
+        self.session = 0
+        self.recorder: Recorder | None = None
+        self._make_source = make_source
+        self._make_tracker = make_tracker
+        self._node_message = node_message
+        self._notice = ""  # why the last recording ended
+        self._lock = threading.RLock()
+        self._source = make_source(rig)
+        try:
+            self._pipeline = Pipeline(self._work(rig), publish)
+        except BaseException:
+            self._source.close()
+            raise
+        self._observer = Observer(rig, self._source, self._pipeline)
+
+    def step(self, timeout_s: float) -> HandState | None:
+        """One step of the pipeline, see `Pipeline.step`."""
+        return self._pipeline.step(timeout_s)
+
+    def start(self) -> int:
+        """Have the nodes stream in a new session; returns its number. Starting again begins another one."""
+        with self._lock:
+            self.session = new_session()
+            self.running = True
+            self._pipeline.restart()
+            self._observer.restart()
+            self._source.start(self.session)
+            return self.session
+
+    def stop(self) -> None:
+        """Have the nodes stop."""
+        with self._lock:
+            self._source.stop()
+            self.running = False
+            self.session = 0
+
+    def record(self, path: Path) -> None:
+        """Write the raw log to `path` from now on; raises RecordingError, also when something is recorded already."""
+        with self._lock:
+            if self.recorder is not None:
+                raise EngineError(f"already recording to {self.recorder.path}; stop that recording first.")
+            self._notice = ""
+            recorder = Recorder(path, self.rig, {"created": datetime.now(UTC).isoformat(timespec="seconds")})
+            try:
+                self._source.record_to(recorder)
+            except BaseException:
+                recorder.close()
+                raise
+            self.recorder = recorder
+
+    def record_stop(self) -> Path | None:
+        """Finish the log; returns its path, or None when nothing was recorded."""
+        with self._lock:
+            recorder, self.recorder = self.recorder, None
+            if recorder is None:
+                return None
+            self._source.record_to(None)
+            recorder.close()
+            self._notice = recorder.failure
+            return recorder.path
+
+    def set_rig(self, rig: Rig) -> None:
+        """Go on with another rig. Ports and sessions stay when the nodes are reached as before.
+
+        Raises SourceError (a port is taken) or what the tracker objects to; the old rig then stays.
+        """
+        with self._lock:
+            kept = same_network(self.rig, rig)
+            if kept:
+                work = self._work(rig)
+                self._source.configure(rig)
+            else:
+                if self.recorder is not None:
+                    raise EngineError("other nodes cannot be used while recording; stop the recording first.")
+                work = self._change_source(rig)
+            self._pipeline.use(work)
+            self.rig = rig
+            self._observer = Observer(rig, self._source, self._pipeline)
+            if self.running and not kept:
+                self.start()
+
+    def save_rig(self, path: Path | None) -> Path:
+        """Write the rig to `path`, by default where it came from; returns the path."""
+        with self._lock:
+            target = path or self.rig_path
+            if target is None:
+                raise EngineError("this rig came from no file; give a path to save it to.")
+            try:
+                save_rig(target, self.rig)
+            except OSError as exc:
+                raise EngineError(f"{target}: cannot be written ({exc.strerror}).") from exc
+            self.rig_path = target
+            return target
+
+    def status(self) -> EngineStatus:
+        """How everything goes, now."""
+        with self._lock:
+            if self.recorder is not None and self.recorder.failure:
+                self.record_stop()
+            extra = [Advice("error", self._notice)] if self._notice else []
+            return self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
+                                         self._node_message, extra)
+
+    def fail(self, sentence: str) -> None:
+        """Note that the tracker broke over a frame; it forgets everything and goes on. Shown until the next start."""
+        self._pipeline.fail(sentence)
+
+    def close(self) -> None:
+        """Stop the nodes, finish the log, close all ports. May be called twice."""
+        with self._lock:
+            if self.running:
+                self.stop()
+            self.record_stop()
+            self._source.close()
+
+    def _work(self, rig: Rig) -> Work:
+        tracker = self._make_tracker(rig)
+        warm_up(tracker, rig)
+        unseen = np.full((len(rig.nodes), len(rig.markers.markers)), time.monotonic_ns(), dtype=np.int64)
+        return Work(self._source, tracker, unseen)
+
+    def _change_source(self, rig: Rig) -> Work:
+        """Other nodes: the old ports must be closed before the new ones, which may be the same, are opened."""
+        old_rig = self.rig
+        if self.running:
+            self._source.stop()
+        self._source.close()
+        try:
+            self._source = self._make_source(rig)
+            return self._work(rig)
+        except Exception:
+            self._source.close()
+            self._source = self._make_source(old_rig)
+            self._pipeline.use(self._work(old_rig))
+            self._observer = Observer(old_rig, self._source, self._pipeline)
+            if self.running:
+                self.start()
+            raise

@@ -1,0 +1,243 @@
+"""The engine as client of the nodes' control channels: requests handed on without waiting, previews, fault messages.
+
+Used by the server's thread only, except `message`, which any thread may read.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+import zmq
+
+from rhot_app.engine.commands import Answer, Arguments, refusal
+from rhot_app.engine.status import EngineStatus, Preview
+from rhot_app.errors import EngineError
+from rhot_app.project import Rig, RigNode
+
+TIMEOUT_S = 4.0
+"""A still may take two seconds on a node whose camera has just stopped."""
+
+_FAULT_PERIOD_S = 1.0
+_ATTACHMENT_NAMES = {"still": "png", "node": "data"}
+
+log = logging.getLogger(__name__)
+
+_Context = zmq.Context[zmq.Socket[bytes]]
+_Reply = tuple[bytes, tuple[Answer, bytes | None]]
+
+
+@dataclass(slots=True)
+class _Asked:
+    """A request on its way. `client` None: the engine's own question about a fault."""
+
+    number: int
+    client: bytes | None
+    command: str
+    payload: bytes
+    deadline_s: float
+    sent: bool = False
+
+
+@dataclass(slots=True)
+class _Peer:
+    """One node's control channel."""
+
+    node: RigNode
+    requests: zmq.Socket[bytes]
+    previews: zmq.Socket[bytes] | None = None
+    asked: dict[int, _Asked] = field(default_factory=dict)
+    message: str = ""
+    fault_asked_s: float = -1e9
+
+
+class NodeControl:
+    """Talks to the control channels of the rig's nodes that have one (text nodes have none)."""
+
+    commands = frozenset({"node", "still"})
+
+    def __init__(self, context: _Context) -> None:
+        self._context = context
+        self._peers: dict[int, _Peer] = {}
+        self._rig: Rig | None = None
+        self._preview = False
+        self._numbers = itertools.count(1)
+
+    def follow(self, rig: Rig) -> None:
+        """Connect to the nodes of `rig`, keeping what stays the same. Cheap when nothing changed."""
+        if rig is self._rig:
+            return
+        self._rig = rig
+        wanted = {node.node_id: node for node in rig.nodes if not node.text_datagrams}
+        for node_id in [*self._peers]:
+            node = wanted.get(node_id)
+            if node is None or _endpoints(node) != _endpoints(self._peers[node_id].node):
+                _close(self._peers.pop(node_id))
+            else:
+                self._peers[node_id].node = node
+        for node_id, node in wanted.items():
+            if node_id not in self._peers:
+                try:
+                    self._peers[node_id] = _Peer(node, _connect(self._context, zmq.DEALER, _endpoints(node)[0]))
+                except zmq.ZMQError as exc:  # the node is tracked all the same; only its settings are out of reach
+                    log.warning("node %s: %s is no address to connect to (%s)", node.name, _endpoints(node)[0], exc)
+        self.set_preview(self._preview)
+
+    def ask(self, client: bytes, command: str, arguments: Arguments) -> None:
+        """Hand a client's request to its node; raises EngineError when it names none."""
+        node_id = arguments.get("node_id")
+        peer = self._peers.get(node_id) if isinstance(node_id, int) else None
+        if peer is None:
+            known = ", ".join(f"{peer.node.node_id} ({peer.node.name})" for peer in self._peers.values())
+            raise EngineError(f"there is no node {node_id!r} with a control channel; there is {known or 'none'}.")
+        request = {"request": "still"} if command == "still" else arguments.get("request")
+        if not isinstance(request, dict):
+            raise EngineError('node needs a "request": an object as docs/node.md describes.')
+        self._put(peer, client, command, request)
+
+    def answers(self) -> list[_Reply]:
+        """(client, (answer, attachment)) for every request that was answered, or was not in time."""
+        now_s = time.monotonic()
+        done: list[_Reply] = []
+        for peer in self._peers.values():
+            self._send_waiting(peer)
+            for asked, answer, attachment in _receive(peer):
+                if asked.client is None:
+                    peer.message = str(answer.get("answer", {}).get("message", ""))
+                else:
+                    done.append((asked.client, (answer, attachment)))
+            for asked in [asked for asked in peer.asked.values() if now_s > asked.deadline_s]:
+                del peer.asked[asked.number]
+                if asked.client is not None:
+                    error = EngineError(f"node {peer.node.name} does not answer on its control channel "
+                                        f"{_endpoints(peer.node)[0]}; is rhot-node running there?")
+                    done.append((asked.client, (refusal(error), None)))
+        return done
+
+    def set_preview(self, on: bool) -> None:
+        """Subscribe to the nodes' previews, or no longer; a node encodes them only while somebody does."""
+        self._preview = on
+        for peer in self._peers.values():
+            if on and peer.previews is None:
+                peer.previews = _connect(self._context, zmq.SUB, _endpoints(peer.node)[1])
+                peer.previews.setsockopt(zmq.SUBSCRIBE, b"")
+            elif not on and peer.previews is not None:
+                peer.previews.close()
+                peer.previews = None
+
+    def previews(self) -> list[Preview]:
+        """The pictures that came since the last call."""
+        found = []
+        for peer in self._peers.values():
+            while peer.previews is not None:
+                try:
+                    parts = peer.previews.recv_multipart(zmq.DONTWAIT)
+                except zmq.Again:
+                    break
+                preview = _read_preview(peer.node.name, parts)
+                if preview is not None:
+                    found.append(preview)
+        return found
+
+    def ask_for_faults(self, status: EngineStatus) -> None:
+        """Ask nodes in fault for their own words, once a second; forget those of nodes that are well."""
+        now_s = time.monotonic()
+        for node in status.nodes:
+            peer = self._peers.get(node.node_id)
+            if peer is None:
+                continue
+            if node.state != "fault":
+                peer.message = ""
+            elif now_s - peer.fault_asked_s > _FAULT_PERIOD_S:
+                peer.fault_asked_s = now_s
+                self._put(peer, None, "node", {"request": "state"})
+
+    def message(self, node_id: int) -> str:
+        """What the node says about its fault; empty when it has none or did not say yet."""
+        peer = self._peers.get(node_id)
+        return "" if peer is None else peer.message
+
+    def close(self) -> None:
+        """Close all sockets. May be called twice."""
+        while self._peers:
+            _close(self._peers.popitem()[1])
+
+    def _put(self, peer: _Peer, client: bytes | None, command: str, request: dict[str, Any]) -> None:
+        asked = _Asked(next(self._numbers), client, command, msgspec.json.encode(request),
+                       time.monotonic() + TIMEOUT_S)
+        peer.asked[asked.number] = asked
+        self._send_waiting(peer)
+
+    def _send_waiting(self, peer: _Peer) -> None:
+        """Send what could not be sent yet: nothing is queued for a node that is not there, to reach it much later."""
+        for asked in peer.asked.values():
+            if not asked.sent:
+                try:
+                    peer.requests.send_multipart([asked.number.to_bytes(8, "little"), b"", asked.payload], zmq.DONTWAIT)
+                except zmq.Again:
+                    return
+                asked.sent = True
+
+
+def _receive(peer: _Peer) -> list[tuple[_Asked, Answer, bytes | None]]:
+    found: list[tuple[_Asked, Answer, bytes | None]] = []
+    while True:
+        try:
+            parts = peer.requests.recv_multipart(zmq.DONTWAIT)
+        except zmq.Again:
+            return found
+        asked = peer.asked.pop(int.from_bytes(parts[0], "little"), None)
+        if asked is not None and len(parts) >= 3:
+            found.append((asked, *_translate(peer.node.name, asked.command, parts[2:])))
+
+
+def _translate(name: str, command: str, parts: list[bytes]) -> tuple[Answer, bytes | None]:
+    """A node's reply as the engine's answer to its client."""
+    try:
+        reply = msgspec.json.decode(parts[0], type=dict[str, Any])
+    except msgspec.MsgspecError as exc:
+        return refusal(EngineError(f"node {name} gave an answer that cannot be read ({exc}).")), None
+    if not reply.pop("ok", False):
+        return refusal(EngineError(f"node {name}: {reply.get('error', 'it refused without a reason')}")), None
+    if len(parts) > 1:
+        return {"ok": True, "answer": reply, "attachment": _ATTACHMENT_NAMES[command]}, parts[1]
+    return {"ok": True, "answer": reply}, None
+
+
+def _read_preview(name: str, parts: list[bytes]) -> Preview | None:
+    try:
+        header = msgspec.json.decode(parts[0], type=dict[str, Any])
+        return Preview(name, time.monotonic_ns(), int(header["width"]), int(header["height"]), parts[1])
+    except (msgspec.MsgspecError, KeyError, TypeError, ValueError, IndexError):
+        return None
+
+
+def _endpoints(node: RigNode) -> tuple[str, str]:
+    return f"tcp://{node.address}:{node.control_port}", f"tcp://{node.address}:{node.preview_port}"
+
+
+def _connect(context: _Context, kind: int, endpoint: str) -> zmq.Socket[bytes]:
+    """A socket towards one node."""
+    socket = context.socket(kind)
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.RECONNECT_IVL, 100)
+    socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
+    socket.setsockopt(zmq.RCVHWM, 8)
+    if kind == zmq.DEALER:
+        socket.setsockopt(zmq.IMMEDIATE, 1)
+    try:
+        socket.connect(endpoint)
+    except zmq.ZMQError:
+        socket.close()
+        raise
+    return socket
+
+
+def _close(peer: _Peer) -> None:
+    peer.requests.close()
+    if peer.previews is not None:
+        peer.previews.close()

@@ -1,0 +1,96 @@
+"""One node's counters turned into what the operator reads: rate, recent losses, recent refusals, one word of state."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import dataclass
+
+from rhot_app.engine.status import NodeStatus, NodeWord
+from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.receiver import NodeReceiver
+from rhot_node.wire.messages import NodeState
+
+RECENT_NS = 2_000_000_000
+"""What was refused or lost within this time counts as going on."""
+
+_RATE_NS = 1_000_000_000
+_WORDS: dict[NodeState, NodeWord] = {NodeState.STARTING: "starting", NodeState.READY: "ready",
+                                     NodeState.STREAMING: "streaming", NodeState.FAULT: "fault"}
+
+
+@dataclass(frozen=True, slots=True)
+class Recent:
+    """What happened at one node within the last two seconds."""
+
+    accepted: int
+    lost: int
+    dropped: dict[str, int]
+    skipped: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Sample:
+    t_ns: int
+    accepted: int
+    lost: int
+    dropped: dict[str, int]
+    skipped: int
+
+
+class NodeMeter:
+    """Watches one node's link and receiver; `sample` is called with every status."""
+
+    def __init__(self, link: NodeLink, receiver: NodeReceiver | None) -> None:
+        self.link = link
+        self.receiver = receiver
+        self._samples: deque[_Sample] = deque([self._read(0)])
+
+    def sample(self, now_ns: int) -> None:
+        """Read the counters."""
+        self._samples.append(self._read(now_ns))
+        while len(self._samples) > 2 and now_ns - self._samples[1].t_ns >= RECENT_NS:
+            self._samples.popleft()
+
+    def recent(self) -> Recent:
+        """Differences over the last two seconds."""
+        first, last = self._samples[0], self._samples[-1]
+        dropped = Counter(last.dropped)
+        dropped.subtract(first.dropped)
+        return Recent(last.accepted - first.accepted, last.lost - first.lost,
+                      {reason: count for reason, count in dropped.items() if count > 0}, last.skipped - first.skipped)
+
+    def rate_hz(self) -> float:
+        """Accepted frames per second over the last second."""
+        last = self._samples[-1]
+        first = next(sample for sample in self._samples if last.t_ns - sample.t_ns <= _RATE_NS)
+        span_ns = last.t_ns - first.t_ns
+        return 1e9 * (last.accepted - first.accepted) / span_ns if span_ns else 0.0
+
+    def status(self, now_ns: int, message: str) -> NodeStatus:
+        """The node as clients see it; `message`: its own words."""
+        link, clock = self.link, self.link.clock
+        return NodeStatus(
+            node_id=link.node.node_id, name=link.node.name, state=self._word(now_ns),
+            text_datagrams=link.node.text_datagrams, rate_hz=self.rate_hz(), received=link.door.received,
+            lost=link.door.sequence.lost, dropped=self._dropped(), clock_offset_s=clock.offset_s,
+            clock_bound_s=clock.bound_s, clock_round_trip_s=clock.round_trip_s, message=message)
+
+    def _word(self, now_ns: int) -> NodeWord:
+        if self.receiver is None:  # a replay: its times are not of now
+            return "streaming" if self.rate_hz() > 0.0 else "silent"
+        if self.link.silent(now_ns):
+            return "silent"
+        if self.link.node.text_datagrams or self.link.state is None:
+            return "streaming"
+        return _WORDS[self.link.state]
+
+    def _dropped(self) -> dict[str, int]:
+        dropped = self.link.door.dropped.copy()
+        if self.receiver is not None and self.receiver.overflowed:
+            dropped["kernel_overflow"] = self.receiver.overflowed
+        return dropped
+
+    def _read(self, now_ns: int) -> _Sample:
+        door = self.link.door
+        return _Sample(now_ns, door.accepted, door.sequence.lost, self._dropped(),
+                       0 if self.receiver is None else self.receiver.skipped)

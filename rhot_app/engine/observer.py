@@ -1,0 +1,91 @@
+"""Looks at a running pipeline a few times a second and says how it goes: the status that clients get."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Literal
+
+from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice
+from rhot_app.engine.node_meter import NodeMeter
+from rhot_app.engine.pipeline import Pipeline
+from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus
+from rhot_app.project import Rig
+from rhot_app.recording.recorder import Recorder
+from rhot_app.sources.receiver import RECEIVE_BUFFER
+from rhot_app.sources.source import ObservationSource
+from rhot_app.tracking.state import Condition
+
+_SUMMARY_NS = 500_000_000  # sorting the latencies is the dearest part of a status
+
+NodeMessage = Callable[[int], str]
+"""``message(node_id)``: what the node itself says about its fault."""
+
+
+class Observer:
+    """Watches one source and pipeline. Replaced together with the source."""
+
+    def __init__(self, rig: Rig, source: ObservationSource, pipeline: Pipeline) -> None:
+        self.rig = rig
+        self._source = source
+        self._pipeline = pipeline
+        receivers = source.receivers or (None,) * len(source.links)
+        self._meters = [NodeMeter(link, receiver) for link, receiver in zip(source.links, receivers, strict=True)]
+        self._latency: dict[str, LatencySummary] = {}
+        self._summarised_ns = 0
+        self._ever_tracked = False
+
+    def restart(self) -> None:
+        """A new run begins."""
+        self._ever_tracked = False
+
+    def status(self, rig_path: str, session: int, running: bool, recorder: Recorder | None,
+               message: NodeMessage, extra: list[Advice]) -> EngineStatus:
+        """The engine's status now; `extra` advice comes first."""
+        now_ns = time.monotonic_ns()
+        for meter in self._meters:
+            meter.sample(now_ns)
+        nodes = tuple(meter.status(now_ns, message(meter.link.node.node_id)) for meter in self._meters)
+        if now_ns - self._summarised_ns >= _SUMMARY_NS:
+            self._latency, self._summarised_ns = self._pipeline.latency.summary(), now_ns
+        return EngineStatus(
+            t_master_ns=now_ns, pid=os.getpid(), session=session, running=running,
+            condition=self._condition(running, nodes, now_ns).value, rig_name=self.rig.name, rig_path=rig_path,
+            state_rate_hz=self._pipeline.states.rate_hz(now_ns), nodes=nodes,
+            advice=(*extra, *self._advice(nodes, running, now_ns)), latency=self._latency,
+            log_path="" if recorder is None else str(recorder.path),
+            log_bytes=0 if recorder is None else recorder.bytes_written)
+
+    def _condition(self, running: bool, nodes: tuple[NodeStatus, ...], now_ns: int) -> Condition:
+        if not running:
+            return Condition.IDLE
+        if self._pipeline.failure or any(node.state == "fault" for node in nodes):
+            return Condition.FAULT
+        state, rate_hz = self._pipeline.last_state, self._pipeline.states.rate_hz(now_ns)
+        if state is None or rate_hz == 0.0:
+            return Condition.LOST if self._ever_tracked else Condition.SEARCHING
+        self._ever_tracked |= state.condition is Condition.TRACKING
+        return state.condition
+
+    def _advice(self, nodes: tuple[NodeStatus, ...], running: bool, now_ns: int) -> list[Advice]:
+        facts = [self._facts(camera, status, now_ns) for camera, status in enumerate(nodes)]
+        nowhere = no_marker_advice(facts, running)
+        marker_ids = self.rig.markers.ids
+        found = [advice for one in facts for advice in node_advice(one, marker_ids, running, sight=not nowhere)]
+        if self._pipeline.failure:
+            found.append(Advice("error", self._pipeline.failure))
+        order: tuple[Literal["error", "warning", "info"], ...] = ("error", "warning", "info")
+        notices = [Advice("info", text) for text in self._source.notices()]
+        return sorted([*found, *nowhere, *notices], key=lambda advice: order.index(advice.level))
+
+    def _facts(self, camera: int, status: NodeStatus, now_ns: int) -> NodeFacts:
+        meter = self._meters[camera]
+        node, link, receiver = self.rig.nodes[camera], meter.link, meter.receiver
+        unseen_s = 1e-9 * (now_ns - self._pipeline.work.last_seen_ns[camera])
+        return NodeFacts(
+            status=status, recent=meter.recent(), address=node.address, udp_port=node.udp_port,
+            expected_size=(node.intrinsics.width, node.intrinsics.height), sent_size=link.door.image_size,
+            buffer_bytes=None if receiver is None else receiver.buffer_bytes, wanted_buffer_bytes=RECEIVE_BUFFER,
+            unseen_s=unseen_s.tolist(), streams_elsewhere=link.streams_elsewhere,
+            not_started_s=link.not_started_s(now_ns))

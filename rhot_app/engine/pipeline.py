@@ -1,0 +1,109 @@
+"""A frame's way through the engine: from the source's queue into the tracker, and the state out to the clients."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.engine.codec import encode
+from rhot_app.engine.meters import LatencyMeter, RateMeter
+from rhot_app.sources.source import ObservationSource
+from rhot_app.tracking.state import HandState
+from rhot_app.tracking.tracker import CameraObservations, Tracker
+
+PublishState = Callable[[bytes], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What a pipeline works with; replaced as a whole when the rig changes."""
+
+    source: ObservationSource
+    tracker: Tracker
+    last_seen_ns: NDArray[np.int64]  # (C, M) master time at which a camera last saw a marker
+
+
+class Pipeline:
+    """Ingests all frames that wait, solves once, publishes. `step` belongs to one thread; the meters may be read."""
+
+    def __init__(self, work: Work, publish: PublishState) -> None:
+        """`publish` takes a state's bytes and must not block."""
+        self.states = RateMeter()
+        self.latency = LatencyMeter()
+        self.last_state: HandState | None = None
+        self.frame_count = 0
+        self.failure = ""
+        self._work = work
+        self._publish = publish
+        self._changes = work.source.changes
+        self._previous: dict[str, float] = {}
+        self._lock = threading.Lock()
+
+    @property
+    def work(self) -> Work:
+        """What the next step works with."""
+        return self._work
+
+    def use(self, work: Work) -> None:
+        """Go on with another source or tracker, from the next step on."""
+        with self._lock:
+            self._work = work
+            self._changes = work.source.changes
+            self.last_state = None
+
+    def restart(self) -> None:
+        """Forget the last run's figures and what the tracker knows."""
+        with self._lock:
+            self._work.tracker.reset()
+            self._work.last_seen_ns[:] = time.monotonic_ns()
+            self.latency.clear()
+            self.last_state = None
+            self.failure = ""
+            self._previous = {}
+
+    def fail(self, sentence: str) -> None:
+        """Note that a step raised; the tracker may be in any state, so it forgets everything."""
+        with self._lock:
+            self.failure = sentence
+            self._work.tracker.reset()
+
+    def step(self, timeout_s: float) -> HandState | None:
+        """Wait for frames (at most `timeout_s`), take all that wait, publish the state that is due, if any."""
+        work = self._work
+        frames = work.source.frames.take(timeout_s)
+        if not frames:
+            return None
+        with self._lock:
+            if work is not self._work:
+                return None
+            return self._process(work, frames)
+
+    def _process(self, work: Work, frames: list[CameraObservations]) -> HandState | None:
+        if work.source.changes != self._changes:
+            self._changes = work.source.changes
+            work.tracker.reset()
+        for frame in frames:
+            work.tracker.ingest(frame)
+            work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = frame.t_receive_ns
+        self.frame_count += len(frames)
+        state = work.tracker.solve()
+        if state is not None:
+            self._send(state, work.source.live)
+        return state
+
+    def _send(self, state: HandState, live: bool) -> None:
+        begun_ns = time.monotonic_ns()
+        state.latency_s.update(self._previous)
+        self._publish(encode(state))
+        now_ns = time.monotonic_ns()
+        self._previous = {"publish": 1e-9 * (now_ns - begun_ns)}
+        if live:
+            self._previous["receive_to_state"] = 1e-9 * (now_ns - state.t_receive_ns)
+        self.latency.add(state.latency_s)
+        self.states.tick(now_ns)
+        self.last_state = state
