@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from rhot_node.detect.image import YuvImage
 
@@ -40,6 +40,15 @@ class Camera(Protocol):
 
     def close(self) -> None:
         """Release the device. May be called twice."""
+        ...
+
+
+@runtime_checkable
+class Rewindable(Protocol):
+    """A finite source that can be played again."""
+
+    def rewind(self) -> None:
+        """Go before the first frame; frame numbers and times go on, as if the recording were longer."""
         ...
 
 

@@ -1,0 +1,160 @@
+"""The ``rhot-node`` command: the daemon, or ``rhot-node detect`` on files."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import gc
+import json
+import logging
+import os
+import secrets
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from rhot_node.errors import NodeError
+
+if TYPE_CHECKING:
+    from rhot_node.config import NodeSettings
+    from rhot_node.detect.detector import Detector
+
+PR_SET_PDEATHSIG = 1
+ENDING_HELP = """When ready it prints one line of JSON on standard output, with its real ports. It ends with code 0
+on SIGTERM, SIGINT or at the end of a recording; with 2 and a sentence on standard error when something is wrong."""
+GIL_SWITCH_S = 0.0005  # the link's thread answers clock requests while the main one works; 5 ms is Python's own
+
+
+class End:
+    """When to end: on SIGTERM and SIGINT, and with the starting process if asked. Both interrupt blocking calls."""
+
+    def __init__(self, parent: int | None) -> None:
+        """`parent` is the process id of the parent to end with; None: live on."""
+        self._parent = parent
+        self._asked = False
+        signal.signal(signal.SIGTERM, self._end)
+        signal.signal(signal.SIGINT, self._end)
+        if parent is not None:
+            # The kernel watches the thread that started us, not the process: its signal only makes us look.
+            signal.signal(signal.SIGUSR1, self._look)
+            ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGUSR1)
+
+    def due(self) -> bool:
+        """Whether to end now; an interrupt raised inside a finaliser would be lost without this."""
+        return self._asked or (self._parent is not None and os.getppid() != self._parent)
+
+    def _end(self, _number: int, _frame: FrameType | None) -> None:
+        if not self._asked:
+            self._asked = True
+            raise KeyboardInterrupt
+
+    def _look(self, number: int, frame: FrameType | None) -> None:
+        if self.due():
+            self._end(number, frame)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit code: 0 when ended by the user or the recording, 2 after an error."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        if arguments[:1] == ["detect"]:
+            return _detect(arguments[1:])
+        return _serve(_parse(arguments))
+    except NodeError as exc:
+        print(f"rhot-node: {exc}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 0
+
+
+def _detect(arguments: list[str]) -> int:
+    from rhot_node import detect_command
+    parser = argparse.ArgumentParser(
+        prog="rhot-node detect", formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Find the markers in an image, a folder of images or a video, frame by frame.")
+    detect_command.add_arguments(parser)
+    return detect_command.run(parser.parse_args(arguments))
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    from rhot_node.capture.open import SPEC_HELP
+    parser = argparse.ArgumentParser(
+        prog="rhot-node", formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="A camera node: finds the markers in every frame and streams them to the master by UDP.\n"
+                    "rhot-node detect --help: find markers in files instead.",
+        epilog=f"{SPEC_HELP}\n\n{ENDING_HELP}")
+    parser.add_argument("--settings", type=Path, required=True, metavar="FILE",
+                        help="settings of this node (JSON, see docs/node.md)")
+    parser.add_argument("--camera", required=True, metavar="SPEC", help="where frames come from, see below")
+    parser.add_argument("--loop", action="store_true", help="play a file or recording again when it ends")
+    parser.add_argument("--exit-with-parent", action="store_true", help="end when the starting process ends")
+    parser.add_argument("--log-level", default="info", choices=("debug", "info", "warning", "error"),
+                        help="what is written to standard error (default: info)")
+    return parser.parse_args(arguments)
+
+
+def _serve(options: argparse.Namespace) -> int:
+    from rhot_node.config import load_settings
+    end = End(os.getppid() if options.exit_with_parent else None)
+    settings = load_settings(options.settings)
+    logging.basicConfig(level=options.log_level.upper(), stream=sys.stderr,
+                        format=f"%(asctime)s {settings.name} %(levelname)s %(message)s")
+    sys.setswitchinterval(GIL_SWITCH_S)
+    _run(options, settings, end)
+    return 0
+
+
+def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
+    """Put the parts together and loop until the end."""
+    from rhot_node.capture.open import open_camera, takes_settings
+    from rhot_node.control import ControlServer
+    from rhot_node.daemon import NodeDaemon
+    from rhot_node.link import UdpLink
+    from rhot_node.requests import Responder, SettingsStore
+
+    clock = settings.clock.clock(time.monotonic_ns())
+    store = SettingsStore(options.settings, settings)
+    daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), make_detector,
+                        camera_takes_settings=takes_settings(options.camera), loop=options.loop)
+    link = UdpLink(settings, clock, daemon.sessions, secrets.randbits(32), lambda: daemon.state)
+    try:
+        control = ControlServer(settings)
+        try:
+            link.start()
+            daemon.prepare()
+            control.start(Responder(store, daemon.sessions, control.pictures, clock, daemon.report,
+                                    lambda: {**daemon.count(), **link.count()}))
+            gc.freeze()
+            width, height = daemon.size
+            print(json.dumps({"event": "ready", "node_id": settings.node_id, "name": settings.name,
+                              "udp_port": link.port, "control_port": control.control_port,
+                              "preview_port": control.preview_port, "width": width, "height": height}), flush=True)
+            while daemon.step(link, control.pictures) and not end.due():
+                pass
+        finally:
+            control.close()
+            daemon.close()
+    finally:
+        link.close()
+
+
+def make_detector(settings: NodeSettings) -> Detector:
+    """The detector that the settings name, compiled and rehearsed."""
+    from rhot_node.warm_up import warm_up
+    detector: Detector
+    if settings.detector == "reference":
+        from rhot_node.detect.reference import ReferenceDetector
+        detector = ReferenceDetector(settings.markers)
+    else:
+        from rhot_node.detect.fast import FastDetector
+        detector = FastDetector(settings.markers)
+    warm_up(detector, settings.markers, (settings.camera.width, settings.camera.height))
+    return detector
+
+
+if __name__ == "__main__":
+    sys.exit(main())

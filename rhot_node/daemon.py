@@ -1,0 +1,223 @@
+"""The node itself: reads a frame, finds the markers, sends them. States and their changes live here."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Rewindable
+from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings, NodeSettings
+from rhot_node.detect.detector import Detector
+from rhot_node.errors import CameraError
+from rhot_node.pictures import PictureBox
+from rhot_node.requests import SettingsStore
+from rhot_node.session import Sessions, Stream
+from rhot_node.wire.messages import MarkerObservation, NodeState, Observations
+
+log = logging.getLogger(__name__)
+
+READ_S = 0.05  # how long to wait for a frame before looking at everything else
+REOPEN_S = 1.0  # between tries to open a lost camera
+U32_MAX = 2**32 - 1
+
+OpenCamera = Callable[[CameraSettings], Camera]
+MakeDetector = Callable[[NodeSettings], Detector]
+
+
+class ObservationSender(Protocol):
+    """Where observations go; the UDP link or a fake."""
+
+    def send(self, observations: Observations, address: tuple[str, int]) -> bool:
+        """False when they could not be sent."""
+        ...
+
+
+@dataclass
+class Counters:
+    """What the daemon has counted since it started."""
+
+    frames: int = 0
+    skipped_frames: int = 0  # gaps in the camera's numbers
+    over_budget: int = 0  # frames whose processing took longer than a frame lasts
+    sent: int = 0
+    not_sent: int = 0  # refused by the network
+    faults: int = 0
+
+
+class NodeDaemon:
+    """One node. `step` handles one frame; everything it works with is passed in. One thread, but `state`, `report`
+    and `count` may be asked by any."""
+
+    def __init__(self, store: SettingsStore, clock: NodeClock, open_camera: OpenCamera, make_detector: MakeDetector,
+                 *, camera_takes_settings: bool = True, loop: bool = False) -> None:
+        """`loop`: a recording that ends begins again. Nothing is opened before `prepare`."""
+        self.sessions = Sessions()
+        self.counters = Counters()
+        self._store = store
+        self._settings = store.current
+        self._clock = clock
+        self._open_camera = open_camera
+        self._make_detector = make_detector
+        self._camera_takes_settings = camera_takes_settings
+        self._loop = loop
+        self._camera: Camera | None = None
+        self._detector: Detector | None = None
+        self._prepared = False
+        self._message = ""  # why the node is in fault
+        self._size = (0, 0)
+        self._shown_state = NodeState.STARTING
+        self._retry_s = 0.0
+        self._last_frame: tuple[int, int] | None = None  # number and time of the frame before
+        self._session = 0  # whose sequence is being counted
+        self._sequence = 0
+
+    @property
+    def state(self) -> NodeState:
+        """What the node does now."""
+        if not self._prepared:
+            return NodeState.STARTING
+        if self._camera is None:
+            return NodeState.FAULT
+        return NodeState.STREAMING if self.sessions.current else NodeState.READY
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px, of the camera's images."""
+        return self._size
+
+    def report(self) -> dict[str, Any]:
+        """State, for the control channel."""
+        stream = self.sessions.current
+        return {"node_id": self._settings.node_id, "name": self._settings.name, "state": self.state.name.lower(),
+                "message": self._message, "session": stream.session if stream else 0,
+                "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
+                "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns()}
+
+    def count(self) -> dict[str, Any]:
+        """Counters, for the control channel."""
+        return dataclasses.asdict(self.counters)
+
+    def prepare(self) -> None:
+        """Make the detector and open the camera: the node is then ready. Raises CameraError."""
+        self._detector = self._make_detector(self._settings)
+        self._open()
+        self._prepared = True
+        self._show_state()
+
+    def close(self) -> None:
+        """Close the camera."""
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+
+    def step(self, sender: ObservationSender, pictures: PictureBox) -> bool:
+        """Handle one frame, or wait for one a moment. False when the recording is over and the node with it."""
+        self.sessions.expire(time.monotonic())
+        if self._store.current is not self._settings:
+            self._take_settings(self._store.current, pictures)
+        self._show_state()
+        if self._camera is None or self._detector is None:
+            self._reopen()
+            return True
+        try:
+            frame = self._camera.read(READ_S)
+        except EndOfRecording:
+            return self._begin_again(self._camera)
+        except CameraError as exc:
+            self._fail(exc)
+            return True
+        if frame is None:
+            return True
+        markers = self._detector.detect(frame.image)
+        stream = self.sessions.current
+        if stream is not None and frame.t_node_ns >= stream.t_start_node_ns:
+            self._send(frame, markers, stream, sender)
+        self._count_frame(frame)
+        pictures.offer(frame)
+        return True
+
+    def _send(self, frame: Frame, markers: tuple[MarkerObservation, ...], stream: Stream,
+              sender: ObservationSender) -> None:
+        if stream.session != self._session:
+            self._session, self._sequence = stream.session, 0
+        width, height = frame.image.size
+        t_send_node_ns = self._clock.now_ns()
+        processing_ns = min(max(t_send_node_ns - frame.t_available_node_ns, 0), U32_MAX)
+        observations = Observations(
+            self._settings.node_id, stream.session, self._sequence, frame.t_node_ns, t_send_node_ns, processing_ns,
+            frame.exposure_ns, frame.row_time_ns, width, height, frame.number & U32_MAX,
+            self._settings.markers.checksum, markers)
+        self._sequence = (self._sequence + 1) & U32_MAX
+        if sender.send(observations, stream.address):
+            self.counters.sent += 1
+        else:
+            self.counters.not_sent += 1
+
+    def _count_frame(self, frame: Frame) -> None:
+        self.counters.frames += 1
+        if self._last_frame is not None:
+            step = frame.number - self._last_frame[0]
+            budget_ns = (frame.t_node_ns - self._last_frame[1]) // max(step, 1)
+            self.counters.skipped_frames += max(step - 1, 0)
+            if self._clock.now_ns() - frame.t_available_node_ns > budget_ns:
+                self.counters.over_budget += 1
+        self._last_frame = frame.number, frame.t_node_ns
+
+    def _open(self) -> None:
+        self._last_frame = None
+        self._camera = self._open_camera(self._settings.camera)
+        self._size = self._camera.size
+        self._message = ""
+
+    def _fail(self, error: CameraError) -> None:
+        self.counters.faults += 1
+        self._message = str(error)
+        self.close()
+        self._retry_s = time.monotonic() + REOPEN_S
+        self._show_state()
+
+    def _reopen(self) -> None:
+        """Try to open the lost camera once a second. A session goes on where it was."""
+        wait_s = self._retry_s - time.monotonic()
+        if wait_s > 0:
+            time.sleep(min(wait_s, READ_S))
+            return
+        try:
+            self._open()
+        except CameraError as exc:
+            self._message = str(exc)
+            self._retry_s = time.monotonic() + REOPEN_S
+            return
+        if self._detector is not None:
+            self._detector.reset()
+        self._show_state()
+
+    def _begin_again(self, camera: Camera) -> bool:
+        if self._loop and isinstance(camera, Rewindable):
+            camera.rewind()
+            return True
+        log.info("the recording is over")
+        return False
+
+    def _take_settings(self, settings: NodeSettings, pictures: PictureBox) -> None:
+        """Apply changed settings as far as a running node can."""
+        old, self._settings = self._settings, settings
+        pictures.preview_hz = settings.preview_hz
+        if (settings.detector, settings.markers) != (old.detector, old.markers):
+            self._detector = self._make_detector(settings)
+        if settings.camera != old.camera and self._camera_takes_settings:
+            self.close()
+            self._retry_s = 0.0
+
+    def _show_state(self) -> None:
+        state = self.state
+        if state is not self._shown_state:
+            level = logging.ERROR if state is NodeState.FAULT else logging.INFO
+            log.log(level, "%s -> %s%s", self._shown_state.name.lower(), state.name.lower(),
+                    f": {self._message}" if self._message else "")
+            self._shown_state = state

@@ -1,0 +1,64 @@
+"""When the kernel received a datagram, on this machine's monotonic clock.
+
+The kernel stamps with the wall clock (SO_TIMESTAMPNS). It is brought to the monotonic clock by their difference
+measured right after the read; when the wall clock was set in between, the stamp is not used.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+
+SO_TIMESTAMPNS = 35  # Linux; not in the socket module of Python 3.11
+SO_RXQ_OVFL = 40
+ANCILLARY_SIZE = socket.CMSG_SPACE(16) + socket.CMSG_SPACE(4)
+
+_TIMESPEC = struct.Struct("@ll")
+_COUNT = struct.Struct("@I")
+_STEP_NS = 300_000  # more than reading two clocks can differ by
+_SLEW = 1e-3  # time services turn the wall clock's rate by 500 ppm at most
+_OLDEST_NS = 10_000_000_000  # no datagram waits longer in a socket that is being read
+
+Ancillary = list[tuple[int, int, bytes]]
+
+
+def ask_for_times(sock: socket.socket) -> None:
+    """Have the kernel stamp every datagram and tell how many it had to drop."""
+    sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+    sock.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+
+
+class KernelTime:
+    """Turns one socket's ancillary data into monotonic receive times. One thread only."""
+
+    def __init__(self) -> None:
+        self.overflowed = 0  # datagrams the kernel dropped because the buffer was full
+        self._difference_ns, self._measured_ns = _measure()
+
+    def receive_time_ns(self, ancillary: Ancillary) -> int:
+        """Monotonic time at which the kernel received the datagram that was just read, ns."""
+        stamp_ns = None
+        for _, kind, data in ancillary:
+            if kind == SO_TIMESTAMPNS and len(data) >= _TIMESPEC.size:
+                seconds, nanoseconds = _TIMESPEC.unpack_from(data)
+                stamp_ns = seconds * 1_000_000_000 + nanoseconds
+            elif kind == SO_RXQ_OVFL and len(data) >= _COUNT.size:
+                self.overflowed = _COUNT.unpack_from(data)[0]
+        difference_ns, now_ns = _measure()
+        change_ns = abs(difference_ns - self._difference_ns)
+        steady = change_ns < _STEP_NS + _SLEW * (now_ns - self._measured_ns)
+        self._difference_ns, self._measured_ns = difference_ns, now_ns
+        if stamp_ns is None or not steady:
+            return now_ns
+        t_ns = stamp_ns - difference_ns
+        # The difference is read with some noise: a datagram cannot have come after now.
+        return min(t_ns, now_ns) if now_ns - _OLDEST_NS < t_ns < now_ns + _STEP_NS else now_ns
+
+
+def _measure() -> tuple[int, int]:
+    """(wall clock - monotonic clock, monotonic now), ns."""
+    before_ns = time.monotonic_ns()
+    wall_ns = time.time_ns()
+    now_ns = time.monotonic_ns()
+    return wall_ns - (before_ns + now_ns) // 2, now_ns

@@ -1,0 +1,162 @@
+"""The control channel's requests: what may be asked of a node, as JSON, and the answers. No sockets.
+
+docs/node.md lists them. A request that is wrong in any way is answered with ``{"ok": false, "error": sentence}``.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta
+
+from rhot_node.clock import NodeClock
+from rhot_node.config import NodeSettings, changed_settings, needs_restart, save_settings
+from rhot_node.errors import NodeError
+from rhot_node.pictures import PictureBox, encode_still
+from rhot_node.session import Sessions
+
+log = logging.getLogger(__name__)
+
+STILL_S = 2.0  # how long a still may take; a node in fault has no frames
+Report = Callable[[], dict[str, Any]]
+
+
+class _Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="request"):
+    """Root of all requests; the field "request" tells them apart."""
+
+
+class StateRequest(_Request, frozen=True, tag="state"):
+    """What the node is and does."""
+
+
+class CountersRequest(_Request, frozen=True, tag="counters"):
+    """What the node has counted since it started."""
+
+
+class SettingsRequest(_Request, frozen=True, tag="settings"):
+    """The settings as they are."""
+
+
+class SetSettingsRequest(_Request, frozen=True, tag="set_settings"):
+    """Change some settings: objects are merged field by field, everything else is replaced."""
+
+    settings: dict[str, Any]
+
+
+class StillRequest(_Request, frozen=True, tag="still"):
+    """One frame as PNG, full size, in a second message part."""
+
+
+class StartRequest(_Request, frozen=True, tag="start"):
+    """Stream `session` to UDP `port` of `host`, from node time `t_start_node_ns` on (0: at once)."""
+
+    session: Annotated[int, Meta(ge=1)]
+    host: str
+    port: Annotated[int, Meta(ge=1, le=65535)]
+    t_start_node_ns: int = 0
+
+
+class StopRequest(_Request, frozen=True, tag="stop"):
+    """Stop `session`, or whatever runs when it is 0."""
+
+    session: Annotated[int, Meta(ge=0)] = 0
+
+
+Request = (StateRequest | CountersRequest | SettingsRequest | SetSettingsRequest | StillRequest | StartRequest
+           | StopRequest)
+
+_decoder = msgspec.json.Decoder(Request)
+
+
+class SettingsStore:
+    """The settings in force and their file; changes are saved before they count."""
+
+    def __init__(self, path: Path, settings: NodeSettings) -> None:
+        self.path = path
+        self.current = settings
+        self._at_start = settings
+        self._lock = threading.Lock()
+
+    def change(self, changes: dict[str, Any]) -> list[str]:
+        """Validate, save, then take up `changes`; returns what needs a restart. Raises SettingsError, OSError."""
+        with self._lock:
+            settings = changed_settings(self.current, changes)
+            save_settings(self.path, settings)
+            self.current = settings
+        log.info("settings changed and saved to %s", self.path)
+        return needs_restart(self._at_start, settings)
+
+
+class Responder:
+    """Answers requests. `state` and `counters` report on the daemon from any thread."""
+
+    def __init__(self, store: SettingsStore, sessions: Sessions, pictures: PictureBox, clock: NodeClock,
+                 state: Report, counters: Report) -> None:
+        self._store = store
+        self._sessions = sessions
+        self._pictures = pictures
+        self._clock = clock
+        self._state = state
+        self._counters = counters
+
+    def answer(self, parts: list[bytes]) -> list[bytes]:
+        """The reply's message parts to a request's. Never raises."""
+        try:
+            if len(parts) != 1:
+                raise NodeError(f"a request is one JSON document in one message part, not {len(parts)} parts.")
+            reply, attachment = self._perform(_decoder.decode(parts[0]))
+        except (msgspec.DecodeError, NodeError) as exc:
+            reply, attachment = {"ok": False, "error": str(exc)}, b""
+        except OSError as exc:
+            sentence = f"{self._store.path}: cannot be written ({exc.strerror}); nothing was changed."
+            reply, attachment = {"ok": False, "error": sentence}, b""
+        except Exception as exc:  # a request must never end the node; the log has the whole story
+            log.exception("a request failed")
+            reply, attachment = {"ok": False, "error": f"the node could not do that: {exc!r}. See its log."}, b""
+        encoded = msgspec.json.encode(reply)
+        return [encoded, attachment] if attachment else [encoded]
+
+    def _perform(self, request: Request) -> tuple[dict[str, Any], bytes]:
+        match request:
+            case StateRequest():
+                return {"ok": True, **self._state()}, b""
+            case CountersRequest():
+                return {"ok": True, "counters": self._counters()}, b""
+            case SettingsRequest():
+                return {"ok": True, "settings": self._store.current}, b""
+            case SetSettingsRequest():
+                return {"ok": True, "restart": self._store.change(request.settings)}, b""
+            case StillRequest():
+                return self._take_still()
+            case StartRequest():
+                return self._start(request), b""
+            case StopRequest():
+                return {"ok": True, "stopped": self._sessions.stop(request.session)}, b""
+
+    def _take_still(self) -> tuple[dict[str, Any], bytes]:
+        picture = self._pictures.next_still(STILL_S)
+        if picture is None:
+            raise NodeError(f"no frame came within {STILL_S:.0f} s; ask for the state to see what the camera does.")
+        still = encode_still(picture)
+        return {"ok": True, "format": "png", "width": still.width, "height": still.height,
+                "number": picture.number, "t_node_ns": picture.t_node_ns}, still.data
+
+    def _start(self, request: StartRequest) -> dict[str, Any]:
+        if request.session >= 1 << 64:
+            raise NodeError(f"session {request.session} does not fit 64 bits.")
+        try:
+            host = str(ipaddress.IPv4Address(request.host))
+        except ValueError as exc:
+            raise NodeError(f"host {request.host!r} is not an IPv4 address such as 192.168.1.10.") from exc
+        verdict = self._sessions.start(request.session, (host, request.port), request.t_start_node_ns,
+                                       now_node_ns=self._clock.now_ns(), now_s=time.monotonic())
+        if verdict == "stale":
+            raise NodeError(f"session {request.session} is over; every start needs a new session number.")
+        return {"ok": True, "verdict": verdict}

@@ -1,0 +1,99 @@
+"""Which session a node streams in: started, repeated, replaced, stopped, left alone. No sockets, no clock."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from dataclasses import dataclass
+
+log = logging.getLogger(__name__)
+
+MASTER_SILENCE_S = 5.0
+"""A node that hears nothing of its session for so long takes its master for gone."""
+
+START_AHEAD_MAX_NS = 10_000_000_000
+"""A start further ahead than this was meant for another clock; it then begins at once."""
+
+ENDED_MAX = 4096  # sessions remembered as over
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """One session: where the observations go, and the first instant to send (node clock, 0: at once)."""
+
+    session: int
+    address: tuple[str, int]
+    t_start_node_ns: int
+
+
+class Sessions:
+    """The current session and those that are over. Used by the link's, the control channel's and the main thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._current: Stream | None = None
+        self._heard_s = 0.0
+        self._ended: dict[int, None] = {}  # in the order of their end
+
+    @property
+    def current(self) -> Stream | None:
+        """The stream that is asked for now, None when none."""
+        return self._current
+
+    def start(self, session: int, address: tuple[str, int], t_start_node_ns: int, *, now_node_ns: int,
+              now_s: float) -> str:
+        """Take up `session`. Returns 'started'; 'repeated' when it is the current one; 'stale' when it is over."""
+        if t_start_node_ns - now_node_ns > START_AHEAD_MAX_NS:
+            log.warning("session %d was to start %.1f s ahead, by another clock; it starts at once", session,
+                        (t_start_node_ns - now_node_ns) / 1e9)
+            t_start_node_ns = 0
+        with self._lock:
+            if session in self._ended:
+                return "stale"
+            old = self._current
+            if old is not None and old.session == session:
+                self._heard_s = now_s
+                return "repeated"
+            if old is not None:
+                self._end(old.session)
+            self._current = Stream(session, address, t_start_node_ns)
+            self._heard_s = now_s
+        log.info("session %d started: streaming to %s port %d", session, *address)
+        return "started"
+
+    def stop(self, session: int) -> bool:
+        """Stop `session`, or whatever runs when it is 0. True when something stopped.
+
+        A session that never ran is over as well: its start may still be on its way.
+        """
+        with self._lock:
+            current = self._current
+            if session:
+                self._end(session)
+            if current is None or session not in (0, current.session):
+                return False
+            self._end(current.session)
+            self._current = None
+        log.info("session %d stopped", current.session)
+        return True
+
+    def hear(self, session: int, now_s: float) -> None:
+        """Note a sign of life of the master of `session`."""
+        with self._lock:
+            if self._current is not None and self._current.session == session:
+                self._heard_s = now_s
+
+    def expire(self, now_s: float) -> bool:
+        """End the session when its master fell silent; it may be taken up again when the master comes back."""
+        with self._lock:
+            current = self._current
+            if current is None or now_s - self._heard_s <= MASTER_SILENCE_S:
+                return False
+            self._current = None
+        log.warning("session %d ended: nothing heard of its master for %.0f s", current.session, MASTER_SILENCE_S)
+        return True
+
+    def _end(self, session: int) -> None:
+        self._ended[session] = None
+        while len(self._ended) > ENDED_MAX:
+            del self._ended[next(iter(self._ended))]

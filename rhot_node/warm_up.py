@@ -1,0 +1,38 @@
+"""A detector's rehearsal: everything is compiled and cached before the first real frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rhot_node.detect.detector import Detector
+from rhot_node.detect.image import YuvImage
+from rhot_node.markers import MarkerSet
+
+DISC_RADIUS = 10  # px
+FRAMES = 3  # acquire, then track
+
+
+def warm_up(detector: Detector, markers: MarkerSet, size: tuple[int, int]) -> None:
+    """Show the detector a few frames of `size` (width, height) with a disc of every marker's colour, then reset it.
+
+    A blank frame would leave the code that measures a marker uncompiled until the first marker is seen.
+    """
+    image = rehearsal_image(markers, size)
+    for _ in range(FRAMES):
+        detector.detect(image)
+    detector.reset()
+
+
+def rehearsal_image(markers: MarkerSet, size: tuple[int, int]) -> YuvImage:
+    """Mid-grey with the markers' discs on a grid."""
+    width, height = size
+    luma = np.full((height, width), 128, dtype=np.uint8)
+    chroma = np.full((2, height // 2, width // 2), 128, dtype=np.uint8)
+    rows, columns = np.mgrid[:height // 2, :width // 2]
+    across = max(1, width // (4 * DISC_RADIUS))
+    for index, marker in enumerate(markers.markers):
+        x, y = 2 * DISC_RADIUS * (1 + 2 * (index % across)), 2 * DISC_RADIUS * (1 + 2 * (index // across))
+        disc = (2 * columns + 0.5 - x) ** 2 + (2 * rows + 0.5 - y) ** 2 <= DISC_RADIUS**2
+        chroma[0][disc] = np.clip(128 + round(marker.chroma.cb), 0, 255)
+        chroma[1][disc] = np.clip(128 + round(marker.chroma.cr), 0, 255)
+    return YuvImage(luma, chroma[0], chroma[1])
