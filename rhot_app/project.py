@@ -6,7 +6,7 @@ docs/rig.md describes the format. Nothing else on the master is configured anywh
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 from msgspec import Meta
@@ -16,8 +16,8 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_node.files import decode_document, read_document, write_document
 from rhot_node.markers import MarkerSet
 
-FORMAT = "rhot-rig"
-VERSION = 1
+FORMAT: Final = "rhot-rig"
+VERSION: Final = 1
 
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
@@ -104,9 +104,10 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     version: Literal[1] = VERSION
 
     def __post_init__(self) -> None:
-        for what, values in (("node_id", [node.node_id for node in self.nodes]),
-                             ("name", [node.name for node in self.nodes]),
-                             ("data_port", [node.data_port for node in self.nodes if node.data_port])):
+        fields: tuple[tuple[str, list[int | str]], ...] = (
+            ("node_id", [node.node_id for node in self.nodes]), ("name", [node.name for node in self.nodes]),
+            ("data_port", [node.data_port for node in self.nodes if node.data_port]))
+        for what, values in fields:
             doubled = [value for value in values if values.count(value) > 1]
             if doubled:
                 raise ValueError(f"two nodes have the same {what} {doubled[0]!r}; each node needs its own")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import zlib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 from msgspec import Meta
@@ -16,8 +16,8 @@ from msgspec import Meta
 from rhot_node.errors import SettingsError
 from rhot_node.files import decode_document, read_document, write_document
 
-FORMAT = "rhot-markers"
-VERSION = 1
+FORMAT: Final = "rhot-markers"
+VERSION: Final = 1
 
 Byte = Annotated[int, Meta(ge=0, le=255)]
 Positive = Annotated[float, Meta(gt=0)]

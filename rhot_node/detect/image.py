@@ -48,7 +48,8 @@ def from_bgr(bgr: Plane) -> YuvImage:
     bgr = bgr[:height, :width]
     luma = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
     half = cv2.cvtColor(cv2.resize(bgr, (width // 2, height // 2), interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2YCrCb)
-    return YuvImage(luma, np.ascontiguousarray(half[:, :, 2]), np.ascontiguousarray(half[:, :, 1]))
+    return YuvImage(np.asarray(luma, np.uint8), np.asarray(half[:, :, 2], np.uint8, order="C"),
+                    np.asarray(half[:, :, 1], np.uint8, order="C"))
 
 
 def to_bgr(image: YuvImage) -> Plane:
