@@ -99,7 +99,7 @@ class FastDetector:
     def _measure(self, image: YuvImage, index: int, request: NDArray[np.float64]) -> bool:
         """Measure marker `index` into `self._row`; the paint's noise is learnt on the way."""
         row = self._row
-        if not m.measure(image.u, image.v, self._sector, index + 1, self._directions[index], request,
+        if not m.measure(image.y, image.u, image.v, self._sector, index + 1, self._directions[index], request,
                          self._scratch.arrays, row):
             return False
         if row[m.NOISE_COUNT] >= 4:

@@ -45,6 +45,7 @@ class Scratch:
     def __init__(self, height: int, width: int) -> None:
         self.mask = np.zeros((height, width), dtype=np.int16)
         self.kind = np.zeros((height, width), dtype=np.uint8)
+        self.colour = np.zeros((3, height, width), dtype=np.float32)
         self.coverage = np.zeros((height, width), dtype=np.float32)
         self.gain = np.zeros((height, width), dtype=np.float32)
         self.stack = np.zeros(height * width, dtype=np.int32)
@@ -54,13 +55,13 @@ class Scratch:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         """In the order `measure` takes them."""
-        return self.mask, self.kind, self.coverage, self.gain, self.stack, self.components, self.own
+        return self.mask, self.kind, self.colour, self.coverage, self.gain, self.stack, self.components, self.own
 
 
 @njit(cache=True)
-def measure(u, v, sector, label, direction, request, scratch, result):  # type: ignore[no-untyped-def]
+def measure(y, u, v, sector, label, direction, request, scratch, result):  # type: ignore[no-untyped-def]
     """Fill `result` (MEASURE_COLUMNS) for the marker `label`; False when the window does not show it."""
-    mask, kind, coverage, gain, stack, components, own = scratch
+    mask, _kind, _colour, _coverage, _gain, stack, components, own = scratch
     level = request[LEVEL_REF]
     half_x, half_y = request[HALF_X], request[HALF_Y]
     found = False
@@ -88,13 +89,13 @@ def measure(u, v, sector, label, direction, request, scratch, result):  # type: 
             found = False
     if not found:
         return False
-    return _place(u, v, window, count, level, request, scratch, result)
+    return _place(y, u, v, window, count, level, request, scratch, result)
 
 
 @njit(cache=True)
-def _place(u, v, window, count, level, request, scratch, result):  # type: ignore[no-untyped-def]
+def _place(y, u, v, window, count, level, request, scratch, result):  # type: ignore[no-untyped-def]
     """Coverage, position and noise of the components marked in `own`."""
-    mask, kind, coverage, gain, stack, components, own = scratch
+    mask, kind, colour, coverage, gain, stack, components, own = scratch
     x0 = y0 = 1e9
     x1 = y1 = -1.0
     for number in range(count):
@@ -104,7 +105,7 @@ def _place(u, v, window, count, level, request, scratch, result):  # type: ignor
     region = _clamp(x0 - PAD, x1 + PAD, y0 - PAD, y1 + PAD, u)
     _clear_beyond(region, window, mask)
     classify(region, own, mask, kind, stack)
-    unmix(u, v, region, level, kind, coverage, gain)
+    unmix(y, u, v, region, level, kind, colour, coverage, gain)
     if not centroid(region, coverage, gain, result):
         return False
     at_border = x0 == 0 or y0 == 0 or x1 == u.shape[1] - 1 or y1 == u.shape[0] - 1
