@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
 from rhot_app.hand.dh import ROOT, DhArrays, DhRow, compile_table, rigid_rows
+from rhot_app.hand.limits import NaturalPose, natural_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, HandPose
 
 Array = NDArray[np.float64]
@@ -34,6 +35,8 @@ class HandModel:
     bones: Array  # (5, 3) m
     radii: Array  # (5, 3) m
     marker: Array  # (5,) m, from the last joint along the distal bone
+    chain: Array  # (5, 3) m, the bones, the last one only as far as its marker's centre
+    natural: NaturalPose  # of the angles, what to believe without evidence
 
 
 def build_model(anatomy: HandAnatomy) -> HandModel:
@@ -41,6 +44,8 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
     fingers = [anatomy.fingers[name] for name in FINGERS]
     base = 1e-3 * np.array([finger.base_mm for finger in fingers], dtype=np.float64)
     rotation = np.array([euler_zyx(*np.radians(finger.base_rotation_deg)) for finger in fingers])
+    bones = 1e-3 * np.array([finger.bones_mm for finger in fingers], dtype=np.float64)
+    marker = 1e-3 * np.array([finger.marker_mm for finger in fingers], dtype=np.float64)
     right = anatomy.side == "right"
     return HandModel(
         anatomy=anatomy,
@@ -49,9 +54,11 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
         limits=np.radians(np.concatenate([np.array(finger.limits_deg, dtype=np.float64) for finger in fingers])),
         base=base,
         base_rotation=rotation,
-        bones=1e-3 * np.array([finger.bones_mm for finger in fingers], dtype=np.float64),
+        bones=bones,
         radii=1e-3 * np.array([finger.radii_mm for finger in fingers], dtype=np.float64),
-        marker=1e-3 * np.array([finger.marker_mm for finger in fingers], dtype=np.float64),
+        marker=marker,
+        chain=np.column_stack([bones[:, :2], marker]),
+        natural=natural_pose(),
     )
 
 

@@ -1,0 +1,172 @@
+"""One finger in its own base frame: forward kinematics with Jacobian, and FABRIK passes that keep joint limits.
+
+The base frame is the model's `base_rotation` frame: x along the first bone at zero angles, y the flexion axis. A
+finger has four angles and moves in one plane through z; a thumb has five: a saddle joint, a second one, a hinge.
+Arrays: `angles` (4,) or (5,) rad, `lengths` (3,) m with the last bone ending at the point to be placed,
+`limits` like the angles with (low, high) rows, `joints` (4, 3) m from the root to that point.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.limits import clamp_angle, wrap
+
+Array = NDArray[np.float64]
+
+PLANE_MARGIN = 0.02
+"""A target nearer to the abduction axis than this part of the finger's length does not show the finger's plane."""
+
+
+@njit(cache=True)
+def chain_points(angles: Array, lengths: Array, joints: Array, jacobian: Array) -> None:
+    """Fill `joints` (4, 3) and `jacobian` (3, n): change of the last of them per angle."""
+    ca, sa, cf, sf = math.cos(angles[0]), math.sin(angles[0]), math.cos(angles[1]), math.sin(angles[1])
+    x, y, z = np.array((ca * cf, sa * cf, -sf)), np.array((-sa, ca, 0.0)), np.array((ca * sf, sa * sf, cf))
+    thumb = angles.shape[0] == 5
+    joints[0] = 0.0
+    joints[1] = lengths[0] * x
+    bent, hinge = 0.0, y
+    if thumb:
+        cb, sb = math.cos(angles[2]), math.sin(angles[2])
+        hinge = cb * y - sb * x
+        x = cb * x + sb * y
+    for bone in range(1, 3):
+        bent += angles[bone + 2] if thumb else angles[bone + 1]
+        joints[bone + 1] = joints[bone] + lengths[bone] * (math.cos(bent) * x - math.sin(bent) * z)
+    _turn(np.array((0.0, 0.0, 1.0)), joints[0], joints[3], jacobian, 0)
+    _turn(y, joints[0], joints[3], jacobian, 1)
+    if thumb:
+        _turn(z, joints[1], joints[3], jacobian, 2)
+    first = 3 if thumb else 2
+    _turn(hinge, joints[1], joints[3], jacobian, first)
+    _turn(hinge, joints[2], joints[3], jacobian, first + 1)
+
+
+@njit(cache=True)
+def _turn(axis: Array, origin: Array, point: Array, out: Array, column: int) -> None:
+    """Column of the Jacobian: velocity of `point` turning about `axis` through `origin`."""
+    rx, ry, rz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    out[0, column] = axis[1] * rz - axis[2] * ry
+    out[1, column] = axis[2] * rx - axis[0] * rz
+    out[2, column] = axis[0] * ry - axis[1] * rx
+
+
+@njit(cache=True)
+def fold_abduction(x: float, y: float, margin: float, fallback: float) -> float:
+    """Abduction, within -90..90 degrees, of a plane through z and (x, y); `fallback` when that lies within `margin`."""
+    if math.hypot(x, y) < margin:
+        return fallback
+    return math.atan2(y, x) if x > 0.0 else math.atan2(-y, -x)
+
+
+@njit(cache=True)
+def fabrik_finger(angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
+                  max_iterations: int) -> int:
+    """FABRIK in the finger's plane, in place on `angles`; returns the iterations done.
+
+    The abduction axis lies in the plane, so the target alone chooses it. In the plane (u outward, w palmar) a bone
+    is its direction F from u; a hinge limits the difference of neighbours' directions in both passes.
+    """
+    reach = lengths.sum()
+    angles[0] = clamp_angle(fold_abduction(target[0], target[1], PLANE_MARGIN * reach, angles[0]),
+                            limits[0, 0], limits[0, 1])
+    goal_u = math.cos(angles[0]) * target[0] + math.sin(angles[0]) * target[1]
+    goal_w = -target[2]
+    if math.sqrt(target[0] ** 2 + target[1] ** 2 + target[2] ** 2) >= reach:
+        angles[1] = clamp_angle(math.atan2(goal_w, goal_u), limits[1, 0], limits[1, 1])
+        for k in range(2, 4):
+            angles[k] = clamp_angle(0.0, limits[k, 0], limits[k, 1])
+        return 0
+    u, w = np.zeros(4), np.zeros(4)
+    _lay_out(angles, lengths, u, w)
+    if math.hypot(u[3] - goal_u, w[3] - goal_w) <= tolerance:
+        return 0
+    for iteration in range(1, max_iterations + 1):
+        u[3], w[3] = goal_u, goal_w
+        heading = math.atan2(w[3] - w[2], u[3] - u[2])
+        for k in range(2, 0, -1):
+            u[k] = u[k + 1] - lengths[k] * math.cos(heading)
+            w[k] = w[k + 1] - lengths[k] * math.sin(heading)
+            bend = wrap(heading - math.atan2(w[k] - w[k - 1], u[k] - u[k - 1]))
+            heading -= clamp_angle(bend, limits[k + 1, 0], limits[k + 1, 1])
+        # The first bone keeps its far end: that is what the forward pass reads from it.
+        heading = 0.0
+        for k in range(3):
+            turn = math.atan2(w[k + 1] - w[k], u[k + 1] - u[k]) - heading
+            angles[k + 1] = clamp_angle(turn, limits[k + 1, 0], limits[k + 1, 1])
+            heading += angles[k + 1]
+            u[k + 1] = u[k] + lengths[k] * math.cos(heading)
+            w[k + 1] = w[k] + lengths[k] * math.sin(heading)
+        if math.hypot(u[3] - goal_u, w[3] - goal_w) <= tolerance:
+            return iteration
+    return max_iterations
+
+
+@njit(cache=True)
+def _lay_out(angles: Array, lengths: Array, u: Array, w: Array) -> None:
+    """The finger's joints in its plane."""
+    heading = 0.0
+    for k in range(3):
+        heading += angles[k + 1]
+        u[k + 1] = u[k] + lengths[k] * math.cos(heading)
+        w[k + 1] = w[k] + lengths[k] * math.sin(heading)
+
+
+@njit(cache=True)
+def fabrik_thumb(angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
+                 max_iterations: int) -> int:
+    """FABRIK of the thumb, in place on `angles`; returns the iterations done.
+
+    The backward pass is free; the forward pass reads each bone's angles in its parent's frame and clamps them. The
+    two bones behind the MCP joint share a plane, which the target chooses as it does for a finger.
+    """
+    joints, jacobian, bone = np.empty((4, 3)), np.empty((3, 5)), np.empty(3)
+    chain_points(angles, lengths, joints, jacobian)
+    if math.sqrt(target[0] ** 2 + target[1] ** 2 + target[2] ** 2) >= lengths.sum():
+        for k in range(1, 4):
+            joints[k] = target
+        _read_thumb(angles, joints, lengths, limits)
+        return 0
+    for iteration in range(1, max_iterations + 1):
+        joints[3] = target
+        for k in range(2, 0, -1):
+            bone[:] = joints[k + 1] - joints[k]
+            length = math.sqrt(bone[0] ** 2 + bone[1] ** 2 + bone[2] ** 2)
+            if length > 0.0:
+                joints[k] = joints[k + 1] - lengths[k] / length * bone
+        joints[0] = 0.0
+        _read_thumb(angles, joints, lengths, limits)
+        chain_points(angles, lengths, joints, jacobian)
+        bone[:] = joints[3] - target
+        if math.sqrt(bone[0] ** 2 + bone[1] ** 2 + bone[2] ** 2) <= tolerance:
+            return iteration
+    return max_iterations
+
+
+@njit(cache=True)
+def _read_thumb(angles: Array, joints: Array, lengths: Array, limits: Array) -> None:
+    """Clamped angles that point the thumb's bones, one after the other from the root, at `joints`."""
+    abduction = fold_abduction(joints[1, 0], joints[1, 1], 1e-9, angles[0])
+    angles[0] = clamp_angle(abduction, limits[0, 0], limits[0, 1])
+    ca, sa = math.cos(angles[0]), math.sin(angles[0])
+    flexion = math.atan2(-joints[1, 2], ca * joints[1, 0] + sa * joints[1, 1])
+    angles[1] = clamp_angle(flexion, limits[1, 0], limits[1, 1])
+    cf, sf = math.cos(angles[1]), math.sin(angles[1])
+    local = np.empty((2, 3))  # the two joints behind the MCP joint, seen from it in the metacarpal's frame
+    for k in range(2):
+        along = ca * joints[k + 2, 0] + sa * joints[k + 2, 1]
+        local[k, 0] = cf * along - sf * joints[k + 2, 2] - lengths[0]
+        local[k, 1] = ca * joints[k + 2, 1] - sa * joints[k + 2, 0]
+        local[k, 2] = sf * along + cf * joints[k + 2, 2]
+    margin = PLANE_MARGIN * (lengths[1] + lengths[2])
+    angles[2] = clamp_angle(fold_abduction(local[1, 0], local[1, 1], margin, angles[2]), limits[2, 0], limits[2, 1])
+    c, s = math.cos(angles[2]), math.sin(angles[2])
+    angles[3] = clamp_angle(math.atan2(-local[0, 2], c * local[0, 0] + s * local[0, 1]), limits[3, 0], limits[3, 1])
+    u = c * local[1, 0] + s * local[1, 1] - lengths[1] * math.cos(angles[3])
+    w = -local[1, 2] - lengths[1] * math.sin(angles[3])
+    angles[4] = clamp_angle(math.atan2(w, u) - angles[3], limits[4, 0], limits[4, 1])

@@ -1,0 +1,214 @@
+"""Inverse kinematics of single fingers within joint limits, the palm's pose known.
+
+FABRIK brings the marker near its target; a constrained Gauss-Newton descent then meets the target exactly and spends
+the joints that the target leaves free on the natural pose (DIP = 2/3 PIP, RHOT eq. 2.4).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.finger_chain import chain_points, fabrik_finger, fabrik_thumb
+from rhot_app.hand.linear import solve_in_box
+from rhot_app.hand.model import HandModel
+from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 5e-5
+"""A finger has reached its target within this distance, m."""
+
+DESCENT_STEPS = 12
+STEP_MAX = 0.4
+"""Largest change of an angle in one Gauss-Newton step, rad: beyond it the linearisation says nothing."""
+
+COMPLIANCE = 2e-10
+"""Weight of the natural pose against the target, m^2: it shifts a reached marker by less than a micrometre."""
+
+CONTINUITY = 1.0
+"""Information of the start angles, 1/rad^2: they settle what neither target nor natural pose does."""
+
+
+@dataclass(frozen=True, slots=True)
+class FingerSolution:
+    """`angles` (4,) or for the thumb (5,) rad; `joints` (4, 3) m world, base to tip; `end_effector` (3,) m world: the
+    marker's centre; `residual`: its distance from the target, m; `iterations`: FABRIK's."""
+
+    angles: Array
+    joints: Array
+    end_effector: Array
+    residual: float
+    iterations: int
+    reached: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FingersSolution:
+    """All five fingers: `angles` (21,) rad, `residuals` (5,) m (NaN without a target), `iterations` (5,), `reached`
+    (5,) bool."""
+
+    angles: Array
+    residuals: Array
+    iterations: NDArray[np.int64]
+    reached: NDArray[np.bool_]
+
+
+def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_angles: Array, target: Array,
+                 tolerance: float = TOLERANCE, max_iterations: int = 10) -> FingerSolution:
+    """Bring the marker of one finger (index into skeleton.FINGERS) to `target` (3,) m, world.
+
+    `start_angles` (4,) or (5,) are the last known ones: nearby targets then give nearby angles. A target out of
+    reach stretches the finger towards it as far as the limits allow; `reached` is then False.
+    """
+    local = np.empty(3)
+    to_finger(world_from_palm, model.mirror, model.base[finger], model.base_rotation[finger], target, local)
+    angles = np.array(start_angles, dtype=np.float64)
+    rows = ANGLE_SLICES[finger]
+    mean, information = model.natural.mean[rows], model.natural.information[rows, rows]
+    residual, iterations = solve_arrays(angles, model.chain[finger], model.limits[rows], local, mean, information,
+                                        tolerance, max_iterations)
+    points = np.empty((4, 3))
+    chain_points(angles, model.chain[finger], points, np.empty((3, len(angles))))
+    scale = model.bones[finger, 2] / model.marker[finger]
+    points = np.vstack([points, points[2] + scale * (points[3] - points[2])])
+    palm = (model.base[finger] + points @ model.base_rotation[finger].T) * [1.0, model.mirror, 1.0]
+    world = palm @ world_from_palm[:3, :3].T + world_from_palm[:3, 3]
+    return FingerSolution(angles, world[[0, 1, 2, 4]], world[3], residual, iterations, residual <= tolerance)
+
+
+def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: float = TOLERANCE,
+                  max_iterations: int = 10) -> FingersSolution:
+    """`solve_finger` for every finger with a target: `targets` (5, 3) m world, NaN rows keep the pose's angles."""
+    angles, residuals, iterations = np.array(pose.angles), np.empty(5), np.empty(5, dtype=np.int64)
+    solve_fingers_arrays(angles, pose.world_from_palm, model.mirror, model.base, model.base_rotation,
+                         model.chain, model.limits, targets, model.natural.mean, model.natural.information,
+                         tolerance, max_iterations, residuals, iterations)
+    return FingersSolution(angles, residuals, iterations, residuals <= tolerance)
+
+
+@njit(cache=True)
+def to_finger(world_from_palm: Array, mirror: float, base: Array, base_rotation: Array, point: Array,
+              local: Array) -> None:
+    """Fill `local` (3,): a world point in one finger's base frame, mirrored into a right hand."""
+    palm = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            palm[i] += world_from_palm[j, i] * (point[j] - world_from_palm[j, 3])
+    palm[1] *= mirror
+    for i in range(3):
+        local[i] = 0.0
+        for j in range(3):
+            local[i] += base_rotation[j, i] * (palm[j] - base[j])
+
+
+@njit(cache=True)
+def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, base: Array, base_rotation: Array,
+                         lengths: Array, limits: Array, targets: Array, mean: Array, information: Array,
+                         tolerance: float, max_iterations: int, residuals: Array,
+                         iterations: NDArray[np.int64]) -> None:
+    """`solve_fingers` on arrays, in place on `angles`, `residuals` and `iterations`."""
+    local = np.empty(3)
+    for finger in range(5):
+        residuals[finger], iterations[finger] = np.nan, 0
+        if math.isnan(targets[finger, 0] + targets[finger, 1] + targets[finger, 2]):
+            continue
+        to_finger(world_from_palm, mirror, base[finger], base_rotation[finger], targets[finger], local)
+        low = 0 if finger == 0 else 1 + 4 * finger
+        high = 5 + 4 * finger
+        residuals[finger], iterations[finger] = solve_arrays(
+            angles[low:high], lengths[finger], limits[low:high], local, mean[low:high],
+            information[low:high, low:high], tolerance, max_iterations)
+
+
+@njit(cache=True)
+def solve_arrays(angles: Array, lengths: Array, limits: Array, target: Array, mean: Array, information: Array,
+                 tolerance: float, max_iterations: int) -> tuple[float, int]:
+    """One finger in its base frame, in place on `angles`; returns the residual, m, and FABRIK's iterations.
+
+    `mean` and `information`: the natural pose of these angles.
+    """
+    count = angles.shape[0]
+    for k in range(count):
+        angles[k] = min(max(angles[k], limits[k, 0]), limits[k, 1])
+    start = angles.copy()
+    if count == 5:
+        iterations = fabrik_thumb(angles, lengths, limits, target, tolerance, max_iterations)
+    else:
+        iterations = fabrik_finger(angles, lengths, limits, target, tolerance, max_iterations)
+    trial = angles.copy()
+    residual = _miss(angles, lengths, target)
+    found = _descend(trial, start, lengths, limits, target, mean, information)
+    if found > tolerance:
+        # Stopped by a limit or a local minimum: once more from the middle of the range, where FABRIK began, stretched.
+        for attempt in range(3):
+            other = start.copy()
+            if attempt == 0:
+                other[:] = 0.5 * (limits[:, 0] + limits[:, 1])
+            elif attempt == 2:
+                other[1:] = limits[1:, 0]
+            missed = _descend(other, start, lengths, limits, target, mean, information)
+            if missed < found:
+                trial[:], found = other, missed
+            if found <= tolerance:
+                break
+    if found <= tolerance or found < residual:
+        angles[:], residual = trial, found
+    return residual, iterations
+
+
+@njit(cache=True)
+def _miss(angles: Array, lengths: Array, target: Array) -> float:
+    joints = np.empty((4, 3))
+    chain_points(angles, lengths, joints, np.empty((3, angles.shape[0])))
+    return math.sqrt((joints[3, 0] - target[0]) ** 2 + (joints[3, 1] - target[1]) ** 2
+                     + (joints[3, 2] - target[2]) ** 2)
+
+
+@njit(cache=True)
+def _descend(angles: Array, start: Array, lengths: Array, limits: Array, target: Array, mean: Array,
+             information: Array) -> float:
+    """Gauss-Newton steps to the most natural angles that meet the target, in place; returns the residual, m.
+
+    Steps are not tested for descent: on the way along the target's constraint the residual must rise for a moment.
+    When it stays far from zero the steps are damped more and more, and the best angles seen are the result.
+    """
+    count = angles.shape[0]
+    joints, jacobian = np.empty((4, 3)), np.empty((3, count))
+    error, step, best = np.empty(3), np.empty(count), angles.copy()
+    matrix, right = np.empty((count, count)), np.empty(count)
+    least, damping = np.inf, 0.0
+    for _ in range(DESCENT_STEPS):
+        chain_points(angles, lengths, joints, jacobian)
+        error[:] = target - joints[3]
+        residual = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+        damping = 0.1 * damping if residual <= max(0.7 * least, 1e-6) else max(4.0 * damping, 10.0)
+        if residual <= max(least, 1e-6):
+            least = residual
+            best[:] = angles
+        for i in range(count):
+            right[i] = CONTINUITY * (start[i] - angles[i])
+            for j in range(count):
+                matrix[i, j] = information[i, j]
+                right[i] += information[i, j] * (mean[j] - angles[j])
+                for k in range(3):
+                    matrix[i, j] += jacobian[k, i] * jacobian[k, j] / COMPLIANCE
+            for k in range(3):
+                right[i] += jacobian[k, i] * error[k] / COMPLIANCE
+            matrix[i, i] += CONTINUITY + damping
+        solve_in_box(matrix, right, limits[:, 0] - angles, limits[:, 1] - angles, step)
+        largest = np.abs(step).max()
+        angles += step * min(1.0, STEP_MAX / max(largest, 1e-12))
+        if largest < 1e-3 and residual < 1e-6:
+            break
+    residual = _miss(angles, lengths, target)
+    if residual > max(least, 1e-6):
+        angles[:] = best
+        return least
+    return residual
+
+

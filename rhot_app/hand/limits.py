@@ -1,0 +1,76 @@
+"""Joint limits, and how the joints of a relaxed human hand move together.
+
+The natural pose is a Gaussian over the 21 angles: what to believe of a joint that no marker shows. Its couplings are
+soft, because people can break all of them; the standard deviations say how readily.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.skeleton import ANGLES, FINGERS
+
+Array = NDArray[np.float64]
+
+DIP_PER_PIP = 2.0 / 3.0
+"""Flexion of the DIP joint per flexion of the PIP joint (RHOT eq. 2.4; Rijpkema and Girard 1991)."""
+
+MCP_PER_PIP = 0.7
+"""Flexion of the MCP joint per flexion of the PIP joint when a hand closes around something (Santello 1998)."""
+
+
+class NaturalPose(NamedTuple):
+    """`mean` (21,) rad and `information` (21, 21) 1/rad^2, the inverse of the covariance."""
+
+    mean: Array
+    information: Array
+
+
+def natural_pose() -> NaturalPose:
+    """What a relaxed hand's angles are and how they go together."""
+    rows, values = [], []
+
+    def expect(value_deg: float, sd_deg: float, **factors: float) -> None:
+        """Believe that the sum of factor x angle is about this many degrees."""
+        row = np.zeros(len(ANGLES))
+        for name, factor in factors.items():
+            row[ANGLES.index(name)] = factor
+        rows.append(row / math.radians(sd_deg))
+        values.append(value_deg / sd_deg)
+
+    expect(5.0, 15.0, thumb_cmc_abduction=1.0)
+    expect(5.0, 15.0, thumb_cmc_flexion=1.0)
+    expect(0.0, 6.0, thumb_mcp_abduction=1.0)
+    expect(15.0, 20.0, thumb_mcp_flexion=1.0)
+    expect(0.0, 12.0, thumb_ip_flexion=1.0, thumb_mcp_flexion=-1.0)
+    for name in FINGERS[1:]:
+        mcp, pip, dip = (f"{name}_{joint}_flexion" for joint in ("mcp", "pip", "dip"))
+        expect(0.0, 8.0, **{f"{name}_mcp_abduction": 1.0})
+        expect(0.0, 5.0, **{dip: 1.0, pip: -DIP_PER_PIP})
+        expect(0.0, 20.0, **{mcp: 1.0, pip: -MCP_PER_PIP})
+        expect(30.0, 40.0, **{pip: 1.0})
+    for name, neighbour in pairwise(FINGERS[1:]):
+        # Neighbours share tendons: one finger bends the next (RHOT 2.1.1, inter-finger constraints).
+        expect(0.0, 20.0, **{f"{name}_mcp_flexion": 1.0, f"{neighbour}_mcp_flexion": -1.0})
+    matrix = np.array(rows)
+    information = matrix.T @ matrix
+    return NaturalPose(np.linalg.solve(information, matrix.T @ np.array(values)), information)
+
+
+@njit(cache=True)
+def wrap(angle: float) -> float:
+    """The same direction within -pi..pi."""
+    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+
+
+@njit(cache=True)
+def clamp_angle(angle: float, low: float, high: float) -> float:
+    """The angle of low..high that points nearest to `angle`."""
+    middle = 0.5 * (low + high)
+    return min(max(middle + wrap(angle - middle), low), high)

@@ -1,0 +1,143 @@
+"""Finger inverse kinematics: targets met, limits kept, neighbours near."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hand_samples import natural_motion, random_pose, random_world
+
+from rhot_app.hand.finger_chain import chain_points, fabrik_finger, fabrik_thumb
+from rhot_app.hand.finger_ik import solve_finger, solve_fingers, to_finger
+from rhot_app.hand.joint_angles import angles_from_joints
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.limits import clamp_angle
+from rhot_app.hand.model import neutral_pose
+from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
+
+HUNDREDTH_DEGREE = np.radians(0.01)
+
+
+@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
+def test_reachable_targets_are_met_within_limits(side, request):
+    model = request.getfixturevalue(side)
+    rng = np.random.default_rng(1)
+    low, high = model.limits.T
+    residuals = []
+    for _ in range(300):
+        pose = random_pose(model, rng)
+        targets = forward(model, pose).marker_centres
+        solution = solve_fingers(model, neutral_pose(pose.world_from_palm), targets)
+        residuals.append(solution.residuals)
+        assert (solution.angles >= low - HUNDREDTH_DEGREE).all() and (solution.angles <= high + HUNDREDTH_DEGREE).all()
+        effectors = forward(model, HandPose(pose.world_from_palm, solution.angles)).marker_centres
+        np.testing.assert_allclose(np.linalg.norm(effectors - targets, axis=1), solution.residuals, atol=1e-9)
+    met = np.array(residuals)
+    assert (met <= 5e-5).mean() > 0.998
+    assert met.max() < 1e-3
+
+
+def test_single_finger_agrees_with_all_five(left_hand):
+    rng = np.random.default_rng(2)
+    pose = random_pose(left_hand, rng)
+    start = neutral_pose(pose.world_from_palm)
+    targets = forward(left_hand, pose).marker_centres
+    together = solve_fingers(left_hand, start, targets)
+    joints = forward(left_hand, HandPose(pose.world_from_palm, together.angles)).joints
+    for finger, rows in enumerate(ANGLE_SLICES):
+        alone = solve_finger(left_hand, finger, pose.world_from_palm, start.angles[rows], targets[finger])
+        np.testing.assert_allclose(alone.angles, together.angles[rows], atol=1e-12)
+        np.testing.assert_allclose(alone.joints, joints[1 + 4 * finger:5 + 4 * finger], atol=1e-9)
+        assert alone.reached and np.linalg.norm(alone.end_effector - targets[finger]) <= 5e-5
+
+
+def test_fabrik_alone_comes_near_and_keeps_the_limits(right_hand):
+    rng = np.random.default_rng(3)
+    misses = []
+    for _ in range(300):
+        pose = random_pose(right_hand, rng, np.eye(4))
+        targets = forward(right_hand, pose).marker_centres
+        for finger, rows in enumerate(ANGLE_SLICES):
+            local, joints = np.empty(3), np.empty((4, 3))
+            to_finger(np.eye(4), 1.0, right_hand.base[finger], right_hand.base_rotation[finger], targets[finger], local)
+            angles, limits = neutral_pose().angles[rows].copy(), right_hand.limits[rows]
+            solve = fabrik_thumb if finger == 0 else fabrik_finger
+            solve(angles, right_hand.chain[finger], limits, local, 1e-4, 20)
+            assert (angles >= limits[:, 0]).all() and (angles <= limits[:, 1]).all()
+            chain_points(angles, right_hand.chain[finger], joints, np.empty((3, len(angles))))
+            misses.append(np.linalg.norm(joints[3] - local))
+    assert np.median(misses) < 2e-4
+
+
+def test_unreachable_target_stretches_the_finger_towards_it(right_hand):
+    world = random_world(np.random.default_rng(4))
+    straight = np.zeros(21)
+    straight[6] = 0.5  # index finger straight, bent in its MCP joint only
+    points = forward(right_hand, HandPose(world, straight))
+    base, centre = points.joints[5], points.marker_centres[1]
+    solution = solve_finger(right_hand, 1, world, neutral_pose().angles[5:9], base + 1.5 * (centre - base))
+    assert not solution.reached
+    assert solution.residual == pytest.approx(0.5 * np.linalg.norm(centre - base), rel=1e-3)
+    np.testing.assert_allclose(solution.angles, straight[5:9], atol=0.03)
+
+
+def test_target_behind_the_hand_says_not_reached_and_stays_legal(right_hand):
+    solution = solve_finger(right_hand, 2, np.eye(4), neutral_pose().angles[9:13], np.array([0.06, 0.0, 0.06]))
+    assert not solution.reached and np.isfinite(solution.angles).all()
+    assert (solution.angles >= right_hand.limits[9:13, 0]).all()
+
+
+def test_free_joints_follow_the_dip_coupling(right_hand):
+    angles = neutral_pose().angles.copy()
+    for finger in range(1, 5):
+        angles[6 + 4 * (finger - 1):9 + 4 * (finger - 1)] = np.radians([30.0, 45.0, 30.0])
+    targets = forward(right_hand, HandPose(np.eye(4), angles)).marker_centres
+    found = solve_fingers(right_hand, HandPose(np.eye(4), np.clip(angles + 0.3, *right_hand.limits.T)), targets).angles
+    for finger in range(1, 5):
+        pip, dip = found[7 + 4 * (finger - 1):9 + 4 * (finger - 1)]
+        assert abs(np.degrees(dip - 2 / 3 * pip)) < 3.0
+
+
+def test_nearby_targets_give_nearby_angles(right_hand):
+    world = random_world(np.random.default_rng(5))
+    motion = natural_motion(right_hand, np.random.default_rng(6), 600)
+    previous = motion[0]
+    jumps = []
+    for angles in motion:
+        targets = forward(right_hand, HandPose(world, angles)).marker_centres
+        found = solve_fingers(right_hand, HandPose(world, previous), targets).angles
+        jumps.append(np.degrees(np.abs(found - previous)).max())
+        previous = found
+    assert np.percentile(jumps[1:], 99) < 10 * np.degrees(np.abs(np.diff(motion, axis=0)).max())
+
+
+def test_missing_targets_keep_their_angles(right_hand):
+    start = neutral_pose()
+    targets = forward(right_hand, start).marker_centres.copy()
+    targets[3] = np.nan
+    solution = solve_fingers(right_hand, start, targets)
+    np.testing.assert_array_equal(solution.angles[13:17], start.angles[13:17])
+    assert np.isnan(solution.residuals[3]) and not solution.reached[3] and solution.reached[[0, 1, 2, 4]].all()
+
+
+def test_narrower_limits_are_kept(right_hand):
+    limits = right_hand.limits.copy()
+    limits[7] = np.radians([0.0, 20.0])
+    narrow = replace(right_hand, limits=limits)
+    targets = forward(right_hand, HandPose(np.eye(4), random_pose(right_hand, np.random.default_rng(8)).angles))
+    solution = solve_fingers(narrow, neutral_pose(), targets.marker_centres)
+    assert solution.angles[7] <= limits[7, 1]
+
+
+def test_solved_joints_give_back_the_solved_angles(right_hand):
+    pose = random_pose(right_hand, np.random.default_rng(9))
+    solution = solve_fingers(right_hand, neutral_pose(pose.world_from_palm), forward(right_hand, pose).marker_centres)
+    joints = forward(right_hand, HandPose(pose.world_from_palm, solution.angles)).joints
+    np.testing.assert_allclose(angles_from_joints(right_hand, pose.world_from_palm, joints), solution.angles, atol=1e-6)
+
+
+def test_clamping_takes_the_nearer_end_around_the_circle():
+    assert clamp_angle(np.radians(-170), 0.0, np.radians(90)) == pytest.approx(np.radians(90))
+    assert clamp_angle(np.radians(-20), 0.0, np.radians(90)) == 0.0
+    assert clamp_angle(np.radians(400), 0.0, np.radians(90)) == pytest.approx(np.radians(40))
