@@ -1,0 +1,105 @@
+"""The receiving socket: kernel times, bursts, bounded queue, ports in use."""
+
+import socket
+import time
+
+import numpy as np
+import pytest
+
+from rhot_app.errors import SourceError
+from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.sources.clock import NodeClockModel
+from rhot_app.sources.door import NodeDoor
+from rhot_app.sources.receiver import NEWEST, QUEUE_LIMIT, FrameQueue, NodeReceiver, granted_buffer, open_data_socket
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.wire.codec import encode
+from rhot_node.wire.messages import MarkerObservation, Observations
+
+SESSION = 3
+
+
+def make_receiver() -> tuple[NodeReceiver, FrameQueue, socket.socket]:
+    rig = synthetic_rig()
+    clock = NodeClockModel()
+    now = time.monotonic_ns()
+    for k in range(4):
+        t = now - (4 - k) * 10**8
+        clock.add(t, t + 50_000, t + 50_000, t + 100_000, 1)
+    door = NodeDoor(rig, 0, clock)
+    door.expect_session(SESSION)
+    frames = FrameQueue()
+    receiver = NodeReceiver(open_data_socket(0, "left"), door, frames, "left")
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sender.connect(("127.0.0.1", receiver.port))
+    return receiver, frames, sender
+
+
+def datagram(sequence: int, checksum: int) -> bytes:
+    now = time.monotonic_ns()
+    markers = tuple(MarkerObservation(k, 5.0 + k, 6.0, 10.0, 0.1, 0.0, 0.1, 1.0) for k in range(6))
+    return encode(Observations(1, SESSION, sequence, now - 10**7, now, 10**6, 10**6, 10**4, 640, 480, sequence,
+                               checksum, markers))
+
+
+def test_receive_time_is_the_kernels() -> None:
+    receiver, frames, sender = make_receiver()
+    sent = time.monotonic_ns()
+    sender.send(datagram(0, synthetic_rig().markers.checksum))
+    arrived = time.monotonic_ns()
+    time.sleep(0.05)  # the program is late; the time must not be
+    assert receiver.step() == 1
+    (frame,) = frames.take(0.0)
+    assert sent - 200_000 <= frame.t_receive_ns <= arrived + 200_000
+    receiver.close()
+
+
+def test_a_burst_is_counted_whole_and_only_its_newest_tracked() -> None:
+    receiver, frames, sender = make_receiver()
+    checksum = synthetic_rig().markers.checksum
+    seen: list[bytes] = []
+    receiver.tap = lambda t_receive_ns, data: seen.append(data)
+    for k in range(100):
+        sender.send(datagram(k, checksum))
+    sender.send(b"junk")
+    assert receiver.step() == 101
+    assert (receiver.door.received, receiver.door.accepted, receiver.door.sequence.lost) == (101, 100, 0)
+    assert receiver.door.dropped == {"length": 1}
+    assert len(frames.take(0.0)) == NEWEST
+    assert receiver.skipped == 100 - NEWEST
+    assert len(seen) == 101
+    receiver.close()
+
+
+def test_a_silent_socket_returns_soon_and_the_thread_ends() -> None:
+    receiver, _, _ = make_receiver()
+    begun = time.monotonic()
+    assert receiver.step() == 0
+    assert time.monotonic() - begun < 1.0
+    receiver.start()
+    receiver.close()
+    receiver.close()
+
+
+def test_port_in_use_names_node_and_remedy() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("", 0))
+        port = taken.getsockname()[1]
+        with pytest.raises(SourceError, match=f"node left.*{port}.*data_port"):
+            open_data_socket(port, "left")
+
+
+def test_buffer_is_asked_for() -> None:
+    with open_data_socket(0, "left") as sock:
+        assert granted_buffer(sock) >= 100_000
+
+
+def test_queue_drops_the_oldest() -> None:
+    queue = FrameQueue()
+    nothing = np.zeros((0, 2))
+    for k in range(QUEUE_LIMIT + 10):
+        queue.put(CameraObservations(0, k, 0, 0.0, 0, 0.0, 0.0, nothing, np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0),
+                                     np.zeros(0, np.uint16)))
+    waiting = queue.take(0.0)
+    assert [waiting[0].t_row0_master_ns, waiting[-1].t_row0_master_ns] == [10, QUEUE_LIMIT + 9]
+    assert queue.overrun == 10
+    assert queue.take(0.01) == []

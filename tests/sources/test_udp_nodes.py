@@ -1,0 +1,121 @@
+"""Live nodes over real sockets: start, clocks of their own, restarts, silence, faults, other masters."""
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot_app.project import Rig
+from rhot_app.simulator.synthetic_node import SyntheticNode, hand_markers, synthetic_rig
+from rhot_app.sources.links import new_session
+from rhot_app.sources.node_link import SILENT_NS
+from rhot_app.sources.udp_nodes import UdpNodes
+from rhot_node.clock import NodeClock
+from rhot_node.wire.codec import encode
+from rhot_node.wire.messages import NodeState, Start, StartEntry
+
+CLOCKS = (NodeClock(7 * 3600 * 10**9, 40.0, 0), NodeClock(-(10**13), -40.0, 0))
+
+
+def eventually(condition: Callable[[], bool], timeout_s: float = 4.0) -> float:
+    begun = time.monotonic()
+    while not condition():
+        assert time.monotonic() - begun < timeout_s, "did not happen in time"
+        time.sleep(0.005)
+    return time.monotonic() - begun
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return synthetic_rig()
+
+
+@pytest.fixture
+def source(rig: Rig) -> Iterator[UdpNodes]:
+    source = UdpNodes(rig)
+    yield source
+    source.close()
+
+
+@pytest.fixture
+def nodes(rig: Rig) -> Iterator[list[SyntheticNode]]:
+    nodes = [SyntheticNode(rig, camera, rate_hz=100.0, clock=CLOCKS[camera]) for camera in (0, 1)]
+    for node in nodes:
+        node.start()
+    yield nodes
+    for node in nodes:
+        node.close()
+
+
+def ready(source: UdpNodes) -> bool:
+    return all(link.state is not None and link.clock.offset_s is not None for link in source.links)
+
+
+def test_frames_of_both_cameras_in_master_time(rig: Rig, source: UdpNodes, nodes: list[SyntheticNode]) -> None:
+    eventually(lambda: ready(source))
+    source.start(new_session())
+    time.sleep(0.5)
+    source.stop()
+    frames = source.frames.take(0.0)
+    assert {frame.camera for frame in frames} == {0, 1}
+    for frame in frames:
+        age_ns = frame.t_receive_ns - frame.t_row0_master_ns
+        assert abs(age_ns - 6_000_000) < 3_000_000 + 1e9 * frame.clock_bound_s
+    assert all(link.door.sequence.lost == 0 for link in source.links)
+    assert np.isfinite(hand_markers(rig)).all()
+    eventually(lambda: all(node.state is NodeState.READY for node in nodes))
+
+
+def test_restarted_node_streams_again_within_two_seconds(rig: Rig, source: UdpNodes,
+                                                         nodes: list[SyntheticNode]) -> None:
+    eventually(lambda: ready(source))
+    source.start(new_session())
+    link = source.links[1]
+    eventually(lambda: link.door.accepted > 10)
+    nodes[1].close()
+    assert eventually(lambda: link.silent(time.monotonic_ns())) < 1e-9 * SILENT_NS + 0.2
+    accepted, changes = link.door.accepted, source.changes
+    nodes[1] = SyntheticNode(rig, 1, clock=NodeClock(123456, 10.0, 0), boot_id=2)
+    nodes[1].start()
+    assert eventually(lambda: link.door.accepted > accepted + 5) < 2.0
+    assert source.changes > changes  # the tracker must forget
+
+
+def test_node_that_lost_its_start_gets_another(source: UdpNodes, nodes: list[SyntheticNode]) -> None:
+    source.start(new_session())  # before anybody has answered
+    eventually(lambda: all(link.door.accepted > 5 for link in source.links))
+
+
+def test_other_masters_session_is_left_alone(rig: Rig, source: UdpNodes, nodes: list[SyntheticNode]) -> None:
+    eventually(lambda: ready(source))
+    source.start(new_session())
+    eventually(lambda: all(link.session == link.wanted for link in source.links))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.sendto(encode(Start(99, 1, (StartEntry(1, 9, 0),))), ("127.0.0.1", rig.nodes[0].udp_port))
+        eventually(lambda: source.links[0].streams_elsewhere)
+        time.sleep(0.6)
+        assert nodes[0].session == 99
+        source.start(new_session())
+        eventually(lambda: not source.links[0].streams_elsewhere and nodes[0].session != 99)
+
+
+def test_fault_is_seen(rig: Rig, source: UdpNodes) -> None:
+    node = SyntheticNode(rig, 0, state=NodeState.FAULT)
+    node.start()
+    eventually(lambda: source.links[0].state is NodeState.FAULT)
+    node.close()
+
+
+def test_text_node_needs_no_start_message(rig: Rig) -> None:
+    text = msgspec.structs.replace(rig.nodes[0], text_datagrams=True)
+    source = UdpNodes(msgspec.structs.replace(rig, nodes=(text, rig.nodes[1])))
+    source.start(new_session())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as typed:
+        typed.sendto(b"1,2;3,4;5,6;7,8;9,10;11,12\n", ("127.0.0.1", source.receivers[0].port))
+    (frame,) = source.frames.take(1.0)
+    assert frame.camera == 0
+    assert frame.pixels[5].tolist() == [11.0, 12.0]
+    source.close()
