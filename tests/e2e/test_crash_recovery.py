@@ -1,0 +1,120 @@
+"""Nodes and engines die in the middle (kill -9) and come back: what remains goes on, and what returns is taken in."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+from bench import FPS, START_S, Bench, kill_hard, node_status, states_of, wait_until
+from scene import Scene
+
+from rhot_app.engine.client import EngineClient
+
+NOTICED_S = 1.0
+REJOINED_S = 2.0
+POLL_S = 0.02
+
+
+@dataclass
+class Running:
+    """A bench whose nodes and engine stream a hand that holds still."""
+
+    bench: Bench
+    nodes: list[subprocess.Popen[bytes]]
+    engine: subprocess.Popen[bytes]
+    client: EngineClient
+
+    def camera(self, index: int) -> str:
+        """Camera spec of a node."""
+        return f"yuv:{self.bench.folder / self.bench.rig.nodes[index].name}.yuv"
+
+    def streams(self, name: str) -> bool:
+        """Whether the engine says that a node streams."""
+        status = node_status(self.client, name)
+        return status is not None and status.state == "streaming" and status.rate_hz > 0.5 * FPS
+
+    def tracks(self) -> bool:
+        """Whether both nodes stream and a state describes the last moment."""
+        state = self.client.state
+        return (self.streams("left") and self.streams("right") and state is not None
+                and time.monotonic_ns() - state.t_master_ns < 300_000_000)
+
+
+@pytest.fixture
+def running(bench: Bench) -> Iterator[Running]:
+    """Nodes, engine and client, once states flow."""
+    scene = Scene(bench.rig)
+    for node in bench.rig.nodes:
+        scene.record(bench.folder / f"{node.name}.yuv", node, 0.5)
+    with EngineClient(bench.sockets) as client:
+        running = Running(bench, [], bench.start_engine("--start"), client)
+        running.nodes += [bench.start_node(index, running.camera(index)) for index in range(2)]
+        wait_until(client, running.tracks, START_S, "states from both nodes")
+        yield running
+
+
+def wait_ready(bench: Bench, name: str, times: int) -> None:
+    """Wait until a node has said "ready" so many times in its log."""
+    deadline = time.monotonic() + START_S
+    while bench.log(name).count('"event": "ready"') < times:
+        assert time.monotonic() < deadline, f"{name} did not become ready: {bench.log(name)}"
+        time.sleep(POLL_S)
+
+
+@pytest.mark.timeout(150)
+def test_a_killed_node_shows_within_a_second_and_joins_again(running: Running) -> None:
+    bench, client = running.bench, running.client
+    kill_hard(running.nodes[0])
+
+    wait_until(client, lambda: not running.streams("left"), NOTICED_S, "the silent node shows")
+    wait_until(client, lambda: client.status is not None and any(
+        "left" in advice.text for advice in client.status.advice), NOTICED_S, "a sentence names the silent node")
+    assert running.streams("right")
+
+    bench.start_node(0, running.camera(0))
+    wait_ready(bench, "left", 2)
+    wait_until(client, running.tracks, REJOINED_S, "the node joins again")
+
+
+@pytest.mark.timeout(150)
+def test_a_new_engine_takes_over_from_a_killed_one(running: Running) -> None:
+    bench, client = running.bench, running.client
+    kill_hard(running.engine)
+
+    wait_until(client, lambda: not client.connected, 2.0, "the client sees that the engine is gone")
+    assert [node.poll() for node in running.nodes] == [None, None], "nodes outlive the engine"
+
+    engine = bench.start_engine("--start")
+    wait_until(client, running.tracks, START_S, "the nodes join the new engine")
+    assert client.status is not None
+    assert client.status.pid == engine.pid
+    assert [node.poll() for node in running.nodes] == [None, None]
+
+
+WATCHER = """
+import sys
+from rhot_app.engine.client import EngineClient
+with EngineClient(Path(sys.argv[1])) as client:
+    while True:
+        client.poll(0.1)
+        if client.state is not None:
+            print("watching", flush=True)
+"""
+
+
+@pytest.mark.timeout(150)
+def test_a_killed_client_takes_nothing_with_it(running: Running) -> None:
+    bench, client = running.bench, running.client
+    watcher = bench.start_code(WATCHER, str(bench.sockets), name="watcher")
+    wait_until(client, lambda: "watching" in bench.log("watcher"), START_S, "the second client sees states")
+    before = len(states_of(client, 1.0))
+    kill_hard(watcher)
+
+    after = len(states_of(client, 1.0))
+    assert after >= 0.8 * before > 0
+    assert running.engine.poll() is None
+    with EngineClient(bench.sockets) as late:
+        wait_until(late, lambda: late.state is not None, 1.0, "a new client attaches")

@@ -1,0 +1,67 @@
+"""Two nodes with clocks of their own, an engine, a client, each its own process: a moving hand arrives in time."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from bench import FPS, START_S, Bench, node_status, states_of, wait_until
+from scene import PERIOD_S, Scene
+
+from rhot_app.engine.client import EngineClient
+from rhot_app.tracking.state import Knowledge
+from rhot_node.files import write_atomically
+
+SECONDS = 4.0  # of motion; the recordings hold a little more
+MARKER_RMS_MM = 2.5  # of the unfiltered positions; 9 mm per px of disparity at 0.6 m
+STATE_AGE_S = 0.15
+
+
+@pytest.mark.timeout(120)
+def test_a_moving_hand_arrives_at_the_cameras_rate(bench: Bench) -> None:
+    scene = Scene(bench.rig, amplitude_m=0.03)
+    begin = bench.folder / "begin"
+    for index, node in enumerate(bench.rig.nodes):
+        scene.record(bench.folder / f"{node.name}.yuv", node, 3 * PERIOD_S)
+        bench.start_node(index, f"yuv:{bench.folder / node.name}.yuv?start={begin}")
+    bench.start_engine("--start")
+    with EngineClient(bench.sockets) as client:
+        wait_until(client, lambda: client.state is not None, START_S, "the first state")
+        t0_ns = time.monotonic_ns() + 500_000_000
+        write_atomically(begin, str(t0_ns).encode())
+        states_of(client, 1.5)  # the start, and a second to settle
+        received = [(time.monotonic_ns(), state) for state in states_of(client, 0.0)]
+        begun = time.monotonic()
+        while time.monotonic() - begun < SECONDS:
+            received += [(time.monotonic_ns(), state) for state in states_of(client, 0.02)]
+
+    rate_hz = len(received) / SECONDS
+    assert 0.95 * FPS <= rate_hz <= 2.05 * FPS, f"{rate_hz:.1f} states per second from {FPS:g} frames per second"
+    errors_mm, ages_s = [], []
+    for t_received_ns, state in received:
+        truth_m = scene.markers_m(1e-9 * (state.t_master_ns - t0_ns))
+        measured = state.marker_knowledge == Knowledge.MEASURED
+        errors_mm.append(1e3 * (state.marker_raw_positions - truth_m)[measured])
+        ages_s.append(1e-9 * (t_received_ns - state.t_master_ns))
+    rms_mm = float(np.sqrt((np.concatenate(errors_mm) ** 2).sum(axis=1).mean()))
+    assert sum(map(len, errors_mm)) > 0.95 * 6 * len(received), "markers that both cameras see count as measured"
+    assert rms_mm < MARKER_RMS_MM
+    assert np.median(ages_s) < STATE_AGE_S
+    assert (np.diff([state.t_master_ns for _, state in received]) > 0).all()
+
+
+@pytest.mark.timeout(120)
+def test_the_engine_knows_each_nodes_clock(bench: Bench) -> None:
+    scene = Scene(bench.rig)
+    for index, node in enumerate(bench.rig.nodes):
+        scene.record(bench.folder / f"{node.name}.yuv", node, 0.5)
+        bench.start_node(index, f"yuv:{bench.folder / node.name}.yuv")
+    bench.start_engine("--start")
+    with EngineClient(bench.sockets) as client:
+        wait_until(client, lambda: client.state is not None, START_S, "the first state")
+        for name, offset_s in (("left", 1234.5), ("right", -77.25)):
+            status = node_status(client, name)
+            assert status is not None
+            assert status.clock_offset_s is not None
+            assert abs(status.clock_offset_s) == pytest.approx(abs(offset_s), abs=0.01)

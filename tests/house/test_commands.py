@@ -1,0 +1,69 @@
+"""Commands explain themselves, and the documents name only commands and options that exist."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
+
+OPTIONS: dict[str, tuple[str, ...]] = {
+    "rhot": ("--version", "demo", "engine", "replay", "simulate", "evaluate"),
+    "rhot demo": ("--motion", "--seed"),
+    "rhot engine": ("--rig", "--log"),
+    "rhot replay": ("LOG", "--rig"),
+    "rhot simulate": ("--motion", "--seconds", "--out"),
+    "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json"),
+    "rhot-node": ("--settings", "--camera", "detect"),
+    "rhot-node detect": ("--markers", "--detector", "--all", "--json"),
+}
+
+
+@cache
+def help_of(command: str) -> str:
+    """What ``COMMAND --help`` prints; it must end with code 0."""
+    program, *arguments = command.split()
+    done = subprocess.run([sys.executable, "-m", MODULES[program], *arguments, "--help"], capture_output=True,
+                          text=True, check=False)
+    assert done.returncode == 0, f"{command} --help: {done.stderr}"
+    return done.stdout
+
+
+def documented_commands() -> list[tuple[str, str]]:
+    """(file, command line) of every command in the documents, with ``./run X`` read as ``rhot X``."""
+    found = []
+    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        text = path.read_text().replace("\\\n", " ") if path.exists() else ""
+        spans = re.findall(r"`((?:rhot|rhot-node|\./run) [^`\n]+)`", text)
+        lines = re.findall(r"^\s*(?:\$ )?((?:\.venv/bin/)?(?:rhot|rhot-node|\./run) [^\n]+)$", text, re.MULTILINE)
+        for line in [*spans, *lines]:
+            line = line.split("#")[0].removeprefix(".venv/bin/").strip()
+            if re.match(r"\./run (test|setup)\b", line):
+                continue
+            found.append((path.name, line.replace("./run ", "rhot ")))
+    return found
+
+
+@pytest.mark.parametrize("command", OPTIONS)
+def test_help_names_every_option(command: str) -> None:
+    text = help_of(command)
+    missing = [option for option in OPTIONS[command] if option.lower() not in text.lower()]
+    assert not missing, f"{command} --help does not mention {', '.join(missing)}"
+
+
+@pytest.mark.parametrize(("file", "line"), documented_commands())
+def test_documented_commands_exist(file: str, line: str) -> None:
+    words = line.split()
+    named = " ".join(words[:2])
+    command = named if named in OPTIONS else words[0]
+    if command == "rhot":
+        assert len(words) == 1 or words[1].startswith("-"), f"{file}: there is no command {line!r}"
+    text = help_of(command)
+    for option in re.findall(r"(?<!\S)--?[a-z][a-z-]*", line):
+        assert option in text, f"{file}: {line!r} names {option}, which {command} --help does not"
