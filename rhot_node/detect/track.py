@@ -23,6 +23,7 @@ PARTIAL_AREA = 0.75  # of the reference
 JUMP_AREA = 1.8  # of the reference: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
 FLOOR_VARIANCE = 4e-4  # px^2: sampling and shading leave about 0.02 px
+BAND_FLOOR_VARIANCE = 3e-3  # px^2: the fit of a band's curvature magnifies them
 NOISE_INFLATION = 1.2  # paint and surroundings are themselves means of few noisy pixels
 MARGIN = 5.0  # chroma px around a resting marker
 
@@ -148,7 +149,8 @@ class Track:
 def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: float, ratio: float,
                  flags: MarkerFlag) -> MarkerObservation:
     scale = CHROMA_TO_LUMA**2 * NOISE_INFLATION * noise**2
-    widened = FLOOR_VARIANCE + (CHROMA_TO_LUMA * bias) ** 2
+    floor = BAND_FLOOR_VARIANCE if row[p.FIT] else FLOOR_VARIANCE
+    widened = floor + (CHROMA_TO_LUMA * bias) ** 2
     area = float(row[p.AREA])
     quality = min(1.0, row[m.LEVEL] / (15.0 * noise)) * min(1.0, area / 12.0)
     if flags & MarkerFlag.PARTIAL:
