@@ -12,14 +12,18 @@ from numpy.typing import NDArray
 from rhot_app.engine.status import EngineStatus, Preview
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.jitter import JitterWindow
-from rhot_app.ui.models.latency import LatencyWindow
+from rhot_app.ui.models.latency import STACKED, LatencyWindow
 from rhot_app.ui.models.rates import LossMeter, rate_names, rate_row
 from rhot_app.ui.models.series import Series
 
 Array = NDArray[np.float64]
 
 SILENCE_S = 1.5
-"""The engine reports several times a second; silence longer than this means that it is gone or stuck."""
+"""The engine reports ten times a second; silence longer than this means that it is gone or stuck."""
+
+LATENCY_COLUMNS: tuple[str, ...] = (*(f"{stage} p50" for stage in STACKED), "all p50",
+                                    *(f"{stage} p99" for stage in STACKED), "all p99")
+LOST = "lost"
 
 
 class Client(Protocol):
@@ -38,12 +42,13 @@ class Live:
     """The newest of everything, and the sliding windows behind the plots.
 
     `state`, `status` and `previews` are the newest messages; `state_count` grows with each state, so that a widget
-    knows whether there is anything new to draw.
+    knows whether there is anything new to draw. The series behind the plots run on this machine's monotonic clock
+    (a replayed log's states carry the times of their recording): `jitter` mm, `latency` ms, `rates` per second.
     """
 
     def __init__(self) -> None:
-        self.jitter = JitterWindow()
-        self.latency = LatencyWindow()
+        self._jitter_window = JitterWindow()
+        self._latency_window = LatencyWindow()
         self._losses = LossMeter()
         self.clear()
 
@@ -56,10 +61,12 @@ class Live:
         self.preview_count = 0
         self.heard_at_s = time.monotonic()
         self.sights: deque[tuple[int, Array, NDArray[np.uint16]]] = deque(maxlen=256)
-        self.rates = Series(("states",))
-        self.losses = Series(("lost",))
-        self.jitter.clear()
-        self.latency.clear()
+        self.jitter = Series(())
+        self.latency = Series(LATENCY_COLUMNS)
+        self.rates = Series(("states", LOST))
+        self._sampled = 0
+        self._jitter_window.clear()
+        self._latency_window.clear()
         self._losses.clear()
 
     def step(self, client: Client) -> None:
@@ -80,17 +87,31 @@ class Live:
     def _take_state(self, state: HandState) -> None:
         self.state = state
         self.state_count += 1
-        self.jitter.add(state)
-        self.latency.add(state)
+        self._jitter_window.add(state)
+        self._latency_window.add(state)
         self.sights.append((state.t_master_ns, state.camera_pixels, state.camera_flags))
 
     def _take_status(self, status: EngineStatus) -> None:
         self.status = status
         self.heard_at_s = time.monotonic()
-        if rate_names(status) != self.rates.names:
-            self.rates = Series(rate_names(status))
-        self.rates.append(status.t_master_ns, rate_row(status))
-        self.losses.append(status.t_master_ns, np.array([self._losses.per_second(status)]))
+        names = (*rate_names(status), LOST)
+        if names != self.rates.names:
+            self.rates = Series(names)
+        self.rates.append(time.monotonic_ns(), np.append(rate_row(status), self._losses.per_second(status)))
+
+    def sample(self, now_ns: int) -> None:
+        """Add the windows' figures of this moment to the series of jitter and latency; a gap when nothing came."""
+        fresh = self.state is not None and self.state_count != self._sampled
+        self._sampled = self.state_count
+        if self.state is not None and self.state.marker_ids != self.jitter.names:
+            self.jitter = Series(self.state.marker_ids)
+        if fresh and self.state is not None:
+            t_ns = self.state.t_master_ns
+            self.jitter.append(now_ns, 1e3 * self._jitter_window.rms(t_ns))
+            self.latency.append(now_ns, 1e3 * np.concatenate(self._latency_window.summary(t_ns)))
+        else:
+            self.jitter.append(now_ns, np.full(len(self.jitter.names), np.nan))
+            self.latency.append(now_ns, np.full(len(LATENCY_COLUMNS), np.nan))
 
     def sight_at(self, t_master_ns: int) -> tuple[Array, NDArray[np.uint16]] | None:
         """Pixels (C, M, 2) and flags (C, M) of the state nearest to a preview's time; None without a state within 0.25 s.

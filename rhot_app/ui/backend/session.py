@@ -1,0 +1,226 @@
+"""The processes behind the window: which engine it talks to, what the app has started, and how all of it ends.
+
+Every function that waits is meant for a worker thread; nothing here knows Qt.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+
+from rhot_app.engine.client import EngineClient
+from rhot_app.engine.directory import EngineDirectory, open_directory
+from rhot_app.engine.process import (
+    end_started,
+    ensure_engine,
+    remember_process,
+    running_engine,
+    started_processes,
+)
+from rhot_app.errors import EngineError, SimulatorError
+from rhot_app.project import Rig, load_rig, parse_rig
+
+ENGINE_ROLE = "engine"
+TWIN_ROLE = "simulated nodes"
+TWIN_TIMEOUT_S = 60.0
+TWIN_RIG = "simulated.rig.json"
+
+Report = Callable[[str, float], None]
+"""``report(text, fraction)``; raises when the work is to be given up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A rig that is open now. `ours` is False when somebody else started the engine: closing leaves it running."""
+
+    rig: Rig
+    rig_path: str
+    running: bool
+    ours: bool
+    simulated: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TwinChoice:
+    """What the simulated hand does."""
+
+    motion: str = "wave"
+    seed: int = 1
+    preset: str = "wide"
+
+
+class Backend(Protocol):
+    """What the window needs of the processes; `Session` is the real one."""
+
+    def found(self) -> bool:
+        """Whether an engine runs already that the window should attach to."""
+        ...
+
+    def attach(self, report: Report) -> Opened:
+        """Attach to the running engine."""
+        ...
+
+    def open_rig(self, path: Path, report: Report) -> Opened:
+        """Start an engine on a rig file."""
+        ...
+
+    def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
+        """Start simulated nodes and an engine on their rig."""
+        ...
+
+    def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
+        """Start the engine again after it vanished."""
+        ...
+
+    def twin_alive(self) -> bool:
+        """Whether the simulated nodes, if any were started, still run."""
+        ...
+
+    def give_up(self) -> None:
+        """End whatever is being started, so that a cancelled start leaves nothing behind."""
+        ...
+
+    def close(self) -> str:
+        """End all that the app started; a sentence about what was left running on purpose, or ""."""
+        ...
+
+
+class Session:
+    """Engine and simulated nodes in one private directory."""
+
+    def __init__(self, directory: Path | None = None) -> None:
+        self._place: EngineDirectory = open_directory(directory)
+        self._twin_started = False
+
+    @property
+    def directory(self) -> Path:
+        """The engine's directory."""
+        return self._place.path
+
+    def client(self) -> EngineClient:
+        """A client for this directory; it outlives restarts of the engine."""
+        return EngineClient(self._place.path)
+
+    def found(self) -> bool:
+        """Whether an engine runs here."""
+        return running_engine(self._place.path) is not None
+
+    def attach(self, report: Report) -> Opened:
+        """Attach to the engine that runs here, whoever started it; raises EngineError when it does not answer."""
+        report("Attaching to the running engine …", 0.5)
+        ours = self._engine_is_ours()
+        with EngineClient(self._place.path, states=False) as client:
+            hello = client.command("hello")
+            answer = client.command("rig")
+            client.command("preview", on=True)
+        path = str(answer.get("path", ""))
+        rig = parse_rig(msgspec.json.encode(answer["document"]), path or "the engine's rig")
+        simulated = any(process.role == TWIN_ROLE for process in started_processes(self._place))
+        self._twin_started = simulated
+        return Opened(rig, path, bool(hello.get("running")), ours, simulated)
+
+    def open_rig(self, path: Path, report: Report) -> Opened:
+        """End what the app ran before and start an engine on `path`; raises RigError or EngineError."""
+        report("Reading the rig file …", 0.1)
+        load_rig(path)
+        self._clear(report)
+        return self._start_engine(path, report)
+
+    def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
+        """Start the simulated nodes, then an engine on the rig that they write; raises SimulatorError, EngineError."""
+        self._clear(report)
+        report("Starting two simulated cameras …", 0.15)
+        rig_path = self._start_twin(choice, report)
+        return self._start_engine(rig_path, report)
+
+    def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
+        """Start the engine again on the same rig; `start` has it tell the nodes to stream at once."""
+        if not path:
+            raise EngineError("The engine had no rig file, so it cannot be started again. Open a rig.")
+        report("Starting the engine again …", 0.3)
+        ensure_engine(Path(path), self._place.path, start=start)
+        return self.attach(report)
+
+    def twin_alive(self) -> bool:
+        """True unless simulated nodes were started and have ended since."""
+        return not self._twin_started or any(process.role == TWIN_ROLE for process in started_processes(self._place))
+
+    def give_up(self) -> None:
+        """End everything that the app started; what waits for it then fails and is forgotten."""
+        self._twin_started = False
+        end_started(self._place)
+
+    def close(self) -> str:
+        """End all that apps started here. An engine that somebody started by hand goes on."""
+        left = self.found() and not self._engine_is_ours()
+        self.give_up()
+        return (f"The engine in {self._place.path} was not started by this app and goes on running."
+                if left else "")
+
+    def _engine_is_ours(self) -> bool:
+        pid = running_engine(self._place.path)
+        return any(process.pid == pid for process in started_processes(self._place))
+
+    def _clear(self, report: Report) -> None:
+        if self.found() and not self._engine_is_ours():
+            raise EngineError(f"An engine that was started by hand runs in {self._place.path}. Stop it first, or start "
+                              "the app with another --directory.")
+        report("Ending what ran before …", 0.12)
+        self._twin_started = False
+        end_started(self._place)
+
+    def _start_engine(self, path: Path, report: Report) -> Opened:
+        report("Starting the engine …", 0.5)
+        ensure_engine(path, self._place.path)
+        report("Asking the engine for its rig …", 0.9)
+        return self.attach(lambda text, fraction: None)
+
+    def _start_twin(self, choice: TwinChoice, report: Report) -> Path:
+        """Start the twin in the background; its ready line goes to a file, so that it outlives this process."""
+        rig_path, output = self._place.path / TWIN_RIG, self._place.path / "twin.out"
+        errors = self._place.path / "twin.log"
+        command = [sys.executable, "-m", "rhot_app.simulator.live", "--motion", choice.motion, "--seed", str(choice.seed),
+                   "--preset", choice.preset, "--directory", str(self._place.path), "--rig", str(rig_path)]
+        with output.open("wb") as out, errors.open("wb") as log:
+            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=log,
+                                       start_new_session=True)
+        remember_process(self._place, process.pid, TWIN_ROLE)
+        self._twin_started = True
+        try:
+            self._await_ready(process, output, errors, report)
+        except BaseException:
+            end_started(self._place, [TWIN_ROLE])
+            self._twin_started = False
+            raise
+        return rig_path
+
+    def _await_ready(self, process: subprocess.Popen[bytes], output: Path, errors: Path, report: Report) -> None:
+        begin = time.monotonic()
+        while time.monotonic() - begin < TWIN_TIMEOUT_S:
+            if _has_ready_line(output):
+                return
+            if process.poll() is not None:
+                words = errors.read_text(errors="replace").strip().splitlines()
+                raise SimulatorError("The simulated cameras did not start: "
+                                     f"{words[-1] if words else f'they said nothing; see {errors}'}")
+            report("Starting two simulated cameras …", 0.15 + 0.3 * min(1.0, (time.monotonic() - begin) / 15.0))
+            time.sleep(0.05)
+        raise SimulatorError(f"The simulated cameras were not ready within {TWIN_TIMEOUT_S:.0f} s; see {errors}.")
+
+
+def _has_ready_line(output: Path) -> bool:
+    """Whether the twin has printed a whole JSON object."""
+    with contextlib.suppress(OSError, ValueError):
+        line, newline, _ = output.read_text().partition("\n")
+        return bool(newline) and isinstance(json.loads(line), dict)
+    return False
+

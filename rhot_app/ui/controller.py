@@ -1,0 +1,312 @@
+"""What the window does: opens rigs, gives commands, watches over the engine. Holds no widgets.
+
+Everything that waits runs as a `Job`; `step()` is called by the window's timer and never waits.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from PySide6.QtCore import QObject, Signal
+
+from rhot_app.errors import RhotError
+from rhot_app.project import Rig
+from rhot_app.ui.backend.live import SILENCE_S, Client, Live
+from rhot_app.ui.backend.session import Backend, Opened, TwinChoice
+from rhot_app.ui.job import Job, Progress
+from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look
+from rhot_app.ui.panels.advice_bar import Notice
+
+SAMPLE_S = 0.1
+RESTART_TRIES = 3
+RESTART_FORGET_S = 60.0
+TWIN_CHECK_S = 0.5
+_CLOSE_WAIT_S = 15.0
+
+TWIN_GONE = "twin"
+ENGINE_GONE = "engine"
+
+
+class ClosableClient(Client, Protocol):
+    """The engine's client, which can be closed."""
+
+    def close(self) -> None:
+        """Disconnect."""
+        ...
+
+
+class Controller(QObject):
+    """`rig_changed` after another rig (or none) is open, `busy_changed` while something long runs, `failed` with a
+    sentence when it failed."""
+
+    rig_changed = Signal()
+    busy_changed = Signal()
+    failed = Signal(str)
+
+    def __init__(self, backend: Backend, connect: Callable[[], ClosableClient], parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.backend = backend
+        self.live = Live()
+        self.opened: Opened | None = None
+        self.twin_choice = TwinChoice()
+        self._connect = connect
+        self._client: ClosableClient | None = None
+        self._job: Job | None = None
+        self._commands: list[Job] = []
+        self.busy: tuple[str, float] | None = None
+        self._problem = ""
+        self._restarts: list[float] = []
+        self._restarting = False
+        self._was_running = False
+        self._twin_gone = False
+        self._next_sample = self._next_twin_check = 0.0
+        self._begin_after_opening = False
+
+    # -- opening and closing ---------------------------------------------------------------------------------------
+
+    @property
+    def rig(self) -> Rig | None:
+        """The rig that is open."""
+        return self.opened.rig if self.opened is not None else None
+
+    @property
+    def running(self) -> bool:
+        """Whether the nodes were told to stream."""
+        status = self.live.status
+        return bool(status is not None and status.running and not self.engine_gone)
+
+    @property
+    def recording(self) -> bool:
+        """Whether a log is being written."""
+        return self.live.status is not None and bool(self.live.status.log_path)
+
+    @property
+    def engine_gone(self) -> bool:
+        """Whether a rig is open but its engine has fallen silent."""
+        return self.opened is not None and self.live.silent_for_s() > SILENCE_S
+
+    def attach(self) -> None:
+        """Attach to the engine that runs already."""
+        self._open("Attaching to the running engine …", self.backend.attach)
+
+    def open_rig(self, path: Path) -> None:
+        """Open a rig file."""
+        self._open("Opening the rig …", lambda report: self.backend.open_rig(path, report))
+
+    def open_twin(self, choice: TwinChoice, *, begin: bool = True) -> None:
+        """Start the simulated rig; `begin` starts the tracking as soon as it is there."""
+        self.twin_choice = choice
+        self._begin_after_opening = begin
+        self._open("Starting the simulated rig …", lambda report: self.backend.open_twin(choice, report))
+
+    def _open(self, text: str, op: Callable[[Callable[[str, float], None]], Opened]) -> None:
+        if self._job is not None:
+            return
+        self._forget_rig()
+        self._start_job(text, lambda progress: op(progress.report), self._on_opened)
+
+    def _start_job(self, text: str, op: Callable[[Progress], Any], done: Callable[[Any], None]) -> None:
+        self._problem = ""
+        self._set_busy((text, 0.0))
+        self._job = Job(op, done, self._on_failed, lambda t, f: self._set_busy((t, f)), self).start()
+
+    def _on_opened(self, opened: Opened) -> None:
+        self._job = None
+        self._set_busy(None)
+        self._connect_client()
+        self.opened = opened
+        self.live.clear()
+        self._twin_gone = self._restarting = False
+        self._was_running = opened.running
+        self.rig_changed.emit()
+        if self._begin_after_opening and not opened.running:
+            self.start()
+        self._begin_after_opening = False
+
+    def _connect_client(self) -> None:
+        if self._client is not None:
+            self._client.close()
+        self._client = self._connect()
+
+    def _on_failed(self, sentence: str) -> None:
+        self._job = None
+        self._begin_after_opening = False
+        self._set_busy(None)
+        if not self._restarting:
+            self.failed.emit(sentence)
+        self._restarting = False
+        self._problem = sentence
+
+    def _forget_rig(self) -> None:
+        self.opened = None
+        self.live.clear()
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+        self._problem = ""
+        self.rig_changed.emit()
+
+    def cancel(self) -> None:
+        """Give up what is being opened; whatever it has started is ended."""
+        if self._job is None:
+            return
+        job, self._job = self._job, None
+        job.cancel()
+        self._begin_after_opening = self._restarting = False
+        self._run_quietly(lambda: self.backend.give_up())
+        self._set_busy(None)
+
+    def close_rig(self) -> None:
+        """Back to the first page; ends what the app started."""
+        if self._job is not None:
+            self.cancel()
+        self._forget_rig()
+        self._start_job("Closing the rig …", lambda progress: self.backend.close(), self._on_closed)
+
+    def _on_closed(self, left_running: str) -> None:
+        self._job = None
+        self._set_busy(None)
+        if left_running:
+            self._problem = left_running
+
+    def shut_down(self) -> str:
+        """End everything that the app started, and wait for it; what is left running on purpose, as a sentence."""
+        if self._job is not None:
+            self._job.cancel()
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+        sentence = self.backend.close()
+        for job in [*([self._job] if self._job is not None else []), *self._commands]:
+            job.wait(_CLOSE_WAIT_S)
+        return self.backend.close() or sentence
+
+    # -- commands --------------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Tell the nodes to stream."""
+        self._was_running = True
+        self._command("start")
+
+    def stop(self) -> None:
+        """Tell the nodes to stop."""
+        self._was_running = False
+        self._command("stop")
+
+    def start_or_stop(self) -> None:
+        """The toolbar's first button."""
+        if self.opened is not None:
+            if self.running:
+                self.stop()
+            else:
+                self.start()
+
+    def record(self, path: Path) -> None:
+        """Write the raw log of all datagrams to `path`."""
+        self._command("record", path=str(path))
+
+    def stop_recording(self) -> None:
+        """End the log."""
+        self._command("record_stop")
+
+    def set_preview(self, on: bool) -> None:
+        """Have the nodes send pictures, or not: nobody looks while the panel is hidden."""
+        if self.opened is not None and not self.engine_gone:
+            self._command("preview", on=on)
+
+    def _command(self, name: str, **args: Any) -> None:
+        client = self._client
+        if client is None:
+            return
+        self._run_quietly(lambda: client.command(name, **args))
+
+    def _run_quietly(self, op: Callable[[], Any]) -> None:
+        """Run something short in a worker; only its failure is shown."""
+        self._commands = [job for job in self._commands if job.running]
+        job = Job(lambda progress: op(), lambda result: None, self._on_command_failed, None, self)
+        self._commands.append(job)
+        job.start()
+
+    def _on_command_failed(self, sentence: str) -> None:
+        if not self.engine_gone:
+            self.failed.emit(sentence)
+
+    # -- every tick ------------------------------------------------------------------------------------------------
+
+    def step(self) -> None:
+        """Pull what arrived, sample the windows ten times a second, watch over engine and simulated nodes."""
+        if self._client is None or self.opened is None:
+            return
+        try:
+            self.live.step(self._client)
+        except RhotError as exc:
+            self._problem = str(exc)
+        now = time.monotonic()
+        if now >= self._next_sample:
+            self._next_sample = max(self._next_sample + SAMPLE_S, now)
+            self.live.sample(time.monotonic_ns())
+        if now >= self._next_twin_check:
+            self._next_twin_check = now + TWIN_CHECK_S
+            self._twin_gone = self.opened.simulated and not self.backend.twin_alive()
+        if self.engine_gone:
+            self._restart(now)
+        elif self.live.status is not None:
+            self._was_running = self.live.status.running
+
+    def _restart(self, now: float) -> None:
+        """Start a vanished engine again, a few times in a minute and then no more until asked."""
+        if self._job is not None or self.opened is None:
+            return
+        self._restarts = [t for t in self._restarts if now - t < RESTART_FORGET_S]
+        if len(self._restarts) >= RESTART_TRIES:
+            return
+        self._restarts.append(now)
+        self._restarting = True
+        path, start = self.opened.rig_path, self._was_running
+        self._start_job("The engine stopped. Starting it again …",
+                        lambda progress: self.backend.restart_engine(path, start, progress.report), self._on_opened)
+
+    def act(self, key: str) -> None:
+        """The button of a notice."""
+        if key == TWIN_GONE:
+            self.open_twin(self.twin_choice)
+        elif key == ENGINE_GONE:
+            self._restarts = []
+
+    # -- what is to be said ----------------------------------------------------------------------------------------
+
+    def look(self) -> Look:
+        """The one word."""
+        if self.opened is None:
+            return STARTING if self._job is not None else NO_RIG
+        if self.engine_gone:
+            return NO_ENGINE
+        return condition_look(self.live.status.condition) if self.live.status is not None else STARTING
+
+    def notices(self) -> list[Notice]:
+        """The sentences of the moment: the app's own, then the engine's."""
+        notices: list[Notice] = []
+        if self.engine_gone:
+            notices.append(self._engine_notice())
+        elif self._problem:
+            notices.append(Notice("error", self._problem))
+        if self._twin_gone:
+            notices.append(Notice("error", "The simulated cameras have stopped.", "Start them again", TWIN_GONE))
+        if self.opened is not None and not self.opened.ours:
+            notices.append(Notice("info", "This engine was started outside the app; closing the app leaves it running."))
+        if self.live.status is not None and not self.engine_gone:
+            notices += [Notice(advice.level, advice.text) for advice in self.live.status.advice]
+        return notices
+
+    def _engine_notice(self) -> Notice:
+        if self._job is not None:
+            return Notice("error", "The engine stopped. The app is starting it again; the nodes re-join by themselves.")
+        reason = f" {self._problem}" if self._problem else ""
+        return Notice("error", f"The engine stopped and could not be started again.{reason}", "Try again", ENGINE_GONE)
+
+    def _set_busy(self, busy: tuple[str, float] | None) -> None:
+        self.busy = busy
+        self.busy_changed.emit()

@@ -1,0 +1,94 @@
+"""The sentences at the bottom: what is wrong and what to do; gone when it is mended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.shapes import ShapeMark
+
+Level = Literal["info", "warning", "error"]
+LOOKS: dict[str, tuple[str, str]] = {"info": ("info", "accent"), "warning": ("half", "caution"),
+                                     "error": ("octagon", "fault")}
+SHOWN = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """One sentence, with the next step as a button when `action` names one (`key` tells which)."""
+
+    level: Level
+    text: str
+    action: str = ""
+    key: str = ""
+
+
+class AdviceBar(QWidget):
+    """Up to three sentences, the gravest first; a quiet one when there is nothing to say."""
+
+    acted = Signal(str)
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("advice")
+        self.setProperty("panel", True)
+        self.setProperty("guide", "troubles")
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+        self._scheme = scheme
+        self._shown: list[Notice] | None = None
+        self._lines: list[tuple[QWidget, ShapeMark, QLabel, QPushButton]] = []
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(12, 6, 12, 6)
+        layout.setSpacing(4)
+        for _ in range(SHOWN):
+            layout.addWidget(self._make_line())
+
+    def _make_line(self) -> QWidget:
+        line, mark, label, button = QWidget(), ShapeMark(18), QLabel(), QPushButton()
+        label.setWordWrap(True)
+        label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        row = QHBoxLayout(line)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(10)
+        row.addWidget(mark)
+        row.addWidget(label, 1)
+        row.addWidget(button)
+        index = len(self._lines)
+        button.clicked.connect(lambda: self._act(index))
+        self._lines.append((line, mark, label, button))
+        return line
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        shown, self._shown = self._shown, None
+        self.show_notices(shown or [])
+
+    def show_notices(self, notices: list[Notice]) -> None:
+        """Show these sentences instead of the last ones."""
+        order = {"error": 0, "warning": 1, "info": 2}
+        chosen = sorted(notices, key=lambda notice: order[notice.level])[:SHOWN]
+        if chosen == self._shown:
+            return
+        self._shown = chosen
+        for k, (line, mark, label, button) in enumerate(self._lines):
+            line.setVisible(k < len(chosen))
+            if k < len(chosen):
+                shape, tone = LOOKS[chosen[k].level]
+                mark.set_shape(shape, self._scheme.tone(tone))
+                label.setText(chosen[k].text)
+                button.setText(chosen[k].action)
+                button.setVisible(bool(chosen[k].action))
+
+    @property
+    def texts(self) -> list[str]:
+        """The sentences shown."""
+        return [notice.text for notice in self._shown or []]
+
+    def _act(self, index: int) -> None:
+        if self._shown is not None and index < len(self._shown):
+            self.acted.emit(self._shown[index].key)

@@ -1,0 +1,167 @@
+"""What the cameras see: the last preview of each with the markers found in it drawn over it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen
+from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+
+from rhot_app.engine.status import Preview
+from rhot_app.project import Rig
+from rhot_app.ui.backend.live import Live
+from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
+from rhot_app.ui.models.rows import short_name
+from rhot_app.ui.panels.empty_state import EmptyState
+from rhot_node.wire.messages import MarkerFlag
+
+Array = NDArray[np.float64]
+
+_RING_PX = 7.0
+
+
+class CameraView(QWidget):
+    """One camera's preview, as large as fits, with name, marks and labels."""
+
+    def __init__(self, name: str, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.name = name
+        self._scheme = scheme
+        self._image = QImage()
+        self._frame = (4, 3)
+        self._marks: list[tuple[QPointF, str, str, bool]] = []
+        self.setMinimumSize(160, 120)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName(f"Picture of camera {name}")
+        self.setToolTip(f"Camera {name}: what it saw a moment ago, and the markers found in that picture.\n"
+                        "A full ring is a marker seen whole, a broken ring one that is half hidden or doubtful.")
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """Four by three."""
+        return QSize(272, 204)
+
+    def show_preview(self, preview: Preview) -> None:
+        """Another picture."""
+        image = QImage.fromData(preview.jpeg, b"JPEG")
+        if not image.isNull():
+            self._image = image
+            self._frame = (preview.width, preview.height)
+            self.update()
+
+    def show_marks(self, pixels: Array, flags: NDArray[np.uint16], names: tuple[str, ...], colours: list[str]) -> None:
+        """Markers at `pixels` (M, 2) px of the full frame; NaN ones are left out."""
+        doubtful = int(MarkerFlag.PARTIAL | MarkerFlag.AMBIGUOUS)
+        self._marks = [(QPointF(float(x), float(y)), short_name(name), colour, not int(flag) & doubtful)
+                       for (x, y), flag, name, colour in zip(pixels, flags, names, colours, strict=True)
+                       if np.isfinite(x) and np.isfinite(y)]
+        self.update()
+
+    def clear_marks(self) -> None:
+        """No marks: no state belongs to this picture."""
+        if self._marks:
+            self._marks = []
+            self.update()
+
+    @property
+    def marked(self) -> list[str]:
+        """Names of the markers drawn."""
+        return [name for _, name, _, _ in self._marks]
+
+    def paintEvent(self, event: object) -> None:  # noqa: N802
+        """Picture, marks, name."""
+        painter = QPainter(self)
+        painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform)
+        width, height = self._frame
+        scale = min(self.width() / width, self.height() / height)
+        target = QRectF(0, 0, width * scale, height * scale)
+        target.moveCenter(QPointF(self.width() / 2, self.height() / 2))
+        painter.fillRect(target, QColor(self._scheme.scene))
+        if not self._image.isNull():
+            painter.drawImage(target, self._image)
+        painter.setClipRect(target)
+        for place, name, colour, whole in self._marks:
+            at = target.topLeft() + scale * (place + QPointF(0.5, 0.5))
+            self._paint_mark(painter, at, name, colour, whole, target)
+        self._paint_tag(painter, target.topLeft() + QPointF(6, 6), self.name, bold=True)
+        if self._image.isNull():
+            painter.setPen(QColor(self._scheme.muted))
+            painter.drawText(target, Qt.AlignmentFlag.AlignCenter, "no picture yet")
+        painter.end()
+
+    def _paint_mark(self, painter: QPainter, at: QPointF, name: str, colour: str, whole: bool, target: QRectF) -> None:
+        style = Qt.PenStyle.SolidLine if whole else Qt.PenStyle.DotLine
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        for pen_colour, width in (("#000000", 4.0), (colour, 2.0)):
+            painter.setPen(QPen(QColor(pen_colour), width, style))
+            painter.drawEllipse(at, _RING_PX, _RING_PX)
+        metrics = QFontMetricsF(painter.font())
+        offset = QPointF(_RING_PX + 3, -0.5 * metrics.height() - 1)
+        if at.x() + offset.x() + metrics.horizontalAdvance(name) + 8 > target.right():
+            offset.setX(-_RING_PX - 11 - metrics.horizontalAdvance(name))
+        self._paint_tag(painter, at + offset, name)
+
+    def _paint_tag(self, painter: QPainter, corner: QPointF, text: str, *, bold: bool = False) -> None:
+        font = painter.font()
+        font.setBold(bold)
+        painter.setFont(font)
+        metrics = QFontMetricsF(font)
+        box = QRectF(corner.x(), corner.y(), metrics.horizontalAdvance(text) + 8, metrics.height() + 2)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(0, 0, 0, 150))
+        painter.drawRoundedRect(box, 3, 3)
+        painter.setPen(QColor("#ffffff"))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+
+
+class CameraPanel(QWidget):
+    """The cameras of the rig, one above the other."""
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("panel", True)
+        self.setProperty("guide", "cameras")
+        self._scheme = scheme
+        self._rig: Rig | None = None
+        self._shown: dict[str, int] = {}
+        self.views: dict[str, CameraView] = {}
+        self.empty = EmptyState("Pictures appear here once a rig is open and its nodes answer.")
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(8, 4, 8, 8)
+        self._layout.setSpacing(8)
+        self._layout.addWidget(self.empty)
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        self.show_rig(self._rig)
+
+    def show_rig(self, rig: Rig | None) -> None:
+        """Views for another rig's cameras."""
+        self._rig = rig
+        for view in self.views.values():
+            self._layout.removeWidget(view)
+            view.deleteLater()
+        self.views = {node.name: CameraView(node.name, self._scheme) for node in (rig.nodes if rig else ())}
+        self._shown = {}
+        for view in self.views.values():
+            self._layout.addWidget(view, 1)
+        self.empty.setVisible(rig is None)
+
+    def refresh(self, live: Live) -> None:
+        """Show new previews with the marks that belong to their instant."""
+        if self._rig is None:
+            return
+        markers = self._rig.markers
+        colours = [visible_on(hex_of(marker.display_rgb), "#000000", 3.0) for marker in markers.markers]
+        for camera, (name, view) in enumerate(self.views.items()):
+            preview = live.previews.get(name)
+            if preview is None or self._shown.get(name) == preview.t_master_ns:
+                continue
+            self._shown[name] = preview.t_master_ns
+            view.show_preview(preview)
+            sight = live.sight_at(preview.t_master_ns)
+            if sight is None or len(sight[0]) <= camera or sight[0].shape[1] != len(markers.ids):
+                view.clear_marks()
+            else:
+                view.show_marks(sight[0][camera], sight[1][camera], markers.ids, colours)

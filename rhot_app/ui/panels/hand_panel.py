@@ -1,0 +1,130 @@
+"""The hand's joint angles as a table, each with how it is known."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QPainter
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
+from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.ui.models.glossary import tip
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.rows import DASH, angle_text
+from rhot_app.ui.models.words import KNOWLEDGE
+from rhot_app.ui.shapes import ShapeMark
+
+FINGER_HEADS = (("spread", "abduction"), ("MCP", "MCP"), ("PIP", "PIP"), ("DIP", "DIP"))
+THUMB_HEADS = (("spread", "abduction"), ("CMC", "CMC"), ("turn", "abduction"), ("MCP", "MCP"), ("IP", "IP"))
+
+
+class AngleCell(QLabel):
+    """One angle: plain when measured, muted when inferred, hatched ground when guessed."""
+
+    def __init__(self, name: str, scheme: Scheme) -> None:
+        super().__init__(DASH)
+        self._scheme = scheme
+        self._knowledge = Knowledge.UNKNOWN
+        self._title = name.replace("_", " ")
+        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setContentsMargins(4, 1, 4, 1)
+
+    def show_angle(self, angle_rad: float, knowledge: Knowledge) -> None:
+        """Another value."""
+        text = angle_text(angle_rad)
+        if text == self.text() and knowledge == self._knowledge:
+            return
+        self.setText(text)
+        if knowledge != self._knowledge:
+            self._knowledge = knowledge
+            colour = self._scheme.text if knowledge == Knowledge.MEASURED else self._scheme.muted
+            self.setStyleSheet(f"color: {colour}; font-weight: {600 if knowledge == Knowledge.MEASURED else 400};")
+            look = KNOWLEDGE[knowledge]
+            self.setToolTip(f"{self._title}: {look.word}.\n{look.meaning}")
+
+    def paintEvent(self, event: object) -> None:  # noqa: N802
+        """Hatch under a guessed value, then the text."""
+        if self._knowledge == Knowledge.GUESSED:
+            painter = QPainter(self)
+            painter.fillRect(QRectF(self.rect()).adjusted(1, 1, -1, -1),
+                             QBrush(QColor(self._scheme.border), Qt.BrushStyle.BDiagPattern))
+            painter.end()
+        super().paintEvent(event)  # type: ignore[arg-type]
+
+
+class HandPanel(QWidget):
+    """Four fingers in one table, the thumb in another, and the key to how values are known."""
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("panel", True)
+        self.setProperty("guide", "hand")
+        self._scheme = scheme
+        self.cells: list[AngleCell] = []
+        self._grid = QGridLayout()
+        self._grid.setHorizontalSpacing(2)
+        self._grid.setVerticalSpacing(1)
+        self._key = QHBoxLayout()
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 4, 8, 8)
+        layout.setSpacing(6)
+        layout.addLayout(self._grid)
+        layout.addLayout(self._key)
+        layout.addStretch(1)
+        self._fill()
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        for box in (self._grid, self._key):
+            while (item := box.takeAt(0)) is not None:
+                if (widget := item.widget()) is not None:
+                    widget.deleteLater()
+        self._fill()
+
+    def _fill(self) -> None:
+        self.cells = []
+        self._add_heads(0, FINGER_HEADS)
+        cells: dict[str, list[AngleCell]] = {}
+        for name, part in zip(FINGERS, ANGLE_SLICES, strict=True):
+            heads = THUMB_HEADS if name == "thumb" else FINGER_HEADS
+            cells[name] = [AngleCell(f"{name} {head}", self._scheme) for head, _ in heads]
+            assert len(cells[name]) == part.stop - part.start
+            self.cells += cells[name]
+        for row, name in enumerate(FINGERS[1:], start=1):
+            self._add_row(row, name, cells[name])
+        self._add_heads(6, THUMB_HEADS)
+        self._add_row(7, "thumb", cells["thumb"])
+        self._grid.setRowMinimumHeight(5, 6)
+        for knowledge in (Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED):
+            look = KNOWLEDGE[knowledge]
+            mark, word = ShapeMark(12), QLabel(look.word)
+            mark.set_shape(look.shape, self._scheme.tone(look.tone))
+            word.setProperty("muted", True)
+            word.setToolTip(look.meaning)
+            self._key.addWidget(mark)
+            self._key.addWidget(word)
+            self._key.addStretch(1)
+
+    def _add_heads(self, row: int, heads: tuple[tuple[str, str], ...]) -> None:
+        for column, (head, term) in enumerate(heads, start=1):
+            label = QLabel(head)
+            label.setProperty("muted", True)
+            label.setAlignment(Qt.AlignmentFlag.AlignRight)
+            label.setContentsMargins(4, 0, 4, 0)
+            label.setToolTip(tip(term) + ("" if term == "abduction" else "\n" + tip("flexion")))
+            self._grid.addWidget(label, row, column)
+
+    def _add_row(self, row: int, name: str, cells: list[AngleCell]) -> None:
+        self._grid.addWidget(QLabel(name), row, 0)
+        for column, cell in enumerate(cells, start=1):
+            self._grid.addWidget(cell, row, column)
+            self._grid.setColumnStretch(column, 1)
+
+    def show_state(self, state: HandState | None) -> None:
+        """The angles of `state`; None shows dashes."""
+        for k, cell in enumerate(self.cells):
+            if state is None:
+                cell.show_angle(float("nan"), Knowledge.UNKNOWN)
+            else:
+                cell.show_angle(float(state.angles[k]), Knowledge(int(state.angle_knowledge[k])))

@@ -1,0 +1,109 @@
+"""The markers: own colour with the name beside it, and in words who sees them."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPen
+from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+
+from rhot_app.project import Rig
+from rhot_app.tracking.state import HandState
+from rhot_app.ui.models.glossary import tip
+from rhot_app.ui.models.palette import Scheme, hex_of
+from rhot_app.ui.models.rows import MarkerRow, marker_rows, short_name
+from rhot_app.ui.models.words import Look
+from rhot_app.ui.panels.empty_state import EmptyState
+from rhot_app.ui.shapes import ShapeMark
+
+_UNSEEN = Look("not seen yet", "square", "neutral", "Nothing has been received since the start.")
+
+
+class Swatch(QWidget):
+    """A marker's own colour with a rim, so that dark ones are seen on dark ground."""
+
+    def __init__(self, colour: str, rim: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._colour, self._rim = QColor(colour), QColor(rim)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """14 px square."""
+        return QSize(14, 14)
+
+    def paintEvent(self, event: object) -> None:  # noqa: N802
+        """A rounded square."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QPen(self._rim, 1.0))
+        painter.setBrush(self._colour)
+        painter.drawRoundedRect(QRectF(1, 1, 12, 12), 3, 3)
+        painter.end()
+
+
+class MarkersPanel(QWidget):
+    """One line per marker of the rig: swatch, name, shape, word."""
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("panel", True)
+        self.setProperty("guide", "markers")
+        self.setToolTip(tip("marker"))
+        self._scheme = scheme
+        self._rig: Rig | None = None
+        self._lines: list[tuple[ShapeMark, QLabel]] = []
+        self._shown: list[MarkerRow | None] = []
+        self.empty = EmptyState("The rig says which markers there are. No rig is open.")
+        self._body = QWidget()
+        self._grid = QGridLayout(self._body)
+        self._grid.setContentsMargins(8, 0, 8, 0)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(4)
+        self._grid.setColumnStretch(1, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 4, 0, 8)
+        layout.addWidget(self.empty)
+        layout.addWidget(self._body)
+        layout.addStretch(1)
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        self.show_rig(self._rig)
+
+    def show_rig(self, rig: Rig | None) -> None:
+        """Lines for another marker set."""
+        self._rig = rig
+        while (item := self._grid.takeAt(0)) is not None:
+            if (widget := item.widget()) is not None:
+                widget.deleteLater()
+        self._lines = []
+        self.empty.setVisible(rig is None)
+        for row, marker in enumerate(rig.markers.markers if rig is not None else ()):
+            mark, word = ShapeMark(12), QLabel()
+            word.setAlignment(Qt.AlignmentFlag.AlignRight)
+            word.setProperty("muted", True)
+            self._grid.addWidget(Swatch(hex_of(marker.display_rgb), self._scheme.muted), row, 0)
+            self._grid.addWidget(QLabel(short_name(marker.id)), row, 1)
+            self._grid.addWidget(word, row, 2)
+            self._grid.addWidget(mark, row, 3)
+            self._lines.append((mark, word))
+        self._shown = [None] * len(self._lines)
+        self.show_state(None)
+
+    def show_state(self, state: HandState | None) -> None:
+        """What is known of each marker; None before the first state and after the last."""
+        rows = marker_rows(state) if state is not None else []
+        for k, (mark, word) in enumerate(self._lines):
+            row = rows[k] if k < len(rows) else None
+            if row is not None and row == self._shown[k]:
+                continue
+            self._shown[k] = row
+            look = row.look if row is not None else _UNSEEN
+            mark.set_shape(look.shape, self._scheme.tone(look.tone))
+            word.setText(look.word)
+            word.setToolTip(f"{look.meaning}\n{row.detail}" if row is not None else look.meaning)
+
+    @property
+    def words(self) -> list[str]:
+        """The words shown, in the rig's order."""
+        return [word.text() for _, word in self._lines]

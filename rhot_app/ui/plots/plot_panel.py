@@ -1,0 +1,160 @@
+"""What every plot has: title, named axes in units, legend, pause, reset, copy as CSV; time runs left to right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+
+from rhot_app.ui.models.glossary import tip
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.series import Series, to_csv
+from rhot_app.ui.plots.legend import Legend
+
+Array = NDArray[np.float64]
+
+SPAN_S = 30.0
+DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine, Qt.PenStyle.DashDotLine)
+
+
+class PlotPanel(QWidget):
+    """Base of the plots. A subclass draws in `_draw(seconds, rows)`; `refresh` gives it the window to show.
+
+    While paused the window stands still; the data go on and are there again when the pause ends.
+    """
+
+    term = ""
+    title = ""
+    unit = ""
+    least_span = 1.0
+
+    def __init__(self, scheme: Scheme, heads: tuple[str, ...], widest_value: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("panel", True)
+        self.setProperty("guide", "plots")
+        self._scheme = scheme
+        self._window: tuple[Array, Array, tuple[str, ...]] = (np.empty(0), np.empty((0, 0)), ())
+        self._reset_ns = 0
+        self.pause_button = self._button("Pause", "Stop the plot to look at it; the measurement goes on.")
+        self.pause_button.setCheckable(True)
+        self.reset_button = self._button("Reset", "Begin the plot anew and fit the axes.")
+        self.copy_button = self._button("Copy CSV", "Copy what the plot shows to the clipboard, as comma-separated text.")
+        self.reset_button.clicked.connect(self._ask_reset)
+        self.copy_button.clicked.connect(self.copy_csv)
+        self.plot = pg.PlotWidget()
+        self.legend = Legend(scheme, heads, widest_value)
+        self._lay_out()
+        self._style_plot()
+
+    def _button(self, text: str, meaning: str) -> QPushButton:
+        button = QPushButton(text)
+        button.setProperty("flat", True)
+        button.setToolTip(meaning)
+        return button
+
+    def _lay_out(self) -> None:
+        label = QLabel(self.title)
+        label.setProperty("title", True)
+        label.setToolTip(tip(self.term))
+        self.setToolTip(tip(self.term))
+        head = QHBoxLayout()
+        head.setSpacing(0)
+        head.addWidget(label, 1)
+        for button in (self.pause_button, self.reset_button, self.copy_button):
+            head.addWidget(button)
+        body = QHBoxLayout()
+        body.setSpacing(6)
+        body.addWidget(self.plot, 1)
+        body.addWidget(self.legend)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 2, 8, 4)
+        layout.setSpacing(0)
+        layout.addLayout(head)
+        layout.addLayout(body, 1)
+
+    def _style_plot(self) -> None:
+        self.plot.setBackground(self._scheme.panel)
+        self.plot.setMenuEnabled(False)
+        self.plot.hideButtons()
+        self.plot.setMinimumHeight(80)
+        item = self.plot.getPlotItem()
+        item.showGrid(x=True, y=True, alpha=0.25)
+        item.setXRange(-SPAN_S, 0.0, padding=0.0)
+        item.setMouseEnabled(x=False, y=True)
+        item.getViewBox().setLimits(yMin=0.0)
+        style = {"color": self._scheme.muted, "font-size": "10pt"}
+        for side in ("left", "bottom"):
+            axis = item.getAxis(side)
+            axis.setPen(pg.mkPen(self._scheme.border))
+            axis.setTextPen(pg.mkPen(self._scheme.muted))
+            axis.enableAutoSIPrefix(False)
+        item.setLabel("left", self.unit, **style)
+        item.setLabel("bottom", "time before now [s]", **style)
+        item.getAxis("left").setWidth(48)
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        self.legend.set_scheme(scheme)
+        self._style_plot()
+        self._redraw()
+
+    @property
+    def paused(self) -> bool:
+        """Whether the plot stands still."""
+        return self.pause_button.isChecked()
+
+    def refresh(self, series: Series, now_ns: int) -> None:
+        """Show the last seconds of `series`, unless paused."""
+        if self.paused:
+            return
+        if self._reset_ns == -1:
+            self._reset_ns = now_ns
+        seconds, rows = series.window(now_ns, min(SPAN_S, max(0.0, (now_ns - self._reset_ns) * 1e-9)))
+        self._window = (seconds, rows, series.names)
+        self._redraw()
+
+    def _redraw(self) -> None:
+        seconds, rows, names = self._window
+        self._draw(seconds, rows, names)
+
+    def _draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+        """Draw `rows` (n, columns) over `seconds` (n,)."""
+        raise TypeError(f"{type(self).__name__} does not draw")
+
+    def _fit(self, top: float) -> None:
+        """Let the vertical axis begin at zero and end a little above `top`, at one of a few round values."""
+        if not np.isfinite(top) or top <= 0:
+            top = self.least_span
+        steps = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
+        scale = 10.0 ** np.floor(np.log10(top))
+        high = max(scale * steps[np.searchsorted(steps, 1.05 * top / scale).clip(max=len(steps) - 1)], self.least_span)
+        self.plot.setYRange(0.0, float(high), padding=0.02)
+
+    def _ask_reset(self) -> None:
+        """Forget what was before this moment, and leave a pause."""
+        self.pause_button.setChecked(False)
+        self._reset_ns = -1
+        self.plot.getPlotItem().setXRange(-SPAN_S, 0.0, padding=0.0)
+
+    def csv(self) -> str:
+        """What the plot shows as comma-separated text."""
+        seconds, rows, names = self._window
+        return to_csv(seconds, rows, names, self.unit)
+
+    def copy_csv(self) -> None:
+        """Put `csv` on the clipboard."""
+        QGuiApplication.clipboard().setText(self.csv())
+
+
+def newest(rows: Array, column: int) -> float:
+    """Last value of a column; NaN when there is none."""
+    return float(rows[-1, column]) if len(rows) else float("nan")
+
+
+def number(value: float, digits: int) -> str:
+    """A value with a fixed number of digits, a dash when there is none."""
+    return f"{value:.{digits}f}" if np.isfinite(value) else "–"

@@ -1,0 +1,127 @@
+"""The shapes that go with the words: disc, ring, half, square, cross, octagon, hatch; and the toolbar's signs."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QBrush, QColor, QIcon, QPainter, QPen, QPixmap, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+
+def paint_shape(painter: QPainter, shape: str, box: QRectF, colour: QColor) -> None:
+    """Draw one shape into the largest square of `box`."""
+    size = min(box.width(), box.height())
+    square = QRectF(0, 0, size, size)
+    square.moveCenter(box.center())
+    width = max(size * 0.14, 1.5)
+    inner = square.adjusted(width / 2, width / 2, -width / 2, -width / 2)
+    painter.save()
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    pen = QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
+    painter.setPen(pen)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    if shape == "disc":
+        painter.setBrush(colour)
+        painter.drawEllipse(inner)
+    elif shape == "ring":
+        painter.drawEllipse(inner)
+    elif shape == "half":
+        painter.drawEllipse(inner)
+        painter.setBrush(colour)
+        painter.drawPie(inner, 90 * 16, 180 * 16)
+    elif shape == "square":
+        painter.drawRect(inner.adjusted(width / 2, width / 2, -width / 2, -width / 2))
+    elif shape == "cross":
+        painter.drawLine(QLineF(inner.topLeft(), inner.bottomRight()))
+        painter.drawLine(QLineF(inner.topRight(), inner.bottomLeft()))
+    elif shape == "hatch":
+        painter.setPen(QPen(colour, max(width * 0.6, 1.0)))
+        painter.setBrush(QBrush(colour, Qt.BrushStyle.BDiagPattern))
+        painter.drawEllipse(inner)
+    elif shape == "octagon":
+        _paint_octagon(painter, square, colour)
+    elif shape == "play":
+        painter.setBrush(colour)
+        painter.drawPolygon(QPolygonF([inner.topLeft() + QPointF(width, 0), inner.bottomLeft() + QPointF(width, 0),
+                                       QPointF(inner.right(), inner.center().y())]))
+    elif shape == "stop":
+        painter.setBrush(colour)
+        painter.drawRect(inner.adjusted(width / 2, width / 2, -width / 2, -width / 2))
+    elif shape == "info":
+        _paint_info(painter, square, colour)
+    painter.restore()
+
+
+def _paint_octagon(painter: QPainter, square: QRectF, colour: QColor) -> None:
+    centre, radius = square.center(), square.width() / 2
+    corners = [QPointF(centre.x() + radius * math.cos(math.pi / 8 + k * math.pi / 4),
+                       centre.y() + radius * math.sin(math.pi / 8 + k * math.pi / 4)) for k in range(8)]
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(colour)
+    painter.drawPolygon(QPolygonF(corners))
+    _paint_mark(painter, square, downward=True)
+
+
+def _paint_info(painter: QPainter, square: QRectF, colour: QColor) -> None:
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(colour)
+    painter.drawEllipse(square)
+    _paint_mark(painter, square, downward=False)
+
+
+def _paint_mark(painter: QPainter, square: QRectF, *, downward: bool) -> None:
+    """An exclamation mark, or turned over an i, cut out of a filled shape."""
+    painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_DestinationOut)
+    painter.setBrush(Qt.GlobalColor.black)
+    centre, unit = square.center(), square.height() / 16
+    bar = QRectF(centre.x() - unit, centre.y() - (4.5 if downward else 1.2) * unit, 2 * unit, 5.7 * unit)
+    dot_y = centre.y() + (3.4 if downward else -3.4) * unit
+    painter.drawRect(bar)
+    painter.drawEllipse(QPointF(centre.x(), dot_y), 1.2 * unit, 1.2 * unit)
+
+
+def shape_pixmap(shape: str, colour: str, size: int, ratio: float = 1.0) -> QPixmap:
+    """The shape as a picture on nothing, `size` device-independent px."""
+    picture = QPixmap(round(size * ratio), round(size * ratio))
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(picture)
+    paint_shape(painter, shape, QRectF(1, 1, size - 2, size - 2), QColor(colour))
+    painter.end()
+    return picture
+
+
+def shape_icon(shape: str, colour: str) -> QIcon:
+    """The shape as an icon in the sizes that toolbars and menus use."""
+    icon = QIcon()
+    for size in (16, 24, 32, 48):
+        icon.addPixmap(shape_pixmap(shape, colour, size))
+    return icon
+
+
+class ShapeMark(QWidget):
+    """A shape in a colour, of a fixed size."""
+
+    def __init__(self, size: int = 14, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._side = size
+        self._shape, self._colour = "", QColor()
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """The fixed size."""
+        return QSize(self._side, self._side)
+
+    def set_shape(self, shape: str, colour: str) -> None:
+        """Show another shape or colour."""
+        if (shape, QColor(colour)) != (self._shape, self._colour):
+            self._shape, self._colour = shape, QColor(colour)
+            self.update()
+
+    def paintEvent(self, event: object) -> None:  # noqa: N802
+        """Draw from a picture, because the octagon's mark is cut out."""
+        if self._shape:
+            painter = QPainter(self)
+            painter.drawPixmap(0, 0, shape_pixmap(self._shape, self._colour.name(), self._side, self.devicePixelRatioF()))
+            painter.end()
