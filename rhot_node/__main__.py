@@ -59,6 +59,8 @@ class End:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code: 0 when ended by the user or the recording, 2 after an error."""
+    if argv is None:
+        _hide_scipy()
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         if arguments[:1] == ["detect"]:
@@ -69,6 +71,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 0
+
+
+def _hide_scipy() -> None:
+    """numba imports scipy when it finds it: half a second and 40 MB for functions that no detector calls. A Pi has no
+    scipy; this makes a node on any other machine the same."""
+    sys.modules["scipy"] = None  # type: ignore[assignment]
 
 
 def _detect(arguments: list[str]) -> int:

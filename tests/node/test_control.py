@@ -1,0 +1,218 @@
+"""The control channel over real ZeroMQ sockets: every request, every wrong one, stills and previews."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import zmq
+from node_fakes import grey_image
+
+from rhot_node.capture.camera import Frame
+from rhot_node.clock import NodeClock
+from rhot_node.config import NodeSettings, load_settings, save_settings
+from rhot_node.control import ControlServer
+from rhot_node.detect.image import YuvImage, to_bgr
+from rhot_node.errors import LinkError
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+from rhot_node.pictures import PictureBox
+from rhot_node.requests import Responder, SettingsStore
+from rhot_node.session import Sessions
+
+RNG = np.random.default_rng(3)
+
+
+def noisy_frame(number: int = 5) -> Frame:
+    planes = [RNG.integers(0, 256, shape, dtype=np.uint8) for shape in ((480, 640), (240, 320), (240, 320))]
+    return Frame(YuvImage(*planes), number, 1000 + number, 2000, 0, 0)
+
+
+class Served:
+    """A control server in its thread, with a client."""
+
+    def __init__(self, folder: Path) -> None:
+        settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")), "127.0.0.1", 0, 0, 0,
+                                None, preview_hz=20.0)
+        self.store = SettingsStore(folder / "node.json", settings)
+        save_settings(self.store.path, settings)
+        self.sessions = Sessions()
+        self.server = ControlServer(settings)
+        self.server.start(Responder(self.store, self.sessions, self.server.pictures, NodeClock(),
+                                    lambda: {"state": "ready"}, lambda: {"frames": 12}))
+        self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self.client = self.context.socket(zmq.REQ)
+        self.client.connect(f"tcp://127.0.0.1:{self.server.control_port}")
+        self.client.rcvtimeo = 3000
+
+    def ask_raw(self, *parts: bytes) -> list[bytes]:
+        self.client.send_multipart(parts)
+        return self.client.recv_multipart()
+
+    def ask(self, **request: Any) -> dict[str, Any]:
+        answer: dict[str, Any] = json.loads(self.ask_raw(json.dumps(request).encode())[0])
+        return answer
+
+    def close(self) -> None:
+        self.server.close()
+        self.server.close()
+        self.context.destroy(linger=0)
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Served]:
+    served = Served(tmp_path)
+    yield served
+    served.close()
+
+
+def test_state_counters_and_settings(served: Served) -> None:
+    assert served.ask(request="state") == {"ok": True, "state": "ready"}
+    assert served.ask(request="counters") == {"ok": True, "counters": {"frames": 12}}
+    answer = served.ask(request="settings")
+    assert answer["ok"] and answer["settings"]["node_id"] == 3
+    assert answer["settings"]["markers"]["markers"][0]["id"]
+
+
+def test_settings_are_saved_and_say_what_needs_a_restart(served: Served) -> None:
+    answer = served.ask(request="set_settings", settings={"camera": {"gain": 3.5}, "udp_port": 4711})
+    assert answer == {"ok": True, "restart": ["udp_port"]}
+    assert load_settings(served.store.path) == served.store.current
+    assert served.store.current.camera.gain == 3.5
+    answer = served.ask(request="set_settings", settings={"preview_hz": 2})
+    assert answer["restart"] == ["udp_port"], "what waits for a restart still waits"
+
+
+def test_wrong_settings_change_nothing(served: Served) -> None:
+    before = served.store.path.read_bytes()
+    answer = served.ask(request="set_settings", settings={"camera": {"gain": -1}})
+    assert not answer["ok"] and "camera.gain" in answer["error"]
+    assert served.store.path.read_bytes() == before and served.store.current.camera.gain is None
+
+
+def test_settings_that_cannot_be_saved_change_nothing(served: Served) -> None:
+    served.store.path = served.store.path.parent / "gone" / "node.json"
+    answer = served.ask(request="set_settings", settings={"preview_hz": 2})
+    assert not answer["ok"] and "gone" in answer["error"]
+    assert served.store.current.preview_hz == 20.0
+
+
+@pytest.mark.parametrize("data", [
+    b"", b"{", b"[]", b"null", b"\xff", b'{"request": "dance"}', b'{"ask": "state"}', b'{"request": "state", "x": 1}',
+    b'{"request": "start", "session": 0, "host": "127.0.0.1", "port": 5000}',
+    b'{"request": "start", "session": 1, "host": "127.0.0.1", "port": 0}',
+    b'{"request": "start", "session": 18446744073709551616, "host": "127.0.0.1", "port": 5000}',
+    b'{"request": "start", "session": 1, "host": "nowhere.invalid", "port": 5000}',
+    b'{"request": "start", "session": 1, "port": 5000}', b'{"request": "set_settings", "settings": 3}',
+])
+def test_a_wrong_request_is_answered_with_a_sentence(served: Served, data: bytes) -> None:
+    answer = json.loads(served.ask_raw(data)[0])
+    assert answer["ok"] is False and len(answer["error"]) > 10
+    assert served.ask(request="state")["ok"], "the channel still works"
+    assert served.sessions.current is None
+
+
+def test_a_request_in_two_parts_is_refused(served: Served) -> None:
+    assert b"2 parts" in served.ask_raw(b"{}", b"{}")[0]
+
+
+def test_start_and_stop(served: Served) -> None:
+    assert served.ask(request="start", session=9, host="10.0.0.1", port=5000) == {"ok": True, "verdict": "started"}
+    assert served.sessions.current is not None and served.sessions.current.address == ("10.0.0.1", 5000)
+    assert served.ask(request="stop") == {"ok": True, "stopped": True}
+    answer = served.ask(request="start", session=9, host="10.0.0.1", port=5000)
+    assert not answer["ok"] and "new session" in answer["error"]
+
+
+def test_a_still_is_the_whole_frame_without_loss(served: Served) -> None:
+    frame = noisy_frame()
+    offering = threading.Event()
+
+    def offer() -> None:
+        while not offering.wait(0.01):
+            served.server.pictures.offer(frame)
+
+    thread = threading.Thread(target=offer)
+    thread.start()
+    head, png = served.ask_raw(b'{"request": "still"}')
+    offering.set()
+    thread.join()
+    assert json.loads(head) == {"ok": True, "format": "png", "width": 640, "height": 480, "number": 5,
+                                "t_node_ns": 1005}
+    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None and np.array_equal(image, to_bgr(frame.image))
+
+
+def test_a_node_without_frames_says_so(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rhot_node.requests.STILL_S", 0.1)
+    answer = served.ask(request="still")
+    assert not answer["ok"] and "no frame" in answer["error"]
+
+
+def test_previews_are_small_and_only_for_those_who_look(served: Served) -> None:
+    pictures = served.server.pictures
+    assert not pictures.wanted
+    viewer = served.context.socket(zmq.SUB)
+    viewer.rcvtimeo = 3000
+    viewer.connect(f"tcp://127.0.0.1:{served.server.preview_port}")
+    viewer.subscribe(b"")
+    wait_for(lambda: pictures.wanted)
+    pictures.offer(noisy_frame(8))
+    head, jpeg = viewer.recv_multipart()
+    assert json.loads(head) == {"node_id": 3, "number": 8, "t_node_ns": 1008, "width": 640, "height": 480,
+                                "preview_width": 320, "preview_height": 240}
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None and image.shape == (240, 320, 3)
+    viewer.close(linger=0)
+    wait_for(lambda: not pictures.wanted)
+
+
+def wait_for(condition: Any) -> None:
+    deadline = time.monotonic() + 3.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_nothing_is_copied_when_nobody_looks() -> None:
+    woken: list[int] = []
+    box = PictureBox(4.0, lambda: woken.append(1))
+    frame = Frame(grey_image(), 1, 0, 0, 0, 0)
+    box.offer(frame)
+    assert box.take_preview() is None and not woken
+    box.wanted = True
+    for _ in range(50):
+        box.offer(frame)
+    assert len(woken) == 1, "fifty frames at once are one preview at 4 Hz"
+    preview = box.take_preview()
+    assert preview is not None and preview.image.y is not frame.image.y
+    assert box.take_preview() is None
+
+
+def test_previews_keep_their_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [1000.0]
+    monkeypatch.setattr("rhot_node.pictures.time.monotonic", lambda: now[0])
+    woken: list[float] = []
+    box = PictureBox(4.0, lambda: woken.append(now[0]))
+    box.wanted = True
+    for k in range(400):
+        now[0] = 1000.0 + k / 40
+        box.offer(Frame(grey_image(), k, 0, 0, 0, 0))
+    assert 39 <= len(woken) <= 41
+
+
+@pytest.mark.parametrize("setting", ["control_port", "preview_port"])
+def test_a_taken_port_is_named_with_its_setting(served: Served, setting: str) -> None:
+    port = getattr(served.server, setting)
+    settings = NodeSettings(4, "right", served.store.current.markers, "127.0.0.1", 0, 0, 0, None)
+    taken = {"control_port": NodeSettings(4, "right", settings.markers, "127.0.0.1", 0, port, 0, None),
+             "preview_port": NodeSettings(4, "right", settings.markers, "127.0.0.1", 0, 0, port, None)}[setting]
+    with pytest.raises(LinkError, match=f"{setting}: TCP port {port}"):
+        ControlServer(taken)

@@ -1,0 +1,216 @@
+"""The daemon's step, with fakes: states, sequences, faults, the end of a recording, live settings."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from node_fakes import LOST_CAMERA, SIZE, FakeCamera, FakeDetector, FakeSender
+
+import rhot_node.daemon
+from rhot_node.clock import NodeClock
+from rhot_node.config import NodeSettings, save_settings
+from rhot_node.daemon import NodeDaemon
+from rhot_node.errors import CameraError
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+from rhot_node.pictures import PictureBox
+from rhot_node.requests import SettingsStore
+from rhot_node.wire.messages import NodeState
+
+MASTER = ("10.0.0.1", 5000)
+Script = Iterable[int | Exception | None]
+
+
+class Node:
+    """A daemon on fakes. Each time the camera is opened it plays the next script."""
+
+    def __init__(self, tmp_path: Path, *scripts: Script | CameraError, loop: bool = False,
+                 detector_s: float = 0.0, period_ns: int = 0) -> None:
+        self.clock = NodeClock(offset_ns=10**15)
+        settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")))
+        self.store = SettingsStore(tmp_path / "node.json", settings)
+        save_settings(self.store.path, settings)
+        self.scripts = list(scripts)
+        self.period_ns = period_ns
+        self.cameras: list[FakeCamera] = []
+        self.detectors: list[FakeDetector] = []
+        self.detector_s = detector_s
+        self.sender = FakeSender()
+        self.pictures = PictureBox(4.0)
+        self.daemon = NodeDaemon(self.store, self.clock, self._open, self._make_detector, loop=loop)
+
+    def step(self, times: int = 1) -> bool:
+        return all(self.daemon.step(self.sender, self.pictures) for _ in range(times))
+
+    def start(self, session: int = 7, t_start_node_ns: int = 0) -> None:
+        self.daemon.sessions.start(session, MASTER, t_start_node_ns, now_node_ns=self.clock.now_ns(),
+                                   now_s=time.monotonic())
+
+    def _open(self, _settings: object) -> FakeCamera:
+        script = self.scripts.pop(0)
+        if isinstance(script, CameraError):
+            raise script
+        self.cameras.append(FakeCamera(script, self.clock, self.period_ns))
+        return self.cameras[-1]
+
+    def _make_detector(self, _settings: NodeSettings) -> FakeDetector:
+        self.detectors.append(FakeDetector(self.detector_s))
+        return self.detectors[-1]
+
+
+@pytest.fixture
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rhot_node.daemon, "REOPEN_S", 0.0)
+
+
+def test_states_from_start_to_stop(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, logger="rhot_node.daemon")
+    node = Node(tmp_path, range(100))
+    states = [node.daemon.state]
+    node.daemon.prepare()
+    states.append(node.daemon.state)
+    node.step(3)
+    assert not node.sender.sent
+    node.start()
+    states.append(node.daemon.state)
+    node.step(2)
+    node.daemon.sessions.stop(7)
+    states.append(node.daemon.state)
+    node.step(2)
+    assert states == [NodeState.STARTING, NodeState.READY, NodeState.STREAMING, NodeState.READY]
+    assert [observations.frame_number for observations, _ in node.sender.sent] == [3, 4]
+    assert [record.message for record in caplog.records] == [
+        "starting -> ready", "ready -> streaming", "streaming -> ready"]
+
+
+def test_what_is_sent(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(100), detector_s=0.003)
+    node.daemon.prepare()
+    node.start()
+    node.step()
+    observations, address = node.sender.sent[0]
+    assert address == MASTER
+    assert (observations.node_id, observations.session, observations.sequence) == (3, 7, 0)
+    assert (observations.width, observations.height) == SIZE
+    assert observations.marker_checksum == node.store.current.markers.checksum
+    assert observations.exposure_ns == 4_000_000 and observations.row_time_ns == 48_000
+    assert 3_000_000 <= observations.processing_ns < 10**9
+    assert observations.t_frame_node_ns <= observations.t_send_node_ns <= node.clock.now_ns()
+    assert observations.markers[0].x == SIZE[0] / 2
+
+
+def test_sequences_count_from_zero_in_each_session(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(100))
+    node.daemon.prepare()
+    node.start(7)
+    node.step(3)
+    node.start(8)
+    node.step(2)
+    assert [(o.session, o.sequence) for o, _ in node.sender.sent] == [(7, 0), (7, 1), (7, 2), (8, 0), (8, 1)]
+
+
+def test_streaming_begins_with_the_first_frame_exposed_after_the_start_time(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(1000))
+    node.daemon.prepare()
+    t_start = node.clock.now_ns() + 20_000_000
+    node.start(7, t_start)
+    assert node.daemon.state is NodeState.STREAMING
+    while not node.sender.sent:
+        node.step()
+    assert node.sender.sent[0][0].t_frame_node_ns >= t_start
+    assert node.sender.sent[0][0].frame_number > 0 and node.sender.sent[0][0].sequence == 0
+
+
+def test_a_lost_camera_is_a_fault_that_mends_itself_in_the_same_session(
+        tmp_path: Path, at_once: None, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, logger="rhot_node.daemon")
+    node = Node(tmp_path, [0, 1, LOST_CAMERA], CameraError("still unplugged"), range(5))
+    node.daemon.prepare()
+    node.start()
+    node.step(3)
+    assert node.daemon.state is NodeState.FAULT and node.cameras[0].closed
+    assert node.daemon.report()["message"] == "the plug was pulled"
+    node.step()
+    assert node.daemon.state is NodeState.FAULT and node.daemon.report()["message"] == "still unplugged"
+    node.step(3)
+    assert node.daemon.state is NodeState.STREAMING and node.daemon.report()["message"] == ""
+    assert [(o.session, o.sequence) for o, _ in node.sender.sent] == [(7, k) for k in range(4)]
+    assert node.detectors[0].resets == 1 and node.daemon.counters.faults == 1
+    assert "streaming -> fault: the plug was pulled" in caplog.text and "fault -> streaming" in caplog.text
+
+
+def test_a_camera_that_cannot_be_opened_at_first_is_an_error(tmp_path: Path) -> None:
+    node = Node(tmp_path, CameraError("absent"))
+    with pytest.raises(CameraError, match="absent"):
+        node.daemon.prepare()
+
+
+def test_the_camera_is_not_opened_again_at_once(tmp_path: Path) -> None:
+    node = Node(tmp_path, [LOST_CAMERA], range(5))
+    node.daemon.prepare()
+    node.step(3)
+    assert len(node.cameras) == 1
+
+
+def test_the_end_of_a_recording_ends_the_node(tmp_path: Path) -> None:
+    node = Node(tmp_path, [0, 1])
+    node.daemon.prepare()
+    assert node.step(2)
+    assert not node.step()
+
+
+def test_a_looped_recording_goes_on(tmp_path: Path) -> None:
+    node = Node(tmp_path, [0, 1], loop=True)
+    node.daemon.prepare()
+    node.start()
+    assert node.step(5)
+    assert node.cameras[0].rewound == 1
+    assert [o.frame_number for o, _ in node.sender.sent] == [0, 1, 100, 101]
+
+
+def test_gaps_and_late_frames_are_counted(tmp_path: Path) -> None:
+    node = Node(tmp_path, [0, 1, None, 5, 6], period_ns=100_000, detector_s=0.002)
+    node.daemon.prepare()
+    node.step(5)
+    counters = node.daemon.count()
+    assert (counters["frames"], counters["skipped_frames"]) == (4, 3)
+    assert counters["over_budget"] == 3, "the first frame has no period to be measured by"
+
+
+def test_frames_that_the_network_refuses_are_counted(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(5))
+    node.sender = FakeSender(works=False)
+    node.daemon.prepare()
+    node.start()
+    node.step(2)
+    assert (node.daemon.counters.sent, node.daemon.counters.not_sent) == (0, 2)
+
+
+def test_a_silent_master_ends_the_stream(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(9))
+    node.daemon.prepare()
+    node.daemon.sessions.start(7, MASTER, 0, now_node_ns=0, now_s=time.monotonic() - 5.1)
+    node.step()
+    assert node.daemon.state is NodeState.READY and not node.sender.sent
+
+
+def test_settings_take_effect_between_two_frames(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(9), range(9), range(9))
+    node.daemon.prepare()
+    node.step()
+    assert node.store.change({"preview_hz": 9}) == []
+    node.step()
+    assert node.pictures.preview_hz == 9 and len(node.detectors) == len(node.cameras) == 1
+    node.store.change({"detector": "reference"})
+    node.step()
+    assert len(node.detectors) == 2 and len(node.cameras) == 1
+    node.store.change({"camera": {"gain": 2.0}})
+    node.step(2)
+    assert len(node.cameras) == 2 and node.cameras[0].closed
+    assert node.daemon.state is NodeState.READY
+
+
