@@ -87,13 +87,19 @@ class Pipeline:
         if work.source.changes != self._changes:
             self._changes = work.source.changes
             work.tracker.reset()
-        for frame in frames:
-            work.tracker.ingest(frame)
-            work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = frame.t_receive_ns
         self.frame_count += len(frames)
-        state = work.tracker.solve()
-        if state is not None:
-            self._send(state, work.source.live)
+        live = work.source.live
+        now_ns = time.monotonic_ns()
+        state = None
+        for k, frame in enumerate(frames, start=1):
+            work.tracker.ingest(frame)
+            work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = now_ns
+            # Live, only the newest instant matters to anybody; a replay leaves none out.
+            if not live or k == len(frames):
+                solved = work.tracker.solve()
+                if solved is not None:
+                    self._send(solved, live)
+                    state = solved
         return state
 
     def _send(self, state: HandState, live: bool) -> None:

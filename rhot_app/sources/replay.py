@@ -34,6 +34,11 @@ class LogDoor:
             if link.node.text_datagrams:
                 link.door.expect_session(1)
 
+    @property
+    def changes(self) -> int:
+        """Sessions so far, and clocks that were set: the tracker must then forget."""
+        return self.starts + sum(link.clock_changes for link in self.links)
+
     def feed(self, record: Record) -> CameraObservations | None:
         """Take one record in; a frame when it holds one that is admitted."""
         if record.kind is RecordKind.DATAGRAM:
@@ -85,7 +90,7 @@ class LogReplay:
     @property
     def changes(self) -> int:
         """Sessions in the log so far, and clocks that were set."""
-        return self._door.starts + sum(link.clock_changes for link in self.links)
+        return self._door.changes
 
     def notices(self) -> list[str]:
         """That the log is over, broken or torn."""

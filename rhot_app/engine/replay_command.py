@@ -1,0 +1,56 @@
+"""``rhot replay``: a raw log through the live door, summed up or served to clients like a running engine."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+from pathlib import Path
+
+from rhot_app.engine.command import add_serving_arguments
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot replay``."""
+    parser.add_argument("path", type=Path, metavar="LOG", help="a raw log written by rhot engine --log or the app")
+    parser.add_argument("--rig", type=Path, metavar="FILE",
+                        help="track with this rig instead of the one the log was recorded with")
+    parser.add_argument("--speed", type=_speed, default=1.0, metavar="N",
+                        help="times real time, or max for as fast as possible (default 1)")
+    parser.add_argument("--json", action="store_true",
+                        help="serve nothing: replay at once and print a summary as one JSON object")
+    add_serving_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Replay; with clients to serve, until SIGTERM, SIGINT or the command ``quit``."""
+    from rhot_app.engine.replay_summary import summarise
+    from rhot_app.engine.serve import serving
+    from rhot_app.project import load_rig
+    from rhot_app.recording.raw_log import LogReader
+    from rhot_app.sources.replay import LogReplay
+    from rhot_app.tracking.make import make_tracker
+
+    logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
+    reader = LogReader(args.path)
+    rig = load_rig(args.rig) if args.rig is not None else reader.rig
+    if args.json:
+        print(json.dumps(summarise(reader, rig, make_tracker(rig))))
+        return 0
+    reader.close()
+    rig_path = None if args.rig is None else args.rig.absolute()
+    with serving(rig, rig_path, lambda rig: LogReplay(args.path, rig, args.speed), args.directory) as (
+            engine, server, _):
+        engine.start()
+        server.run()
+    return 0
+
+
+def _speed(text: str) -> float | None:
+    """Times real time; None for max."""
+    if text == "max":
+        return None
+    speed = float(text)
+    if not 0.001 <= speed <= 1000.0:
+        raise argparse.ArgumentTypeError(f"{text} is not between 0.001 and 1000; say max for as fast as possible")
+    return speed

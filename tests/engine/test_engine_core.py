@@ -1,0 +1,212 @@
+"""The engine over synthetic nodes: states out, figures, recording and replay, rigs changed while it runs."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from fake_tracker import FakeTracker
+
+from rhot_app.engine import codec
+from rhot_app.engine.core import Engine
+from rhot_app.engine.replay_summary import replay_states, summarise
+from rhot_app.errors import EngineError, RecordingError, RhotError
+from rhot_app.project import OneEuroSettings, Rig
+from rhot_app.recording.raw_log import LogReader
+from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.sources.replay import LogDoor, LogReplay
+from rhot_app.sources.udp_nodes import UdpNodes
+from rhot_app.tracking.state import HandState
+from rhot_node.clock import NodeClock
+
+
+class Bench:
+    """An engine, the bytes it published, the trackers it made."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.published: list[bytes] = []
+        self.trackers: list[FakeTracker] = []
+        self.engine = Engine(rig, None, UdpNodes, self._tracker, self.published.append)
+
+    def _tracker(self, rig: Rig) -> FakeTracker:
+        self.trackers.append(FakeTracker(rig))
+        return self.trackers[-1]
+
+    def run_until(self, condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+        deadline = time.monotonic() + timeout_s
+        while not condition():
+            assert time.monotonic() < deadline, self.engine.status()
+            self.engine.step(0.01)
+
+    def run_for(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.engine.step(0.01)
+            self.engine.status()
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return synthetic_rig()
+
+
+@pytest.fixture
+def bench(rig: Rig) -> Iterator[Bench]:
+    bench = Bench(rig)
+    yield bench
+    bench.engine.close()
+
+
+@pytest.fixture
+def nodes(rig: Rig) -> Iterator[list[SyntheticNode]]:
+    nodes = [SyntheticNode(rig, camera, rate_hz=100.0, clock=NodeClock(10**12 * camera, 20.0, 0)) for camera in (0, 1)]
+    for node in nodes:
+        node.start()
+    yield nodes
+    for node in nodes:
+        node.close()
+
+
+def test_states_carry_the_latency_of_the_one_before(bench: Bench, nodes: list[SyntheticNode]) -> None:
+    bench.engine.start()
+    bench.run_until(lambda: len(bench.published) > 20)
+    state = codec.decode(codec.TOPIC_STATE, bench.published[-1])
+    assert isinstance(state, HandState)
+    assert 0.0 < state.latency_s["publish"] < 0.05
+    assert 0.0 < state.latency_s["receive_to_state"] < 0.5
+    assert state.latency_s["publish"] < state.latency_s["receive_to_state"]
+
+
+def test_status_says_how_it_goes(bench: Bench, nodes: list[SyntheticNode]) -> None:
+    assert bench.engine.status().condition == "IDLE"
+    bench.engine.start()
+    assert bench.engine.status().condition == "SEARCHING"
+    bench.run_for(1.6)
+    status = bench.engine.status()
+    assert status.running and status.condition == "TRACKING"
+    assert [node.state for node in status.nodes] == ["streaming", "streaming"]
+    assert all(85 < node.rate_hz < 110 for node in status.nodes), status.nodes
+    assert 80 < status.state_rate_hz < 115
+    assert 0.0 < status.latency["receive_to_state"].p50_s <= status.latency["receive_to_state"].p99_s
+    assert [advice for advice in status.advice if advice.level == "error"] == []
+    bench.engine.stop()
+    assert bench.engine.status().condition == "IDLE"
+
+
+def test_silent_node_is_named_and_forgotten_when_it_answers(rig: Rig, bench: Bench) -> None:
+    bench.engine.start()
+    bench.run_for(0.3)
+    texts = [advice.text for advice in bench.engine.status().advice]
+    assert any("Node left does not answer at 127.0.0.1:" in text for text in texts)
+    node = SyntheticNode(rig, 0)
+    node.start()
+    bench.run_until(lambda: not any("Node left does not" in a.text for a in bench.engine.status().advice))
+    node.close()
+
+
+def test_broken_tracker_is_reported_and_begins_anew(bench: Bench, nodes: list[SyntheticNode]) -> None:
+    bench.engine.start()
+    bench.run_until(lambda: len(bench.published) > 3)
+    tracker = bench.trackers[-1]
+    tracker.broken = True
+    with pytest.raises(FloatingPointError):
+        bench.run_for(2.0)
+    resets = tracker.resets
+    bench.engine.fail("The tracker failed.")
+    assert tracker.resets == resets + 1
+    assert bench.engine.status().condition == "FAULT"
+    tracker.broken = False
+    bench.engine.start()
+    bench.run_until(lambda: bench.engine.status().condition == "TRACKING")
+
+
+def test_log_replays_to_the_same_states(tmp_path: Path, rig: Rig, bench: Bench, nodes: list[SyntheticNode]) -> None:
+    bench.engine.start()
+    bench.run_until(lambda: len(bench.published) > 5)
+    bench.engine.record(tmp_path / "a.log")  # in the middle of a session
+    with pytest.raises(EngineError, match="already recording"):
+        bench.engine.record(tmp_path / "b.log")
+    first = len(bench.published)
+    bench.run_for(0.7)
+    assert bench.engine.status().log_bytes > 0
+    bench.engine.record_stop()
+    live = np.array([_decode_state(payload).t_master_ns for payload in bench.published[first:]])
+    reader = LogReader(tmp_path / "a.log")
+    summary = summarise(reader, reader.rig, FakeTracker(rig))
+    assert summary["nodes"]["right"]["dropped"] == {}
+    assert summary["nodes"]["right"]["accepted"] == summary["nodes"]["right"]["received"]
+    assert 90 < summary["state_rate_hz"] < 110
+    door = LogDoor(rig)
+    again = np.array([s.t_master_ns for s in replay_states(LogReader(tmp_path / "a.log"), door, FakeTracker(rig))])
+    nearest = np.abs(live[:, None] - again[None, :]).min(axis=1)
+    assert np.mean(nearest < 20_000) > 0.9  # the clock's estimate may step between two records of different threads
+
+
+def _decode_state(payload: bytes) -> HandState:
+    state = codec.decode(codec.TOPIC_STATE, payload)
+    assert isinstance(state, HandState)
+    return state
+
+
+def test_replay_source_serves_like_nodes(tmp_path: Path, rig: Rig, bench: Bench, nodes: list[SyntheticNode]) -> None:
+    bench.engine.record(tmp_path / "a.log")
+    bench.engine.start()
+    bench.run_until(lambda: len(bench.published) > 50)
+    bench.engine.record_stop()
+    for speed in (20.0, None):
+        published: list[bytes] = []
+        engine = Engine(rig, None, lambda rig, speed=speed: LogReplay(tmp_path / "a.log", rig, speed),
+                        FakeTracker, published.append)
+        engine.start()
+        deadline = time.monotonic() + 10.0
+        while not any("over" in advice.text for advice in engine.status().advice):
+            assert time.monotonic() < deadline
+            engine.step(0.01)
+        engine.step(0.0)
+        assert len(published) > 25 and "receive_to_state" not in engine.status().latency
+        with pytest.raises(RecordingError):
+            engine.record(tmp_path / "c.log")
+        engine.close()
+
+
+def test_filter_change_keeps_the_session(rig: Rig, bench: Bench, nodes: list[SyntheticNode]) -> None:
+    session = bench.engine.start()
+    bench.run_until(lambda: len(bench.published) > 3)
+    filters = msgspec.structs.replace(rig.filters, pixel=OneEuroSettings(1.0, 0.0))
+    bench.engine.set_rig(msgspec.structs.replace(rig, filters=filters))
+    count = len(bench.published)
+    bench.run_until(lambda: len(bench.published) > count + 3)
+    assert bench.engine.session == session
+    assert bench.trackers[-1].rig.filters == filters
+
+
+def test_other_network_restarts_and_a_taken_port_keeps_the_old_rig(rig: Rig, bench: Bench,
+                                                                   nodes: list[SyntheticNode]) -> None:
+    session = bench.engine.start()
+    taken = UdpNodes(synthetic_rig())
+    port = taken.receivers[0].port
+    with pytest.raises(RhotError, match=str(port)):
+        bench.engine.set_rig(_with_data_port(rig, port))
+    assert bench.engine.rig is rig
+    count = len(bench.published)
+    bench.run_until(lambda: len(bench.published) > count + 3)
+    taken.close()
+    bench.engine.set_rig(_with_data_port(rig, port))
+    assert bench.engine.session != session
+    count = len(bench.published)
+    bench.run_until(lambda: len(bench.published) > count + 3)
+
+
+def _with_data_port(rig: Rig, port: int) -> Rig:
+    return msgspec.structs.replace(rig, nodes=(msgspec.structs.replace(rig.nodes[0], data_port=port), rig.nodes[1]))
+
+
+def test_rig_is_saved_where_asked(tmp_path: Path, bench: Bench) -> None:
+    with pytest.raises(EngineError, match="path"):
+        bench.engine.save_rig(None)
+    assert bench.engine.save_rig(tmp_path / "rig.json") == tmp_path / "rig.json"
+    assert bench.engine.save_rig(None) == tmp_path / "rig.json"
+    with pytest.raises(EngineError, match="cannot be written"):
+        bench.engine.save_rig(tmp_path / "no" / "rig.json")

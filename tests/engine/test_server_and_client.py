@@ -1,0 +1,261 @@
+"""Client and server over real sockets: commands, refusals, streams, a node's control channel, a vanished engine."""
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+import zmq
+from fake_tracker import FakeTracker
+
+from rhot_app.engine.client import EngineClient
+from rhot_app.engine.core import Engine
+from rhot_app.engine.directory import open_directory
+from rhot_app.engine.node_control import NodeControl
+from rhot_app.engine.server import Server, StatePublisher
+from rhot_app.engine.status import EngineStatus, Preview
+from rhot_app.errors import EngineError
+from rhot_app.project import Rig, load_rig
+from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.sources.udp_nodes import UdpNodes
+from rhot_app.tracking.state import HandState
+from rhot_node.wire.messages import NodeState
+
+
+class ControlPeer:
+    """A node's control channel: answers what it is told to, publishes a preview when somebody subscribes."""
+
+    def __init__(self) -> None:
+        self.context = zmq.Context()
+        self.requests = self.context.socket(zmq.REP)
+        self.port = self.requests.bind_to_random_port("tcp://127.0.0.1")
+        self.previews = self.context.socket(zmq.XPUB)
+        self.preview_port = self.previews.bind_to_random_port("tcp://127.0.0.1")
+        self.heard: list[dict[str, object]] = []
+        self.delay_s = 0.0
+        self.subscribed = False
+        self.ending = False
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def run(self) -> None:
+        while not self.ending:
+            if self.requests.poll(20):
+                request = msgspec.json.decode(self.requests.recv())
+                self.heard.append(request)
+                time.sleep(self.delay_s)
+                self.requests.send_multipart(self.answer(request))
+            if self.previews.poll(0):
+                self.subscribed = self.previews.recv()[:1] == b"\x01"
+            if self.subscribed:
+                self.previews.send_multipart([b'{"node_id": 1, "width": 640, "height": 480}', b"\xff\xd8jpeg"])
+
+    @staticmethod
+    def answer(request: dict[str, object]) -> list[bytes]:
+        if request["request"] == "still":
+            return [b'{"ok": true, "width": 640}', b"\x89PNG"]
+        if request["request"] == "state":
+            return [b'{"ok": true, "state": "fault", "message": "the camera is gone: plug it in."}']
+        return [b'{"ok": false, "error": "no such request."}']
+
+    def close(self) -> None:
+        self.ending = True
+        self.thread.join()
+        self.context.destroy(0)
+
+
+class Bench:
+    def __init__(self, rig: Rig, path: Path) -> None:
+        self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        place = open_directory(path)
+        nodes = NodeControl(self.context)
+        publisher = StatePublisher(self.context, place)
+        self.engine = Engine(rig, None, UdpNodes, FakeTracker, publisher, nodes.message)
+        self.server = Server(self.context, place, self.engine, nodes)
+        self.ending = False
+        self.threads = [threading.Thread(target=self.server.run), threading.Thread(target=self._pipeline)]
+        for thread in self.threads:
+            thread.start()
+
+    def _pipeline(self) -> None:
+        while not self.ending:
+            self.engine.step(0.02)
+
+    def close(self) -> None:
+        self.ending = True
+        self.server.end()
+        for thread in self.threads:
+            thread.join()
+        self.server.close()
+        self.engine.close()
+        self.context.destroy(0)
+
+
+@pytest.fixture
+def peer() -> Iterator[ControlPeer]:
+    peer = ControlPeer()
+    yield peer
+    peer.close()
+
+
+@pytest.fixture
+def rig(peer: ControlPeer) -> Rig:
+    rig = synthetic_rig()
+    left = msgspec.structs.replace(rig.nodes[0], control_port=peer.port, preview_port=peer.preview_port)
+    return msgspec.structs.replace(rig, nodes=(left, msgspec.structs.replace(rig.nodes[1], control_port=9)))
+
+
+@pytest.fixture
+def bench(rig: Rig, tmp_path: Path) -> Iterator[Bench]:
+    bench = Bench(rig, tmp_path / "e")
+    yield bench
+    bench.close()
+
+
+@pytest.fixture
+def client(bench: Bench, tmp_path: Path) -> Iterator[EngineClient]:
+    with EngineClient(tmp_path / "e") as client:
+        yield client
+
+
+def collect(client: EngineClient, kind: type, timeout_s: float = 3.0) -> object:
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline:
+        for message in client.poll(0.05):
+            if isinstance(message, kind):
+                return message
+    raise AssertionError(f"no {kind.__name__} came")
+
+
+def test_states_and_status_reach_the_client(rig: Rig, client: EngineClient) -> None:
+    nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
+    for node in nodes:
+        node.start()
+    assert client.command("hello")["rig_name"] == "synthetic"
+    client.command("start")
+    state = collect(client, HandState)
+    assert isinstance(state, HandState) and state.marker_ids == rig.markers.ids
+    status = collect(client, EngineStatus)
+    assert isinstance(status, EngineStatus) and status.running
+    assert client.state is not None and client.status is not None and client.connected
+    client.command("stop")
+    for node in nodes:
+        node.close()
+    assert msgspec.convert(client.command("status")["status"], EngineStatus).running is False
+
+
+def test_rig_travels_and_is_validated(client: EngineClient, tmp_path: Path, bench: Bench) -> None:
+    document = client.command("rig")["document"]
+    document["name"] = "another"
+    client.command("set_rig", document=document)
+    assert bench.engine.rig.name == "another"
+    document["nodes"][0]["node_id"] = document["nodes"][1]["node_id"]
+    with pytest.raises(EngineError, match="node_id"):
+        client.command("set_rig", document=document)
+    assert bench.engine.rig.name == "another"
+    assert client.command("save_rig", path=str(tmp_path / "rig.json"))["path"] == str(tmp_path / "rig.json")
+    assert load_rig(tmp_path / "rig.json") == bench.engine.rig
+
+
+def test_recording_by_command(client: EngineClient, tmp_path: Path) -> None:
+    client.command("record", path=str(tmp_path / "a.log"))
+    with pytest.raises(EngineError, match="already recording"):
+        client.command("record", path=str(tmp_path / "b.log"))
+    assert client.command("record_stop")["path"] == str(tmp_path / "a.log")
+    assert client.command("record_stop")["path"] == ""
+    with pytest.raises(EngineError, match="absolute"):
+        client.command("record", path="a.log")
+
+
+@pytest.mark.parametrize(("command", "arguments", "sentence"), [
+    ("dance", {}, "no command 'dance'"), ("record", {}, "path"), ("set_rig", {}, "document"),
+    ("set_rig", {"document": {"format": "other"}}, "not a"), ("preview", {"on": 1}, "true or false"),
+    ("node", {"node_id": 99, "request": {}}, "no node 99"), ("node", {"node_id": 1}, "request"),
+    ("still", {}, "no node None"),
+])
+def test_wrong_commands_are_refused_with_a_sentence(client: EngineClient, command: str, arguments: dict[str, object],
+                                                    sentence: str) -> None:
+    with pytest.raises(EngineError, match=sentence):
+        client.command(command, **arguments)
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff", b"[]", b"{}", b'{"command": 3}'])
+def test_broken_bytes_are_refused_and_the_engine_lives(client: EngineClient, data: bytes) -> None:
+    socket = zmq.Context.instance().socket(zmq.REQ)
+    socket.linger = 0
+    socket.connect(client.directory.commands)
+    socket.send(data)
+    assert socket.poll(2000)
+    answer = msgspec.json.decode(socket.recv())
+    assert answer["ok"] is False and "command" in answer["error"]
+    socket.close()
+    assert client.command("hello")["pid"]
+
+
+def test_requests_go_to_the_node_and_back(client: EngineClient, peer: ControlPeer) -> None:
+    still = client.command("still", node_id=1)
+    assert still["png"] == b"\x89PNG" and still["answer"]["width"] == 640
+    assert client.command("node", node_id=1, request={"request": "state"})["answer"]["state"] == "fault"
+    with pytest.raises(EngineError, match="node left: no such request"):
+        client.command("node", node_id=1, request={"request": "sing"})
+    assert [request["request"] for request in peer.heard] == ["still", "state", "sing"]
+
+
+def test_a_slow_node_delays_nobody_else(client: EngineClient, peer: ControlPeer, tmp_path: Path) -> None:
+    peer.delay_s = 0.6
+    slow = threading.Thread(target=lambda: EngineClient(tmp_path / "e").command("still", node_id=1))
+    slow.start()
+    time.sleep(0.1)
+    begun = time.monotonic()
+    client.command("hello")
+    assert time.monotonic() - begun < 0.3
+    slow.join()
+
+
+def test_previews_only_when_asked(client: EngineClient, peer: ControlPeer) -> None:
+    collect(client, EngineStatus)
+    assert not peer.subscribed
+    client.command("preview", on=True)
+    preview = collect(client, Preview)
+    assert isinstance(preview, Preview)
+    assert (preview.camera, preview.width, preview.height) == ("left", 640, 480)
+    assert preview.jpeg.startswith(b"\xff\xd8")
+    client.command("preview", on=False)
+    deadline = time.monotonic() + 2.0
+    while peer.subscribed and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not peer.subscribed
+
+
+def test_a_nodes_own_words_reach_the_status(rig: Rig, client: EngineClient) -> None:
+    node = SyntheticNode(rig, 0, state=NodeState.FAULT)
+    node.start()
+    deadline = time.monotonic() + 3.0
+    while time.monotonic() < deadline:
+        status = collect(client, EngineStatus)
+        assert isinstance(status, EngineStatus)
+        if status.nodes[0].message:
+            break
+    node.close()
+    assert status.nodes[0].state == "fault"
+    assert any("Node left: the camera is gone" in advice.text for advice in status.advice)
+
+
+def test_a_vanished_engine_is_noticed(rig: Rig, tmp_path: Path) -> None:
+    bench = Bench(rig, tmp_path / "f")
+    with EngineClient(tmp_path / "f") as client:
+        collect(client, EngineStatus)
+        assert client.connected
+        bench.close()
+        time.sleep(1.05)
+        client.poll()
+        assert not client.connected
+        with pytest.raises(EngineError, match="rhot engine --rig"):
+            client.command("hello", timeout_s=0.2)
+        again = Bench(rig, tmp_path / "f")  # at the same place: the client comes back by itself
+        collect(client, EngineStatus)
+        assert client.command("hello")["pid"]
+        client.command("quit")
+        again.close()
