@@ -69,7 +69,7 @@ class Motion:
     limits: Array
     sway: SwayCurve
 
-    def poses(self, times_s: Array) -> tuple[Array, Array]:
+    def sample(self, times_s: Array) -> tuple[Array, Array]:
         """(N, 4, 4) world_from_palm and (N, 21) angles rad at scene times (N,), s; angles within their limits."""
         times_s = np.asarray(times_s, dtype=np.float64)
         inside = np.mod(times_s, self.period_s) if self.repeats else np.clip(times_s, 0.0, self.period_s)
@@ -81,7 +81,7 @@ class Motion:
 
     def pose(self, t_s: float) -> HandPose:
         """The pose at one scene time, s."""
-        transforms, angles = self.poses(np.array([t_s]))
+        transforms, angles = self.sample(np.array([t_s]))
         return HandPose(transforms[0], angles[0])
 
 

@@ -33,7 +33,7 @@ def test_markers_stay_in_view_of_both_wide_cameras_at_each_distance(name: str, m
     focal = 320.0 / np.tan(np.radians(31.1))
     for distance in (0.4, 0.6, 1.0) if name != "fast" else (0.6, 1.0):
         motion = load_motion(name, model, np.array([0.0375, 0.0, distance]), seed=2)
-        transforms, angles = motion.poses(np.linspace(0.0, 8.0, 160))
+        transforms, angles = motion.sample(np.linspace(0.0, 8.0, 160))
         points = np.array([[*forward(model, HandPose(t, a)).marker_centres, t[:3, 3]]
                            for t, a in zip(transforms, angles, strict=True)])
         for camera_x in (0.0, 0.075):
@@ -52,7 +52,7 @@ def test_poses_are_smooth_and_within_limits(name: str, model: HandModel) -> None
     acceleration = np.diff(values, 2, axis=0) / step**2
     jumps = np.abs(np.diff(acceleration, axis=0)).max(axis=0)
     assert (jumps <= 0.08 * np.abs(acceleration).max(axis=0) + 0.5).all()
-    transforms, angles = motion.poses(times)
+    transforms, angles = motion.sample(times)
     assert (angles >= model.limits[:, 0]).all() and (angles <= model.limits[:, 1]).all()
     rotations = transforms[:, :3, :3]
     assert np.allclose(rotations @ rotations.transpose(0, 2, 1), np.eye(3), atol=1e-12)
@@ -61,14 +61,14 @@ def test_poses_are_smooth_and_within_limits(name: str, model: HandModel) -> None
 def test_fast_peaks_at_two_metres_per_second(model: HandModel) -> None:
     motion = load_motion("fast", model, CENTRE, seed=1)
     times = np.arange(0.0, 4.0, 1e-3)
-    positions = motion.poses(times)[0][:, :3, 3]
+    positions = motion.sample(times)[0][:, :3, 3]
     speed = np.linalg.norm(np.gradient(positions, 1e-3, axis=0), axis=1)
     assert speed.max() == pytest.approx(2.0, abs=0.1)
 
 
 def test_still_is_still_and_faces_the_cameras(model: HandModel) -> None:
     motion = load_motion("still", model, CENTRE, seed=5)
-    transforms, angles = motion.poses(np.linspace(0.0, 20.0, 50))
+    transforms, angles = motion.sample(np.linspace(0.0, 20.0, 50))
     assert np.ptp(transforms, axis=0).max() < 1e-12 and np.ptp(angles, axis=0).max() < 1e-12
     assert np.allclose(transforms[0, :3, :3], FACING)
     points = forward(model, HandPose(transforms[0], angles[0]))
@@ -79,8 +79,8 @@ def test_seeds_differ_in_sway_by_what_the_file_says(model: HandModel) -> None:
     times = np.linspace(0.0, 200.0, 4000)
     a, b = (load_motion("rest", model, CENTRE, seed=s) for s in (1, 2))
     again = load_motion("rest", model, CENTRE, seed=1)
-    assert np.array_equal(a.poses(times)[0], again.poses(times)[0])
-    assert not np.allclose(a.poses(times)[0], b.poses(times)[0])
+    assert np.array_equal(a.sample(times)[0], again.sample(times)[0])
+    assert not np.allclose(a.sample(times)[0], b.sample(times)[0])
     assert a.sway(times)[:, :3].std() == pytest.approx(2e-3, rel=0.1)
 
 

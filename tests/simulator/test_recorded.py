@@ -29,7 +29,7 @@ def model() -> HandModel:
 def recording_of_our_own_hand(model: HandModel, missing: float) -> tuple[Landmarks, np.ndarray]:
     """Tip and middle of every finger and a triad on the back, from a known motion."""
     times = np.arange(0.0, 1.5, 0.01)
-    transforms, angles = load_motion("grasp", model, CENTRE, seed=3).poses(times)
+    transforms, angles = load_motion("grasp", model, CENTRE, seed=3).sample(times)
     ends = np.array([pair for k in range(5) for pair in ((3 + 4 * k, 4 + 4 * k), (1 + 4 * k, 2 + 4 * k))])
     fraction = np.tile([0.75, 0.5], 5)
     joints = np.array([forward(model, HandPose(t, a)).joints for t, a in zip(transforms, angles, strict=True)])
@@ -63,7 +63,7 @@ def test_a_recording_becomes_a_motion_before_the_cameras(name: str, model: HandM
                      landmarks.fraction)
     assert fit_poses(thin, model).rms_m < 12e-3
     motion = load_motion(str(DATA / name), model, CENTRE, seed=0)
-    transforms, _ = motion.poses(np.linspace(0.0, motion.period_s, 200))
+    transforms, _ = motion.sample(np.linspace(0.0, motion.period_s, 200))
     tips = (transforms @ np.array([0.085, 0.0, 0.0, 1.0]))[:, :3]
     assert np.allclose(tips.mean(axis=0), CENTRE, atol=0.01)
     assert (np.einsum("nij,ij->n", transforms[:, :3, :3], FACING) > 1.0).all()  # within 90 degrees of facing us
