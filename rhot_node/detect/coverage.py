@@ -30,7 +30,7 @@ OUTSIDE, INTERIOR, HOLE, EDGE, RIM, _REACHED = range(6)
 def classify(region, own, mask, kind, stack):  # type: ignore[no-untyped-def]
     """Sort the pixels of `region` (x0, x1, y0, y1) into interior, filled hole, edge (in), rim (out) and outside.
 
-    `own[n]` says whether component n belongs to the marker.
+    `own[n]` says whether component n belongs to the marker. Returns its area and how much of that is interior.
     """
     x0, x1, y0, y1 = region
     area = 0
@@ -41,6 +41,7 @@ def classify(region, own, mask, kind, stack):  # type: ignore[no-untyped-def]
             kind[row, column] = INTERIOR if inside else OUTSIDE
             area += 1 if inside else 0
     _fill_holes(region, area, kind, stack)
+    interior = area
     height, width = kind.shape
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
@@ -52,11 +53,13 @@ def classify(region, own, mask, kind, stack):  # type: ignore[no-untyped-def]
                     if kind[near_y, near_x] == OUTSIDE or kind[near_y, near_x] == RIM:
                         on_edge = True
             if on_edge:
+                interior -= kind[row, column] == INTERIOR
                 kind[row, column] = EDGE
                 for near_y in range(max(row - RING, y0), min(row + RING, y1) + 1):
                     for near_x in range(max(column - RING, x0), min(column + RING, x1) + 1):
                         if kind[near_y, near_x] == OUTSIDE:
                             kind[near_y, near_x] = RIM
+    return area, interior
 
 
 @njit(cache=True)

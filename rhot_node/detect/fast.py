@@ -23,6 +23,7 @@ Blobs = NDArray[np.float64]
 
 AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
 AS_PLAUSIBLE = 0.5  # merit of a second blob, as a fraction of the best, that makes the choice ambiguous
+CANDIDATES = 4  # blobs per marker that are measured until one proves to be paint
 NOISE_START = 1.5  # grey levels of chroma noise, until the first frames have told
 NOISE_MIN = 0.5  # quantisation alone leaves 0.3
 NOISE_GAIN = 0.1
@@ -47,18 +48,6 @@ class FastDetector:
     def reset(self) -> None:
         """Forget all tracks: the next frame is searched as a whole."""
         self._tracks = [Track(marker.shape) for marker in self._markers]
-
-    def warm(self) -> None:
-        """Compile everything now, so that the first frame is not late by seconds."""
-        detector = FastDetector(MarkerSet(markers=self._markers))
-        image = YuvImage(np.full((64, 64), 128, np.uint8), np.full((32, 32), 128, np.uint8),
-                         np.full((32, 32), 128, np.uint8))
-        chroma = self._markers[0].chroma
-        image.u[10:20, 8:24] = min(max(round(128 + chroma.cb), 0), 255)
-        image.v[10:20, 8:24] = min(max(round(128 + chroma.cr), 0), 255)
-        detector._tracks[0].shape = "band"
-        detector.detect(image)
-        detector.detect(image)
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """One observation per marker, in the order of the marker set; lost markers are stated as lost."""
@@ -112,10 +101,12 @@ class FastDetector:
         blobs = self._search(image, lost).copy()
         for index in lost:
             track = self._tracks[index]
-            best, flags = self._best_blob(index, blobs[blobs[:, LABEL] == index + 1])
-            if best is not None and self._measure(image, index, self._blob_request(index, best)):
-                self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
-                found[index] = track.observe(index, self._row, self._noise, flags)
+            ranked, flags = self._rank(index, blobs[blobs[:, LABEL] == index + 1])
+            for blob in ranked[:CANDIDATES]:
+                if self._measure(image, index, self._blob_request(index, blob)):
+                    self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
+                    found[index] = track.observe(index, self._row, self._noise, flags)
+                    break
             else:
                 track.lose()
                 found[index] = lost_observation(index)
@@ -125,11 +116,8 @@ class FastDetector:
         wanted[np.asarray(indices, dtype=np.intp) + 1] = True
         return self._searcher.find(image.y, image.u, image.v, wanted, AREA_MIN)
 
-    def _best_blob(self, index: int, blobs: Blobs) -> tuple[Blobs | None, MarkerFlag]:
-        """The blob that is the marker: by motion and size while it is remembered, else by colour, area and form."""
-        flags = MarkerFlag.ACQUIRED
-        if len(blobs) == 0:
-            return None, flags
+    def _rank(self, index: int, blobs: Blobs) -> tuple[Blobs, MarkerFlag]:
+        """The blobs from the likeliest on: by motion and size while the marker is remembered, else by `_merits`."""
         track = self._tracks[index]
         if track.remembered:
             costs = np.array([track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
@@ -140,7 +128,7 @@ class FastDetector:
             merits = self._merits(index, blobs)
             order = np.argsort(-merits)
             doubtful = len(blobs) > 1 and merits[order[1]] > AS_PLAUSIBLE * merits[order[0]]
-        return blobs[order[0]], flags | MarkerFlag.AMBIGUOUS if doubtful else flags
+        return blobs[order], MarkerFlag.ACQUIRED | MarkerFlag.AMBIGUOUS if doubtful else MarkerFlag.ACQUIRED
 
     def _merits(self, index: int, blobs: Blobs) -> NDArray[np.float64]:
         """(N,) area, as far as compact, of the marker's own hue, and not cut by the frame's border."""

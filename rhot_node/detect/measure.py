@@ -35,6 +35,7 @@ ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
 LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed one is used for another attempt
 SHRINK_SIGMA = 0.6  # of the log area, towards smaller: hidden markers are common
 GROW_SIGMA = 0.35  # and towards larger: markers do not grow in one frame
+SEAM = 16  # chroma pixels; a component this large without any interior is a seam where two other colours mix
 FRAGMENT_REACH = 1.0  # diameters from the prediction within which pieces of a marker are put together
 FRAGMENT_AREA = 1.2  # of the expected area: more is another object
 
@@ -104,7 +105,9 @@ def _place(y, u, v, window, count, level, request, scratch, result):  # type: ig
             y0, y1 = min(y0, components[number, Y_MIN]), max(y1, components[number, Y_MAX])
     region = _clamp(x0 - PAD, x1 + PAD, y0 - PAD, y1 + PAD, u)
     _clear_beyond(region, window, mask)
-    classify(region, own, mask, kind, stack)
+    area, interior = classify(region, own, mask, kind, stack)
+    if interior == 0 and area >= SEAM:
+        return False
     unmix(y, u, v, region, level, kind, colour, coverage, gain)
     if not centroid(region, coverage, gain, result):
         return False

@@ -56,7 +56,7 @@ def _principal_axes(m_xx, m_xy, m_yy, result):  # type: ignore[no-untyped-def]
     half = 0.5 * (m_xx + m_yy)
     spread = np.hypot(0.5 * (m_xx - m_yy), m_xy)
     angle = 0.5 * np.arctan2(2.0 * m_xy, m_xx - m_yy)
-    result[VAR_MAJOR] = half + spread
+    result[VAR_MAJOR] = max(half + spread, 0.0)
     result[VAR_MINOR] = max(half - spread, 0.0)
     result[AXIS_X], result[AXIS_Y] = np.cos(angle), np.sin(angle)
 

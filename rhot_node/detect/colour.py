@@ -1,0 +1,59 @@
+"""Learn a marker's colour from samples of its paint."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_node.detect.image import YuvImage
+from rhot_node.errors import SettingsError
+from rhot_node.markers import ChromaModel
+
+Box = tuple[int, int, int, int]
+
+SAMPLES_MIN = 12  # chroma pixels
+MAGNITUDE_LEAST = 12.0  # grey levels of mean chroma; less is grey
+TOLERANCE_DEG = (8.0, 22.0)  # narrower loses paint in noise, wider takes the neighbour's colour
+SPREADS = 3.0  # robust standard deviations on both sides of the mean that the hue tolerance spans
+LIGHT_LEFT = 0.5  # of the weakest sample: shadow on the paint leaves about this much of its chroma
+
+
+def learn_chroma(image: YuvImage, boxes: list[Box]) -> ChromaModel:
+    """Colour model of the paint inside `boxes`, each (x0, y0, x1, y1) luma px, the upper ends exclusive.
+
+    Mean and spread are robust (median, median absolute deviation): a glint or a corner of something else in a box
+    does no harm as long as most of it is paint. Raises SettingsError when the boxes hold too few pixels or no colour.
+    """
+    mask = np.zeros(image.u.shape, dtype=np.bool_)
+    for x0, y0, x1, y1 in boxes:
+        mask[(max(y0, 0) + 1) // 2:max(y1, 0) // 2, (max(x0, 0) + 1) // 2:max(x1, 0) // 2] = True
+    return learn_chroma_from_pixels(image, mask)
+
+
+def learn_chroma_from_pixels(image: YuvImage, mask: NDArray[np.bool_]) -> ChromaModel:
+    """As `learn_chroma`, from the chroma pixels where `mask` (H/2, W/2) is True."""
+    cb = image.u[mask].astype(np.float64) - 128.0
+    cr = image.v[mask].astype(np.float64) - 128.0
+    luma = image.y[::2, ::2][mask].astype(np.float64)
+    if cb.size < SAMPLES_MIN:
+        raise SettingsError(f"the samples hold {cb.size} colour pixels inside the image; at least {SAMPLES_MIN} are "
+                            "needed. Draw the box larger, or go nearer.")
+    mean_cb, mean_cr = float(np.median(cb)), float(np.median(cr))
+    magnitude = math.hypot(mean_cb, mean_cr)
+    if magnitude < MAGNITUDE_LEAST:
+        raise SettingsError(f"the samples are almost grey (chroma {magnitude:.0f} of at least {MAGNITUDE_LEAST:.0f}); "
+                            "grey, black and white cannot be told from the room. Use a stronger paint or more light.")
+    direction = mean_cb / magnitude, mean_cr / magnitude
+    along = cb * direction[0] + cr * direction[1]
+    hue = np.degrees(np.arctan2(cr * direction[0] - cb * direction[1], along))
+    spread = 1.4826 * float(np.median(np.abs(hue - np.median(hue))))
+    weakest = float(np.percentile(along, 10))
+    return ChromaModel(
+        cb=round(mean_cb, 1), cr=round(mean_cr, 1),
+        hue_tolerance_deg=round(min(max(SPREADS * spread, TOLERANCE_DEG[0]), TOLERANCE_DEG[1]), 1),
+        magnitude_min=round(max(LIGHT_LEFT * weakest, 8.0), 1),
+        luma_min=int(max(8.0, 0.4 * float(np.percentile(luma, 5)))),
+        luma_max=250 if float(np.percentile(luma, 95)) < 235.0 else 255,
+    )
