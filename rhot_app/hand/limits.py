@@ -44,14 +44,14 @@ def natural_pose() -> NaturalPose:
         rows.append(row / math.radians(sd_deg))
         values.append(value_deg / sd_deg)
 
-    expect(5.0, 15.0, thumb_cmc_abduction=1.0)
+    expect(5.0, 18.0, thumb_cmc_abduction=1.0)
     expect(5.0, 15.0, thumb_cmc_flexion=1.0)
     expect(0.0, 6.0, thumb_mcp_abduction=1.0)
     expect(15.0, 20.0, thumb_mcp_flexion=1.0)
     expect(0.0, 12.0, thumb_ip_flexion=1.0, thumb_mcp_flexion=-1.0)
     for name in FINGERS[1:]:
         mcp, pip, dip = (f"{name}_{joint}_flexion" for joint in ("mcp", "pip", "dip"))
-        expect(0.0, 8.0, **{f"{name}_mcp_abduction": 1.0})
+        expect(0.0, 12.0 if name == "little" else 8.0, **{f"{name}_mcp_abduction": 1.0})
         expect(0.0, 5.0, **{dip: 1.0, pip: -DIP_PER_PIP})
         expect(0.0, 20.0, **{mcp: 1.0, pip: -MCP_PER_PIP})
         expect(30.0, 40.0, **{pip: 1.0})

@@ -26,10 +26,11 @@ WRIST_SD = 1.0e-3
 TIP_SD = 1.5e-3
 """Standard deviations of the markers' positions, m: measurement, and what the model's bones get wrong."""
 
-ROTATION_RATE = 3.0
-ANGLE_RATE = 6.0
-TRANSLATION_RATE = 1.0
-"""How fast palms turn, joints bend (rad/s) and hands move (m/s): standard deviations of a change, per time."""
+ROTATION_DRIFT = 0.6
+ANGLE_DRIFT = 0.8
+TRANSLATION_DRIFT = 0.15
+"""Random walks of palm rotation and joint angles, rad/sqrt(s), and of the palm's place, m/sqrt(s): standard
+deviations of the change since the previous pose. A walk weighs the past alike at every frame rate."""
 
 STEPS_WARM = 8
 STEPS_COLD = 40
@@ -201,10 +202,10 @@ def _cost(points: Array, world: Array, angles: Array, mean: Array, information: 
     if dt < np.inf:
         turn = rotation_vector(world, previous_world)
         for i in range(3):
-            total += (turn[i] / (ROTATION_RATE * dt)) ** 2
-            total += ((world[i, 3] - previous_world[i, 3]) / (TRANSLATION_RATE * dt)) ** 2
+            total += (turn[i] / (ROTATION_DRIFT * math.sqrt(dt))) ** 2
+            total += ((world[i, 3] - previous_world[i, 3]) / (TRANSLATION_DRIFT * math.sqrt(dt))) ** 2
         for i in range(angles.shape[0]):
-            total += ((angles[i] - previous_angles[i]) / (ANGLE_RATE * dt)) ** 2
+            total += ((angles[i] - previous_angles[i]) / (ANGLE_DRIFT * math.sqrt(dt))) ** 2
     return 0.5 * total
 
 
@@ -233,10 +234,10 @@ def _normal_equations(points: Array, jacobian: Array, world: Array, angles: Arra
     if dt < np.inf:
         turn = rotation_vector(world, previous_world)
         for i in range(3):
-            _pull(i, previous_world[i, 3] - world[i, 3], TRANSLATION_RATE * dt, matrix, right)
-            _pull(3 + i, -turn[i], ROTATION_RATE * dt, matrix, right)
+            _pull(i, previous_world[i, 3] - world[i, 3], TRANSLATION_DRIFT * math.sqrt(dt), matrix, right)
+            _pull(3 + i, -turn[i], ROTATION_DRIFT * math.sqrt(dt), matrix, right)
         for i in range(count):
-            _pull(TWIST + i, previous_angles[i] - angles[i], ANGLE_RATE * dt, matrix, right)
+            _pull(TWIST + i, previous_angles[i] - angles[i], ANGLE_DRIFT * math.sqrt(dt), matrix, right)
 
 
 @njit(cache=True)
