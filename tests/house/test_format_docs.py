@@ -1,0 +1,35 @@
+"""The pages about file formats name every field that the programs read, and say the version they read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from rhot_app import project
+from rhot_app.hand import anatomy
+from rhot_node import config, markers
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+PAGES: dict[str, tuple[str, int, tuple[type[msgspec.Struct], ...]]] = {
+    "rig.md": (project.FORMAT, project.VERSION, (
+        project.Rig, project.RigNode, project.Intrinsics, project.CameraPose, project.Broadcast, project.FilterSettings,
+        project.OneEuroSettings)),
+    "markers.md": (markers.FORMAT, markers.VERSION, (
+        markers.MarkerSet, markers.Marker, markers.ChromaModel, markers.RangeModel)),
+    "hand.md": (anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy)),
+    "node.md": (config.FORMAT, config.VERSION, (config.NodeSettings, config.CameraSettings, config.ClockSettings)),
+}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_page_names_every_field(page: str) -> None:
+    format_name, version, structs = PAGES[page]
+    text = (DOCS / page).read_text()
+    assert f"`{format_name}`" in text
+    assert f"version {version}" in text
+    missing = [f"{struct.__name__}.{field}" for struct in structs for field in struct.__struct_fields__
+               if f"`{field}`" not in text]
+    assert not missing, f"docs/{page} does not explain {', '.join(missing)}"
