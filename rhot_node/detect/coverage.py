@@ -27,7 +27,7 @@ OUTSIDE, INTERIOR, HOLE, EDGE, RIM, _REACHED = range(6)
 
 
 @njit(cache=True)
-def classify(region, own, mask, kind, stack):  # type: ignore[no-untyped-def]
+def classify(region, own, mask, kind, stack):
     """Sort the pixels of `region` (x0, x1, y0, y1) into interior, filled hole, edge (in), rim (out) and outside.
 
     `own[n]` says whether component n belongs to the marker. Returns its area and how much of that is interior.
@@ -63,7 +63,7 @@ def classify(region, own, mask, kind, stack):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill_holes(region, area, kind, stack):  # type: ignore[no-untyped-def]
+def _fill_holes(region, area, kind, stack):
     """Outside pixels that are not connected (4) to the region's border become HOLE, unless they are too many."""
     x0, x1, y0, y1 = region
     width = kind.shape[1]
@@ -100,7 +100,7 @@ def _fill_holes(region, area, kind, stack):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def unmix(y, u, v, region, level, kind, colour, coverage, gain):  # type: ignore[no-untyped-def]
+def unmix(y, u, v, region, level, kind, colour, coverage, gain):
     """Write `coverage` and its noise `gain` (d coverage / d grey level, 0 where it is fixed) over `region`.
 
     `colour` is scratch, (3, ...) of the chroma planes' size: mean luma and chroma of the region's pixels.
@@ -120,7 +120,7 @@ def unmix(y, u, v, region, level, kind, colour, coverage, gain):  # type: ignore
             if code == OUTSIDE:
                 coverage[row, column] = 0.0
                 continue
-            if code == INTERIOR or code == HOLE:
+            if code in (INTERIOR, HOLE):
                 coverage[row, column] = 1.0
                 continue
             _local_paint(row, column, region, kind, colour, paint, origin, near_paint)
@@ -139,7 +139,7 @@ def unmix(y, u, v, region, level, kind, colour, coverage, gain):  # type: ignore
 
 
 @njit(cache=True)
-def _gather_colour(y, u, v, region, colour):  # type: ignore[no-untyped-def]
+def _gather_colour(y, u, v, region, colour):
     x0, x1, y0, y1 = region
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
@@ -151,7 +151,7 @@ def _gather_colour(y, u, v, region, colour):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _paint_plane(region, kind, colour, paint):  # type: ignore[no-untyped-def]
+def _paint_plane(region, kind, colour, paint):
     """Fit mean and slopes of the paint's colour over its interior (its most saturated edge pixels when it has none).
 
     Returns the interior's centre, which the mean belongs to. Slopes stay 0 for fewer than SLOPE_PIXELS pixels.
@@ -188,7 +188,7 @@ def _paint_plane(region, kind, colour, paint):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _paint_slopes(region, kind, colour, paint, center_x, center_y):  # type: ignore[no-untyped-def]
+def _paint_slopes(region, kind, colour, paint, center_x, center_y):
     x0, x1, y0, y1 = region
     s_xx = s_xy = s_yy = 1e-9
     c_x, c_y = np.zeros(3), np.zeros(3)
@@ -210,12 +210,12 @@ def _paint_slopes(region, kind, colour, paint, center_x, center_y):  # type: ign
 
 
 @njit(cache=True)
-def _magnitude(colour, row, column):  # type: ignore[no-untyped-def]
+def _magnitude(colour, row, column):
     return np.hypot(colour[1, row, column] - 128.0, colour[2, row, column] - 128.0)
 
 
 @njit(cache=True)
-def _mean_outside(region, kind, colour, mean):  # type: ignore[no-untyped-def]
+def _mean_outside(region, kind, colour, mean):
     """Mean colour around the marker; neutral grey when nothing of it is in the picture."""
     x0, x1, y0, y1 = region
     count = 0
@@ -230,7 +230,7 @@ def _mean_outside(region, kind, colour, mean):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _local_paint(row, column, region, kind, colour, paint, origin, out):  # type: ignore[no-untyped-def]
+def _local_paint(row, column, region, kind, colour, paint, origin, out):
     """The paint's colour at a pixel: mean of the interior nearby, carried there along the marker's overall slopes."""
     x0, x1, y0, y1 = region
     out[:] = 0.0
@@ -252,7 +252,7 @@ def _local_paint(row, column, region, kind, colour, paint, origin, out):  # type
 
 
 @njit(cache=True)
-def _local_backdrop(row, column, region, kind, colour, fallback, mean, covariance):  # type: ignore[no-untyped-def]
+def _local_backdrop(row, column, region, kind, colour, fallback, mean, covariance):
     """Mean and covariance of the surroundings near a pixel."""
     x0, x1, y0, y1 = region
     mean[:] = 0.0
@@ -279,7 +279,7 @@ def _local_backdrop(row, column, region, kind, colour, fallback, mean, covarianc
 
 
 @njit(cache=True)
-def _least_noise(contrast, covariance, weight):  # type: ignore[no-untyped-def]
+def _least_noise(contrast, covariance, weight):
     """Weights w with w.contrast = 1 that let the least of the surroundings' variation through; returns |w|.
 
     w = S^-1 d / (d' S^-1 d), S = covariance + FLATNESS I.
@@ -300,7 +300,7 @@ def _least_noise(contrast, covariance, weight):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def chroma_noise(u, v, region, kind):  # type: ignore[no-untyped-def]
+def chroma_noise(u, v, region, kind):
     """(sum, count): squared mixed second differences / 4 inside the paint; their mean is one chroma plane's variance.
 
     The mixed difference of a 2x2 block cancels any linear shading.

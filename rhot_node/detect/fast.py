@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
-from rhot_node.detect import position as p
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import acquisition_table, directions, sector_table
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN, Searcher

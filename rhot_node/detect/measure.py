@@ -60,7 +60,7 @@ class Scratch:
 
 
 @njit(cache=True)
-def measure(y, u, v, sector, label, direction, request, scratch, result):  # type: ignore[no-untyped-def]
+def measure(y, u, v, sector, label, direction, request, scratch, result):
     """Fill `result` (MEASURE_COLUMNS) for the marker `label`; False when the window does not show it."""
     mask, _kind, _colour, _coverage, _gain, stack, components, own = scratch
     level = request[LEVEL_REF]
@@ -94,7 +94,7 @@ def measure(y, u, v, sector, label, direction, request, scratch, result):  # typ
 
 
 @njit(cache=True)
-def _place(y, u, v, window, count, level, request, scratch, result):  # type: ignore[no-untyped-def]
+def _place(y, u, v, window, count, level, request, scratch, result):
     """Coverage, position and noise of the components marked in `own`."""
     mask, kind, colour, coverage, gain, stack, components, own = scratch
     x0 = y0 = 1e9
@@ -121,14 +121,14 @@ def _place(y, u, v, window, count, level, request, scratch, result):  # type: ig
 
 
 @njit(cache=True)
-def _clamp(x0, x1, y0, y1, plane):  # type: ignore[no-untyped-def]
+def _clamp(x0, x1, y0, y1, plane):
     height, width = plane.shape
     return (max(int(np.floor(x0)), 0), min(int(np.ceil(x1)), width - 1),
             max(int(np.floor(y0)), 0), min(int(np.ceil(y1)), height - 1))
 
 
 @njit(cache=True)
-def _clear_beyond(region, window, mask):  # type: ignore[no-untyped-def]
+def _clear_beyond(region, window, mask):
     """The mask outside the window is from some other marker: nothing of this one is there."""
     for row in range(region[2], region[3] + 1):
         for column in range(region[0], region[1] + 1):
@@ -137,7 +137,7 @@ def _clear_beyond(region, window, mask):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _cut_by_window(component, window, plane):  # type: ignore[no-untyped-def]
+def _cut_by_window(component, window, plane):
     """Does the component reach a side of the window that is not the frame's border?"""
     height, width = plane.shape
     return ((component[X_MIN] == window[0] and window[0] > 0)
@@ -147,7 +147,7 @@ def _cut_by_window(component, window, plane):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _cost(component, request):  # type: ignore[no-untyped-def]
+def _cost(component, request):
     """How far a component is from the hypothesis, in squared standard deviations of motion and size."""
     dx = component[SUM_X] / component[AREA] - request[PX]
     dy = component[SUM_Y] / component[AREA] - request[PY]
@@ -157,7 +157,7 @@ def _cost(component, request):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _choose(components, count, request, own, result):  # type: ignore[no-untyped-def]
+def _choose(components, count, request, own, result):
     """Mark the component nearest to the hypothesis, and its fragments, in `own`; return the former.
 
     Pieces of a marker that a finger crosses count as one, as long as they are together no larger than the marker was.

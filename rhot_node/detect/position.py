@@ -17,7 +17,7 @@ RESULT_COLUMNS = 13
 
 
 @njit(cache=True)
-def centroid(region, coverage, gain, result):  # type: ignore[no-untyped-def]
+def centroid(region, coverage, gain, result):
     """Coverage centroid, its covariance, area and principal axes; False when nothing is covered."""
     x0, x1, y0, y1 = region
     area = sum_x = sum_y = 0.0
@@ -52,7 +52,7 @@ def centroid(region, coverage, gain, result):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _principal_axes(m_xx, m_xy, m_yy, result):  # type: ignore[no-untyped-def]
+def _principal_axes(m_xx, m_xy, m_yy, result):
     half = 0.5 * (m_xx + m_yy)
     spread = np.hypot(0.5 * (m_xx - m_yy), m_xy)
     angle = 0.5 * np.arctan2(2.0 * m_xy, m_xx - m_yy)
@@ -62,13 +62,14 @@ def _principal_axes(m_xx, m_xy, m_yy, result):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def band_center(region, coverage, gain, result):  # type: ignore[no-untyped-def]
+def band_center(region, coverage, gain, result):
     """Replace the centroid in `result` by the projection of the band's centre on its axis; True when the fit holds.
 
     Both rims of a band tilted by theta are half-ellipse arcs, so the mid of the coverage at u (-1..1 across) is
-    m(u) = c + k u + s sqrt(1 - u^2), s = R sin(theta): its centroid lies (pi / 4) s off the axis point. Least squares of
-    the pixels' axial coordinate on (1, u, sqrt(1 - u^2)), weighted by coverage, is least squares of the column mids
-    weighted by column height. Across is the major axis of the second moments; k mends its error.
+    m(u) = c + k u + s sqrt(1 - u^2), s = R sin(theta): its centroid lies (pi / 4) s off the axis point. Least squares
+    of the pixels' axial coordinate on (1, u, sqrt(1 - u^2)), weighted by coverage, is least squares of the column mids
+    weighted by column height. Across is the major axis of the second moments, so a band must look wider than long; k
+    mends the axis's error.
     """
     half_width = np.sqrt(max(3.0 * (result[VAR_MAJOR] - BLUR_VARIANCE), 0.0))
     if half_width < BAND_HALF_WIDTH_MIN:
@@ -110,7 +111,7 @@ def band_center(region, coverage, gain, result):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _inverse(m):  # type: ignore[no-untyped-def]
+def _inverse(m):
     """Inverse and determinant of a symmetric 3x3 (numba's own linear algebra would need scipy, which a node lacks)."""
     inverse = np.empty((3, 3))
     for i in range(3):
@@ -125,7 +126,7 @@ def _inverse(m):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _band_coordinates(column, row, result):  # type: ignore[no-untyped-def]
+def _band_coordinates(column, row, result):
     """(across, along) of a pixel in the band's own axes, from its centroid."""
     dx = column - result[X]
     dy = row - result[Y]
@@ -133,7 +134,7 @@ def _band_coordinates(column, row, result):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _arc(u, half_width):  # type: ignore[no-untyped-def]
+def _arc(u, half_width):
     """sqrt(1 - u^2), averaged over a box as wide as the blur, as far as it falls on the band."""
     spread = np.sqrt(3.0 * BLUR_VARIANCE) / half_width
     low, high = max(u - spread, -1.0), min(u + spread, 1.0)
@@ -143,12 +144,12 @@ def _arc(u, half_width):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _arc_integral(u):  # type: ignore[no-untyped-def]
+def _arc_integral(u):
     return 0.5 * (u * np.sqrt(1.0 - u * u) + np.arcsin(u))
 
 
 @njit(cache=True)
-def _is_a_band(moments, residual, length, half_width, sag):  # type: ignore[no-untyped-def]
+def _is_a_band(moments, residual, length, half_width, sag):
     """Does the coverage look like a whole band: even across its width, and as thick as its area says?"""
     skew = moments[1] / moments[0]
     fourth = moments[2] / moments[0]  # 1/5 for an even box
@@ -158,7 +159,7 @@ def _is_a_band(moments, residual, length, half_width, sag):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _band_result(region, coverage, gain, half_width, inverse, solution, result):  # type: ignore[no-untyped-def]
+def _band_result(region, coverage, gain, half_width, inverse, solution, result):
     """Position and covariance: each pixel's influence on (mean across, c) times its noise."""
     x0, x1, y0, y1 = region
     v_uu = v_uv = v_vv = v_ss = 0.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from rhot_node.detect.image import Plane, YuvImage, to_bgr
 from rhot_node.markers import Marker, MarkerSet, RangeModel
-from rhot_node.wire.messages import MarkerFlag, MarkerObservation
+from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
 Box = tuple[int, int, int, int]  # x, y, width, height; px
 
@@ -45,32 +45,60 @@ class ReferenceDetector:
         bgr = to_bgr(image)
         return tuple(self._find(index, bgr) for index in range(len(self._ranges)))
 
+    def all_blobs(self, image: YuvImage) -> list[list[MarkerObservation]]:
+        """Every blob of every marker's colour, largest first, without regard to the ROI; a list per marker."""
+        bgr = to_bgr(image)
+        height, width = bgr.shape[:2]
+        everything = []
+        for index, model in enumerate(self._ranges):
+            boxes = _blobs(bgr, model, (0, 0, width, height))
+            everything.append([_observe(index, box, area, (width, height), MarkerFlag.ACQUIRED) for area, box in boxes])
+        return everything
+
     def _find(self, index: int, bgr: Plane) -> MarkerObservation:
         height, width = bgr.shape[:2]
         last = self._boxes[index]
-        x0, y0, x1, y1 = 0, 0, width, height
-        if last is not None:
-            x0, y0 = max(last[0] - self._margin, 0), max(last[1] - self._margin, 0)
-            x1 = min(last[0] + last[2] + self._margin, width)
-            y1 = min(last[1] + last[3] + self._margin, height)
-        mask = clean_mask(threshold(bgr[y0:y1, x0:x1], self._ranges[index]))
-        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        largest = max(contours, key=cv2.contourArea, default=None)
-        flags = MarkerFlag.REFERENCE if last is not None else MarkerFlag.REFERENCE | MarkerFlag.ACQUIRED
-        if largest is None or cv2.contourArea(largest) < CONTOUR_AREA_MIN:
+        roi = (0, 0, width, height) if last is None else _grow(last, self._margin, width, height)
+        blobs = _blobs(bgr, self._ranges[index], roi)
+        if not blobs:
             self._boxes[index] = None
             nan = math.nan
             return MarkerObservation(index, nan, nan, 0.0, nan, nan, nan, 0.0, MarkerFlag.LOST | MarkerFlag.REFERENCE)
-        x, y, box_width, box_height = cv2.boundingRect(largest)
-        x, y = x + x0, y + y0
-        self._boxes[index] = (x, y, box_width, box_height)
-        if x == 0 or y == 0 or x + box_width == width or y + box_height == height:
-            flags |= MarkerFlag.EDGE
-        area = float(cv2.contourArea(largest))
-        return MarkerObservation(
-            index=index, x=x + 0.5 * (box_width - 1), y=y + 0.5 * (box_height - 1),
-            diameter=math.sqrt(4.0 * area / math.pi), cov_xx=BOX_VARIANCE, cov_xy=0.0, cov_yy=BOX_VARIANCE,
-            quality=min(1.0, area / (0.5 * box_width * box_height)), flags=flags)
+        area, box = blobs[0]
+        self._boxes[index] = box
+        return _observe(index, box, area, (width, height), NO_FLAGS if last else MarkerFlag.ACQUIRED)
+
+
+def _grow(box: Box, margin: int, width: int, height: int) -> Box:
+    """The box with a margin all round, clamped to the frame (RHOT eq. 6.3 to 6.5)."""
+    x, y = max(box[0] - margin, 0), max(box[1] - margin, 0)
+    return x, y, min(box[0] + box[2] + margin, width) - x, min(box[1] + box[3] + margin, height) - y
+
+
+def _blobs(bgr: Plane, model: RangeModel, roi: Box) -> list[tuple[float, Box]]:
+    """(contour area, bounding box in the frame) of the blobs in the region of interest, largest first."""
+    x0, y0, width, height = roi
+    mask = clean_mask(threshold(bgr[y0:y0 + height, x0:x0 + width], model))
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    found = []
+    for contour in contours:
+        area = float(cv2.contourArea(contour))
+        if area >= CONTOUR_AREA_MIN:
+            x, y, box_width, box_height = cv2.boundingRect(contour)
+            found.append((area, (x + x0, y + y0, box_width, box_height)))
+    return sorted(found, reverse=True)
+
+
+def _observe(index: int, box: Box, area: float, size: tuple[int, int], flags: MarkerFlag) -> MarkerObservation:
+    """The box's centre as an observation."""
+    x, y, width, height = box
+    flags |= MarkerFlag.REFERENCE
+    if x == 0 or y == 0 or x + width == size[0] or y + height == size[1]:
+        flags |= MarkerFlag.EDGE
+    return MarkerObservation(
+        index=index, x=x + 0.5 * (width - 1), y=y + 0.5 * (height - 1), diameter=math.sqrt(4.0 * area / math.pi),
+        cov_xx=BOX_VARIANCE, cov_xy=0.0, cov_yy=BOX_VARIANCE, quality=min(1.0, area / (0.5 * width * height)),
+        flags=flags)
 
 
 def threshold(bgr: Plane, model: RangeModel) -> Plane:

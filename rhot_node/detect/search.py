@@ -41,7 +41,7 @@ class Searcher:
 
 
 @njit(cache=True)
-def label_runs(y, u, v, table, wanted, luma_limits, runs):  # type: ignore[no-untyped-def]
+def label_runs(y, u, v, table, wanted, luma_limits, runs):
     """Fill `runs` with the runs of equal wanted label, each joined to its neighbours above; return how many."""
     height, width = u.shape
     count = 0
@@ -82,7 +82,7 @@ def label_runs(y, u, v, table, wanted, luma_limits, runs):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def _join_rows(runs, above, above_end, here, here_end):  # type: ignore[no-untyped-def]
+def _join_rows(runs, above, above_end, here, here_end):
     """Union runs of two adjacent rows that touch (8-connected) and have the same label."""
     for run in range(here, here_end):
         while above < above_end and runs[above, _END] + 1 < runs[run, _START]:
@@ -97,7 +97,7 @@ def _join_rows(runs, above, above_end, here, here_end):  # type: ignore[no-untyp
 
 
 @njit(cache=True)
-def _root(runs, index):  # type: ignore[no-untyped-def]
+def _root(runs, index):
     while runs[index, _PARENT] != index:
         runs[index, _PARENT] = runs[runs[index, _PARENT], _PARENT]
         index = runs[index, _PARENT]
@@ -105,7 +105,7 @@ def _root(runs, index):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def gather_blobs(runs, run_count, area_min, slots, blobs):  # type: ignore[no-untyped-def]
+def gather_blobs(runs, run_count, area_min, slots, blobs):
     """Sum joined runs into `blobs`; keep those of at least `area_min` pixels, return how many."""
     areas = slots[:run_count]
     areas[:] = 0
@@ -130,7 +130,7 @@ def gather_blobs(runs, run_count, area_min, slots, blobs):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def _add_run(runs, index, blobs, slot):  # type: ignore[no-untyped-def]
+def _add_run(runs, index, blobs, slot):
     start = runs[index, _START]
     end = runs[index, _END]
     length = end - start + 1

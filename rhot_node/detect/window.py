@@ -19,7 +19,7 @@ _NEW = 1  # mask value of a pixel not yet in a component; component n is written
 
 
 @njit(cache=True)
-def segment(u, v, sector, label, direction, level, window, mask, stack, components):  # type: ignore[no-untyped-def]
+def segment(u, v, sector, label, direction, level, window, mask, stack, components):
     """Label the components of `label` in `window` (x0, x1, y0, y1, inclusive); return how many.
 
     A pixel belongs when its hue is in the marker's sector and its chroma, projected on `direction` (cb, cr), reaches
@@ -51,7 +51,7 @@ def segment(u, v, sector, label, direction, level, window, mask, stack, componen
 
 
 @njit(cache=True)
-def _flood(row, column, window, mask, stack, components, number):  # type: ignore[no-untyped-def]
+def _flood(row, column, window, mask, stack, components, number):
     """Take the 8-connected component of (row, column) into `components[number]`."""
     x0, x1, y0, y1 = window
     width = mask.shape[1]
@@ -82,7 +82,7 @@ def _flood(row, column, window, mask, stack, components, number):  # type: ignor
 
 
 @njit(cache=True)
-def _erase(component, mask, number):  # type: ignore[no-untyped-def]
+def _erase(component, mask, number):
     for row in range(int(component[Y_MIN]), int(component[Y_MAX]) + 1):
         for column in range(int(component[X_MIN]), int(component[X_MAX]) + 1):
             if mask[row, column] == number + 2:
@@ -90,7 +90,7 @@ def _erase(component, mask, number):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def interior_level(u, v, direction, component, number, mask):  # type: ignore[no-untyped-def]
+def interior_level(u, v, direction, component, number, mask):
     """Mean projected chroma of the component's pixels whose four neighbours belong to it too; 0 when it has none."""
     total = 0.0
     count = 0
