@@ -36,7 +36,8 @@ def test_frames_come_at_their_time_with_their_pixels(tmp_path: Path) -> None:
     opened_ns = time.monotonic_ns()
     camera = YuvRecording(record(tmp_path, 5), clock)
     assert camera.size == (WIDTH, HEIGHT)
-    stamps, numbers = [], []
+    stamps: list[int] = []
+    numbers: list[int] = []
     while not numbers or numbers[-1] < 4:
         frame = read(camera)
         now_ns = clock.now_ns()

@@ -1,0 +1,172 @@
+"""Camera specs: files and folders played at their rate or as fast as possible, and every way they can be wrong."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rhot_node.capture.camera import Camera, EndOfRecording, Frame
+from rhot_node.capture.open import open_camera, takes_settings
+from rhot_node.capture.yuv import YuvWriter
+from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings
+from rhot_node.errors import CameraError
+
+SETTINGS = CameraSettings(fps=50, exposure_us=4000, row_time_us=50)
+PERIOD_NS = 20_000_000
+CLOCK = NodeClock(offset_ns=10**14)
+
+
+def write_images(folder: Path, count: int, size: tuple[int, int] = (64, 48)) -> Path:
+    folder.mkdir(exist_ok=True)
+    for k in range(count):
+        cv2.imwrite(str(folder / f"{k:03d}.png"), np.full((size[1], size[0], 3), 10 * k % 256, np.uint8))
+    return folder
+
+
+def write_video(path: Path, count: int, fps: float = 25.0) -> Path:
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), fps, (64, 48))
+    for k in range(count):
+        writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
+    writer.release()
+    return path
+
+
+def read_all(camera: Camera) -> list[Frame]:
+    frames = []
+    with pytest.raises(EndOfRecording):
+        while True:
+            frame = camera.read(1.0)
+            assert frame is not None
+            frames.append(frame)
+    camera.close()
+    return frames
+
+
+def level(frame: Frame) -> int:
+    return int(np.median(frame.image.y))
+
+
+def test_a_folder_plays_at_the_settings_rate(tmp_path: Path) -> None:
+    write_images(tmp_path / "images", 6)
+    (tmp_path / "images" / "notes.txt").write_text("not an image")
+    camera = open_camera(str(tmp_path / "images"), SETTINGS, CLOCK)
+    assert camera.size == (64, 48)
+    frames = read_all(camera)
+    numbers = [frame.number for frame in frames]
+    assert numbers[0] == 0 and numbers[-1] == 5
+    assert [level(frame) for frame in frames] == [10 * number for number in numbers]
+    assert np.diff([frame.t_node_ns for frame in frames]).tolist() == (np.diff(numbers) * PERIOD_NS).tolist()
+    assert all(frame.t_available_node_ns - frame.t_node_ns == 2_000_000 + 47 * 50_000 for frame in frames)
+    assert all((frame.exposure_ns, frame.row_time_ns) == (4_000_000, 50_000) for frame in frames)
+
+
+def test_a_late_reader_of_a_file_gets_the_newest_frame(tmp_path: Path) -> None:
+    camera = open_camera(str(write_images(tmp_path / "images", 30)), SETTINGS, CLOCK)
+    camera.read(1.0)
+    time.sleep(0.11)
+    frame = camera.read(1.0)
+    assert frame is not None and frame.number >= 5 and level(frame) == (10 * frame.number) % 256
+
+
+def test_as_fast_as_possible_delivers_every_frame(tmp_path: Path) -> None:
+    camera = open_camera(f"{write_images(tmp_path / 'images', 20)}?rate=max", SETTINGS, CLOCK)
+    began = time.monotonic()
+    frames = read_all(camera)
+    assert [frame.number for frame in frames] == list(range(20))
+    assert time.monotonic() - began < 20 * PERIOD_NS * 1e-9
+    assert abs(frames[-1].t_available_node_ns - CLOCK.now_ns()) < 10**9
+
+
+def test_a_video_plays_at_its_own_rate(tmp_path: Path) -> None:
+    frames = read_all(open_camera(str(write_video(tmp_path / "video.avi", 5)), SETTINGS, CLOCK))
+    numbers = [frame.number for frame in frames]
+    assert numbers[-1] == 4
+    assert np.diff([frame.t_node_ns for frame in frames]).tolist() == (np.diff(numbers) * 40_000_000).tolist()
+    assert [level(frame) for frame in frames] == pytest.approx([20 * number for number in numbers], abs=4)
+
+
+@pytest.mark.parametrize("kind", ["images", "video.avi"])
+def test_files_can_be_played_again(tmp_path: Path, kind: str) -> None:
+    path = write_images(tmp_path / kind, 3) if kind == "images" else write_video(tmp_path / kind, 3)
+    camera = open_camera(f"{path}?rate=max", SETTINGS, CLOCK)
+    for _ in range(3):
+        camera.read(1.0)
+    with pytest.raises(EndOfRecording):
+        camera.read(1.0)
+    camera.rewind()  # type: ignore[attr-defined]
+    again = read_all(camera)
+    assert [frame.number for frame in again] == [3, 4, 5]
+    assert level(again[0]) < level(again[2])
+
+
+def test_a_single_image_is_one_frame(tmp_path: Path) -> None:
+    path = write_images(tmp_path / "images", 1) / "000.png"
+    assert len(read_all(open_camera(str(path), SETTINGS, CLOCK))) == 1
+
+
+def test_odd_images_are_cut_to_even_ones(tmp_path: Path) -> None:
+    camera = open_camera(str(write_images(tmp_path / "images", 1, (65, 49))), SETTINGS, CLOCK)
+    assert camera.size == (64, 48)
+
+
+def test_a_timeout_keeps_the_frame(tmp_path: Path) -> None:
+    camera = open_camera(str(write_images(tmp_path / "images", 3)), CameraSettings(fps=5), CLOCK)
+    camera.read(1.0)
+    assert camera.read(0.01) is None
+    frame = camera.read(1.0)
+    assert frame is not None and frame.number == 1
+
+
+def test_yuv_and_its_start_file(tmp_path: Path) -> None:
+    with YuvWriter(tmp_path / "recording", 32, 16, 0, 0) as writer:
+        writer.append(0, np.zeros(32 * 16 * 3 // 2, np.uint8))
+    camera = open_camera(f"yuv:{tmp_path / 'recording'}", SETTINGS, CLOCK)
+    assert camera.size == (32, 16) and len(read_all(camera)) == 1
+    waiting = open_camera(f"yuv:{tmp_path / 'recording'}?start={tmp_path / 'start'}", SETTINGS, CLOCK)
+    assert [frame.number for frame in (waiting.read(1.0), waiting.read(1.0)) if frame] == [0, 1]
+
+
+def test_recordings_and_twins_bring_their_own_settings() -> None:
+    assert takes_settings("0") and takes_settings("folder")
+    assert not takes_settings("yuv:folder") and not takes_settings("stream:socket")
+
+
+def test_an_image_of_another_size_ends_in_an_error(tmp_path: Path) -> None:
+    write_images(tmp_path / "images", 2)
+    cv2.imwrite(str(tmp_path / "images" / "001.png"), np.zeros((48, 32, 3), np.uint8))
+    camera = open_camera(f"{tmp_path / 'images'}?rate=max", SETTINGS, CLOCK)
+    camera.read(1.0)
+    with pytest.raises(CameraError, match="frame 1 has 32 x 48 px, the first one has 64 x 48"):
+        camera.read(1.0)
+
+
+def test_a_broken_image_is_named(tmp_path: Path) -> None:
+    write_images(tmp_path / "images", 2)
+    (tmp_path / "images" / "001.png").write_bytes(b"\x89PNG and then nothing")
+    camera = open_camera(f"{tmp_path / 'images'}?rate=max", SETTINGS, CLOCK)
+    camera.read(1.0)
+    with pytest.raises(CameraError, match=r"001\.png: not an image"):
+        camera.read(1.0)
+
+
+def test_what_cannot_be_opened_is_named(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "text.avi").write_text("no video")
+    (tmp_path / "cut.png").write_bytes(b"\x89PNG")
+    write_video(tmp_path / "zero.avi", 0)
+    wrong = {
+        "/dev/video99": "/dev/video99: no such camera", "99": "/dev/video99: no such camera",
+        str(tmp_path / "gone.avi"): "no such file", str(tmp_path / "empty"): "a folder without images",
+        str(tmp_path / "text.avi"): r"text\.avi: not a video", str(tmp_path / "cut.png"): r"cut\.png: not an image",
+        str(tmp_path / "zero.avi"): r"zero\.avi", f"yuv:{tmp_path / 'gone'}": "no such folder",
+        f"yuv:{tmp_path}?rate=max": "takes \\?start=", f"{tmp_path / 'empty'}?start=x": "takes \\?rate=",
+        f"{tmp_path / 'empty'}?rate=2": "the only rate is max", "": "names no file", "?rate=max": "names no file",
+    }
+    for spec, sentence in wrong.items():
+        with pytest.raises(CameraError, match=sentence):
+            open_camera(spec, SETTINGS, CLOCK)

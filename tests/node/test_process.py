@@ -1,0 +1,338 @@
+"""A real ``rhot-node`` process on real sockets: its whole life, its deaths, and what it says when it cannot start."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zmq
+
+from rhot_node.capture.stream import StreamHeader, pack_header
+from rhot_node.capture.yuv import YuvWriter
+from rhot_node.config import CameraSettings, ClockSettings, NodeSettings, save_settings
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+from rhot_node.warm_up import rehearsal_image
+from rhot_node.wire.codec import decode, encode
+from rhot_node.wire.messages import (
+    ClockReply,
+    ClockRequest,
+    Message,
+    NodeState,
+    Observations,
+    Start,
+    StartEntry,
+    Stop,
+)
+
+SIZE = (320, 240)
+PERIOD_NS = 25_000_000
+OFFSET_S = 5000.0
+READY_S = 120.0  # a first start compiles the detector
+MARKERS = load_markers(resource_path("markers", "rhot6.json"))
+
+
+def i420() -> np.ndarray:
+    image = rehearsal_image(MARKERS, SIZE)
+    return np.concatenate([image.y.ravel(), image.u.ravel(), image.v.ravel()])
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("recording")
+    frame = i420()
+    with YuvWriter(folder, *SIZE, 4_000_000, 20_000) as writer:
+        for k in range(40):
+            writer.append(k * PERIOD_NS, frame)
+    return folder
+
+
+def write_settings(folder: Path, **changes: Any) -> Path:
+    values: dict[str, Any] = {
+        "node_id": 3, "name": "left", "markers": MARKERS, "bind_address": "127.0.0.1", "udp_port": 0,
+        "control_port": 0, "preview_port": 0, "broadcast_port": None,
+        "camera": CameraSettings(width=SIZE[0], height=SIZE[1], fps=40), "clock": ClockSettings(OFFSET_S, 20.0)}
+    path = folder / "left.json"
+    save_settings(path, NodeSettings(**{**values, **changes}))
+    return path
+
+
+class Node:
+    """A running node, and its master's sockets."""
+
+    def __init__(self, settings: Path, camera: str, *options: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "rhot_node", "--settings", str(settings), "--camera", camera, *options],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        readable, _, _ = select.select([self.process.stdout], [], [], READY_S)
+        assert readable, "the node did not get ready"
+        line = self.process.stdout.readline()
+        assert line, self.process.communicate()[1]
+        self.ready: dict[str, Any] = json.loads(line)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.settimeout(3.0)
+
+    def say(self, message: Message) -> None:
+        self.socket.sendto(encode(message), ("127.0.0.1", self.ready["udp_port"]))
+
+    def start(self, session: int) -> None:
+        self.say(Start(session, 0, (StartEntry(3, self.socket.getsockname()[1], 0),)))
+
+    def hear(self) -> Message:
+        return decode(self.socket.recv(4096))
+
+    def observations(self, count: int) -> list[Observations]:
+        heard: list[Observations] = []
+        while len(heard) < count:
+            message = self.hear()
+            if isinstance(message, Observations):
+                heard.append(message)
+        return heard
+
+    def clock(self, session: int = 0) -> ClockReply:
+        self.say(ClockRequest(3, session, 5, time.monotonic_ns()))
+        while True:
+            message = self.hear()
+            if isinstance(message, ClockReply):
+                return message
+
+    def wait_for(self, state: NodeState, session: int = 0) -> None:
+        deadline = time.monotonic() + 10.0
+        while self.clock(session).state is not state:
+            assert time.monotonic() < deadline, f"never {state.name}"
+            time.sleep(0.02)
+
+    def ask(self, **request: Any) -> list[bytes]:
+        with zmq.Context() as context, context.socket(zmq.REQ) as client:
+            client.linger = 0
+            client.rcvtimeo = 3000
+            client.connect(f"tcp://127.0.0.1:{self.ready['control_port']}")
+            client.send(json.dumps(request).encode())
+            return client.recv_multipart()
+
+    def end(self, number: int = signal.SIGTERM) -> tuple[int, str, str]:
+        self.socket.close()
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=10)
+        return self.process.returncode, out, err
+
+
+@pytest.fixture
+def run_node() -> Iterator[Callable[..., Node]]:
+    nodes: list[Node] = []
+
+    def start(settings: Path, camera: str, *options: str) -> Node:
+        nodes.append(Node(settings, camera, *options))
+        return nodes[-1]
+
+    yield start
+    for node in nodes:
+        node.end(signal.SIGKILL)
+
+
+def test_a_whole_life(run_node: Callable[..., Node], tmp_path: Path, recording: Path) -> None:
+    node = run_node(write_settings(tmp_path), f"yuv:{recording}", "--loop")
+    assert {key: node.ready[key] for key in ("event", "node_id", "name", "width", "height")} == {
+        "event": "ready", "node_id": 3, "name": "left", "width": SIZE[0], "height": SIZE[1]}
+    reply = node.clock()
+    assert (reply.state, reply.session) == (NodeState.READY, 0)
+    offset_s = (reply.t2_node_ns - reply.t1_master_ns) * 1e-9
+    assert OFFSET_S <= offset_s < OFFSET_S + 0.5
+
+    node.start(7)
+    frames = node.observations(20)
+    assert [frame.sequence for frame in frames] == list(range(20)) and {frame.session for frame in frames} == {7}
+    steps = np.diff([frame.t_frame_node_ns for frame in frames]) / np.diff([frame.frame_number for frame in frames])
+    assert np.median(steps) == pytest.approx(PERIOD_NS, rel=1e-3)
+    assert all(marker.found for marker in frames[-1].markers) and len(frames[-1].markers) == 6
+    assert (frames[-1].markers[0].x, frames[-1].markers[0].y) == pytest.approx((20.0, 20.0), abs=0.6)
+    assert frames[-1].marker_checksum == MARKERS.checksum
+    assert node.clock(7).state is NodeState.STREAMING and node.clock(7).session == 7
+
+    state = json.loads(node.ask(request="state")[0])
+    assert (state["state"], state["session"]) == ("streaming", 7)
+    head, png = node.ask(request="still")
+    assert json.loads(head)["ok"] and png.startswith(b"\x89PNG")
+    counters = json.loads(node.ask(request="counters")[0])["counters"]
+    assert counters["frames"] >= counters["sent"] >= 20 and counters["clock_requests"] >= 3
+
+    node.say(Stop(7, 1))
+    node.wait_for(NodeState.READY)
+    node.socket.settimeout(0.2)
+    with pytest.raises(TimeoutError):
+        while True:
+            node.hear()
+    code, out, err = node.end()
+    assert code == 0 and out == ""
+    for change in ("starting -> ready", "ready -> streaming", "streaming -> ready"):
+        assert change in err
+
+
+def test_a_node_loads_neither_the_masters_libraries_nor_qt(tmp_path: Path, recording: Path) -> None:
+    script = ("import sys, rhot_node.__main__ as m; sys.argv[1:] = {!r}; code = m.main(); "
+              "names = ('scipy.linalg', 'PySide6', 'OpenGL', 'rhot_app'); "
+              "print([n for n in names if n in sys.modules]); sys.exit(code)")
+    arguments = ["--settings", str(write_settings(tmp_path)), "--camera", f"yuv:{recording}"]
+    done = subprocess.run([sys.executable, "-c", script.format(arguments)], capture_output=True, text=True,
+                          timeout=READY_S)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert "the recording is over" in done.stderr
+
+
+def test_killed_and_started_again_it_is_another_boot(run_node: Callable[..., Node], tmp_path: Path,
+                                                     recording: Path) -> None:
+    first = run_node(write_settings(tmp_path), f"yuv:{recording}", "--loop")
+    boot_id = first.clock().boot_id
+    first.start(7)
+    first.observations(3)
+    first.end(signal.SIGKILL)
+    second = run_node(write_settings(tmp_path, udp_port=first.ready["udp_port"]), f"yuv:{recording}", "--loop")
+    assert second.ready["udp_port"] == first.ready["udp_port"]
+    reply = second.clock(7)
+    assert reply.boot_id != boot_id and reply.state is NodeState.READY and reply.session == 0
+    second.start(8)
+    assert second.observations(3)[0].sequence == 0
+
+
+def test_settings_changed_over_the_control_channel_are_there_at_the_next_start(
+        run_node: Callable[..., Node], tmp_path: Path, recording: Path) -> None:
+    settings = write_settings(tmp_path)
+    node = run_node(settings, f"yuv:{recording}", "--loop")
+    answer = json.loads(node.ask(request="set_settings", settings={"name": "right"})[0])
+    assert answer == {"ok": True, "restart": []}
+    assert node.end(signal.SIGINT)[0] == 0
+    assert run_node(settings, f"yuv:{recording}", "--loop").ready["name"] == "right"
+
+
+class Twin:
+    """Sends frames to whoever connects, until closed."""
+
+    def __init__(self, path: Path) -> None:
+        self.frame = i420().tobytes()
+        self.ending = False
+        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.listener.bind(str(path))
+        self.listener.listen()
+        self.listener.settimeout(5.0)
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def run(self) -> None:
+        connection, _ = self.listener.accept()
+        with connection, contextlib.suppress(BrokenPipeError):
+            number = 0
+            while not self.ending:
+                header = StreamHeader(*SIZE, number, time.monotonic_ns() - 10_000_000, 4_000_000, 20_000)
+                connection.sendall(pack_header(header) + self.frame)
+                number += 1
+                time.sleep(0.02)
+
+    def close(self) -> None:
+        self.ending = True
+        self.thread.join(5.0)
+        self.listener.close()
+
+
+def test_a_lost_camera_is_reported_and_the_stream_goes_on_when_it_is_back(run_node: Callable[..., Node],
+                                                                          tmp_path: Path) -> None:
+    path = tmp_path / "twin.sock"
+    twin = Twin(path)
+    node = run_node(write_settings(tmp_path), f"stream:{path}")
+    node.start(7)
+    before = node.observations(5)[-1]
+    twin.close()
+    node.wait_for(NodeState.FAULT, session=7)
+    state = json.loads(node.ask(request="state")[0])
+    assert state["state"] == "fault" and "twin" in state["message"]
+    path.unlink()
+    twin = Twin(path)
+    node.wait_for(NodeState.STREAMING, session=7)
+    after = node.observations(1)[0]
+    assert after.session == 7 and after.sequence > before.sequence
+    code, _, err = node.end()
+    twin.close()
+    assert code == 0 and "streaming -> fault" in err and "fault -> streaming" in err
+
+
+def test_it_ends_with_the_process_that_started_it(tmp_path: Path, recording: Path) -> None:
+    arguments = [sys.executable, "-m", "rhot_node", "--settings", str(write_settings(tmp_path)), "--camera",
+                 f"yuv:{recording}", "--loop", "--exit-with-parent"]
+    # It is started by a thread that ends at once, which must not end it.
+    script = f"""
+import subprocess, sys, threading, time
+def start():
+    global node
+    node = subprocess.Popen({arguments!r}, stdout=subprocess.PIPE)
+thread = threading.Thread(target=start); thread.start(); thread.join()
+print(node.pid, flush=True)
+node.stdout.readline()
+time.sleep(0.5)
+print(node.poll(), flush=True)
+time.sleep(60)
+"""
+    parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    pid = int(parent.stdout.readline())
+    assert parent.stdout.readline() == "None\n"
+    parent.kill()
+    parent.communicate()
+    deadline = time.monotonic() + 5.0
+    while _alive(pid):
+        assert time.monotonic() < deadline, "the node outlived its parent"
+        time.sleep(0.02)
+
+
+def _alive(pid: int) -> bool:
+    """Whether the process still runs; one that only waits to be reaped does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def failed_start(*arguments: str) -> str:
+    done = subprocess.run([sys.executable, "-m", "rhot_node", *arguments], capture_output=True, text=True,
+                          timeout=READY_S)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == "" and "Traceback" not in done.stderr
+    return done.stderr
+
+
+def test_what_is_wrong_is_said_in_a_sentence_with_code_2(tmp_path: Path, recording: Path) -> None:
+    settings = str(write_settings(tmp_path))
+    assert "no such file" in failed_start("--settings", str(tmp_path / "none.json"), "--camera", "0")
+    broken = tmp_path / "broken.json"
+    broken.write_bytes(Path(settings).read_bytes()[:100])
+    assert f"{broken}: not valid JSON" in failed_start("--settings", str(broken), "--camera", "0")
+    assert "/dev/video77: no such camera" in failed_start("--settings", settings, "--camera", "77")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.bind(("127.0.0.1", 0))
+        port = sock.getsockname()[1]
+        taken = str(write_settings(tmp_path, udp_port=port))
+        assert f"udp_port: UDP port {port}" in failed_start("--settings", taken, "--camera", f"yuv:{recording}")
+    assert "--camera" in failed_start("--settings", settings)
+
+
+def test_help_is_complete() -> None:
+    done = subprocess.run([sys.executable, "-m", "rhot_node", "--help"], capture_output=True, text=True, timeout=30)
+    assert done.returncode == 0
+    for word in ("--settings", "--camera", "--loop", "--exit-with-parent", "--log-level", "/dev/video", "yuv:",
+                 "stream:", "?rate=max", "detect"):
+        assert word in done.stdout
+
