@@ -1,0 +1,107 @@
+"""A flood of datagrams through a real node receiver: all received, verified and counted?
+
+    python benchmarks/flood.py [--rate 10000] [--seconds 10] [--json FILE]
+
+The sender is a process of its own on the same machine; the receiver has its thread and a consumer beside it, as in
+the engine. Prints a table; exits with 1 when a datagram was lost, refused or not counted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import resource
+import socket
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.sources.clock import NodeClockModel
+from rhot_app.sources.door import NodeDoor
+from rhot_app.sources.receiver import FrameQueue, NodeReceiver, open_data_socket
+from rhot_node.wire.codec import encode
+from rhot_node.wire.messages import MarkerObservation, Observations
+
+SESSION = 11
+_TICK_S = 0.002
+
+
+def send(port: int, rate: int, seconds: float) -> None:
+    """Send `rate * seconds` datagrams evenly; only the sequence number and the times are written for each."""
+    rig = synthetic_rig()
+    markers = tuple(MarkerObservation(k, 100.0 + k, 200.0, 16.0, 0.01, 0.0, 0.01, 0.9) for k in range(6))
+    template = Observations(1, SESSION, 0, 0, 0, 10**6, 10**6, 10**4, 640, 480, 0, rig.markers.checksum, markers)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.connect(("127.0.0.1", port))
+        begun, sent, total = time.monotonic(), 0, round(rate * seconds)
+        while sent < total:
+            due = min(total, int((time.monotonic() - begun) * rate) + 1)
+            now_ns = time.monotonic_ns()
+            stamped = replace(template, t_frame_node_ns=now_ns - 5_000_000, t_send_node_ns=now_ns)
+            datagram = bytearray(encode(stamped))
+            while sent < due:
+                datagram[20:24] = sent.to_bytes(4, "little")
+                sock.send(datagram)
+                sent += 1
+            time.sleep(_TICK_S)
+
+
+def run(rate: int, seconds: float) -> dict[str, object]:
+    """Flood one receiver and read its counters."""
+    clock = NodeClockModel()
+    now_ns = time.monotonic_ns()
+    for k in range(10):
+        t = now_ns - k * 1000
+        clock.add(t, t + 20_000, t + 20_000, t + 40_000, 1)
+    rig = synthetic_rig()
+    door = NodeDoor(rig, 0, clock)
+    door.expect_session(SESSION)
+    frames = FrameQueue()
+    receiver = NodeReceiver(open_data_socket(0, "left"), door, frames, "left")
+    ending = threading.Event()
+    tracked = [0]
+    consumer = threading.Thread(target=_consume, args=(frames, ending, tracked))
+    consumer.start()
+    receiver.start()
+    sender = multiprocessing.get_context("spawn").Process(target=send, args=(receiver.port, rate, seconds))
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    sender.start()
+    sender.join()
+    time.sleep(0.5)
+    after = resource.getrusage(resource.RUSAGE_SELF)
+    receiver.close()
+    ending.set()
+    consumer.join()
+    cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {"rate_hz": rate, "seconds": seconds, "sent": round(rate * seconds), "received": door.received,
+            "verified": door.accepted, "dropped": door.dropped, "sequence_lost": door.sequence.lost,
+            "kernel_overflow": receiver.overflowed, "handed_to_tracker": tracked[0], "skipped": receiver.skipped,
+            "cpu_us_per_datagram": 1e6 * cpu_s / max(1, door.received), "buffer_bytes": receiver.buffer_bytes}
+
+
+def _consume(frames: FrameQueue, ending: threading.Event, tracked: list[int]) -> None:
+    while not ending.is_set():
+        tracked[0] += len(frames.take(0.05))
+
+
+def main() -> int:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rate", type=int, default=10_000, help="datagrams per second")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures here")
+    args = parser.parse_args()
+    figures = run(args.rate, args.seconds)
+    for name, value in figures.items():
+        print(f"{name:>22}  {value:.1f}" if isinstance(value, float) else f"{name:>22}  {value}")
+    if args.json:
+        args.json.write_text(json.dumps(figures, indent=2) + "\n")
+    return 0 if figures["verified"] == figures["sent"] and not figures["sequence_lost"] else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

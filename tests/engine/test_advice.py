@@ -1,0 +1,63 @@
+"""Sentences for the operator: there when something is wrong, naming where, and gone when it is mended."""
+
+from dataclasses import replace
+
+import pytest
+
+from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice
+from rhot_app.engine.node_meter import Recent
+from rhot_app.engine.status import NodeStatus
+
+IDS = ("thumb", "index", "wrist")
+STATUS = NodeStatus(1, "left", "streaming", False, 100.0, 1000, 0, {}, 1.0, 1e-4, 2e-4)
+WELL = NodeFacts(STATUS, Recent(200, 0, {}, 0), "10.0.0.5", 47800, (640, 480), None, 4 << 20, 4 << 20,
+                 (0.0, 0.0, 0.0), False, 0.0)
+
+
+def texts(facts: NodeFacts, running: bool = True) -> list[str]:
+    return [advice.text for advice in node_advice(facts, IDS, running)]
+
+
+def test_a_well_node_needs_no_words() -> None:
+    assert texts(WELL) == []
+    assert no_marker_advice([WELL], running=True) == []
+
+
+@pytest.mark.parametrize(("facts", "words"), [
+    (replace(WELL, status=replace(STATUS, state="silent")), ["left", "10.0.0.5:47800", "rhot-node"]),
+    (replace(WELL, status=replace(STATUS, state="fault", message="no camera: plug it in.")), ["no camera: plug it"]),
+    (replace(WELL, status=replace(STATUS, state="ready"), not_started_s=2.0), ["press Stop and Start"]),
+    (replace(WELL, streams_elsewhere=True), ["another master"]),
+    (replace(WELL, recent=Recent(0, 0, {"marker_set": 50}, 0)), ["another marker set"]),
+    (replace(WELL, recent=Recent(0, 0, {"image_size": 50}, 0), sent_size=(1280, 720)), ["1280 x 720", "640 x 480"]),
+    (replace(WELL, recent=Recent(100, 0, {"magic": 40, "text": 10}, 0)), ["25 datagrams/s", "text_datagrams"]),
+    (replace(WELL, recent=Recent(100, 50, {}, 0)), ["33 %", "lost"]),
+    (replace(WELL, recent=Recent(9000, 0, {}, 500)), ["floods"]),
+    (replace(WELL, status=replace(STATUS, clock_bound_s=0.004)), ["±4.0 ms"]),
+    (replace(WELL, status=replace(STATUS, clock_bound_s=None)), ["waiting for its clock"]),
+    (replace(WELL, status=replace(STATUS, text_datagrams=True)), ["untrusted"]),
+    (replace(WELL, buffer_bytes=212992), ["208 KiB", "sysctl -w net.core.rmem_max=4194304"]),
+    (replace(WELL, recent=Recent(100, 0, {"kernel_overflow": 9}, 0)), ["kernel drops"]),
+    (replace(WELL, unseen_s=(0.0, 12.0, 0.0)), ["Camera left", "index", "12 s"]),
+    (replace(WELL, unseen_s=(5.0, 12.0, 7.0)), ["seen no marker for 5 s"]),
+])
+def test_trouble_is_named(facts: NodeFacts, words: list[str]) -> None:
+    (text,) = texts(facts)
+    for word in words:
+        assert word in text
+
+
+def test_chance_is_not_trouble() -> None:
+    assert texts(replace(WELL, recent=Recent(200, 3, {"magic": 2}, 0), unseen_s=(1.0, 0.0, 2.9))) == []
+
+
+def test_idle_engines_do_not_miss_markers() -> None:
+    assert texts(replace(WELL, unseen_s=(99.0, 99.0, 99.0)), running=False) == []
+
+
+def test_one_sentence_when_nobody_sees_anything() -> None:
+    blind = replace(WELL, unseen_s=(9.0, 8.0, 10.0))
+    (advice,) = no_marker_advice([blind, blind], running=True)
+    assert "No camera has seen a marker for 8 s" in advice.text
+    assert node_advice(blind, IDS, True, sight=False) == []
+    assert no_marker_advice([blind, WELL], running=True) == []

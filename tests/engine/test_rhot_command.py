@@ -1,0 +1,112 @@
+"""The ``rhot`` command: fast help, sentences and exit codes, the engine and the replay as real processes."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rhot_app.engine.client import EngineClient
+from rhot_app.engine.process import ensure_engine, running_engine, started_processes, stop_engine
+from rhot_app.engine.status import EngineStatus
+from rhot_app.errors import EngineError
+from rhot_app.project import save_rig
+from rhot_app.recording.raw_log import LogReader
+from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.tracking.state import HandState
+
+IMPORTED = """
+import sys
+from rhot_app.__main__ import main
+try:
+    main({arguments!r})
+except SystemExit as exit:
+    assert not exit.code, exit.code
+heavy = sorted({{"numba", "cv2", "scipy", "zmq", "PySide6"}} & set(sys.modules))
+assert not heavy, heavy
+"""
+
+
+def rhot(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "rhot_app", *arguments], capture_output=True, text=True, timeout=90)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["engine", "--help"], ["replay", "--help"]])
+def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
+    done = subprocess.run([sys.executable, "-c", IMPORTED.format(arguments=arguments)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
+    (tmp_path / "half.json").write_text('{"format": "rhot-rig", "ver')
+    (tmp_path / "foreign.log").write_bytes(b"something else")
+    for arguments, words in [
+        (("engine", "--rig", str(tmp_path / "no.json")), "no.json: no such file"),
+        (("engine", "--rig", str(tmp_path / "half.json")), "half.json: not valid JSON"),
+        (("replay", str(tmp_path / "foreign.log"), "--json"), "foreign.log: this is not a raw log"),
+        (("dance",), "dance"),
+    ]:
+        done = rhot(*arguments)
+        assert done.returncode == 2, done
+        assert words in done.stderr and "Traceback" not in done.stderr
+
+
+def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
+    rig = synthetic_rig()
+    rig_path, log_path, place = tmp_path / "rig.json", tmp_path / "a.log", tmp_path / "e"
+    save_rig(rig_path, rig)
+    nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
+    for node in nodes:
+        node.start()
+    command = [sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path), "--log", str(log_path),
+               "--directory", str(place), "--start", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as engine:
+        assert engine.stdout is not None and engine.stderr is not None
+        assert json.loads(engine.stdout.readline())["pid"] == engine.pid == running_engine(place)
+        assert ensure_engine(rig_path, place) == engine.pid
+        second = rhot("engine", "--rig", str(rig_path), "--directory", str(place))
+        assert second.returncode == 2 and str(engine.pid) in second.stderr
+        with EngineClient(place) as client:
+            states = [m for _ in range(30) for m in client.poll(0.05) if isinstance(m, HandState)]
+            assert len(states) > 20
+            assert client.status is not None and client.status.log_bytes > 0
+        engine.send_signal(signal.SIGTERM)
+        assert engine.wait(10) == 0
+        assert engine.stderr.read() == ""
+    for node in nodes:
+        node.close()
+    assert running_engine(place) is None
+    assert len(list(LogReader(log_path))) > 100
+    summary = json.loads(rhot("replay", str(log_path), "--json").stdout)
+    assert summary["states"] > 20
+    assert summary["markers"]["wrist"]["measured_fraction"] > 0.9
+
+
+def test_background_engine_is_killed_found_dead_and_started_again(tmp_path: Path) -> None:
+    rig_path, place = tmp_path / "rig.json", tmp_path / "e"
+    save_rig(rig_path, synthetic_rig())
+    pid = ensure_engine(rig_path, place)
+    directory = EngineClient(place).directory
+    (started,) = started_processes(directory)
+    assert (started.pid, started.role) == (pid, "engine")
+    subprocess.run(["kill", "-9", str(pid)], check=True)
+    deadline = time.monotonic() + 5.0
+    while running_engine(place) is not None:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    again = ensure_engine(rig_path, place)
+    assert again != pid
+    with EngineClient(place) as client:
+        assert any(isinstance(message, EngineStatus) for _ in range(20) for message in client.poll(0.1))
+    stop_engine(place)
+    assert running_engine(place) is None
+    assert started_processes(directory) == []
+
+
+def test_background_engine_that_cannot_start_says_why(tmp_path: Path) -> None:
+    with pytest.raises(EngineError, match=r"no\.json: no such file"):
+        ensure_engine(tmp_path / "no.json", tmp_path / "e")
