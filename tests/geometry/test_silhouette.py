@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rhot_app.geometry.silhouette import point_rays
+from rhot_app.geometry.silhouette import ball, ellipsoid, point_rays
+from rhot_app.geometry.transforms import exp_so3
 from rhot_app.geometry.triangulate import triangulate
 
 FOCAL = 530.0
@@ -16,18 +17,19 @@ def polygon_centroid(outline: np.ndarray) -> np.ndarray:
     return np.array([((x + np.roll(x, -1)) * cross).sum(), ((y + np.roll(y, -1)) * cross).sum()]) / (3 * cross.sum())
 
 
-def sphere_outline(centre: np.ndarray, radius: float, count: int = 20_000) -> np.ndarray:
-    """Normalised coordinates of the points where lines of sight from the origin touch the sphere."""
-    distance = np.linalg.norm(centre)
-    sight = centre / distance
+def outline(centre: np.ndarray, root: np.ndarray, count: int = 20_000) -> np.ndarray:
+    """Normalised coordinates of the points where lines of sight from the origin touch the ellipsoid centre + root u,
+    |u| = 1: seen from the ellipsoid's own space it is the unit sphere."""
+    eye = -np.linalg.solve(root, centre)
+    distance = np.linalg.norm(eye)
+    sight = eye / distance
     side = np.cross(sight, [0.3, 0.9, 0.1])
     side /= np.linalg.norm(side)
     up = np.cross(sight, side)
-    sine = radius / distance
     turn = np.linspace(0.0, 2 * np.pi, count, endpoint=False)[:, None]
-    cosine = np.sqrt(1.0 - sine**2)
-    touch = centre * cosine**2 + distance * sine * cosine * (np.cos(turn) * side + np.sin(turn) * up)
-    return touch[:, :2] / touch[:, 2:]
+    touch = sight / distance + np.sqrt(1.0 - 1.0 / distance**2) * (np.cos(turn) * side + np.sin(turn) * up)
+    points = centre + touch @ root.T
+    return points[:, :2] / points[:, 2:]
 
 
 def cylinder_edges(centre: np.ndarray, radius: float) -> float:
@@ -40,22 +42,36 @@ def cylinder_edges(centre: np.ndarray, radius: float) -> float:
 @pytest.mark.parametrize("radius", [0.008, 0.026])
 def test_the_centre_of_a_sphere_is_found_behind_its_outline(centre, radius):
     world = np.array(centre)
-    seen = np.array([polygon_centroid(sphere_outline(camera @ [*world, 1.0], radius)) for camera in CAMERAS])
+    seen = np.array([polygon_centroid(outline(camera @ [*world, 1.0], radius * np.eye(3))) for camera in CAMERAS])
     position, covariance = np.empty(3), np.empty((3, 3))
     used, focal, unit = np.ones(2, bool), np.full((2, 2), FOCAL), np.tile(np.eye(2), (2, 1, 1))
     triangulate(seen, unit, CAMERAS, focal, used, position, covariance)
     assert world[2] - position[2] == pytest.approx(radius**2 / world[2], rel=1e-3)
     corrected = np.empty((2, 2))
-    point_rays(seen, CAMERAS, radius, position, corrected)
+    point_rays(seen, CAMERAS, ball(radius), position, corrected)
     triangulate(corrected, unit, CAMERAS, focal, used, position, covariance)
     assert np.abs(position - world).max() < 1e-6
+
+
+def test_the_centre_of_a_flat_tilted_band_is_found_too():
+    world = np.array([0.1, -0.08, 0.5])
+    rotation, half_axes = exp_so3([0.4, 0.7, -0.3]), np.array([0.011, 0.031, 0.021])
+    seen = np.array([polygon_centroid(outline(camera @ [*world, 1.0], rotation * half_axes)) for camera in CAMERAS])
+    naive, position, covariance = np.empty(3), np.empty(3), np.empty((3, 3))
+    used, focal, unit = np.ones(2, bool), np.full((2, 2), FOCAL), np.tile(np.eye(2), (2, 1, 1))
+    triangulate(seen, unit, CAMERAS, focal, used, naive, covariance)
+    corrected = np.empty((2, 2))
+    point_rays(seen, CAMERAS, ellipsoid(rotation, half_axes), naive, corrected)
+    triangulate(corrected, unit, CAMERAS, focal, used, position, covariance)
+    assert np.linalg.norm(naive - world) > 5e-4
+    assert np.linalg.norm(position - world) < 1e-6
 
 
 def test_a_cylinder_does_the_same_across_its_axis():
     world, radius = np.array([0.12, 0.0, 0.5]), 0.026
     seen = np.array([[cylinder_edges(camera @ [*world, 1.0], radius), 0.0] for camera in CAMERAS])
     corrected = np.empty((2, 2))
-    point_rays(seen, CAMERAS, radius, world - [0.0, 0.0, radius**2 / world[2]], corrected)
+    point_rays(seen, CAMERAS, ball(radius), world - [0.0, 0.0, radius**2 / world[2]], corrected)
     np.testing.assert_allclose(corrected[:, 0], [0.24, 0.09], atol=1e-12)
 
 
@@ -63,5 +79,5 @@ def test_a_position_inside_the_body_or_unknown_changes_nothing():
     rays = np.array([[0.1, 0.2], [0.0, 0.2]])
     out = np.empty((2, 2))
     for position in (np.array([0.0, 0.0, 0.01]), np.full(3, np.nan), np.array([0.0, 0.0, -1.0])):
-        point_rays(rays, CAMERAS, 0.026, position, out)
+        point_rays(rays, CAMERAS, ball(0.026), position, out)
         np.testing.assert_array_equal(out, rays)

@@ -1,0 +1,105 @@
+"""Which located markers to believe, and what to say of those that are not located: one small memory per marker."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SPEED_LIMIT = 10.0
+"""No hand moves faster, m/s (a boxer's fist peaks near 10): beyond it a marker jumped to another thing."""
+
+JUMP_FLOOR_M = 0.02
+CONFIRMATIONS = 3
+"""A jump is believed when the marker stays at the new place for this many states."""
+
+FORGET_S = 0.5
+"""After this long any place is as likely as any other."""
+
+PREDICT_S = 0.25
+"""How long a marker out of sight is carried on at constant velocity."""
+
+ACCELERATION_SD = 10.0
+VELOCITY_SD = 0.05
+_VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
+
+# Columns of the memory, one row per marker: time, position, velocity, then the jump that waits for confirmation.
+_T, _X, _V, _JUMP_T, _JUMP_X, _JUMPS = 0, 1, 4, 7, 8, 11
+COLUMNS = 12
+
+
+def empty_memory(markers: int) -> Array:
+    """(M, 12) memory of markers never seen."""
+    return np.full((markers, COLUMNS), np.nan)
+
+
+@njit(cache=True)
+def _reachable(position: Array, covariance: Array, since: Array, dt: float) -> bool:
+    distance = math.sqrt((position[0] - since[0]) ** 2 + (position[1] - since[1]) ** 2 + (position[2] - since[2]) ** 2)
+    spread = math.sqrt(max(covariance[0, 0] + covariance[1, 1] + covariance[2, 2], 0.0))
+    return distance <= SPEED_LIMIT * dt + 5.0 * spread + JUMP_FLOOR_M
+
+
+@njit(cache=True)
+def judge(t_s: float, positions: Array, covariances: Array, memory: Array, believed: Mask, restarted: Mask) -> None:
+    """Decide for each located marker whether it can have got there, and remember it if so.
+
+    `positions` (M, 3) m with `covariances` (M, 3, 3), NaN where not located. Fills `believed` (M,), and `restarted`
+    (M,): believed although it did not get there continuously, so filters must start anew.
+    """
+    for m in range(positions.shape[0]):
+        believed[m] = restarted[m] = False
+        position = positions[m]
+        if not math.isfinite(position[0] + position[1] + position[2]):
+            continue
+        row = memory[m]
+        dt = t_s - row[_T]
+        fresh = not dt <= FORGET_S
+        if not fresh and not _reachable(position, covariances[m], row[_X:_X + 3], dt):
+            steady = (t_s - row[_JUMP_T] <= FORGET_S
+                      and _reachable(position, covariances[m], row[_JUMP_X:_JUMP_X + 3], t_s - row[_JUMP_T]))
+            row[_JUMPS] = row[_JUMPS] + 1.0 if steady else 1.0
+            row[_JUMP_T] = t_s
+            row[_JUMP_X:_JUMP_X + 3] = position
+            if row[_JUMPS] < CONFIRMATIONS:
+                continue
+            fresh = True
+        if fresh:
+            row[_V:_V + 3] = 0.0
+        elif dt > 0.0:
+            weight = dt / (dt + _VELOCITY_TIME_S)
+            for k in range(3):
+                row[_V + k] += weight * ((position[k] - row[_X + k]) / dt - row[_V + k])
+        row[_T] = t_s
+        row[_X:_X + 3] = position
+        row[_JUMP_T] = math.nan
+        row[_JUMPS] = 0.0
+        believed[m] = True
+        restarted[m] = fresh
+
+
+@njit(cache=True)
+def predict(t_s: float, memory: Array, located: Mask, origin: Array, positions: Array, covariances: Array) -> None:
+    """Carry on the markers that are not `located` (M,) from `origin` (M, 3), their last published position.
+
+    Fills their `positions` (M, 3) m and `covariances` (M, 3, 3) m^2, growing as the square of time; NaN when they
+    were last seen more than PREDICT_S ago.
+    """
+    for m in range(positions.shape[0]):
+        if located[m]:
+            continue
+        dt = t_s - memory[m, _T]
+        positions[m] = math.nan
+        covariances[m] = math.nan
+        if not 0.0 <= dt <= PREDICT_S:
+            continue
+        variance = (0.5 * ACCELERATION_SD * dt * dt) ** 2 + (VELOCITY_SD * dt) ** 2 + 1e-6
+        for k in range(3):
+            positions[m, k] = origin[m, k] + memory[m, _V + k] * dt
+            for j in range(3):
+                covariances[m, k, j] = variance if j == k else 0.0
