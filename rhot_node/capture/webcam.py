@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -37,8 +38,9 @@ class Capture(Protocol):
 
 
 def open_v4l2(device: str) -> Capture:
-    """Open a device path with OpenCV; whether that worked is asked with isOpened."""
-    return cv2.VideoCapture(device, cv2.CAP_V4L2)
+    """Open a device path with OpenCV, by its number where it has one: names are not taken by every build."""
+    match = re.fullmatch(r"/dev/video(\d+)", str(Path(device).resolve()))
+    return cv2.VideoCapture(int(match[1]) if match else device, cv2.CAP_V4L2)
 
 
 class Webcam:
