@@ -1,0 +1,188 @@
+"""The hand as solids: skin, painted fingertips, forearm and wrist band, posed for the renderer.
+
+Skin and fingertips are the capsules of `rhot_app.hand.shape`; forearm and band are elliptic cylinders, flat as wrists
+are. Each solid rides on one row of the hand's kinematic table.
+
+Parameter rows (12,), m: capsule: end a (3), end b (3), unused (6). Elliptic cylinder: centre (3), then the unit
+vectors of its length, breadth and thickness (3 x 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.errors import RigError
+from rhot_app.hand.dh import ROOT
+from rhot_app.hand.kinematics import forward, forward_arrays
+from rhot_app.hand.model import HandModel, neutral_pose
+from rhot_app.hand.shape import segments
+from rhot_app.hand.skeleton import FINGERS, JOINTS, TIP_ROLES, WRIST_ROLE
+from rhot_node.markers import Marker, MarkerSet
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+CAPSULE, CYLINDER = 0, 1
+PARAMETERS = 12
+SKIN = -1
+PALM_GROUP = len(FINGERS)
+"""Group of palm, thumb base, forearm and wrist band; groups 0..4 are the fingers."""
+
+SKIN_RGB = (201.0, 152.0, 128.0)
+FOREARM_M = 0.22
+BAND_LENGTH_MM = 22.0  # where the marker set gives none
+
+TIP_MARGIN, BAND_MARGIN = 1.05, 2.1
+"""Of a marker's largest half width: how far its own finger's (wrist's) skin may stand before it and still be paint."""
+
+_CYLINDER_NAMES = ("forearm", "wrist")
+_BONE_ENDS = {"metacarpal": 1, "proximal": 1, "medial": 2, "neck": 2, "distal": 3}  # joint of the finger, 0 its base
+_THUMB_BONE_ENDS = {**_BONE_ENDS, "proximal": 2}
+
+
+@dataclass(frozen=True, slots=True)
+class HandBody:
+    """The solids of one hand wearing one marker set: N solids, painted ones first, and M markers.
+
+    `kind`, `group`, `marker` (N,): what it is, which part of the hand, index in the marker set or SKIN. `size` (N, 3) m:
+    capsule (radius, 0, 0), cylinder (half length, half breadth, half thickness). `rgb` (N, 3) 0..255. `margin` (N,) m: by
+    how much paint wins over skin of its own group. `row` (N,): kinematic row that carries the solid, `ends` (N, 2, 3) m:
+    a capsule's ends, a cylinder's centre, in that row's frame. `marker_point` (M,): see `marker_centres`.
+    """
+
+    model: HandModel
+    kind: Indices
+    group: Indices
+    marker: Indices
+    size: Array
+    rgb: Array
+    margin: Array
+    row: Indices
+    ends: Array
+    marker_point: Indices
+
+    @property
+    def marker_count(self) -> int:
+        """Number of markers of the set, hidden ones included."""
+        return len(self.marker_point)
+
+    def points(self, world_from_palm: Array, angles: Array) -> Array:
+        """(T, 26, 3) m: joints, then the five painted centres, for poses (T, 4, 4) and (T, 21)."""
+        return self._forward(world_from_palm, angles)[1]
+
+    def marker_centres(self, points: Array) -> Array:
+        """(T, M, 3) m from `points`."""
+        return np.asarray(points[:, self.marker_point])
+
+    def place(self, world_from_palm: Array, angles: Array) -> Array:
+        """(T, N, 12) parameters of the solids in the world for poses (T, 4, 4) and (T, 21)."""
+        frames = self._forward(world_from_palm, angles)[0][:, self.row]
+        out = np.zeros((len(angles), len(self.kind), PARAMETERS))
+        out[:, :, :6] = (np.einsum("tnij,nkj->tnki", frames[..., :3], self.ends)
+                         + frames[:, :, None, :, 3]).reshape(len(angles), -1, 6)
+        round_ones = self.kind == CYLINDER
+        out[:, round_ones, 3:] = world_from_palm[:, None, :3, :3].transpose(0, 1, 3, 2).reshape(-1, 1, 9)
+        return out
+
+    def _forward(self, world_from_palm: Array, angles: Array) -> tuple[Array, Array]:
+        """(T, R + 1, 3, 4) frames of the rows, the palm's last so that ROOT finds it, and (T, 26, 3) points."""
+        dh = self.model.dh
+        frames = np.empty((len(angles), len(dh.parent) + 1, 3, 4))
+        points = np.empty((len(angles), len(dh.point_row), 3))
+        for k in range(len(angles)):
+            forward_arrays(dh, world_from_palm[k], angles[k], frames[k, :-1], points[k])
+        frames[:, ROOT] = world_from_palm[:, :3]
+        return frames, points
+
+
+@dataclass(frozen=True, slots=True)
+class _Solid:
+    kind: int
+    group: int
+    marker: int
+    size: tuple[float, float, float]
+    row: int
+    ends: Array  # (2, 3) in the row's frame
+
+
+def build_body(model: HandModel, markers: MarkerSet, hidden: frozenset[str] = frozenset()) -> HandBody:
+    """Dress the hand in `markers`; ids in `hidden` stay unpainted skin.
+
+    Raises RigError when a marker names no place on the hand, or `hidden` no marker.
+    """
+    unknown = sorted(hidden - set(markers.ids))
+    if unknown:
+        raise RigError(f"marker {unknown[0]!r} cannot be hidden: the marker set has {', '.join(markers.ids)}.")
+    roles = [_role(marker) for marker in markers.markers]
+    skin = list(_skin(model))
+    worn = [k for k, name in enumerate(markers.ids) if name not in hidden]
+    solids = [_paint(model, k, markers.markers[k], skin) for k in worn] + [solid for _, solid in skin]
+    reach = [max(solid.size) for solid in solids]
+    factor = [0.0 if solid.marker == SKIN else TIP_MARGIN if solid.kind == CAPSULE else BAND_MARGIN for solid in solids]
+    return HandBody(
+        model=model,
+        kind=np.array([solid.kind for solid in solids], dtype=np.int64),
+        group=np.array([solid.group for solid in solids], dtype=np.int64),
+        marker=np.array([solid.marker for solid in solids], dtype=np.int64),
+        size=np.array([solid.size for solid in solids]),
+        rgb=np.array([SKIN_RGB if solid.marker == SKIN else markers.markers[solid.marker].display_rgb
+                      for solid in solids], dtype=np.float64),
+        margin=np.array(factor) * np.array(reach),
+        row=np.array([solid.row for solid in solids], dtype=np.int64),
+        ends=np.array([solid.ends for solid in solids]),
+        marker_point=np.array([JOINTS.index("wrist") if role == WRIST_ROLE else len(JOINTS) + TIP_ROLES.index(role)
+                               for role in roles], dtype=np.int64),
+    )
+
+
+def _role(marker: Marker) -> str:
+    if marker.role is None or marker.role not in (*TIP_ROLES, WRIST_ROLE):
+        raise RigError(f"marker {marker.id!r} has the role {marker.role!r}; the simulated hand wears markers only at "
+                       f"{', '.join((*TIP_ROLES, WRIST_ROLE))}.")
+    return marker.role
+
+
+def _paint(model: HandModel, index: int, marker: Marker, skin: list[tuple[str, _Solid]]) -> _Solid:
+    """A fingertip's whole distal capsule, or a band round the wrist, as flat as the wrist is."""
+    if marker.role == WRIST_ROLE:
+        breadth, thickness = _wrist(model)
+        scale = 1e-3 * marker.radius_mm / (0.5 * (breadth + thickness)) if marker.radius_mm else 1.03
+        half = 0.5e-3 * (marker.length_mm or BAND_LENGTH_MM)
+        return _Solid(CYLINDER, PALM_GROUP, index, (half, scale * breadth, scale * thickness), ROOT, np.zeros((2, 3)))
+    distal = dict(skin)[f"{str(marker.role).removesuffix('_tip')}_distal"]
+    radius = 1e-3 * marker.radius_mm if marker.radius_mm else distal.size[0]
+    return _Solid(CAPSULE, distal.group, index, (radius, 0.0, 0.0), distal.row, distal.ends)
+
+
+def _skin(model: HandModel) -> Iterator[tuple[str, _Solid]]:
+    """Every capsule of the hand's shape, taken to the frame of the bone it rides on; an elliptic forearm."""
+    pose = neutral_pose()
+    frames = np.zeros((len(model.dh.parent) + 1, 3, 4))
+    points = np.empty((len(model.dh.point_row), 3))
+    forward_arrays(model.dh, pose.world_from_palm, pose.angles, frames[:-1], points)
+    frames[ROOT] = pose.world_from_palm[:3]
+    shape = segments(model, pose, forward(model, pose))
+    for name, start, end, radius in zip(shape.names, shape.start, shape.end, shape.radius, strict=True):
+        part, _, bone = name.partition("_")
+        if part in _CYLINDER_NAMES:
+            continue
+        row, group = ROOT, PALM_GROUP
+        if part in FINGERS:
+            finger = FINGERS.index(part)
+            joint = (_THUMB_BONE_ENDS if finger == 0 else _BONE_ENDS)[bone]
+            row = int(model.dh.point_row[1 + 4 * finger + joint])
+            group = PALM_GROUP if bone == "metacarpal" else finger
+        local = (np.stack([start, end]) - frames[row, :, 3]) @ frames[row, :, :3]
+        yield name, _Solid(CAPSULE, group, SKIN, (float(radius), 0.0, 0.0), row, local)
+    centre = np.array([0.012 - 0.5 * FOREARM_M, 0.0, 0.0])
+    yield "forearm", _Solid(CYLINDER, PALM_GROUP, SKIN, (0.5 * FOREARM_M, *_wrist(model)), ROOT,
+                            np.stack([centre, centre]))
+
+
+def _wrist(model: HandModel) -> tuple[float, float]:
+    """Half breadth and half thickness of the wrist, m."""
+    return 0.5e-3 * model.anatomy.wrist_breadth_mm, 0.5e-3 * model.anatomy.wrist_thickness_mm
