@@ -101,6 +101,7 @@ class SyntheticNode:
         self._clock = clock or NodeClock()
         self._boot_id = boot_id
         self._period_ns = round(1e9 / rate_hz)
+        self._phase_ns = round(0.37 * camera * self._period_ns) % self._period_ns  # cameras run freely
         self._frames = _observe(rig, camera, hand_markers(rig))
         self._target: tuple[str, int] | None = None
         self._sequence = 0
@@ -170,7 +171,9 @@ class SyntheticNode:
                 entry = next((entry for entry in message.entries if entry.node_id == self._node.node_id), None)
                 if entry is not None and message.session != self.session and self.state is not NodeState.FAULT:
                     self.session, self.state, self._sequence = message.session, NodeState.STREAMING, 0
-                    self._target, self._due_ns = (sender[0], entry.data_port), time.monotonic_ns()
+                    # Due at whole periods of the machine's clock plus the camera's phase, whoever hears first.
+                    self._due_ns = time.monotonic_ns() // self._period_ns * self._period_ns + self._phase_ns
+                    self._target = (sender[0], entry.data_port)
             case Stop() if message.session in (0, self.session):
                 self.session, self.state, self._target = 0, NodeState.READY, None
 
