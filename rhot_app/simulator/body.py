@@ -48,10 +48,11 @@ _THUMB_BONE_ENDS = {**_BONE_ENDS, "proximal": 2}
 class HandBody:
     """The solids of one hand wearing one marker set: N solids, painted ones first, and M markers.
 
-    `kind`, `group`, `marker` (N,): what it is, which part of the hand, index in the marker set or SKIN. `size` (N, 3) m:
-    capsule (radius, 0, 0), cylinder (half length, half breadth, half thickness). `rgb` (N, 3) 0..255. `margin` (N,) m: by
-    how much paint wins over skin of its own group. `row` (N,): kinematic row that carries the solid, `ends` (N, 2, 3) m:
-    a capsule's ends, a cylinder's centre, in that row's frame. `marker_point` (M,): see `marker_centres`.
+    `kind`, `group`, `marker` (N,): what it is, which part of the hand, index in the marker set or SKIN. `size`
+    (N, 3) m: capsule (radius, 0, 0), cylinder (half length, half breadth, half thickness). `rgb` (N, 3) 0..255.
+    `margin` (N,) m: by how much paint wins over skin of its own group. `row` (N,): kinematic row that carries the
+    solid, `ends` (N, 2, 3) m: a capsule's ends, a cylinder's centre, in that row's frame. `marker_point` (M,): which
+    of `points` is the marker's centre.
     """
 
     model: HandModel

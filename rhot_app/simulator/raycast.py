@@ -93,7 +93,9 @@ def lambert(kind: int, p: Array, s: int, n: int, x: float, y: float, t: float, l
     if kind == CAPSULE:
         along = (p[s, n, 7] + t * (p[s, n, 3] * x + p[s, n, 4] * y + p[s, n, 5])) / p[s, n, 6]
         along = min(max(along, 0.0), 1.0)
-        nx, ny, nz = t * x - p[s, n, 0] - along * p[s, n, 3], t * y - p[s, n, 1] - along * p[s, n, 4], t - p[s, n, 2] - along * p[s, n, 5]
+        nx = t * x - p[s, n, 0] - along * p[s, n, 3]
+        ny = t * y - p[s, n, 1] - along * p[s, n, 4]
+        nz = t - p[s, n, 2] - along * p[s, n, 5]
     else:
         u = p[s, n, 9] + t * (p[s, n, 0] * x + p[s, n, 1] * y + p[s, n, 2])
         v = p[s, n, 10] + t * (p[s, n, 3] * x + p[s, n, 4] * y + p[s, n, 5])
@@ -102,7 +104,9 @@ def lambert(kind: int, p: Array, s: int, n: int, x: float, y: float, t: float, l
             side = 1.0 if u > 0.0 else -1.0
             nx, ny, nz = side * p[s, n, 0], side * p[s, n, 1], side * p[s, n, 2]
         else:
-            nx, ny, nz = v * p[s, n, 3] + w * p[s, n, 6], v * p[s, n, 4] + w * p[s, n, 7], v * p[s, n, 5] + w * p[s, n, 8]
+            nx = v * p[s, n, 3] + w * p[s, n, 6]
+            ny = v * p[s, n, 4] + w * p[s, n, 7]
+            nz = v * p[s, n, 5] + w * p[s, n, 8]
     norm = math.sqrt(nx * nx + ny * ny + nz * nz) + 1e-30
     cosine = (nx * light[0] + ny * light[1] + nz * light[2]) / norm
     return cosine if cosine > 0.0 else 0.0

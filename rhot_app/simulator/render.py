@@ -89,8 +89,8 @@ class FrameRenderer:
         coefficients = self._polynomials(source, middle + half * self._nodes)
         sweep = self._sweep(coefficients, shutter.exposure_s / half)
         timing = np.array([-0.5 * span / half, shutter.row_time_s / half, shutter.exposure_s / half])
-        box = trace(coefficients, body.kind, body.group, body.marker, body.size, body.rgb, body.margin, sweep, self._rays,
-                    camera.intrinsics, timing, self._light, self._shading, self._seed * 1_000_003 + number,
+        box = trace(coefficients, body.kind, body.group, body.marker, body.size, body.rgb, body.margin, sweep,
+                    self._rays, camera.intrinsics, timing, self._light, self._shading, self._seed * 1_000_003 + number,
                     self._background, self._image, self._ids, self._edges, self._masks, self._visible, self._whole)
         whole = self._whole + self._outside(coefficients, timing)
         fractions = np.divide(self._visible, whole, out=np.zeros_like(whole), where=whole > 0.0)

@@ -1,7 +1,7 @@
 """The image sensor: point spread of the lens, colour conversion to planar YUV420, shot and read noise, 8 bits.
 
-Grey levels 0..255. Each colour channel of a pixel has noise of variance read^2 + shot * level; its share in Y and, after
-the mean over 2 x 2 pixels, in U and V is what independent channels would give.
+Grey levels 0..255. Each colour channel of a pixel has noise of variance read^2 + shot * level; its share in Y and,
+after the mean over 2 x 2 pixels, in U and V is what independent channels would give.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Sensor:
         grown = self._grow(box)
         if grown[0] < grown[2]:
             self._develop(image, grown)
-        height, width = self._means[0].shape
+        width = self._means[0].shape[1]
         flat, start = out.reshape(-1), 0
         for mean, sigma in zip(self._means, self._sigmas, strict=True):
             offsets = self._random.integers(0, (1 << _TABLE_BITS) - width, mean.shape[0])

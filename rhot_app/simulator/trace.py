@@ -32,7 +32,8 @@ NODES = 5
 def trace(coefficients: Array, kind: NDArray[np.int64], group: NDArray[np.int64], marker: NDArray[np.int64],
           size: Array, rgb: Array, margin: Array, sweep: Array, rays: Array, intrinsics: Array, timing: Array,
           light: Array, shading: float, seed: int, background: Image, image: Image, ids: NDArray[np.int8],
-          edges: NDArray[np.uint8], masks: NDArray[np.int64], visible: Array, whole: Array) -> tuple[int, int, int, int]:
+          edges: NDArray[np.uint8], masks: NDArray[np.int64], visible: Array,
+          whole: Array) -> tuple[int, int, int, int]:
     """Paint the hand over `background` into `image`, both (3, H, W), only inside the box that is returned.
 
     `coefficients` (N, 12, NODES): parameters of the N solids in the camera's frame. `sweep` (N, 2): px that a solid
@@ -206,7 +207,7 @@ def _reach(group: NDArray[np.int64], marker: NDArray[np.int64], sweep: Array) ->
     for n in range(len(group)):
         code = 1 + group[n] if marker[n] < 0 else 20 + marker[n]
         for axis in range(2):
-            pixels = int(math.ceil(0.5 * sweep[n, axis])) if sweep[n, axis] > 0.02 else 0
+            pixels = math.ceil(0.5 * sweep[n, axis]) if sweep[n, axis] > 0.02 else 0
             reach[code, axis] = max(reach[code, axis], pixels)
     return reach
 
@@ -289,8 +290,8 @@ def _count(mask: int, area: float, whole: Array) -> None:
 
 
 @njit(cache=True)
-def area_outside(coefficients: Array, n: int, kind: int, size: Array, intrinsics: Array, timing: Array, width: int, height: int,
-                 limits: NDArray[np.int64]) -> float:
+def area_outside(coefficients: Array, n: int, kind: int, size: Array, intrinsics: Array, timing: Array, width: int,
+                 height: int, limits: NDArray[np.int64]) -> float:
     """Area, px^2, of solid `n` beyond the image borders, within `limits` (x0, y0, x1, y1): one ray per pixel."""
     row, prepared = np.empty(12), np.empty((1, len(size), PREPARED))
     area = 0.0
