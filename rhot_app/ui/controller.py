@@ -153,16 +153,21 @@ class Controller(QObject):
         """Give up what is being opened; whatever it has started is ended."""
         if self._job is None:
             return
-        job, self._job = self._job, None
+        job = self._job
         job.cancel()
         self._begin_after_opening = self._restarting = False
-        self._run_quietly(lambda: self.backend.give_up())
-        self._set_busy(None)
+
+        def end_all(progress: Progress) -> str:
+            self.backend.give_up()
+            job.wait(_CLOSE_WAIT_S)
+            return self.backend.close()
+
+        self._start_job("Cancelling …", end_all, self._on_closed)
 
     def close_rig(self) -> None:
         """Back to the first page; ends what the app started."""
         if self._job is not None:
-            self.cancel()
+            return
         self._forget_rig()
         self._start_job("Closing the rig …", lambda progress: self.backend.close(), self._on_closed)
 
@@ -176,12 +181,12 @@ class Controller(QObject):
         """End everything that the app started, and wait for it; what is left running on purpose, as a sentence."""
         if self._job is not None:
             self._job.cancel()
-        if self._client is not None:
-            self._client.close()
-            self._client = None
         sentence = self.backend.close()
         for job in [*([self._job] if self._job is not None else []), *self._commands]:
             job.wait(_CLOSE_WAIT_S)
+        if self._client is not None:
+            self._client.close()
+            self._client = None
         return self.backend.close() or sentence
 
     # -- commands --------------------------------------------------------------------------------------------------

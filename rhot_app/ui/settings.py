@@ -51,7 +51,7 @@ class Settings:
     @property
     def motion(self) -> str:
         """Motion of the simulated hand chosen last."""
-        return self._text("twin/motion", "wave")
+        return self._text("twin/motion", "grasp")
 
     @motion.setter
     def motion(self, name: str) -> None:

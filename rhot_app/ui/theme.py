@@ -63,6 +63,7 @@ def style_sheet(s: Scheme) -> str:
     QToolTip {{ background: {s.raised}; color: {s.text}; border: 1px solid {s.border}; padding: 4px 8px; }}
     QMainWindow::separator {{ background: {s.window}; width: 6px; height: 6px; }}
     QMainWindow::separator:hover {{ background: {s.accent}; }}
+    #advicebar {{ border-top: 1px solid {s.border}; border-bottom: none; padding: 0; }}
     QToolBar {{ background: {s.panel}; border: none; border-bottom: 1px solid {s.border}; padding: 4px 8px; spacing: 4px; }}
     QToolBar QToolButton {{ padding: 6px 12px; border: 1px solid transparent; border-radius: 6px; }}
     QToolBar QToolButton:hover {{ background: {s.raised}; }}

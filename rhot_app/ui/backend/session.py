@@ -53,7 +53,7 @@ class Opened:
 class TwinChoice:
     """What the simulated hand does."""
 
-    motion: str = "wave"
+    motion: str = "grasp"
     seed: int = 1
     preset: str = "wide"
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from rhot_app.ui.models.palette import Scheme
@@ -15,6 +16,7 @@ Level = Literal["info", "warning", "error"]
 LOOKS: dict[str, tuple[str, str]] = {"info": ("info", "accent"), "warning": ("half", "caution"),
                                      "error": ("octagon", "fault")}
 SHOWN = 3
+_LEAST_PX = 34
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,7 @@ class AdviceBar(QWidget):
         self._shown: list[Notice] | None = None
         self._lines: list[tuple[QWidget, ShapeMark, QLabel, QPushButton]] = []
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(12, 6, 12, 6)
+        layout.setContentsMargins(12, 5, 12, 5)
         layout.setSpacing(4)
         for _ in range(SHOWN):
             layout.addWidget(self._make_line())
@@ -83,6 +85,18 @@ class AdviceBar(QWidget):
                 label.setText(chosen[k].text)
                 button.setText(chosen[k].action)
                 button.setVisible(bool(chosen[k].action))
+        self._fit_height()
+
+    def _fit_height(self) -> None:
+        """Toolbars do not ask how tall wrapped text gets at their width, so the bar says it."""
+        layout = self.layout()
+        if layout is not None and self.width() > 100:
+            self.setFixedHeight(max(layout.heightForWidth(self.width()), _LEAST_PX))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Another width wraps elsewhere."""
+        super().resizeEvent(event)
+        self._fit_height()
 
     @property
     def texts(self) -> list[str]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen
-from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
 from rhot_app.ui.backend.live import Live
+from rhot_app.ui.models.label_layout import place_labels, unique_prefixes
 from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.panels.empty_state import EmptyState
@@ -19,6 +22,18 @@ from rhot_node.wire.messages import MarkerFlag
 Array = NDArray[np.float64]
 
 _RING_PX = 7.0
+_ROOM_FOR_NAMES_PX = 240.0
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """One marker in the picture: place in px of the full frame, and whether it is seen whole and beyond doubt."""
+
+    place: QPointF
+    name: str
+    initial: str
+    colour: str
+    whole: bool
 
 
 class CameraView(QWidget):
@@ -30,8 +45,8 @@ class CameraView(QWidget):
         self._scheme = scheme
         self._image = QImage()
         self._frame = (4, 3)
-        self._marks: list[tuple[QPointF, str, str, bool]] = []
-        self.setMinimumSize(160, 120)
+        self._marks: list[Mark] = []
+        self.setMinimumSize(120, 90)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName(f"Picture of camera {name}")
         self.setToolTip(f"Camera {name}: what it saw a moment ago, and the markers found in that picture.\n"
@@ -43,7 +58,7 @@ class CameraView(QWidget):
 
     def show_preview(self, preview: Preview) -> None:
         """Another picture."""
-        image = QImage.fromData(preview.jpeg, b"JPEG")
+        image = QImage.fromData(preview.jpeg)
         if not image.isNull():
             self._image = image
             self._frame = (preview.width, preview.height)
@@ -52,8 +67,9 @@ class CameraView(QWidget):
     def show_marks(self, pixels: Array, flags: NDArray[np.uint16], names: tuple[str, ...], colours: list[str]) -> None:
         """Markers at `pixels` (M, 2) px of the full frame; NaN ones are left out."""
         doubtful = int(MarkerFlag.PARTIAL | MarkerFlag.AMBIGUOUS)
-        self._marks = [(QPointF(float(x), float(y)), short_name(name), colour, not int(flag) & doubtful)
-                       for (x, y), flag, name, colour in zip(pixels, flags, names, colours, strict=True)
+        self._marks = [Mark(QPointF(float(x), float(y)), short_name(name), initial, colour, not int(flag) & doubtful)
+                       for (x, y), flag, name, initial, colour
+                       in zip(pixels, flags, names, unique_prefixes(names), colours, strict=True)
                        if np.isfinite(x) and np.isfinite(y)]
         self.update()
 
@@ -66,7 +82,7 @@ class CameraView(QWidget):
     @property
     def marked(self) -> list[str]:
         """Names of the markers drawn."""
-        return [name for _, name, _, _ in self._marks]
+        return [mark.name for mark in self._marks]
 
     def paintEvent(self, event: object) -> None:  # noqa: N802
         """Picture, marks, name."""
@@ -80,26 +96,29 @@ class CameraView(QWidget):
         if not self._image.isNull():
             painter.drawImage(target, self._image)
         painter.setClipRect(target)
-        for place, name, colour, whole in self._marks:
-            at = target.topLeft() + scale * (place + QPointF(0.5, 0.5))
-            self._paint_mark(painter, at, name, colour, whole, target)
+        self._paint_marks(painter, target, scale)
         self._paint_tag(painter, target.topLeft() + QPointF(6, 6), self.name, bold=True)
         if self._image.isNull():
             painter.setPen(QColor(self._scheme.muted))
             painter.drawText(target, Qt.AlignmentFlag.AlignCenter, "no picture yet")
         painter.end()
 
-    def _paint_mark(self, painter: QPainter, at: QPointF, name: str, colour: str, whole: bool, target: QRectF) -> None:
-        style = Qt.PenStyle.SolidLine if whole else Qt.PenStyle.DotLine
+    def _paint_marks(self, painter: QPainter, target: QRectF, scale: float) -> None:
+        places = [scale * (mark.place + QPointF(0.5, 0.5)) for mark in self._marks]
+        painter.translate(target.topLeft())
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        for pen_colour, width in (("#000000", 4.0), (colour, 2.0)):
-            painter.setPen(QPen(QColor(pen_colour), width, style))
-            painter.drawEllipse(at, _RING_PX, _RING_PX)
+        for at, mark in zip(places, self._marks, strict=True):
+            style = Qt.PenStyle.SolidLine if mark.whole else Qt.PenStyle.DotLine
+            for colour, width in (("#000000", 4.0), (mark.colour, 2.0)):
+                painter.setPen(QPen(QColor(colour), width, style))
+                painter.drawEllipse(at, _RING_PX, _RING_PX)
+        texts = [mark.name if target.width() >= _ROOM_FOR_NAMES_PX else mark.initial for mark in self._marks]
         metrics = QFontMetricsF(painter.font())
-        offset = QPointF(_RING_PX + 3, -0.5 * metrics.height() - 1)
-        if at.x() + offset.x() + metrics.horizontalAdvance(name) + 8 > target.right():
-            offset.setX(-_RING_PX - 11 - metrics.horizontalAdvance(name))
-        self._paint_tag(painter, at + offset, name)
+        sizes = [(metrics.horizontalAdvance(text) + 8, metrics.height() + 2) for text in texts]
+        boxes = place_labels([(at.x(), at.y()) for at in places], sizes, (target.width(), target.height()), _RING_PX + 3)
+        for text, box in zip(texts, boxes, strict=True):
+            self._paint_tag(painter, QPointF(box.x, box.y), text)
+        painter.translate(-target.topLeft())
 
     def _paint_tag(self, painter: QPainter, corner: QPointF, text: str, *, bold: bool = False) -> None:
         font = painter.font()
@@ -126,7 +145,7 @@ class CameraPanel(QWidget):
         self._shown: dict[str, int] = {}
         self.views: dict[str, CameraView] = {}
         self.empty = EmptyState("Pictures appear here once a rig is open and its nodes answer.")
-        self._layout = QVBoxLayout(self)
+        self._layout = QBoxLayout(QBoxLayout.Direction.TopToBottom, self)
         self._layout.setContentsMargins(8, 4, 8, 8)
         self._layout.setSpacing(8)
         self._layout.addWidget(self.empty)
@@ -147,6 +166,15 @@ class CameraPanel(QWidget):
         for view in self.views.values():
             self._layout.addWidget(view, 1)
         self.empty.setVisible(rig is None)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Side by side where that makes the pictures larger."""
+        count = max(len(self.views), 1)
+        stacked = min(self.width(), 4 / 3 * self.height() / count)
+        beside = min(self.width() / count, 4 / 3 * self.height())
+        self._layout.setDirection(QBoxLayout.Direction.LeftToRight if beside > stacked
+                                  else QBoxLayout.Direction.TopToBottom)
+        super().resizeEvent(event)
 
     def refresh(self, live: Live) -> None:
         """Show new previews with the marks that belong to their instant."""

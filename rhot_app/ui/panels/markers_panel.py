@@ -52,7 +52,7 @@ class MarkersPanel(QWidget):
         self._rig: Rig | None = None
         self._lines: list[tuple[ShapeMark, QLabel]] = []
         self._shown: list[MarkerRow | None] = []
-        self.empty = EmptyState("The rig says which markers there are. No rig is open.")
+        self.empty = EmptyState("No rig is open.")
         self._body = QWidget()
         self._grid = QGridLayout(self._body)
         self._grid.setContentsMargins(8, 0, 8, 0)

@@ -69,7 +69,7 @@ class NodesPanel(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._scheme = scheme
         self._cards: list[NodeCard] = []
-        self.empty = EmptyState("No rig is open, so there are no nodes to talk to.", "Choose a rig")
+        self.empty = EmptyState("The engine has not reported on its nodes yet.")
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(8, 4, 8, 8)
         self._layout.setSpacing(6)

@@ -28,7 +28,7 @@ class LatencyPlot(PlotPanel):
     least_span = 15.0
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
-        super().__init__(scheme, ("p50", "p99"), "00.00", parent)
+        super().__init__(scheme, ("p50 —", "p99 ┄"), "00.000", parent)
         self._edges = [pg.PlotCurveItem(connect="finite") for _ in range(len(STACKED) + 1)]
         self._bands = [pg.FillBetweenItem(lower, upper) for lower, upper in zip(self._edges, self._edges[1:],
                                                                                 strict=False)]
@@ -57,7 +57,7 @@ class LatencyPlot(PlotPanel):
         self._budget.setPen(pg.mkPen(self._scheme.accent, width=2, style=Qt.PenStyle.DotLine))
         self._budget.label.setColor(self._scheme.accent)
         self.legend.set_entries([
-            LegendEntry("all, p50", self._scheme.text), LegendEntry("all, p99", self._scheme.text, Qt.PenStyle.DashLine),
+            LegendEntry("all", self._scheme.text),
             *(LegendEntry(STAGES[stage], colour, band=True)
               for stage, colour in reversed(list(zip(STACKED, STAGE_COLOURS, strict=False))))])
 
@@ -74,7 +74,6 @@ class LatencyPlot(PlotPanel):
         self._whole[0].setData(seconds, p50[:, -1])
         self._whole[1].setData(seconds, p99[:, -1])
         order = [stages, *reversed(range(stages))]
-        values = [(number(newest(p50, k), 2), number(newest(p99, k), 2)) for k in order]
-        self.legend.set_values([(values[0][0], ""), ("", values[0][1]), *values[1:]])
+        self.legend.set_values([(number(newest(p50, k), 2), number(newest(p99, k), 2)) for k in order])
         finite = p99[:, -1][np.isfinite(p99[:, -1])]
         self._fit(float(np.percentile(finite, 98)) if len(finite) else float("nan"))

@@ -22,6 +22,9 @@ BONES: tuple[tuple[int, int], ...] = tuple((1 + 4 * f + k, 2 + 4 * f + k) for f 
 RAYS: tuple[tuple[int, int], ...] = tuple((0, 1 + 4 * f) for f in range(5))
 """Joint numbers of the five lines from the wrist to each finger's base."""
 
+TIPS: tuple[int, ...] = tuple(4 + 4 * f for f in range(5))
+"""Joint numbers of the fingertips; they get no ball, it would stick out of the skin."""
+
 _SKELETON_RADIUS_M = 0.0017
 _JOINT_RADIUS_M = 0.0034
 
@@ -105,9 +108,9 @@ class SkeletonMesh:
     def __init__(self) -> None:
         self._template = capsule_template(6, 1)
         count = len(self._template.directions)
-        self._pairs = np.array([*BONES, *RAYS, *((k, k) for k in range(len(JOINTS)))])
+        self._pairs = np.array([*BONES, *RAYS, *((k, k) for k in range(len(JOINTS)) if k not in TIPS)])
         bones = len(BONES) + len(RAYS)
-        self._radii = np.repeat([_SKELETON_RADIUS_M, _JOINT_RADIUS_M], [bones, len(JOINTS)])[:, None] * np.ones(2)
+        self._radii = np.repeat([_SKELETON_RADIUS_M, _JOINT_RADIUS_M], [bones, len(self._pairs) - bones])[:, None] * np.ones(2)
         self.faces: Faces = repeat_faces(self._template.faces, count, len(self._pairs))
 
     def pose(self, state: HandState) -> PosedMesh:

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QMatrix4x4, QPainter, QPixmap
 
+from rhot_app.ui.models.label_layout import place_labels
+
 Array = NDArray[np.float64]
+
+_GAP_PX = 26.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,25 @@ class LabelPainter:
             width, height = picture.deviceIndependentSize().width(), picture.deviceIndependentSize().height()
             at = QPointF((x / w + 1) * 0.5 * size[0] - 0.5 * width, (1 - y / w) * 0.5 * size[1] - 0.5 * height - lift)
             painter.drawPixmap(at, picture)
+
+    def paint_apart(self, painter: QPainter, matrix: QMatrix4x4, size: tuple[int, int], places: Array,
+                    texts: list[str], style: TextStyle) -> None:
+        """As `paint`, but each beside its place and clear of the others, with a line from label to place."""
+        rows = np.array(matrix.copyDataTo()).reshape(4, 4)
+        clip = np.column_stack([places, np.ones(len(places))]) @ rows.T
+        shown = [k for k in range(len(texts)) if clip[k, 3] > 0.0]
+        anchors = [((clip[k, 0] / clip[k, 3] + 1) * 0.5 * size[0], (1 - clip[k, 1] / clip[k, 3]) * 0.5 * size[1])
+                   for k in shown]
+        pictures = [self._picture(texts[k], style, painter) for k in shown]
+        sizes = [(p.deviceIndependentSize().width(), p.deviceIndependentSize().height()) for p in pictures]
+        boxes = place_labels(anchors, sizes, (float(size[0]), float(size[1])), _GAP_PX)
+        painter.setPen(QColor(style.colour))
+        for (x, y), box in zip(anchors, boxes, strict=True):
+            near_x = min(max(x, box.x), box.x + box.width)
+            near_y = min(max(y, box.y), box.y + box.height)
+            painter.drawLine(QLineF(x, y, near_x, near_y))
+        for box, picture in zip(boxes, pictures, strict=True):
+            painter.drawPixmap(QPointF(box.x, box.y), picture)
 
     def _picture(self, text: str, style: TextStyle, painter: QPainter) -> QPixmap:
         ratio = painter.device().devicePixelRatioF()

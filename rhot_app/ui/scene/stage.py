@@ -76,6 +76,6 @@ def tick_labels() -> list[Label]:
     labels.append(Label((0.3, Y_RANGE[0] - 0.035, FLOOR_M), "x [mm]"))
     labels += [Label((X_RANGE[1] + 0.03, float(y), FLOOR_M), f"{y * 1e3:.0f}") for y in _steps(*Y_RANGE, TICK_M)]
     labels.append(Label((X_RANGE[1] + 0.03, 0.9, FLOOR_M), "z [mm]"))
-    labels += [Label((X_RANGE[0] - 0.05, Y_RANGE[1], float(z)), f"{z * 1e3:.0f}") for z in _steps(-0.0, Z_RANGE[1], TICK_M)]
+    labels += [Label((X_RANGE[0] - 0.05, Y_RANGE[1], float(z)), f"{abs(z) * 1e3:.0f}") for z in _steps(0.0, Z_RANGE[1], TICK_M)]
     labels.append(Label((X_RANGE[0] - 0.05, Y_RANGE[1], Z_RANGE[1] - 0.1), "up [mm]"))
     return labels

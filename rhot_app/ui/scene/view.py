@@ -7,8 +7,8 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from pyqtgraph.opengl import GLLinePlotItem, GLViewWidget
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeyEvent, QPainter, QVector3D
-from PySide6.QtWidgets import QWidget
+from PySide6.QtGui import QKeyEvent, QPainter, QResizeEvent, QVector3D
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 _FIELD_OF_VIEW_DEG = 50.0
 _FRUSTUM_M = 0.09
-_HOME_DISTANCE_M = 1.15
-_HOME_CENTRE_M = (0.0, 0.42, -0.03)
+_HOME_DISTANCE_M = 0.98
+_HOME_CENTRE_M = (0.04, 0.36, -0.05)
 _HOME_AZIMUTH_DEG = -62.0
 _HOME_ELEVATION_DEG = 20.0
 _FRAMED_DISTANCE_M = 0.42
@@ -50,6 +50,10 @@ class SceneView(GLViewWidget):  # type: ignore[misc]
         self._show_labels = True
         self._show_clouds = True
         self._cameras: list[tuple[str, Array]] = []
+        self.start_button = QPushButton("Start tracking", self)
+        self.start_button.setProperty("primary", True)
+        self.start_button.setToolTip("Tell the nodes to stream (Space).")
+        self.start_button.hide()
         self._rebuild()
         self.reset_view()
 
@@ -81,6 +85,21 @@ class SceneView(GLViewWidget):  # type: ignore[misc]
         if self._actors is not None:
             self._actors.show_clouds = visible
         self.show_state(self._state)
+
+    def offer_start(self, offered: bool) -> None:
+        """A button in the middle while nothing streams: the next step where the hand will be."""
+        if offered != self.start_button.isVisibleTo(self):
+            self.start_button.setVisible(offered)
+            self._place_button()
+
+    def _place_button(self) -> None:
+        self.start_button.adjustSize()
+        self.start_button.move((self.width() - self.start_button.width()) // 2, round(0.4 * self.height()))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Keep the button in the middle."""
+        super().resizeEvent(event)
+        self._place_button()
 
     def reset_view(self) -> None:
         """Back to the view from above and behind the cameras."""
@@ -168,5 +187,5 @@ class SceneView(GLViewWidget):  # type: ignore[misc]
                            [name for name, _ in self._cameras], muted, lift=10.0)
         if self._state is not None and self._show_labels:
             style = TextStyle(self._scheme.text, small=False, plate=self._scheme.scene)
-            self._labels.paint(painter, matrix, size, to_display(self._state.marker_positions),
-                               [short_name(name) for name in self._state.marker_ids], style, lift=24.0)
+            self._labels.paint_apart(painter, matrix, size, to_display(self._state.marker_positions),
+                                     [short_name(name) for name in self._state.marker_ids], style)

@@ -1,0 +1,109 @@
+"""The window's actions with their icons, keys and tooltips, and the toolbar and menus made of them."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, QSize, Qt
+from PySide6.QtGui import QAction, QActionGroup, QKeySequence
+from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
+
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.panels.state_badge import StateBadge
+from rhot_app.ui.shapes import shape_icon
+
+
+class Actions(QObject):
+    """Every action of the window; what they do is connected by the window."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.start = self._make("Start", "Space", "Tell the nodes to stream, or to stop (Space).")
+        self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it (R).")
+        self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
+        self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")
+        self.find = self._make("Find nodes …", "", "Enter the addresses of nodes and see whether they answer.")
+        self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
+        self.quit = self._make("Quit", "Ctrl+Q", "End what the app started and close it.")
+        self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
+        self.markers = self._make("Markers …", "", "The marker set that the rig file says.")
+        self.hand = self._make("Hand …", "", "The hand's bones that the rig file says.")
+        self.files = self._make("How calibration files are made", "", "Opens the guide.")
+        self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene (F).")
+        self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
+        self.names = self._make("Marker names", "", "Names beside the markers in the scene.", checkable=True)
+        self.clouds = self._make("Covariance clouds", "", "How well each marker's place is known: three sigma.",
+                                 checkable=True)
+        self.alone = self._make("Scene alone", "6", "Hide every panel, to look from afar; again brings them back (6).",
+                                checkable=True)
+        self.dark = self._make("Dark", "", "Light text on dark ground.", checkable=True)
+        self.light = self._make("Light", "", "Dark text on light ground.", checkable=True)
+        self.reset = self._make("Reset layout and settings", "", "Forget layout, last rig and switches.")
+        self.guide = self._make("Guide", "F1", "The page of the guide that explains the panel in use (F1).")
+        group = QActionGroup(self)
+        group.addAction(self.dark)
+        group.addAction(self.light)
+
+    def _make(self, text: str, key: str, meaning: str, *, checkable: bool = False) -> QAction:
+        action = QAction(text, self)
+        action.setCheckable(checkable)
+        action.setToolTip(meaning)
+        if key:
+            action.setShortcut(QKeySequence(key))
+        return action
+
+    def all(self) -> list[QAction]:
+        """Every action, so that the window knows their keys."""
+        return [child for child in self.children() if isinstance(child, QAction)]
+
+
+class MainToolBar(QToolBar):
+    """Start, Record, Rig, Calibrate, View, Guide; at the right the rig's name and the state."""
+
+    def __init__(self, actions: Actions, panels: list[QAction], scheme: Scheme, parent: QWidget) -> None:
+        super().__init__("Main", parent)
+        self.setObjectName("main toolbar")
+        self.setMovable(False)
+        self.setIconSize(QSize(18, 18))
+        self.setFloatable(False)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.addAction(actions.start)
+        self.addAction(actions.record)
+        self.addSeparator()
+        a = actions
+        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.find, None, a.close_rig, a.quit])
+        self.calibrate_button = self._add_menu("Calibrate", [a.cameras, a.markers, a.hand, None, a.files])
+        self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, None,
+                                                   a.dark, a.light, None, a.reset])
+        self.addAction(actions.guide)
+        spacer = QWidget()
+        spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self.addWidget(spacer)
+        self.rig_label = QLabel("")
+        self.rig_label.setProperty("muted", True)
+        self.addWidget(self.rig_label)
+        self.badge = StateBadge(scheme)
+        self.addWidget(self.badge)
+        self.set_scheme(actions, scheme, running=False, recording=False)
+
+    def _add_menu(self, title: str, entries: list[QAction | None]) -> QToolButton:
+        button, menu = QToolButton(), QMenu(self)
+        menu.setToolTipsVisible(True)
+        for entry in entries:
+            if entry is None:
+                menu.addSeparator()
+            else:
+                menu.addAction(entry)
+        button.setText(title)
+        button.setMenu(menu)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.addWidget(button)
+        return button
+
+    def set_scheme(self, actions: Actions, scheme: Scheme, *, running: bool, recording: bool) -> None:
+        """Words and icons of the two buttons that change."""
+        actions.start.setText(" Stop " if running else " Start")
+        actions.start.setIcon(shape_icon("stop" if running else "play", scheme.accent))
+        actions.record.setText(" Stop recording" if recording else " Record")
+        actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault))
+        self.badge.set_scheme(scheme)

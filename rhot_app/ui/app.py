@@ -1,0 +1,78 @@
+"""``rhot``: the app. It finds or starts the engine, shows what it does, and ends what it started."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from pathlib import Path
+
+from rhot_app.engine.directory import default_directory
+from rhot_app.ui.backend.session import Session, TwinChoice
+from rhot_app.ui.environment import cap_software_gl, choose_gl_platform, give_way
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot`` without a command."""
+    parser.add_argument("--rig", type=Path, metavar="FILE", help="open this rig file at once")
+    add_window_arguments(parser)
+
+
+def add_window_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of every command that opens the window."""
+    parser.add_argument("--directory", type=Path, metavar="DIR",
+                        help=f"private directory of the engine's sockets (default {default_directory()})")
+    parser.add_argument("--settings", type=Path, metavar="FILE",
+                        help="remember layout and settings in this file instead of the user's configuration folder")
+    parser.add_argument("--reset", action="store_true", help="forget layout and settings first")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Open the window and return its exit code when it is closed."""
+    return open_window(args, rig=args.rig, twin=None)
+
+
+def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice | None) -> int:
+    """Run the app: on `rig`, on the simulated rig `twin`, on the engine that runs already, or on the first page.
+
+    Returns 0 when the window was closed. Everything that the app started has ended then.
+    """
+    choose_gl_platform()
+    cap_software_gl()
+    give_way()
+    from PySide6.QtWidgets import QApplication
+
+    from rhot_app.ui.controller import Controller
+    from rhot_app.ui.keys import SpaceKeeper
+    from rhot_app.ui.main_window import MainWindow
+    from rhot_app.ui.scene.surface import choose_format
+    from rhot_app.ui.settings import Settings
+    from rhot_app.ui.theme import apply_theme, scheme_named
+
+    session = Session(args.directory)
+    settings = Settings(args.settings)
+    if args.reset:
+        settings.reset()
+    app = QApplication.instance() or QApplication(sys.argv[:1])
+    assert isinstance(app, QApplication)
+    app.setApplicationName("RHOT")
+    choose_format()
+    apply_theme(app, scheme_named(settings.scheme))
+    keeper = SpaceKeeper(app)
+    app.installEventFilter(keeper)
+    controller = Controller(session, session.client)
+    window = MainWindow(controller, settings)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: window.close())
+    window.show()
+    if twin is not None:
+        window.open_twin(twin)
+    elif rig is not None:
+        window.open_rig(rig)
+    elif session.found():
+        controller.attach()
+    code = app.exec()
+    left_running = controller.shut_down()
+    if left_running:
+        print(left_running)
+    return int(code)

@@ -1,0 +1,28 @@
+"""``rhot demo``: the app on the simulated rig, tracking at once."""
+
+from __future__ import annotations
+
+import argparse
+
+from rhot_app.errors import SimulatorError
+from rhot_app.ui.app import add_window_arguments, open_window
+from rhot_app.ui.backend.session import TwinChoice
+from rhot_app.ui.models.motions import shipped_motions
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot demo``."""
+    names = ", ".join(info.name for info in shipped_motions())
+    parser.add_argument("--motion", default=TwinChoice().motion, metavar="M",
+                        help=f"what the hand does: {names} (default {TwinChoice().motion})")
+    parser.add_argument("--seed", type=int, default=TwinChoice().seed, metavar="N",
+                        help=f"seed of noise, clocks and cloth (default {TwinChoice().seed})")
+    add_window_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Open the window; raises SimulatorError for a motion that there is not."""
+    names = [info.name for info in shipped_motions()]
+    if args.motion not in names:
+        raise SimulatorError(f"There is no motion {args.motion!r}; there are {', '.join(names)}.")
+    return open_window(args, rig=None, twin=TwinChoice(motion=args.motion, seed=args.seed))

@@ -1,0 +1,88 @@
+"""The operator's guide inside the app: pages of docs/guide, opened by F1 at the page of the panel in use."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QTextBrowser, QVBoxLayout, QWidget
+
+GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide"
+
+PAGES: tuple[tuple[str, str], ...] = (
+    ("start", "Getting started"), ("window", "The window"), ("nodes", "Nodes"), ("markers", "Markers"),
+    ("cameras", "Cameras"), ("hand", "The hand"), ("scene", "The scene"), ("plots", "The plots"),
+    ("calibration", "Calibration files"), ("recording", "Recording"), ("troubles", "When something is wrong"),
+    ("keys", "Keys"),
+)
+"""Name of each page's file and its title, in reading order."""
+
+
+def page_path(name: str) -> Path:
+    """Where a page's text stands."""
+    return GUIDE / f"{name}.md"
+
+
+def page_of(widget: QWidget | None) -> str:
+    """The page that explains a widget: that of the nearest parent which names one, else the window's."""
+    while widget is not None:
+        name = widget.property("guide")
+        if isinstance(name, str) and name:
+            return name
+        widget = widget.parentWidget()
+    return "window"
+
+
+class GuideViewer(QDialog):
+    """A list of pages on the left, the page on the right. Stays open beside the window."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("RHOT guide")
+        self.resize(880, 640)
+        self.list = QListWidget()
+        self.list.setFixedWidth(210)
+        for name, title in PAGES:
+            item = QListWidgetItem(title)
+            item.setData(Qt.ItemDataRole.UserRole, name)
+            self.list.addItem(item)
+        self.browser = QTextBrowser()
+        self.browser.setOpenLinks(False)
+        self.browser.document().setDocumentMargin(16)
+        self.browser.anchorClicked.connect(self._follow)
+        self.list.currentItemChanged.connect(self._show_current)
+        layout = QHBoxLayout()
+        layout.addWidget(self.list)
+        layout.addWidget(self.browser, 1)
+        outer = QVBoxLayout(self)
+        outer.addLayout(layout)
+        QShortcut(QKeySequence("F1"), self, self.close)
+
+    def open_page(self, name: str) -> None:
+        """Show a page and bring the viewer to the front."""
+        names = [page for page, _ in PAGES]
+        self.list.setCurrentRow(names.index(name) if name in names else 0)
+        self.show()
+        self.raise_()
+        self.activateWindow()
+
+    @property
+    def page(self) -> str:
+        """Name of the page shown."""
+        item = self.list.currentItem()
+        return str(item.data(Qt.ItemDataRole.UserRole)) if item is not None else ""
+
+    def _show_current(self) -> None:
+        path = page_path(self.page)
+        try:
+            text = path.read_text(encoding="utf-8")
+        except OSError:
+            text = f"The guide's pages are not installed here ({path}). They are in the project's docs/guide folder."
+        self.browser.setMarkdown(text)
+
+    def _follow(self, url: QUrl) -> None:
+        """Links between pages stay in the viewer; others are left to the reader's own browser."""
+        target = Path(url.path())
+        if url.isRelative() and target.suffix == ".md":
+            self.open_page(target.stem)

@@ -1,0 +1,303 @@
+"""The window: toolbar, docks, scene, sentences at the bottom. A timer pulls from the controller and shows."""
+
+from __future__ import annotations
+
+import time
+from datetime import datetime
+from pathlib import Path
+
+from platformdirs import user_documents_path
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QAction, QCloseEvent
+from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QStackedWidget, QToolBar
+
+from rhot_app.ui.actions import Actions, MainToolBar
+from rhot_app.ui.backend.session import TwinChoice
+from rhot_app.ui.controller import Controller
+from rhot_app.ui.docks import Docks
+from rhot_app.ui.guide import GuideViewer, page_of
+from rhot_app.ui.models.rows import bytes_text
+from rhot_app.ui.nodes_dialog import NodesDialog
+from rhot_app.ui.panels.advice_bar import AdviceBar, Notice
+from rhot_app.ui.rig_dialog import RigDialog
+from rhot_app.ui.screen import Screen
+from rhot_app.ui.settings import Settings
+from rhot_app.ui.theme import apply_theme, scheme_named
+from rhot_app.ui.welcome import WelcomePage
+
+TICK_MS = 16
+FAILURE_S = 15.0
+LOG_SUFFIX = ".rhotlog"
+_SIZE = (1280, 800)
+
+
+class MainWindow(QMainWindow):
+    """`controller` does, this shows. `tick` is one turn of the timer, so that tests can turn by hand."""
+
+    def __init__(self, controller: Controller, settings: Settings) -> None:
+        super().__init__()
+        self.controller = controller
+        self.settings = settings
+        self._scheme = scheme_named(settings.scheme)
+        self._failure: tuple[Notice, float] | None = None
+        self._buttons_shown: tuple[bool, bool] | None = None
+        self._guide: GuideViewer | None = None
+        self.setObjectName("main window")
+        self.setWindowTitle("RHOT")
+        self.screen_parts = Screen(self._scheme)
+        self.actions_ = Actions(self)
+        self.welcome = WelcomePage(settings.motion)
+        self.pages = QStackedWidget()
+        self.pages.addWidget(self.welcome)
+        self.pages.addWidget(self.screen_parts.scene)
+        self.setCentralWidget(self.pages)
+        self.docks = Docks(self)
+        self._add_docks()
+        self.toolbar = MainToolBar(self.actions_, self.docks.actions, self._scheme, self)
+        self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.toolbar)
+        self.advice = AdviceBar(self._scheme)
+        self._add_advice_bar()
+        self._connect_actions()
+        self._restore()
+        self._show_rig()
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start(TICK_MS)
+
+    # -- putting it together ---------------------------------------------------------------------------------------
+
+    def _add_docks(self) -> None:
+        parts = self.screen_parts
+        self.docks.add("Nodes", parts.nodes, "left", scroll=True)
+        self.docks.add("Markers", parts.markers, "left", scroll=True)
+        self.docks.add("Cameras", parts.cameras, "right")
+        self.docks.add("Hand", parts.hand, "right")
+        self.docks.add("Plots", parts.plots, "bottom", title=False)
+
+    def _add_advice_bar(self) -> None:
+        bar = QToolBar("Advice", self)
+        bar.setObjectName("advicebar")
+        bar.setMovable(False)
+        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+        bar.addWidget(self.advice)
+        self.addToolBar(Qt.ToolBarArea.BottomToolBarArea, bar)
+        bar.toggleViewAction().setVisible(False)
+
+    def _connect_actions(self) -> None:
+        a, c = self.actions_, self.controller
+        self.addActions(a.all())
+        self.addActions(self.docks.actions)
+        a.start.triggered.connect(c.start_or_stop)
+        a.record.triggered.connect(self.record_or_stop)
+        a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
+        a.open.triggered.connect(self.choose_rig)
+        a.find.triggered.connect(self.find_nodes)
+        a.close_rig.triggered.connect(c.close_rig)
+        a.quit.triggered.connect(self.close)
+        for action, page in ((a.cameras, "cameras"), (a.markers, "markers"), (a.hand, "hand")):
+            action.triggered.connect(lambda checked=False, page=page: self.show_rig_file(page))
+        a.files.triggered.connect(lambda: self.open_guide("calibration"))
+        a.frame.triggered.connect(self.screen_parts.scene.frame_hand)
+        a.home.triggered.connect(self.screen_parts.scene.reset_view)
+        a.names.toggled.connect(self._show_names)
+        a.clouds.toggled.connect(self._show_clouds)
+        a.alone.toggled.connect(lambda on: self.docks.put_away("scene alone", on))
+        a.dark.triggered.connect(lambda: self.set_scheme("dark"))
+        a.light.triggered.connect(lambda: self.set_scheme("light"))
+        a.reset.triggered.connect(self.reset_settings)
+        a.guide.triggered.connect(lambda: self.open_guide(page_of(QApplication.focusWidget())))
+        w = self.welcome
+        w.twin_asked.connect(self.open_twin)
+        w.file_asked.connect(self.choose_rig)
+        w.last_asked.connect(lambda: self.open_rig(Path(self.settings.last_rig)))
+        w.nodes_asked.connect(self.find_nodes)
+        w.cancel_asked.connect(c.cancel)
+        self.screen_parts.scene.start_button.clicked.connect(c.start)
+        self.advice.acted.connect(c.act)
+        c.rig_changed.connect(self._show_rig)
+        c.busy_changed.connect(self._show_busy)
+        c.failed.connect(self._show_failure)
+        self.docks.docks[2].visibilityChanged.connect(c.set_preview)
+
+    def _restore(self) -> None:
+        """Layout and switches as they were left."""
+        a, s = self.actions_, self.settings
+        (a.light if s.scheme == "light" else a.dark).setChecked(True)
+        a.names.setChecked(s.flag("names"))
+        a.clouds.setChecked(s.flag("clouds"))
+        self.screen_parts.scene.show_names(s.flag("names"))
+        self.screen_parts.scene.show_clouds(s.flag("clouds"))
+        self.resize(*_SIZE)
+        layout = s.layout()
+        self._fresh_layout = layout is None or not (self.restoreGeometry(layout[0]) and self.restoreState(layout[1]))
+        if self._fresh_layout:
+            self.docks.arrange()
+
+    # -- what the actions do ---------------------------------------------------------------------------------------
+
+    def open_twin(self, choice: TwinChoice) -> None:
+        """Start the simulated rig and the tracking."""
+        self.settings.motion = choice.motion
+        self.controller.open_twin(choice)
+
+    def choose_rig(self) -> None:
+        """Ask for a rig file and open it."""
+        last = Path(self.settings.last_rig)
+        start = str(last.parent) if self.settings.last_rig and last.parent.is_dir() else str(Path.home())
+        name, _ = QFileDialog.getOpenFileName(self, "Open a rig file", start, "Rig files (*.json);;All files (*)")
+        if name:
+            self.open_rig(Path(name))
+
+    def open_rig(self, path: Path) -> None:
+        """Open a rig file."""
+        self.controller.open_rig(path)
+
+    def find_nodes(self) -> None:
+        """Ask two nodes and open the rig file written for them."""
+        dialog = NodesDialog(self._scheme, self)
+        if dialog.exec() and dialog.rig_path is not None:
+            self.open_rig(dialog.rig_path)
+
+    def record_or_stop(self) -> None:
+        """Begin a log in the documents folder, named by date and time; or end it."""
+        if self.controller.recording:
+            self.controller.stop_recording()
+            return
+        folder = user_documents_path() / "RHOT"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as exc:
+            self._show_failure(f"{folder}: cannot be made ({exc.strerror}), so nothing is recorded.")
+            return
+        self.controller.record(folder / f"{datetime.now():%Y-%m-%d_%H-%M-%S}{LOG_SUFFIX}")
+
+    def show_rig_file(self, page: str) -> None:
+        """What the rig file says, to read."""
+        if self.controller.rig is not None:
+            dialog = RigDialog(self.controller.rig, page, self)
+            dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            dialog.open()
+
+    def open_guide(self, page: str) -> None:
+        """A page of the guide beside the window."""
+        if self._guide is None:
+            self._guide = GuideViewer(self)
+        self._guide.open_page(page)
+
+    @property
+    def guide_page(self) -> str:
+        """The page of the guide that is open, "" for none."""
+        return self._guide.page if self._guide is not None and self._guide.isVisible() else ""
+
+    def set_scheme(self, name: str) -> None:
+        """Dark or light."""
+        self.settings.scheme = name
+        self._scheme = scheme_named(name)
+        app = QApplication.instance()
+        if isinstance(app, QApplication):
+            apply_theme(app, self._scheme)
+        self.screen_parts.set_scheme(self._scheme)
+        self.advice.set_scheme(self._scheme)
+        self._buttons_shown = None
+        self._show_buttons()
+
+    def reset_settings(self) -> None:
+        """As on the first start: layout, switches, last rig."""
+        self.settings.reset()
+        self.actions_.alone.setChecked(False)
+        self.set_scheme(self.settings.scheme)
+        self._restore()
+        QTimer.singleShot(0, self.docks.set_sizes)
+        self._show_rig()
+
+    def _show_names(self, on: bool) -> None:
+        self.settings.set_flag("names", on)
+        self.screen_parts.scene.show_names(on)
+
+    def _show_clouds(self, on: bool) -> None:
+        self.settings.set_flag("clouds", on)
+        self.screen_parts.scene.show_clouds(on)
+
+    # -- showing ---------------------------------------------------------------------------------------------------
+
+    def tick(self) -> None:
+        """Pull and show."""
+        self.controller.step()
+        now = time.monotonic()
+        self.screen_parts.refresh(self.controller.live, now)
+        self._show_buttons()
+        status = self.controller.live.status
+        rate = status.state_rate_hz if status is not None and not self.controller.engine_gone else None
+        self.toolbar.badge.show_look(self.controller.look(), rate)
+        self.advice.show_notices(self._notices(now))
+
+    def _notices(self, now: float) -> list[Notice]:
+        notices = self.controller.notices()
+        if self._failure is not None:
+            if now < self._failure[1]:
+                notices = [self._failure[0], *(n for n in notices if n.text != self._failure[0].text)]
+            else:
+                self._failure = None
+        status = self.controller.live.status
+        if status is not None and status.log_path:
+            notices.append(Notice("info", f"Recording to {status.log_path} ({bytes_text(status.log_bytes)})."))
+        return notices or [Notice("info", self._quiet_sentence())]
+
+    def _quiet_sentence(self) -> str:
+        if self.controller.opened is None:
+            return "Choose how to begin. F1 opens the guide."
+        if not self.controller.running:
+            return "Press Start, or the space bar, to begin tracking."
+        return "Everything is in order."
+
+    def _show_buttons(self) -> None:
+        c, a = self.controller, self.actions_
+        shown = (c.running, c.recording)
+        if shown != self._buttons_shown:
+            self._buttons_shown = shown
+            self.toolbar.set_scheme(a, self._scheme, running=c.running, recording=c.recording)
+        usable = c.opened is not None and not c.engine_gone
+        self.screen_parts.scene.offer_start(usable and not c.running)
+        for action in (a.start, a.record):
+            if action.isEnabled() != usable:
+                action.setEnabled(usable)
+
+    def _show_rig(self) -> None:
+        rig, opened = self.controller.rig, self.controller.opened
+        self.screen_parts.show_rig(rig)
+        self.pages.setCurrentIndex(0 if rig is None else 1)
+        self.docks.put_away("no rig", rig is None)
+        if rig is not None and self._fresh_layout:
+            self._fresh_layout = False
+            QTimer.singleShot(0, self.docks.set_sizes)
+        self.toolbar.rig_label.setText(f"rig: {rig.name}  " if rig is not None else "")
+        self.toolbar.rig_label.setToolTip(opened.rig_path if opened is not None else "")
+        for action in self._rig_actions():
+            action.setEnabled(rig is not None)
+        if opened is not None and opened.rig_path and not opened.simulated:
+            self.settings.last_rig = opened.rig_path
+        last = Path(self.settings.last_rig)
+        self.welcome.show_last(last.name if self.settings.last_rig and last.exists() else "")
+
+    def _rig_actions(self) -> list[QAction]:
+        a = self.actions_
+        return [a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home, a.names, a.clouds]
+
+    def _show_busy(self) -> None:
+        if self.controller.opened is None:
+            self.welcome.show_busy(self.controller.busy)
+
+    def _show_failure(self, sentence: str) -> None:
+        self._failure = (Notice("error", sentence), time.monotonic() + FAILURE_S)
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """Remember the layout; `app.run` ends the processes once the window is gone."""
+        self._timer.stop()
+        self.actions_.alone.setChecked(False)
+        self.docks.put_away("no rig", False)
+        self.settings.set_layout(self.saveGeometry(), self.saveState())
+        self.settings.sync()
+        if self._guide is not None:
+            self._guide.close()
+        event.accept()

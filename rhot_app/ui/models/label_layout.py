@@ -1,0 +1,56 @@
+"""Where labels go so that they neither cover each other nor leave the picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A rectangle by its top-left corner and size, px."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def overlaps(self, other: Box) -> bool:
+        """Whether the two share any area."""
+        return (self.x < other.x + other.width and other.x < self.x + self.width
+                and self.y < other.y + other.height and other.y < self.y + self.height)
+
+    def inside(self, width: float, height: float) -> bool:
+        """Whether it lies wholly in a picture of that size."""
+        return self.x >= 0 and self.y >= 0 and self.x + self.width <= width and self.y + self.height <= height
+
+
+def place_labels(anchors: list[Point], sizes: list[Point], picture: Point, gap: float) -> list[Box]:
+    """A box for each label near its anchor, in order; earlier labels choose first.
+
+    Tried in turn: right, left, above, below, and the same farther away. When nothing is free the first choice is
+    taken, covered or not: a label in the wrong place would be worse.
+    """
+    placed: list[Box] = []
+    for (x, y), (width, height) in zip(anchors, sizes, strict=True):
+        choices = [box for far in (1.0, 2.0, 3.5) for box in _around(x, y, width, height, far * gap, height * (far - 1))]
+        free = (box for box in choices
+                if box.inside(*picture) and not any(box.overlaps(other) for other in placed))
+        placed.append(next(free, choices[0]))
+    return placed
+
+
+def _around(x: float, y: float, width: float, height: float, gap: float, rise: float) -> list[Box]:
+    middle = y - 0.5 * height
+    boxes = [Box(x + gap, middle, width, height), Box(x - gap - width, middle, width, height)]
+    if rise:
+        boxes += [Box(x + gap, middle + sign * rise, width, height) for sign in (-1, 1)]
+        boxes += [Box(x - gap - width, middle + sign * rise, width, height) for sign in (-1, 1)]
+    return [*boxes, Box(x - 0.5 * width, y - gap - height, width, height), Box(x - 0.5 * width, y + gap, width, height)]
+
+
+def unique_prefixes(names: tuple[str, ...]) -> list[str]:
+    """The shortest beginning of each name that no other name has: "t", "i", "m" … for pictures too small for names."""
+    return [next((name[:n] for n in range(1, len(name)) if sum(other.startswith(name[:n]) for other in names) == 1), name)
+            for name in names]

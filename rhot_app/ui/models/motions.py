@@ -1,0 +1,28 @@
+"""The motions that ship with the simulated hand, with a sentence each."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+from rhot_node.files import resource_path
+
+
+@dataclass(frozen=True, slots=True)
+class MotionInfo:
+    """Name as the simulator takes it, and what the hand does."""
+
+    name: str
+    description: str
+
+
+def shipped_motions() -> list[MotionInfo]:
+    """All motions of resources/motions, by name; one that cannot be read is left out."""
+    found = []
+    for path in sorted(resource_path("motions").glob("*.json")):
+        try:
+            document = json.loads(path.read_text())
+        except (OSError, ValueError):
+            continue
+        found.append(MotionInfo(path.stem, str(document.get("description", ""))))
+    return found

@@ -1,0 +1,156 @@
+"""Enter the addresses of two nodes, ask whether they are there, and write a first rig file for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QDialog,
+    QFileDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from rhot_app.errors import RhotError
+from rhot_app.project import save_rig
+from rhot_app.ui.backend.ping import NodeAddress, NodeAnswer, ask_nodes, first_rig
+from rhot_app.ui.job import Job
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.shapes import ShapeMark
+
+CONTROL_PORT = 47801
+SIDES = ("left", "right")
+
+
+class NodesDialog(QDialog):
+    """`rig_path` is the file written when the dialog was accepted."""
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Find nodes")
+        self.setProperty("guide", "nodes")
+        self._scheme = scheme
+        self._answers: list[NodeAnswer] = []
+        self._job: Job | None = None
+        self.rig_path: Path | None = None
+        intro = QLabel("Nodes are not discovered by themselves: enter the address of each Raspberry Pi. It stands on "
+                       "the node's console, or ask it with <b>hostname -I</b>. Left and right are as seen from behind "
+                       "the cameras.")
+        intro.setWordWrap(True)
+        intro.setTextFormat(Qt.TextFormat.RichText)
+        self.hosts, self.ports, self._marks, self.replies = [], [], [], []
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(8)
+        grid.setVerticalSpacing(8)
+        for row, side in enumerate(SIDES):
+            self._add_row(grid, row, side)
+        grid.setColumnStretch(4, 1)
+        self.ask_button = QPushButton("Ask the nodes")
+        self.ask_button.setDefault(True)
+        self.ask_button.clicked.connect(self.ask)
+        self.save_button = QPushButton("Write a rig file and open it …")
+        self.save_button.setEnabled(False)
+        self.save_button.setToolTip("Possible once both nodes have answered.")
+        self.save_button.clicked.connect(self._choose_file)
+        cancel = QPushButton("Cancel")
+        cancel.clicked.connect(self.reject)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.ask_button)
+        buttons.addStretch(1)
+        buttons.addWidget(cancel)
+        buttons.addWidget(self.save_button)
+        self.verdict = QLabel("")
+        self.verdict.setWordWrap(True)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(16)
+        layout.addWidget(intro)
+        layout.addLayout(grid)
+        layout.addWidget(self.verdict)
+        layout.addLayout(buttons)
+        self.resize(720, 260)
+
+    def _add_row(self, grid: QGridLayout, row: int, side: str) -> None:
+        host, port, mark, reply = QLineEdit(), QSpinBox(), ShapeMark(14), QLabel("not asked yet")
+        host.setPlaceholderText(f"192.168.1.{11 + row}")
+        host.setAccessibleName(f"Address of the {side} node")
+        host.setMinimumWidth(180)
+        host.textChanged.connect(self._forget_answers)
+        port.setRange(1, 65535)
+        port.setValue(CONTROL_PORT)
+        port.setToolTip("The node's control port; 47801 unless its settings say otherwise.")
+        port.setAccessibleName(f"Control port of the {side} node")
+        port.valueChanged.connect(self._forget_answers)
+        reply.setWordWrap(True)
+        reply.setProperty("muted", True)
+        mark.set_shape("square", self._scheme.neutral)
+        for column, widget in enumerate((QLabel(side), host, port, mark, reply)):
+            grid.addWidget(widget, row, column)
+        self.hosts.append(host)
+        self.ports.append(port)
+        self._marks.append(mark)
+        self.replies.append(reply)
+
+    def _forget_answers(self) -> None:
+        self._answers = []
+        self.save_button.setEnabled(False)
+
+    def addresses(self) -> list[NodeAddress]:
+        """What was entered."""
+        return [NodeAddress(host.text().strip() or host.placeholderText(), port.value())
+                for host, port in zip(self.hosts, self.ports, strict=True)]
+
+    def ask(self) -> None:
+        """Ask both addresses in a worker."""
+        if self._job is not None:
+            return
+        addresses = self.addresses()
+        self.ask_button.setEnabled(False)
+        for mark, reply in zip(self._marks, self.replies, strict=True):
+            mark.set_shape("ring", self._scheme.accent)
+            reply.setText("asking …")
+        self._job = Job(lambda progress: ask_nodes(addresses), self._show_answers, self._show_error, None, self).start()
+
+    def _show_answers(self, answers: list[NodeAnswer]) -> None:
+        self._job = None
+        self.ask_button.setEnabled(True)
+        self._answers = answers
+        for answer, mark, reply in zip(answers, self._marks, self.replies, strict=True):
+            if answer.found:
+                mark.set_shape("disc", self._scheme.good)
+                reply.setText(f"{answer.name} (id {answer.node_id}) answers; it is {answer.state}.")
+            else:
+                mark.set_shape("cross", self._scheme.bad)
+                reply.setText(answer.error)
+        both = all(answer.found for answer in answers)
+        self.save_button.setEnabled(both)
+        self.verdict.setText("Both nodes answer. The new rig starts with textbook lenses and a 75 mm baseline; calibrate "
+                             "before you trust millimetres." if both else "")
+
+    def _show_error(self, sentence: str) -> None:
+        self._job = None
+        self.ask_button.setEnabled(True)
+        self.verdict.setText(sentence)
+
+    def _choose_file(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(self, "Write the rig file", str(Path.home() / "rig.json"),
+                                              "Rig files (*.json)")
+        if name:
+            self.write(Path(name))
+
+    def write(self, path: Path) -> None:
+        """Write the rig and accept; a failure is shown and nothing is half-written."""
+        try:
+            save_rig(path, first_rig(self._answers))
+        except (RhotError, OSError) as exc:
+            self.verdict.setText(str(exc))
+            return
+        self.rig_path = path
+        self.accept()

@@ -1,0 +1,72 @@
+"""Processes that are none: what `rhot_app.ui.backend.session.Session` does, on a `FakeEngine`."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+from fake_engine import FakeClient, FakeEngine
+from rhot_app.errors import RigError
+from rhot_app.ui.backend.session import Opened, Report, TwinChoice
+
+
+class FakeBackend:
+    """Opens at once unless `gate` is held by a test; `calls` lists what was asked."""
+
+    def __init__(self, engine: FakeEngine | None = None) -> None:
+        self.engine = engine or FakeEngine(running=False)
+        self.calls: list[str] = []
+        self.already_running = False
+        self.ours = True
+        self.alive = True
+        self.refuse = ""
+        self.gate = threading.Event()
+        self.gate.set()
+
+    def client(self) -> FakeClient:
+        return FakeClient(self.engine)
+
+    def found(self) -> bool:
+        return self.already_running
+
+    def attach(self, report: Report) -> Opened:
+        self.calls.append("attach")
+        return self._opened("", simulated=False)
+
+    def open_rig(self, path: Path, report: Report) -> Opened:
+        self.calls.append(f"open {path.name}")
+        self._work(report)
+        return self._opened(str(path), simulated=False)
+
+    def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
+        self.calls.append(f"twin {choice.motion}")
+        self._work(report)
+        return self._opened("/tmp/simulated.rig.json", simulated=True)
+
+    def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
+        self.calls.append(f"restart start={start}")
+        self._work(report)
+        self.engine.dead = False
+        self.engine.running = start
+        return self._opened(path, simulated=True)
+
+    def twin_alive(self) -> bool:
+        return self.alive
+
+    def give_up(self) -> None:
+        self.calls.append("give up")
+        self.gate.set()
+
+    def close(self) -> str:
+        self.calls.append("close")
+        return "" if self.ours else "The engine was not started by this app and goes on running."
+
+    def _work(self, report: Report) -> None:
+        report("Starting the engine …", 0.4)
+        self.gate.wait(10.0)
+        if self.refuse:
+            raise RigError(self.refuse)
+        report("Asking the engine for its rig …", 0.9)
+
+    def _opened(self, path: str, *, simulated: bool) -> Opened:
+        return Opened(self.engine.rig, path, self.engine.running, self.ours, simulated)
