@@ -55,13 +55,10 @@ def _run(arguments: list[str]) -> int:
         room = commands.add_parser(key, help=subcommand.summary, description=f"{subcommand.summary.capitalize()}.")
         if subcommand is chosen:  # only this one's room is imported: help stays fast
             _load(subcommand.module).add_arguments(room)
-    app = _load(APP) if chosen is None and not {"-h", "--help", "--version"} & set(arguments) else None
-    if app is not None:
-        app.add_arguments(parser)
-    args = parser.parse_args(arguments)
-    module = app if chosen is None else _load(chosen.module)
-    assert module is not None
-    return int(module.run(args))
+    module = _load(APP if chosen is None else chosen.module)
+    if chosen is None:
+        module.add_arguments(parser)
+    return int(module.run(parser.parse_args(arguments)))
 
 
 def _load(name: str) -> ModuleType:

@@ -23,8 +23,8 @@ from rhot_app.engine.directory import EngineDirectory, lock_holder, open_directo
 from rhot_app.errors import EngineError
 from rhot_node.files import write_document
 
-START_TIMEOUT_S = 60.0
-"""The first start of all compiles the tracker; later ones take about two seconds."""
+START_TIMEOUT_S = 240.0
+"""The first start of all compiles the tracker, on a slow or busy machine for minutes; later ones take seconds."""
 
 _END_TIMEOUT_S = 3.0
 

@@ -25,7 +25,7 @@ try:
     main({arguments!r})
 except SystemExit as exit:
     assert not exit.code, exit.code
-heavy = sorted({{"numba", "cv2", "scipy", "zmq", "PySide6"}} & set(sys.modules))
+heavy = sorted({{"numba", "cv2", "scipy", "PySide6"}} & set(sys.modules))
 assert not heavy, heavy
 """
 
