@@ -25,6 +25,11 @@ SLOPE_PIXELS = 9  # interior pixels that a shading slope is fitted to at least
 # Kinds of pixels in the scratch plane `kind`.
 OUTSIDE, INTERIOR, HOLE, EDGE, RIM, _REACHED = range(6)
 
+# Columns of what `_look_around` finds: the paint's colour, and mean and covariance of the surroundings.
+PAINT, MEAN, C00, C11, C22, C10, C20, C21 = 0, 3, 6, 7, 8, 9, 10, 11
+NEAR_COLUMNS = 12
+SUM_COLUMNS = 16  # of the summed-area table, see `_sum_areas`
+
 
 @njit(cache=True)
 def classify(region, own, mask, kind, stack):
@@ -40,7 +45,8 @@ def classify(region, own, mask, kind, stack):
             inside = number >= 2 and own[number - 2]
             kind[row, column] = INTERIOR if inside else OUTSIDE
             area += 1 if inside else 0
-    _fill_holes(region, area, kind, stack)
+    if _has_holes(region, np.sum(own), kind):
+        _fill_holes(region, area, kind, stack)
     interior = area
     height, width = kind.shape
     for row in range(y0, y1 + 1):
@@ -60,6 +66,27 @@ def classify(region, own, mask, kind, stack):
                         if kind[near_y, near_x] == OUTSIDE:
                             kind[near_y, near_x] = RIM
     return area, interior
+
+
+@njit(cache=True)
+def _has_holes(region, pieces, kind):
+    """Does the interior enclose outside? By the Euler number of `pieces` 8-connected pieces, from its 2x2 patterns."""
+    x0, x1, y0, y1 = region
+    quads = 0  # four times the Euler number
+    for row in range(y0 - 1, y1 + 1):
+        for column in range(x0 - 1, x1 + 1):
+            a = row >= y0 and column >= x0 and kind[row, column] == INTERIOR
+            b = row >= y0 and column < x1 and kind[row, column + 1] == INTERIOR
+            c = row < y1 and column >= x0 and kind[row + 1, column] == INTERIOR
+            d = row < y1 and column < x1 and kind[row + 1, column + 1] == INTERIOR
+            count = a + b + c + d
+            if count == 1:
+                quads += 1
+            elif count == 3:
+                quads -= 1
+            elif count == 2 and a == d:
+                quads -= 2
+    return quads < 4 * pieces
 
 
 @njit(cache=True)
@@ -100,17 +127,19 @@ def _fill_holes(region, area, kind, stack):
 
 
 @njit(cache=True)
-def unmix(y, u, v, region, level, kind, colour, coverage, gain):
+def unmix(y, u, v, region, level, kind, colour, sums, coverage, gain):
     """Write `coverage` and its noise `gain` (d coverage / d grey level, 0 where it is fixed) over `region`.
 
-    `colour` is scratch, (3, ...) of the chroma planes' size: mean luma and chroma of the region's pixels.
+    Scratch: `colour`, (..., 3) of the chroma planes' size, mean luma and chroma of the region's pixels; `sums`, one
+    larger both ways and SUM_COLUMNS deep, their summed-area table.
     """
     _gather_colour(y, u, v, region, colour)
     paint = np.zeros((3, 3))  # per channel: mean, slope along x, slope along y
     origin = _paint_plane(region, kind, colour, paint)
     backdrop = np.zeros(3)
     _mean_outside(region, kind, colour, backdrop)
-    near_paint, near_backdrop, covariance = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    _sum_areas(region, kind, colour, backdrop, sums)
+    box, near = np.zeros(SUM_COLUMNS), np.zeros(NEAR_COLUMNS)
     contrast, weight = np.zeros(3), np.zeros(3)
     x0, x1, y0, y1 = region
     for row in range(y0, y1 + 1):
@@ -123,17 +152,16 @@ def unmix(y, u, v, region, level, kind, colour, coverage, gain):
             if code in (INTERIOR, HOLE):
                 coverage[row, column] = 1.0
                 continue
-            _local_paint(row, column, region, kind, colour, paint, origin, near_paint)
-            _local_backdrop(row, column, region, kind, colour, backdrop, near_backdrop, covariance)
+            _look_around(row, column, region, sums, paint, origin, backdrop, box, near)
             for channel in range(3):
-                contrast[channel] = near_paint[channel] - near_backdrop[channel]
-            slope = _least_noise(contrast, covariance, weight)
+                contrast[channel] = near[PAINT + channel] - near[MEAN + channel]
+            slope = _least_noise(contrast, near, weight)
             if slope > 1.0 / (CONTRAST_MIN * level):
                 coverage[row, column] = 1.0 if code == EDGE else 0.0
                 continue
             value = 0.0
             for channel in range(3):
-                value += weight[channel] * (colour[channel, row, column] - near_backdrop[channel])
+                value += weight[channel] * (colour[row, column, channel] - near[MEAN + channel])
             coverage[row, column] = min(max(value, -CLIP), 1.0 + CLIP)
             gain[row, column] = slope
 
@@ -145,9 +173,9 @@ def _gather_colour(y, u, v, region, colour):
         for column in range(x0, x1 + 1):
             total = (np.int64(y[2 * row, 2 * column]) + np.int64(y[2 * row, 2 * column + 1])
                      + np.int64(y[2 * row + 1, 2 * column]) + np.int64(y[2 * row + 1, 2 * column + 1]))
-            colour[0, row, column] = 0.25 * total
-            colour[1, row, column] = u[row, column]
-            colour[2, row, column] = v[row, column]
+            colour[row, column, 0] = 0.25 * total
+            colour[row, column, 1] = u[row, column]
+            colour[row, column, 2] = v[row, column]
 
 
 @njit(cache=True)
@@ -178,7 +206,7 @@ def _paint_plane(region, kind, colour, paint):
                 center_x += column
                 center_y += row
                 for channel in range(3):
-                    paint[channel, 0] += colour[channel, row, column]
+                    paint[channel, 0] += colour[row, column, channel]
     center_x /= count
     center_y /= count
     paint[:, 0] /= count
@@ -200,8 +228,8 @@ def _paint_slopes(region, kind, colour, paint, center_x, center_y):
                 s_xy += dx * dy
                 s_yy += dy * dy
                 for channel in range(3):
-                    c_x[channel] += dx * (colour[channel, row, column] - paint[channel, 0])
-                    c_y[channel] += dy * (colour[channel, row, column] - paint[channel, 0])
+                    c_x[channel] += dx * (colour[row, column, channel] - paint[channel, 0])
+                    c_y[channel] += dy * (colour[row, column, channel] - paint[channel, 0])
     determinant = s_xx * s_yy - s_xy * s_xy
     if determinant > 0.01 * s_xx * s_yy:
         for channel in range(3):
@@ -211,7 +239,7 @@ def _paint_slopes(region, kind, colour, paint, center_x, center_y):
 
 @njit(cache=True)
 def _magnitude(colour, row, column):
-    return np.hypot(colour[1, row, column] - 128.0, colour[2, row, column] - 128.0)
+    return np.hypot(colour[row, column, 1] - 128.0, colour[row, column, 2] - 128.0)
 
 
 @njit(cache=True)
@@ -224,70 +252,87 @@ def _mean_outside(region, kind, colour, mean):
             if kind[row, column] == OUTSIDE:
                 count += 1
                 for channel in range(3):
-                    mean[channel] += colour[channel, row, column]
+                    mean[channel] += colour[row, column, channel]
     for channel in range(3):
         mean[channel] = mean[channel] / count if count > 0 else 128.0
 
 
 @njit(cache=True)
-def _local_paint(row, column, region, kind, colour, paint, origin, out):
-    """The paint's colour at a pixel: mean of the interior nearby, carried there along the marker's overall slopes."""
+def _sum_areas(region, kind, colour, backdrop, sums):
+    """Summed-area table of the interior's places and colours and of the surroundings' colours and their products.
+
+    Row and column 0 are zero; the surroundings count from their overall mean, which keeps products small.
+    """
     x0, x1, y0, y1 = region
-    out[:] = 0.0
-    count = 0
-    from_x = from_y = 0
-    for near_y in range(max(row - REACH, y0), min(row + REACH, y1) + 1):
-        for near_x in range(max(column - REACH, x0), min(column + REACH, x1) + 1):
-            if kind[near_y, near_x] == INTERIOR:
-                count += 1
-                from_x += near_x
-                from_y += near_y
-                for channel in range(3):
-                    out[channel] += colour[channel, near_y, near_x]
-    dx = column - (from_x / count if count > 0 else origin[0])
-    dy = row - (from_y / count if count > 0 else origin[1])
+    line = np.zeros(SUM_COLUMNS)
+    sums[0, :x1 - x0 + 2] = 0.0
+    for row in range(y0, y1 + 1):
+        line[:] = 0.0
+        sums[row - y0 + 1, 0] = 0.0
+        for column in range(x0, x1 + 1):
+            code = kind[row, column]
+            if code == INTERIOR:
+                line[0] += 1.0
+                line[1] += column
+                line[2] += row
+                line[3] += colour[row, column, 0]
+                line[4] += colour[row, column, 1]
+                line[5] += colour[row, column, 2]
+            elif code == OUTSIDE:
+                d0 = colour[row, column, 0] - backdrop[0]
+                d1 = colour[row, column, 1] - backdrop[1]
+                d2 = colour[row, column, 2] - backdrop[2]
+                line[6] += 1.0
+                line[7] += d0
+                line[8] += d1
+                line[9] += d2
+                line[10] += d0 * d0
+                line[11] += d1 * d1
+                line[12] += d2 * d2
+                line[13] += d1 * d0
+                line[14] += d2 * d0
+                line[15] += d2 * d1
+            for k in range(SUM_COLUMNS):
+                sums[row - y0 + 1, column - x0 + 1, k] = sums[row - y0, column - x0 + 1, k] + line[k]
+
+
+@njit(cache=True)
+def _look_around(row, column, region, sums, paint, origin, backdrop, box, near):
+    """Fill `near` with the paint's colour at a pixel, and mean and covariance of the surroundings near it.
+
+    The paint is the mean of the interior nearby, carried here along the marker's overall slopes. Scratch: `box`.
+    """
+    x0, x1, y0, y1 = region
+    top, bottom = max(row - REACH, y0) - y0, min(row + REACH, y1) - y0 + 1
+    left, right = max(column - REACH, x0) - x0, min(column + REACH, x1) - x0 + 1
+    for k in range(SUM_COLUMNS):
+        box[k] = sums[bottom, right, k] - sums[top, right, k] - sums[bottom, left, k] + sums[top, left, k]
+    if box[0] > 0.5:
+        dx, dy = column - box[1] / box[0], row - box[2] / box[0]
+        for channel in range(3):
+            near[PAINT + channel] = box[3 + channel] / box[0]
+    else:
+        dx, dy = column - origin[0], row - origin[1]
+        for channel in range(3):
+            near[PAINT + channel] = paint[channel, 0]
     for channel in range(3):
-        mean = out[channel] / count if count > 0 else paint[channel, 0]
-        out[channel] = mean + paint[channel, 1] * dx + paint[channel, 2] * dy
+        near[PAINT + channel] += paint[channel, 1] * dx + paint[channel, 2] * dy
+    n = max(box[6], 1.0)
+    m0, m1, m2 = box[7] / n, box[8] / n, box[9] / n
+    near[MEAN], near[MEAN + 1], near[MEAN + 2] = backdrop[0] + m0, backdrop[1] + m1, backdrop[2] + m2
+    near[C00], near[C11], near[C22] = box[10] / n - m0 * m0, box[11] / n - m1 * m1, box[12] / n - m2 * m2
+    near[C10], near[C20], near[C21] = box[13] / n - m1 * m0, box[14] / n - m2 * m0, box[15] / n - m2 * m1
 
 
 @njit(cache=True)
-def _local_backdrop(row, column, region, kind, colour, fallback, mean, covariance):
-    """Mean and covariance of the surroundings near a pixel."""
-    x0, x1, y0, y1 = region
-    mean[:] = 0.0
-    covariance[:] = 0.0
-    count = 0
-    for near_y in range(max(row - REACH, y0), min(row + REACH, y1) + 1):
-        for near_x in range(max(column - REACH, x0), min(column + REACH, x1) + 1):
-            if kind[near_y, near_x] == OUTSIDE:
-                count += 1
-                for i in range(3):
-                    di = colour[i, near_y, near_x] - fallback[i]
-                    mean[i] += di
-                    for j in range(i + 1):
-                        covariance[i, j] += di * (colour[j, near_y, near_x] - fallback[j])
-    n = max(count, 1)
-    for i in range(3):
-        mean[i] /= n
-    for i in range(3):
-        for j in range(i + 1):
-            covariance[i, j] = covariance[i, j] / n - mean[i] * mean[j]
-            covariance[j, i] = covariance[i, j]
-    for i in range(3):
-        mean[i] += fallback[i]
-
-
-@njit(cache=True)
-def _least_noise(contrast, covariance, weight):
+def _least_noise(contrast, near, weight):
     """Weights w with w.contrast = 1 that let the least of the surroundings' variation through; returns |w|.
 
     w = S^-1 d / (d' S^-1 d), S = covariance + FLATNESS I.
     """
-    s = covariance
-    a, b, c = s[0, 0] + FLATNESS, s[1, 1] + FLATNESS, s[2, 2] + FLATNESS
-    d, e, f = s[1, 0], s[2, 0], s[2, 1]
-    x, y, z = contrast
+    a, b, c = near[C00] + FLATNESS, near[C11] + FLATNESS, near[C22] + FLATNESS
+    d, e, f = near[C10], near[C20], near[C21]
+    x, y, z = contrast[0], contrast[1], contrast[2]
     weight[0] = (b * c - f * f) * x + (e * f - d * c) * y + (d * f - e * b) * z
     weight[1] = (e * f - d * c) * x + (a * c - e * e) * y + (d * e - a * f) * z
     weight[2] = (d * f - e * b) * x + (d * e - a * f) * y + (a * b - d * d) * z

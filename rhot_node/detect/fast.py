@@ -55,7 +55,7 @@ class FastDetector:
         lost = []
         for index, track in enumerate(self._tracks):
             if track.alive and self._measure(image, index, track.request(self._request)):
-                found[index] = track.observe(index, self._row, self._noise, MarkerFlag(0))
+                found[index] = track.observe(index, self._row.tolist(), self._noise, MarkerFlag(0))
             else:
                 lost.append(index)
         if lost:
@@ -71,7 +71,7 @@ class FastDetector:
             own = []
             for blob in blobs[blobs[:, LABEL] == index + 1]:
                 if self._measure(image, index, self._blob_request(index, blob)):
-                    own.append(Track(marker.shape).observe(index, self._row, self._noise, MarkerFlag.ACQUIRED))
+                    own.append(Track(marker.shape).observe(index, self._row.tolist(), self._noise, MarkerFlag.ACQUIRED))
             everything.append(sorted(own, key=lambda seen: -seen.diameter))
         return everything
 
@@ -104,7 +104,7 @@ class FastDetector:
             for blob in ranked[:CANDIDATES]:
                 if self._measure(image, index, self._blob_request(index, blob)):
                     self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
-                    found[index] = track.observe(index, self._row, self._noise, flags)
+                    found[index] = track.observe(index, self._row.tolist(), self._noise, flags)
                     break
             else:
                 track.lose()

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rhot_node.detect.coverage import PAD, chroma_noise, classify, unmix
+from rhot_node.detect.coverage import PAD, SUM_COLUMNS, chroma_noise, classify, unmix
 from rhot_node.detect.position import RESULT_COLUMNS, band_center, centroid
 from rhot_node.detect.window import (
     AREA,
@@ -46,7 +46,8 @@ class Scratch:
     def __init__(self, height: int, width: int) -> None:
         self.mask = np.zeros((height, width), dtype=np.int16)
         self.kind = np.zeros((height, width), dtype=np.uint8)
-        self.colour = np.zeros((3, height, width), dtype=np.float32)
+        self.colour = np.zeros((height, width, 3), dtype=np.float32)
+        self.sums = np.zeros((height + 1, width + 1, SUM_COLUMNS))
         self.coverage = np.zeros((height, width), dtype=np.float32)
         self.gain = np.zeros((height, width), dtype=np.float32)
         self.stack = np.zeros(height * width, dtype=np.int32)
@@ -56,15 +57,17 @@ class Scratch:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         """In the order `measure` takes them."""
-        return self.mask, self.kind, self.colour, self.coverage, self.gain, self.stack, self.components, self.own
+        return (self.mask, self.kind, self.colour, self.sums, self.coverage, self.gain, self.stack, self.components,
+                self.own)
 
 
 @njit(cache=True)
 def measure(y, u, v, sector, label, direction, request, scratch, result):
     """Fill `result` (MEASURE_COLUMNS) for the marker `label`; False when the window does not show it."""
-    mask, _kind, _colour, _coverage, _gain, stack, components, own = scratch
+    mask, _kind, _colour, _sums, _coverage, _gain, stack, components, own = scratch
     level = request[LEVEL_REF]
     half_x, half_y = request[HALF_X], request[HALF_Y]
+    own[:] = False
     found = False
     for attempt in range(ATTEMPTS):
         window = _clamp(request[PX] - half_x, request[PX] + half_x, request[PY] - half_y, request[PY] + half_y, u)
@@ -96,7 +99,7 @@ def measure(y, u, v, sector, label, direction, request, scratch, result):
 @njit(cache=True)
 def _place(y, u, v, window, count, level, request, scratch, result):
     """Coverage, position and noise of the components marked in `own`."""
-    mask, kind, colour, coverage, gain, stack, components, own = scratch
+    mask, kind, colour, sums, coverage, gain, stack, components, own = scratch
     x0 = y0 = 1e9
     x1 = y1 = -1.0
     for number in range(count):
@@ -108,7 +111,7 @@ def _place(y, u, v, window, count, level, request, scratch, result):
     area, interior = classify(region, own, mask, kind, stack)
     if interior == 0 and area >= SEAM:
         return False
-    unmix(y, u, v, region, level, kind, colour, coverage, gain)
+    unmix(y, u, v, region, level, kind, colour, sums, coverage, gain)
     if not centroid(region, coverage, gain, result):
         return False
     at_border = x0 == 0 or y0 == 0 or x1 == u.shape[1] - 1 or y1 == u.shape[0] - 1

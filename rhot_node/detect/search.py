@@ -51,7 +51,7 @@ def label_runs(y, u, v, table, wanted, luma_limits, runs):
         row_start = count
         current = 0
         for column in range(width):
-            label = np.int64(table[u[row, column], v[row, column]])
+            label = int(table[u[row, column], v[row, column]])
             if label != 0:
                 if not wanted[label]:
                     label = 0

@@ -13,7 +13,7 @@ from rhot_node.detect import position as p
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
-Row = NDArray[np.float64]
+Row = list[float]
 
 MEMORY_FRAMES = 40  # how long a lost marker's motion and size are held against candidates
 VELOCITY_GAIN = 0.7
@@ -54,7 +54,7 @@ class Track:
         """Is the last sight recent enough to judge candidates by?"""
         return self.missed < MEMORY_FRAMES
 
-    def request(self, out: Row) -> Row:
+    def request(self, out: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where to look in the next frame: constant velocity, with a margin that grows with speed and size."""
         speed = math.hypot(self.vx, self.vy)
         half = 0.5 * self.extent + MARGIN + 0.15 * self.extent + 0.75 * speed
@@ -89,7 +89,7 @@ class Track:
         ratio = row[p.AREA] / self.area if known else 1.0
         extent = math.sqrt(12.0 * row[p.VAR_MAJOR])
         flags |= self._judge(row, ratio, known)
-        x, y = float(row[p.X]), float(row[p.Y])
+        x, y = row[p.X], row[p.Y]
         bias = self._plausible_bias(row, ratio, extent, flags)
         if self.shape == "band" and not row[p.FIT]:
             x, y = x - self.sag_x, y - self.sag_y
@@ -130,13 +130,13 @@ class Track:
             self.vy += gain * ((y - self.y) / gap - self.vy)
         else:
             self.vx = self.vy = 0.0
-        self.x, self.y, self.level = x, y, float(row[m.LEVEL])
+        self.x, self.y, self.level = x, y, row[m.LEVEL]
         if not known:
-            self.area, self.extent = float(row[p.AREA]), extent
+            self.area, self.extent = row[p.AREA], extent
         elif flags & (MarkerFlag.PARTIAL | MarkerFlag.EDGE) and ratio < 1.0:
             self.area *= HIDDEN_DECAY
         else:
-            self.area += REFERENCE_GAIN * (float(row[p.AREA]) - self.area)
+            self.area += REFERENCE_GAIN * (row[p.AREA] - self.area)
             self.extent = extent
         if not known:
             self.fitted, self.sag_x, self.sag_y = False, 0.0, 0.0
@@ -151,7 +151,7 @@ def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: f
     scale = CHROMA_TO_LUMA**2 * NOISE_INFLATION * noise**2
     floor = BAND_FLOOR_VARIANCE if row[p.FIT] else FLOOR_VARIANCE
     widened = floor + (CHROMA_TO_LUMA * bias) ** 2
-    area = float(row[p.AREA])
+    area = row[p.AREA]
     quality = min(1.0, row[m.LEVEL] / (15.0 * noise)) * min(1.0, area / 12.0)
     if flags & MarkerFlag.PARTIAL:
         quality *= min(ratio, 0.8)
@@ -162,8 +162,8 @@ def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: f
     return MarkerObservation(
         index=index, x=CHROMA_TO_LUMA * x + SITING, y=CHROMA_TO_LUMA * y + SITING,
         diameter=CHROMA_TO_LUMA * math.sqrt(4.0 * area / math.pi),
-        cov_xx=scale * float(row[p.COV_XX]) + widened, cov_xy=scale * float(row[p.COV_XY]),
-        cov_yy=scale * float(row[p.COV_YY]) + widened, quality=float(quality), flags=flags)
+        cov_xx=scale * row[p.COV_XX] + widened, cov_xy=scale * row[p.COV_XY],
+        cov_yy=scale * row[p.COV_YY] + widened, quality=quality, flags=flags)
 
 
 def lost_observation(index: int) -> MarkerObservation:
