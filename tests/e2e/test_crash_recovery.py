@@ -96,6 +96,7 @@ def test_a_new_engine_takes_over_from_a_killed_one(running: Running) -> None:
 
 WATCHER = """
 import sys
+from pathlib import Path
 from rhot_app.engine.client import EngineClient
 with EngineClient(Path(sys.argv[1])) as client:
     while True:

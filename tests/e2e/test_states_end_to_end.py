@@ -59,7 +59,7 @@ def test_the_engine_knows_each_nodes_clock(bench: Bench) -> None:
         bench.start_node(index, f"yuv:{bench.folder / node.name}.yuv")
     bench.start_engine("--start")
     with EngineClient(bench.sockets) as client:
-        wait_until(client, lambda: client.state is not None, START_S, "the first state")
+        wait_until(client, lambda: client.status is not None and client.state is not None, START_S, "the first state")
         for name, offset_s in (("left", 1234.5), ("right", -77.25)):
             status = node_status(client, name)
             assert status is not None

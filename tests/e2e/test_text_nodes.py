@@ -73,4 +73,5 @@ def test_a_rig_that_does_not_allow_text_ignores_it(bench: Bench) -> None:
         states = send_for(bench, client, Scene(bench.rig).markers_m(0.0), 1.0)
         assert not any((state.marker_knowledge == Knowledge.MEASURED).any() for state in states)
         assert client.status is not None
-        assert all(node.received == 0 and sum(node.dropped.values()) > 0 for node in client.status.nodes)
+        for node in client.status.nodes:
+            assert sum(node.dropped.values()) > 0.9 * RATE_HZ, node
