@@ -19,8 +19,8 @@ from rhot_app.engine.status import EngineStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
 
-TIMEOUT_S = 4.0
-"""A still may take two seconds on a node whose camera has just stopped."""
+TIMEOUT_S = 2.7
+"""A still may take two seconds on a node whose camera has just stopped; a client waits for three."""
 
 _FAULT_PERIOD_S = 1.0
 _ATTACHMENT_NAMES = {"still": "png", "node": "data"}

@@ -91,6 +91,8 @@ class Pipeline:
         live = work.source.live
         now_ns = time.monotonic_ns()
         state = None
+        markers = work.last_seen_ns.shape[1]
+        frames = [frame for frame in frames if len(frame.pixels) == markers]  # some may be of the rig before
         for k, frame in enumerate(frames, start=1):
             work.tracker.ingest(frame)
             work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = now_ns

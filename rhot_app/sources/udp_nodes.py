@@ -66,9 +66,9 @@ class UdpNodes:
 
     def record_to(self, tap: Tap | None) -> None:
         """Tap all sockets; None ends it."""
+        self._commands.record_to(tap)  # first what is known of sessions and clocks: datagrams mean nothing before
         for link, receiver in zip(self.links, self.receivers, strict=True):
             receiver.tap = None if tap is None else _datagram_tap(tap, link.node.node_id)
-        self._commands.record_to(tap)
 
     def close(self) -> None:
         """Close all ports."""

@@ -182,6 +182,20 @@ def test_filter_change_keeps_the_session(rig: Rig, bench: Bench, nodes: list[Syn
     assert bench.trackers[-1].rig.filters == filters
 
 
+def test_fewer_markers_while_streaming(rig: Rig, bench: Bench, nodes: list[SyntheticNode]) -> None:
+    bench.engine.start()
+    bench.run_until(lambda: len(bench.published) > 3)
+    time.sleep(0.1)  # frames of the old marker set wait
+    fewer = msgspec.structs.replace(rig.markers, markers=rig.markers.markers[:4])
+    bench.engine.set_rig(msgspec.structs.replace(rig, markers=fewer))
+    bench.run_for(0.3)
+    assert bench.trackers[-1].ingested == []
+    bench.run_until(lambda: any("another marker set" in a.text for a in bench.engine.status().advice))
+    bench.engine.set_rig(rig)
+    count = len(bench.published)
+    bench.run_until(lambda: len(bench.published) > count + 3)
+
+
 def test_other_network_restarts_and_a_taken_port_keeps_the_old_rig(rig: Rig, bench: Bench,
                                                                    nodes: list[SyntheticNode]) -> None:
     session = bench.engine.start()
