@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import ctypes
 import gc
 import json
@@ -128,26 +129,23 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     store = SettingsStore(options.settings, settings)
     daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), make_detector,
                         camera_takes_settings=takes_settings(options.camera), loop=options.loop)
-    link = UdpLink(settings, clock, daemon.sessions, secrets.randbits(32), lambda: daemon.state)
-    try:
+    with contextlib.ExitStack() as stack:
+        stack.callback(daemon.close)
+        link = UdpLink(settings, clock, daemon.sessions, secrets.randbits(32), lambda: daemon.state)
+        stack.callback(link.close)
         control = ControlServer(settings)
-        try:
-            link.start()
-            daemon.prepare()
-            control.start(Responder(store, daemon.sessions, control.pictures, clock, daemon.report,
-                                    lambda: {**daemon.count(), **link.count()}))
-            gc.freeze()
-            width, height = daemon.size
-            print(json.dumps({"event": "ready", "node_id": settings.node_id, "name": settings.name,
-                              "udp_port": link.port, "control_port": control.control_port,
-                              "preview_port": control.preview_port, "width": width, "height": height}), flush=True)
-            while daemon.step(link, control.pictures) and not end.due():
-                pass
-        finally:
-            control.close()
-            daemon.close()
-    finally:
-        link.close()
+        stack.callback(control.close)
+        link.start()
+        daemon.prepare()
+        control.start(Responder(store, daemon.sessions, control.pictures, clock, daemon.report,
+                                lambda: {**daemon.count(), **link.count()}))
+        gc.freeze()
+        width, height = daemon.size
+        print(json.dumps({"event": "ready", "node_id": settings.node_id, "name": settings.name,
+                          "udp_port": link.port, "control_port": control.control_port,
+                          "preview_port": control.preview_port, "width": width, "height": height}), flush=True)
+        while daemon.step(link, control.pictures) and not end.due():
+            pass
 
 
 def make_detector(settings: NodeSettings) -> Detector:

@@ -122,7 +122,7 @@ class NodeDaemon:
             self._take_settings(self._store.current, pictures)
         self._show_state()
         if self._camera is None or self._detector is None:
-            self._reopen()
+            self._wait_to_reopen()
             return True
         try:
             frame = self._camera.read(READ_S)
@@ -181,20 +181,24 @@ class NodeDaemon:
         self._retry_s = time.monotonic() + REOPEN_S
         self._show_state()
 
-    def _reopen(self) -> None:
-        """Try to open the lost camera once a second. A session goes on where it was."""
+    def _wait_to_reopen(self) -> None:
+        """Try to open the lost camera once a second."""
         wait_s = self._retry_s - time.monotonic()
         if wait_s > 0:
             time.sleep(min(wait_s, READ_S))
-            return
+        else:
+            self._reopen()
+
+    def _reopen(self) -> None:
+        """Open the camera again; a session goes on where it was."""
         try:
             self._open()
         except CameraError as exc:
             self._message = str(exc)
             self._retry_s = time.monotonic() + REOPEN_S
-            return
-        if self._detector is not None:
-            self._detector.reset()
+        else:
+            if self._detector is not None:
+                self._detector.reset()
         self._show_state()
 
     def _begin_again(self, camera: Camera) -> bool:
@@ -210,9 +214,10 @@ class NodeDaemon:
         pictures.preview_hz = settings.preview_hz
         if (settings.detector, settings.markers) != (old.detector, old.markers):
             self._detector = self._make_detector(settings)
-        if settings.camera != old.camera and self._camera_takes_settings:
+        if settings.camera != old.camera and self._camera_takes_settings and self._camera is not None:
             self.close()
-            self._retry_s = 0.0
+            self._message = "the camera is being opened again with new settings"
+            self._reopen()
 
     def _show_state(self) -> None:
         state = self.state

@@ -198,7 +198,8 @@ def test_a_silent_master_ends_the_stream(tmp_path: Path) -> None:
     assert node.daemon.state is NodeState.READY and not node.sender.sent
 
 
-def test_settings_take_effect_between_two_frames(tmp_path: Path) -> None:
+def test_settings_take_effect_between_two_frames(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, logger="rhot_node.daemon")
     node = Node(tmp_path, range(9), range(9), range(9))
     node.daemon.prepare()
     node.step()
@@ -211,6 +212,26 @@ def test_settings_take_effect_between_two_frames(tmp_path: Path) -> None:
     node.store.change({"camera": {"gain": 2.0}})
     node.step(2)
     assert len(node.cameras) == 2 and node.cameras[0].closed
-    assert node.daemon.state is NodeState.READY
+    assert node.daemon.state is NodeState.READY and "fault" not in caplog.text
+
+
+def test_a_camera_that_does_not_open_with_new_settings_is_a_fault(tmp_path: Path, at_once: None) -> None:
+    node = Node(tmp_path, range(9), CameraError("no such mode"), CameraError("still no such mode"), range(9))
+    node.daemon.prepare()
+    node.store.change({"camera": {"fps": 1000}})
+    node.step()
+    assert node.cameras[0].closed and node.daemon.state is NodeState.FAULT
+    assert node.daemon.report()["message"] == "still no such mode"
+    node.step(2)
+    assert node.daemon.state is NodeState.READY and len(node.cameras) == 2
+
+
+def test_a_recording_is_not_opened_again_for_camera_settings(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(9))
+    node.daemon = NodeDaemon(node.store, node.clock, node._open, node._make_detector, camera_takes_settings=False)
+    node.daemon.prepare()
+    node.store.change({"camera": {"gain": 2.0}})
+    node.step(2)
+    assert len(node.cameras) == 1 and not node.cameras[0].closed
 
 
