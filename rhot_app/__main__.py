@@ -28,7 +28,7 @@ SUBCOMMANDS = {
     "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
-    "evaluate": Subcommand("rhot_app.engine.evaluate_command", "run twin nodes against the engine, compare with truth"),
+    "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "run twin nodes against the engine, compare with truth"),
 }
 
 

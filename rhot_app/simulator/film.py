@@ -10,7 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from typing import Final, Literal
 
+import msgspec
 import numpy as np
 
 from rhot_app.errors import SimulatorError
@@ -21,19 +23,40 @@ from rhot_app.simulator.body import HandBody, build_body
 from rhot_app.simulator.motion import Motion, load_motion
 from rhot_app.simulator.nodes import NodePorts
 from rhot_app.simulator.render import FrameRenderer, Optics, Shutter
-from rhot_app.simulator.scene import Scene, build_rig
+from rhot_app.simulator.scene import Scene, TwinSettings, build_rig, make_scene
 from rhot_app.simulator.truth import FrameTruth, save_truth, true_hand
 from rhot_node.capture.yuv import YuvWriter
-from rhot_node.files import write_atomically
+from rhot_node.files import read_document, write_document
 
 TRUTH_NAME = "truth.npz"
 RIG_NAME = "rig.json"
-README_NAME = "README.txt"
+SHOT_NAME = "shot.json"
+
+FORMAT: Final = "rhot-shot"
+VERSION: Final = 1
 
 Progress = Callable[[int, int], None]
 """Called with (frames done, frames in all)."""
 
 _REPORT_FRAMES = 8
+
+
+class ShotFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """``shot.json``: what a folder of frames shows."""
+
+    motion: str
+    seconds: float
+    seed: int
+    hidden: list[str]
+    settings: TwinSettings
+    format: Literal["rhot-shot"] = FORMAT
+    version: Literal[1] = VERSION
+
+
+def read_shot(folder: Path) -> tuple[ShotFile, Scene]:
+    """What was filmed into `folder`, and its scene. Raises SimulatorError when it holds no complete shot."""
+    shot = read_document(folder / SHOT_NAME, ShotFile, format_name=FORMAT, version=VERSION, error=SimulatorError)
+    return shot, make_scene(shot.settings, shot.seed)
 
 
 @dataclass(frozen=True)
@@ -68,7 +91,7 @@ def make_renderer(shot: Shot, index: int) -> FrameRenderer:
 
 
 def film(shot: Shot, folder: Path, progress: Progress | None = None) -> None:
-    """Render the shot into the new `folder`: one recording per camera, ``truth.npz``, ``rig.json``.
+    """Render the shot into the new `folder`: one recording per camera, ``truth.npz``, ``rig.json``, ``shot.json``.
 
     The folder appears only when all is complete; an interrupt or error leaves nothing behind. Raises SimulatorError.
     """
@@ -81,18 +104,12 @@ def film(shot: Shot, folder: Path, progress: Progress | None = None) -> None:
         cameras = _film_cameras(shot, work, progress)
         save_truth(work / TRUTH_NAME, true_hand(shot.motion, shot.body(), shot.seconds, cameras))
         save_rig(work / RIG_NAME, build_rig(shot.scene, (NodePorts(47800, 47801, 47802),) * len(cameras)))
-        write_atomically(work / README_NAME, _readme(shot).encode())
+        write_document(work / SHOT_NAME, ShotFile(shot.motion.name, shot.seconds, shot.scene.seed,
+                                                  sorted(shot.hidden), shot.scene.settings))
         work.chmod(0o755)
         work.replace(folder)
     finally:
         shutil.rmtree(work, ignore_errors=True)
-
-
-def _readme(shot: Shot) -> str:
-    names = ", ".join(f"yuv:{name}" for name in shot.scene.names)
-    return (f"Simulated: motion {shot.motion.name}, {shot.seconds:g} s, preset {shot.scene.settings.preset}, "
-            f"{shot.scene.settings.distance_m:g} m, seed {shot.scene.seed}.\n"
-            f"Cameras for rhot-node --camera: {names}. Truth: {TRUTH_NAME}. A perfect calibration: {RIG_NAME}.\n")
 
 
 def _film_cameras(shot: Shot, folder: Path, progress: Progress | None) -> tuple[FrameTruth, ...]:

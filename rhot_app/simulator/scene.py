@@ -76,7 +76,7 @@ def twin_defaults() -> TwinSettings:
 
 @dataclass(frozen=True, slots=True)
 class TwinClock:
-    """How one simulated node's clock disagrees with the master's."""
+    """How one simulated node's clock disagrees with the master's. Ahead only: a monotonic clock is never negative."""
 
     offset_s: float
     drift_ppm: float
@@ -149,7 +149,7 @@ def make_scene(settings: TwinSettings, seed: int) -> Scene:
         poses=(CameraPose(), CameraPose(translation_m=(1e-3 * settings.baseline_mm, 0.0, 0.0))),
         phases_s=tuple(float(phase) for phase in rng.uniform(0.0, 1.0 / preset.fps, 2)),
         clocks=tuple(TwinClock(float(offset), float(drift)) for offset, drift in zip(
-            rng.uniform(-3600.0 * hours, 3600.0 * hours, 2), rng.uniform(-ppm, ppm, 2), strict=True)),
+            rng.uniform(0.0, 3600.0 * hours, 2), rng.uniform(-ppm, ppm, 2), strict=True)),
         seed=seed,
     )
 
