@@ -1,37 +1,51 @@
-"""Loads every room once, so that a new installation compiles its numerical code now and not at the first frame.
+"""Compiles the numerical code once and leaves it in numba's cache, so that the first start is as quick as any other.
 
-``python -m rhot_app.warm`` does it and fails, with the reason, when an installed package does not work.
+``python -m rhot_app.warm`` does it after an installation; it fails, with the reason, when the installation is broken.
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
+import os
 import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
-import rhot_app
-import rhot_node
+from rhot_app.engine.warm_up import warm_up as rehearse_tracker
+from rhot_app.project import Rig, load_rig
+from rhot_app.tracking.make import make_tracker
+from rhot_node.detect.fast import FastDetector
+from rhot_node.files import resource_path
+from rhot_node.warm_up import warm_up as rehearse_detector
 
-WINDOW_ROOM = "rhot_app.ui"  # needs system libraries that a machine without a screen may lack
-COMMANDS = ("__main__",)
+
+def warm_detector(rig: Rig) -> None:
+    """Compile what a node does with a frame."""
+    camera = rig.nodes[0].intrinsics
+    rehearse_detector(FastDetector(rig.markers), rig.markers, (camera.width, camera.height))
 
 
-def load_rooms() -> list[str]:
-    """Import every module but the window's and the commands; returns their names. Raises ImportError."""
-    loaded = []
-    for package in (rhot_node, rhot_app):
-        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            name = module.name
-            if name.startswith(WINDOW_ROOM) or name.rpartition(".")[2] in COMMANDS:
-                continue
-            importlib.import_module(name)
-            loaded.append(name)
-    return loaded
+def warm_tracker(rig: Rig) -> None:
+    """Compile what the engine does with observations."""
+    rehearse_tracker(make_tracker(rig), rig)
+
+
+STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker}
+
+
+def warm(name: str) -> str:
+    """Take one of `STEPS` on the example rig; returns a line that says how long it took."""
+    begun = time.monotonic()
+    STEPS[name](load_rig(resource_path("rigs", "two_pis.json")))
+    return f"{name}: {time.monotonic() - begun:.1f} s"
 
 
 def main() -> int:
-    """Load all rooms; returns the exit code."""
-    print(f"{len(load_rooms())} modules loaded")
+    """Take all steps, side by side; returns the exit code."""
+    with ProcessPoolExecutor(min(len(STEPS), os.cpu_count() or 1), get_context("spawn")) as pool:
+        for line in pool.map(warm, STEPS):
+            print(line, flush=True)
     return 0
 
 

@@ -44,7 +44,7 @@ def documented_commands() -> list[tuple[str, str]]:
         lines = re.findall(r"^\s*(?:\$ )?((?:\.venv/bin/)?(?:rhot|rhot-node|\./run) [^\n]+)$", text, re.MULTILINE)
         for line in [*spans, *lines]:
             line = line.split("#")[0].removeprefix(".venv/bin/").strip()
-            if re.match(r"\./run (test|setup)\b", line):
+            if re.match(r"\./run (test|setup)\b|\S+ COMMAND", line):
                 continue
             found.append((path.name, line.replace("./run ", "rhot ")))
     return found
