@@ -2,8 +2,8 @@
 
     python benchmarks/flood.py [--rate 10000] [--seconds 10] [--json FILE]
 
-The sender is a process of its own on the same machine; the receiver has its thread and a consumer beside it, as in
-the engine. Prints a table; exits with 1 when a datagram was lost, refused or not counted.
+The sender is a process of its own on the same machine; the receiver has its thread, a consumer beside it and the
+engine's process settings. Prints a table; exits with 1 when a datagram was lost, refused or not counted.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from rhot_app.engine.serve import prepare_process
 from rhot_app.simulator.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.door import NodeDoor
@@ -66,6 +67,7 @@ def run(rate: int, seconds: float) -> dict[str, object]:
     tracked = [0]
     consumer = threading.Thread(target=_consume, args=(frames, ending, tracked))
     consumer.start()
+    prepare_process()
     receiver.start()
     sender = multiprocessing.get_context("spawn").Process(target=send, args=(receiver.port, rate, seconds))
     before = resource.getrusage(resource.RUSAGE_SELF)

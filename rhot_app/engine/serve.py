@@ -52,7 +52,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
         stack.callback(server.close)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: server.end())
-        _prepare_process()
+        prepare_process()
         ending = threading.Event()
         pipeline = threading.Thread(target=_run_pipeline, args=(engine, ending), name="pipeline", daemon=True)
         pipeline.start()
@@ -61,7 +61,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
         yield engine, server, place
 
 
-def _prepare_process() -> None:
+def prepare_process() -> None:
     """Keep the interpreter out of a sample's way."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with contextlib.suppress(OSError):

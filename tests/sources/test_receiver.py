@@ -10,7 +10,15 @@ from rhot_app.errors import SourceError
 from rhot_app.simulator.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.door import NodeDoor
-from rhot_app.sources.receiver import NEWEST, QUEUE_LIMIT, FrameQueue, NodeReceiver, granted_buffer, open_data_socket
+from rhot_app.sources.receiver import (
+    NEWEST,
+    QUEUE_LIMIT,
+    RECEIVE_BUFFER,
+    FrameQueue,
+    NodeReceiver,
+    granted_buffer,
+    open_data_socket,
+)
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import MarkerObservation, Observations
@@ -67,6 +75,19 @@ def test_a_burst_is_counted_whole_and_only_its_newest_tracked() -> None:
     assert len(frames.take(0.0)) == NEWEST
     assert receiver.skipped == 100 - NEWEST
     assert len(seen) == 101
+    receiver.close()
+
+
+def test_a_flood_waits_in_the_buffer_and_nothing_is_lost() -> None:
+    receiver, frames, sender = make_receiver()
+    if receiver.buffer_bytes < RECEIVE_BUFFER:
+        pytest.skip(f"the system grants {receiver.buffer_bytes} bytes of receive buffer only")
+    checksum = synthetic_rig().markers.checksum
+    for k in range(4000):  # nobody reads meanwhile
+        sender.send(datagram(k, checksum))
+    while receiver.step():
+        assert frames.take(0.0)
+    assert (receiver.door.accepted, receiver.door.sequence.lost, receiver.overflowed) == (4000, 0, 0)
     receiver.close()
 
 
