@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import select
 import selectors
 import subprocess
 import sys
@@ -59,6 +60,11 @@ class TwinNode:
     def alive(self) -> bool:
         """Whether the daemon still runs."""
         return self._process.poll() is None
+
+    @property
+    def ready_waits(self) -> bool:
+        """Whether the ready line (or the end of the pipe) can be read without waiting."""
+        return self._process.stdout is not None and bool(select.select([self._process.stdout], [], [], 0.0)[0])
 
     def wait_ready(self, deadline_s: float) -> NodePorts:
         """The daemon's ports once it says that it is ready; `deadline_s` is monotonic time.
