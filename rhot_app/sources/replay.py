@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Iterable
@@ -33,6 +34,12 @@ class LogDoor:
         for link in self.links:
             if link.node.text_datagrams:
                 link.door.expect_session(1)
+
+    def rewind(self) -> None:
+        """The log begins anew; counters go on."""
+        self.starts += 1
+        for link in self.links:
+            link.clock.reset()
 
     @property
     def changes(self) -> int:
@@ -79,13 +86,14 @@ class LogReplay:
         """Open the log; raises RecordingError when it is none."""
         self.frames = FrameQueue()
         self.receivers: tuple[NodeReceiver, ...] = ()
-        self._reader = LogReader(path)
+        LogReader(path).close()
+        self._path = path
         self._speed = speed
         self._door = LogDoor(rig)
         self.links = self._door.links
         self._notice = ""
         self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="replay", daemon=True)
+        self._thread: threading.Thread | None = None
 
     @property
     def changes(self) -> int:
@@ -103,35 +111,39 @@ class LogReplay:
             link.door.configure(rig, camera)
 
     def start(self, session: int) -> None:
-        """Begin to replay; the log brings its own sessions, so `session` is not looked at."""
-        if not self._thread.ident:
-            self._thread.start()
+        """Replay from the beginning; the log brings its own sessions, so `session` is not looked at."""
+        self.stop()
+        self._notice = ""
+        self._ending.clear()
+        self._door.rewind()
+        self._thread = threading.Thread(target=self._run, name="replay", daemon=True)
+        self._thread.start()
 
     def stop(self) -> None:
         """End the replay."""
         self._ending.set()
+        if self._thread is not None:
+            self._thread.join()
 
     def record_to(self, tap: Tap | None) -> None:
         """Raises RecordingError: a copy of the log's file is the recording."""
         if tap is not None:
-            raise RecordingError(f"a replay is not recorded; copy {self._reader.path} instead.")
+            raise RecordingError(f"a replay is not recorded; copy {self._path} instead.")
 
     def close(self) -> None:
-        """End the thread and close the file."""
-        self._ending.set()
-        if self._thread.is_alive():
-            self._thread.join()
-        self._reader.close()
+        """End the replay."""
+        self.stop()
 
     def _run(self) -> None:
         try:
-            self._play(self._reader)
+            with contextlib.closing(LogReader(self._path)) as reader:
+                self._play(reader)
         except RecordingError as exc:
             self._notice = str(exc)
             return
-        torn = self._reader.torn_bytes
-        self._notice = ("The log is over." if not torn else
-                        f"The log is over; its last {torn} bytes are torn (the program died while writing).")
+        torn = reader.torn_bytes
+        self._notice = "The log is over; Start replays it again." if not torn else (
+            f"The log is over; its last {torn} bytes are torn (the program died while writing).")
 
     def _play(self, records: Iterable[Record]) -> None:
         first_ns: int | None = None

@@ -165,7 +165,12 @@ def test_replay_source_serves_like_nodes(tmp_path: Path, rig: Rig, bench: Bench,
             assert time.monotonic() < deadline
             engine.step(0.01)
         engine.step(0.0)
-        assert len(published) > 25 and "receive_to_state" not in engine.status().latency
+        count = len(published)
+        assert count > 25 and "receive_to_state" not in engine.status().latency
+        engine.start()  # once more from the beginning
+        while len(published) < count + 20:
+            assert time.monotonic() < deadline
+            engine.step(0.01)
         with pytest.raises(RecordingError):
             engine.record(tmp_path / "c.log")
         engine.close()
