@@ -60,21 +60,22 @@ def solve_chain_arrays(joints: Array, target: Array, tolerance: float, max_itera
         return 0
     lengths = np.empty(bones)
     directions = np.empty((bones, 3))  # the last one known of each bone, for when its two joints coincide
+    total = 0.0
     for k in range(bones):
         lengths[k] = _distance(joints[k], joints[k + 1])
-        directions[k, 0], directions[k, 1], directions[k, 2] = 1.0, 0.0, 0.0
-        if lengths[k] > 0.0:
-            directions[k] = (joints[k + 1] - joints[k]) / lengths[k]
-    if _distance(joints[0], target) > lengths.sum():
+        total += lengths[k]
+        for i in range(3):
+            directions[k, i] = (joints[k + 1, i] - joints[k, i]) / lengths[k] if lengths[k] > 0.0 else i == 0
+    if _distance(joints[0], target) > total:
         for k in range(bones):
             _place(joints[k], target, lengths[k], directions[k], 1.0, joints[k + 1])
         return 0
     root = joints[0].copy()
     for iteration in range(1, max_iterations + 1):
-        joints[bones] = target
+        _copy(target, joints[bones])
         for k in range(bones - 1, -1, -1):
             _place(joints[k + 1], joints[k], lengths[k], directions[k], -1.0, joints[k])
-        joints[0] = root
+        _copy(root, joints[0])
         for k in range(bones):
             _place(joints[k], joints[k + 1], lengths[k], directions[k], 1.0, joints[k + 1])
         if _distance(joints[bones], target) <= tolerance:
@@ -96,3 +97,9 @@ def _place(fixed: Array, towards: Array, length: float, direction: Array, sign: 
 @njit(cache=True)
 def _distance(a: Array, b: Array) -> float:
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+
+
+@njit(cache=True)
+def _copy(point: Array, out: Array) -> None:
+    for i in range(3):
+        out[i] = point[i]

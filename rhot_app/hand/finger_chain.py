@@ -26,34 +26,51 @@ PLANE_MARGIN = 0.02
 def chain_points(angles: Array, lengths: Array, joints: Array, jacobian: Array) -> None:
     """Fill `joints` (4, 3) and `jacobian` (3, n): change of the last of them per angle."""
     ca, sa, cf, sf = math.cos(angles[0]), math.sin(angles[0]), math.cos(angles[1]), math.sin(angles[1])
-    x, y, z = np.array((ca * cf, sa * cf, -sf)), np.array((-sa, ca, 0.0)), np.array((ca * sf, sa * sf, cf))
+    xx, xy, xz = ca * cf, sa * cf, -sf  # the axes of the first bone's frame; y is (-sa, ca, 0)
+    zx, zy, zz = ca * sf, sa * sf, cf
+    hx, hy, hz = -sa, ca, 0.0  # the hinge axis of the other joints
     thumb = angles.shape[0] == 5
-    joints[0] = 0.0
-    joints[1] = lengths[0] * x
-    bent, hinge = 0.0, y
+    joints[0, 0], joints[0, 1], joints[0, 2] = 0.0, 0.0, 0.0
+    joints[1, 0], joints[1, 1], joints[1, 2] = lengths[0] * xx, lengths[0] * xy, lengths[0] * xz
     if thumb:
         cb, sb = math.cos(angles[2]), math.sin(angles[2])
-        hinge = cb * y - sb * x
-        x = cb * x + sb * y
-    for bone in range(1, 3):
-        bent += angles[bone + 2] if thumb else angles[bone + 1]
-        joints[bone + 1] = joints[bone] + lengths[bone] * (math.cos(bent) * x - math.sin(bent) * z)
-    _turn(np.array((0.0, 0.0, 1.0)), joints[0], joints[3], jacobian, 0)
-    _turn(y, joints[0], joints[3], jacobian, 1)
-    if thumb:
-        _turn(z, joints[1], joints[3], jacobian, 2)
+        hx, hy, hz = -cb * sa - sb * xx, cb * ca - sb * xy, -sb * xz
+        xx, xy, xz = cb * xx - sb * sa, cb * xy + sb * ca, cb * xz
     first = 3 if thumb else 2
-    _turn(hinge, joints[1], joints[3], jacobian, first)
-    _turn(hinge, joints[2], joints[3], jacobian, first + 1)
+    bent = 0.0
+    for bone in range(1, 3):
+        bent += angles[first + bone - 1]
+        along, across = lengths[bone] * math.cos(bent), lengths[bone] * math.sin(bent)
+        joints[bone + 1, 0] = joints[bone, 0] + along * xx - across * zx
+        joints[bone + 1, 1] = joints[bone, 1] + along * xy - across * zy
+        joints[bone + 1, 2] = joints[bone, 2] + along * xz - across * zz
+    _turn(0.0, 0.0, 1.0, joints[0], joints[3], jacobian, 0)
+    _turn(-sa, ca, 0.0, joints[0], joints[3], jacobian, 1)
+    if thumb:
+        _turn(zx, zy, zz, joints[1], joints[3], jacobian, 2)
+    _turn(hx, hy, hz, joints[1], joints[3], jacobian, first)
+    _turn(hx, hy, hz, joints[2], joints[3], jacobian, first + 1)
 
 
 @njit(cache=True)
-def _turn(axis: Array, origin: Array, point: Array, out: Array, column: int) -> None:
-    """Column of the Jacobian: velocity of `point` turning about `axis` through `origin`."""
+def _turn(ax: float, ay: float, az: float, origin: Array, point: Array, out: Array, column: int) -> None:
+    """Column of the Jacobian: velocity of `point` turning about the axis (ax, ay, az) through `origin`."""
     rx, ry, rz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
-    out[0, column] = axis[1] * rz - axis[2] * ry
-    out[1, column] = axis[2] * rx - axis[0] * rz
-    out[2, column] = axis[0] * ry - axis[1] * rx
+    out[0, column] = ay * rz - az * ry
+    out[1, column] = az * rx - ax * rz
+    out[2, column] = ax * ry - ay * rx
+
+
+@njit(cache=True)
+def _copy(point: Array, out: Array) -> None:
+    for i in range(3):
+        out[i] = point[i]
+
+
+@njit(cache=True)
+def distance(a: Array, b: Array) -> float:
+    """Distance of two points (3,)."""
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @njit(cache=True)
@@ -72,7 +89,7 @@ def fabrik_finger(angles: Array, lengths: Array, limits: Array, target: Array, t
     The abduction axis lies in the plane, so the target alone chooses it. In the plane (u outward, w palmar) a bone
     is its direction F from u; a hinge limits the difference of neighbours' directions in both passes.
     """
-    reach = lengths.sum()
+    reach = lengths[0] + lengths[1] + lengths[2]
     angles[0] = clamp_angle(fold_abduction(target[0], target[1], PLANE_MARGIN * reach, angles[0]),
                             limits[0, 0], limits[0, 1])
     goal_u = math.cos(angles[0]) * target[0] + math.sin(angles[0]) * target[1]
@@ -125,25 +142,23 @@ def fabrik_thumb(angles: Array, lengths: Array, limits: Array, target: Array, to
     The backward pass is free; the forward pass reads each bone's angles in its parent's frame and clamps them. The
     two bones behind the MCP joint share a plane, which the target chooses as it does for a finger.
     """
-    joints, jacobian, bone = np.empty((4, 3)), np.empty((3, 5)), np.empty(3)
+    joints, jacobian = np.empty((4, 3)), np.empty((3, 5))
     chain_points(angles, lengths, joints, jacobian)
-    if math.sqrt(target[0] ** 2 + target[1] ** 2 + target[2] ** 2) >= lengths.sum():
+    if distance(joints[0], target) >= lengths[0] + lengths[1] + lengths[2]:
         for k in range(1, 4):
-            joints[k] = target
+            _copy(target, joints[k])
         _read_thumb(angles, joints, lengths, limits)
         return 0
     for iteration in range(1, max_iterations + 1):
-        joints[3] = target
+        _copy(target, joints[3])
         for k in range(2, 0, -1):
-            bone[:] = joints[k + 1] - joints[k]
-            length = math.sqrt(bone[0] ** 2 + bone[1] ** 2 + bone[2] ** 2)
+            length = distance(joints[k + 1], joints[k])
             if length > 0.0:
-                joints[k] = joints[k + 1] - lengths[k] / length * bone
-        joints[0] = 0.0
+                for i in range(3):
+                    joints[k, i] = joints[k + 1, i] + lengths[k] / length * (joints[k, i] - joints[k + 1, i])
         _read_thumb(angles, joints, lengths, limits)
         chain_points(angles, lengths, joints, jacobian)
-        bone[:] = joints[3] - target
-        if math.sqrt(bone[0] ** 2 + bone[1] ** 2 + bone[2] ** 2) <= tolerance:
+        if distance(joints[3], target) <= tolerance:
             return iteration
     return max_iterations
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import chain_points, fabrik_finger, fabrik_thumb
+from rhot_app.hand.finger_chain import chain_points, distance, fabrik_finger, fabrik_thumb
 from rhot_app.hand.linear import solve_in_box
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
@@ -71,7 +71,7 @@ def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_an
     rows = ANGLE_SLICES[finger]
     mean, information = model.natural.mean[rows], model.natural.information[rows, rows]
     residual, iterations = solve_arrays(angles, model.chain[finger], model.limits[rows], local, mean, information,
-                                        tolerance, max_iterations)
+                                        tolerance, max_iterations, 0.0)
     points = np.empty((4, 3))
     chain_points(angles, model.chain[finger], points, np.empty((3, len(angles))))
     scale = model.bones[finger, 2] / model.marker[finger]
@@ -82,12 +82,17 @@ def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_an
 
 
 def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: float = TOLERANCE,
-                  max_iterations: int = 10) -> FingersSolution:
-    """`solve_finger` for every finger with a target: `targets` (5, 3) m world, NaN rows keep the pose's angles."""
+                  max_iterations: int = 10, target_sd: float = 0.0) -> FingersSolution:
+    """`solve_finger` for every finger with a target: `targets` (5, 3) m world, NaN rows keep the pose's angles.
+
+    `target_sd` is the standard deviation of the targets, m. Zero meets them exactly. A nearly stretched or fully
+    curled finger turns a millimetre of noise into tens of degrees; with its `target_sd` known it keeps to the pose
+    it starts from as far as the noise allows, and `reached` then says little.
+    """
     angles, residuals, iterations = np.array(pose.angles), np.empty(5), np.empty(5, dtype=np.int64)
     solve_fingers_arrays(angles, pose.world_from_palm, model.mirror, model.base, model.base_rotation,
                          model.chain, model.limits, targets, model.natural.mean, model.natural.information,
-                         tolerance, max_iterations, residuals, iterations)
+                         tolerance, max_iterations, target_sd, residuals, iterations)
     return FingersSolution(angles, residuals, iterations, residuals <= tolerance)
 
 
@@ -109,7 +114,7 @@ def to_finger(world_from_palm: Array, mirror: float, base: Array, base_rotation:
 @njit(cache=True)
 def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, base: Array, base_rotation: Array,
                          lengths: Array, limits: Array, targets: Array, mean: Array, information: Array,
-                         tolerance: float, max_iterations: int, residuals: Array,
+                         tolerance: float, max_iterations: int, target_sd: float, residuals: Array,
                          iterations: NDArray[np.int64]) -> None:
     """`solve_fingers` on arrays, in place on `angles`, `residuals` and `iterations`."""
     local = np.empty(3)
@@ -122,12 +127,12 @@ def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, b
         high = 5 + 4 * finger
         residuals[finger], iterations[finger] = solve_arrays(
             angles[low:high], lengths[finger], limits[low:high], local, mean[low:high],
-            information[low:high, low:high], tolerance, max_iterations)
+            information[low:high, low:high], tolerance, max_iterations, target_sd)
 
 
 @njit(cache=True)
 def solve_arrays(angles: Array, lengths: Array, limits: Array, target: Array, mean: Array, information: Array,
-                 tolerance: float, max_iterations: int) -> tuple[float, int]:
+                 tolerance: float, max_iterations: int, target_sd: float) -> tuple[float, int]:
     """One finger in its base frame, in place on `angles`; returns the residual, m, and FABRIK's iterations.
 
     `mean` and `information`: the natural pose of these angles.
@@ -135,11 +140,14 @@ def solve_arrays(angles: Array, lengths: Array, limits: Array, target: Array, me
     count = angles.shape[0]
     for k in range(count):
         angles[k] = min(max(angles[k], limits[k, 0]), limits[k, 1])
-    start = angles.copy()
-    if count == 5:
-        iterations = fabrik_thumb(angles, lengths, limits, target, tolerance, max_iterations)
-    else:
-        iterations = fabrik_finger(angles, lengths, limits, target, tolerance, max_iterations)
+    start, iterations, near = angles.copy(), 0, max(tolerance, target_sd)
+    if _miss(angles, lengths, target) > near:
+        if count == 5:
+            iterations = fabrik_thumb(angles, lengths, limits, target, near, max_iterations)
+        else:
+            iterations = fabrik_finger(angles, lengths, limits, target, near, max_iterations)
+    if target_sd > 0.0:
+        return _settle(angles, start, lengths, limits, target, information, target_sd), iterations
     trial = angles.copy()
     residual = _miss(angles, lengths, target)
     found = _descend(trial, start, lengths, limits, target, mean, information)
@@ -147,10 +155,11 @@ def solve_arrays(angles: Array, lengths: Array, limits: Array, target: Array, me
         # Stopped by a limit or a local minimum: once more from the middle of the range, where FABRIK began, stretched.
         for attempt in range(3):
             other = start.copy()
-            if attempt == 0:
-                other[:] = 0.5 * (limits[:, 0] + limits[:, 1])
-            elif attempt == 2:
-                other[1:] = limits[1:, 0]
+            for k in range(count):
+                if attempt == 0:
+                    other[k] = 0.5 * (limits[k, 0] + limits[k, 1])
+                elif attempt == 2 and k > 0:
+                    other[k] = limits[k, 0]
             missed = _descend(other, start, lengths, limits, target, mean, information)
             if missed < found:
                 trial[:], found = other, missed
@@ -165,8 +174,7 @@ def solve_arrays(angles: Array, lengths: Array, limits: Array, target: Array, me
 def _miss(angles: Array, lengths: Array, target: Array) -> float:
     joints = np.empty((4, 3))
     chain_points(angles, lengths, joints, np.empty((3, angles.shape[0])))
-    return math.sqrt((joints[3, 0] - target[0]) ** 2 + (joints[3, 1] - target[1]) ** 2
-                     + (joints[3, 2] - target[2]) ** 2)
+    return distance(joints[3], target)
 
 
 @njit(cache=True)
@@ -179,30 +187,24 @@ def _descend(angles: Array, start: Array, lengths: Array, limits: Array, target:
     """
     count = angles.shape[0]
     joints, jacobian = np.empty((4, 3)), np.empty((3, count))
-    error, step, best = np.empty(3), np.empty(count), angles.copy()
+    error, step, low, high, best = np.empty(3), np.empty(count), np.empty(count), np.empty(count), angles.copy()
     matrix, right = np.empty((count, count)), np.empty(count)
     least, damping = np.inf, 0.0
     for _ in range(DESCENT_STEPS):
         chain_points(angles, lengths, joints, jacobian)
-        error[:] = target - joints[3]
-        residual = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+        for k in range(3):
+            error[k] = target[k] - joints[3, k]
+        residual = distance(joints[3], target)
         damping = 0.1 * damping if residual <= max(0.7 * least, 1e-6) else max(4.0 * damping, 10.0)
         if residual <= max(least, 1e-6):
             least = residual
             best[:] = angles
+        _normal_equations(angles, mean, information, jacobian, error, COMPLIANCE, CONTINUITY + damping, matrix, right)
         for i in range(count):
-            right[i] = CONTINUITY * (start[i] - angles[i])
-            for j in range(count):
-                matrix[i, j] = information[i, j]
-                right[i] += information[i, j] * (mean[j] - angles[j])
-                for k in range(3):
-                    matrix[i, j] += jacobian[k, i] * jacobian[k, j] / COMPLIANCE
-            for k in range(3):
-                right[i] += jacobian[k, i] * error[k] / COMPLIANCE
-            matrix[i, i] += CONTINUITY + damping
-        solve_in_box(matrix, right, limits[:, 0] - angles, limits[:, 1] - angles, step)
-        largest = np.abs(step).max()
-        angles += step * min(1.0, STEP_MAX / max(largest, 1e-12))
+            right[i] += CONTINUITY * (start[i] - angles[i])
+        largest = _step_within(matrix, right, limits, angles, low, high, step)
+        for i in range(count):
+            angles[i] += step[i]
         if largest < 1e-3 and residual < 1e-6:
             break
     residual = _miss(angles, lengths, target)
@@ -212,3 +214,75 @@ def _descend(angles: Array, start: Array, lengths: Array, limits: Array, target:
     return residual
 
 
+
+
+@njit(cache=True)
+def _settle(angles: Array, start: Array, lengths: Array, limits: Array, target: Array, information: Array,
+            target_sd: float) -> float:
+    """Levenberg-Marquardt to the likeliest angles near `start`, in place; returns the residual, m.
+
+    The target counts with its standard deviation, a change of the angles as much as the natural pose resists it:
+    joints that go together move together.
+    """
+    count = angles.shape[0]
+    joints, jacobian = np.empty((4, 3)), np.empty((3, count))
+    error, step, low, high, trial = np.empty(3), np.empty(count), np.empty(count), np.empty(count), angles.copy()
+    matrix, damped, right = np.empty((count, count)), np.empty((count, count)), np.empty(count)
+    least, damping, residual = np.inf, 1e-3, 0.0
+    for _ in range(DESCENT_STEPS):
+        chain_points(trial, lengths, joints, jacobian)
+        for k in range(3):
+            error[k] = target[k] - joints[3, k]
+        missed = distance(joints[3], target)
+        cost = (missed / target_sd) ** 2
+        for i in range(count):
+            for j in range(count):
+                cost += (trial[i] - start[i]) * information[i, j] * (trial[j] - start[j])
+        if cost <= least:
+            settled = least - cost < 1e-4 * (1.0 + cost)
+            least, residual, damping = cost, missed, 0.1 * damping
+            angles[:] = trial
+            if settled:
+                break
+            _normal_equations(angles, start, information, jacobian, error, target_sd ** 2, 0.0, matrix, right)
+        else:
+            damping = max(10.0 * damping, 1e-2)
+        damped[:] = matrix
+        for i in range(count):
+            damped[i, i] *= 1.0 + damping
+        _step_within(damped, right, limits, angles, low, high, step)
+        for i in range(count):
+            trial[i] = angles[i] + step[i]
+    return residual
+
+
+@njit(cache=True)
+def _step_within(matrix: Array, right: Array, limits: Array, angles: Array, low: Array, high: Array,
+                 step: Array) -> float:
+    """Fill `step`, no longer than STEP_MAX, so that angles + step keep the limits; returns its length before that."""
+    for i in range(angles.shape[0]):
+        low[i], high[i] = limits[i, 0] - angles[i], limits[i, 1] - angles[i]
+    solve_in_box(matrix, right, low, high, step)
+    largest = 0.0
+    for i in range(angles.shape[0]):
+        largest = max(largest, abs(step[i]))
+    for i in range(angles.shape[0]):
+        step[i] *= min(1.0, STEP_MAX / max(largest, 1e-12))
+    return largest
+
+
+@njit(cache=True)
+def _normal_equations(angles: Array, mean: Array, information: Array, jacobian: Array, error: Array,
+                      variance: float, damping: float, matrix: Array, right: Array) -> None:
+    """Fill the Gauss-Newton `matrix` and `right` of |target error|^2 / variance plus the pull towards `mean`."""
+    count = angles.shape[0]
+    for i in range(count):
+        right[i] = 0.0
+        for j in range(count):
+            matrix[i, j] = information[i, j]
+            right[i] += information[i, j] * (mean[j] - angles[j])
+            for k in range(3):
+                matrix[i, j] += jacobian[k, i] * jacobian[k, j] / variance
+        for k in range(3):
+            right[i] += jacobian[k, i] * error[k] / variance
+        matrix[i, i] += damping

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_samples import natural_motion, random_pose, random_world
+from hand_samples import natural_angles, natural_motion, random_pose, random_world
 
 from rhot_app.hand.finger_chain import chain_points, fabrik_finger, fabrik_thumb
 from rhot_app.hand.finger_ik import solve_finger, solve_fingers, to_finger
@@ -110,6 +110,32 @@ def test_nearby_targets_give_nearby_angles(right_hand):
         jumps.append(np.degrees(np.abs(found - previous)).max())
         previous = found
     assert np.percentile(jumps[1:], 99) < 10 * np.degrees(np.abs(np.diff(motion, axis=0)).max())
+
+
+def test_noise_known_as_such_moves_the_joints_less(right_hand):
+    """A nearly stretched hand: half a millimetre of noise must not make its joints flutter."""
+    rng = np.random.default_rng(10)
+    pose = HandPose(np.eye(4), np.full(21, np.radians(4.0)))
+    centres = forward(right_hand, pose).marker_centres
+    exact, calm, misses = [], [], []
+    for _ in range(100):
+        targets = centres + rng.normal(0, 5e-4, (5, 3))
+        exact.append(solve_fingers(right_hand, pose, targets).angles)
+        solution = solve_fingers(right_hand, pose, targets, target_sd=1e-3)
+        calm.append(solution.angles)
+        misses.append(forward(right_hand, HandPose(np.eye(4), solution.angles)).marker_centres - centres)
+        low, high = right_hand.limits.T
+        assert (solution.angles >= low).all() and (solution.angles <= high).all()
+    assert np.std(calm, axis=0).mean() < 0.5 * np.std(exact, axis=0).mean()
+    assert np.sqrt(np.mean(np.square(misses))) < 5e-4  # not farther from the truth than the targets were
+
+
+def test_far_start_still_comes_near_when_noise_is_known(right_hand):
+    rng = np.random.default_rng(11)
+    for angles in natural_angles(right_hand, rng, 30):
+        targets = forward(right_hand, HandPose(np.eye(4), angles)).marker_centres
+        residuals = solve_fingers(right_hand, neutral_pose(), targets, target_sd=3e-4).residuals
+        assert np.median(residuals) < 3e-4 and residuals.max() < 6e-3
 
 
 def test_missing_targets_keep_their_angles(right_hand):
