@@ -85,8 +85,8 @@ class FilterSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Filters before depth (pixels) and after (metres); `markers` overrides both for single marker ids."""
 
     enabled: bool = True
-    pixel: OneEuroSettings = OneEuroSettings(min_cutoff_hz=4.0, beta=0.5, derivative_cutoff_hz=8.0)
-    position: OneEuroSettings = OneEuroSettings(min_cutoff_hz=2.0, beta=400.0, derivative_cutoff_hz=8.0)
+    pixel: OneEuroSettings = OneEuroSettings(min_cutoff_hz=1.0, beta=8.0, derivative_cutoff_hz=15.0)
+    position: OneEuroSettings = OneEuroSettings(min_cutoff_hz=1.0, beta=4000.0, derivative_cutoff_hz=15.0)
     pixel_markers: dict[str, OneEuroSettings] = {}
     position_markers: dict[str, OneEuroSettings] = {}
 

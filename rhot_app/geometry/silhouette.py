@@ -5,8 +5,8 @@ tan(phi - alpha) and tan(phi + alpha) with sin(alpha) = r / D. The middle of the
 
     sin(phi) cos(phi) / (cos(phi)^2 - sin(alpha)^2) = tan(phi) / (1 - r^2 / Z^2),    Z = D cos(phi),
 
-exactly as if the centre stood at Z - r^2 / Z: every camera sees it too near, and so does triangulation. A cylinder, and a
-capsule or band, does the same across its axis. 26 mm of wrist at 0.6 m make 1.1 mm of depth.
+exactly as if the centre stood at Z - r^2 / Z: every camera sees it too near, and so does triangulation. A cylinder,
+and a capsule or band, does the same across its axis. 26 mm of wrist at 0.6 m make 1.1 mm of depth.
 
 An ellipsoid with centre c and shape matrix A (x^T A^-1 x = 1 on its surface) is seen as the conic with the dual matrix
 A - c c^T (Hartley and Zisserman 2004, 8.3), whose centre is

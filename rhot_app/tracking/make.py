@@ -9,4 +9,6 @@ from rhot_app.tracking.tracker import Tracker
 
 def make_tracker(rig: Rig) -> Tracker:
     """A new tracker for `rig`, compiled and warm: its first state takes no longer than the others."""
-    return ClassicTracker(rig)
+    tracker = ClassicTracker(rig)
+    tracker.warm_up()
+    return tracker

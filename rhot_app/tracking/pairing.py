@@ -8,6 +8,7 @@ paired by arrival.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,5 +199,5 @@ class Pairing:
 
 def _period_ns(frames: list[int]) -> int:
     """Median spacing of frame times, ns; 0 with fewer than two."""
-    spacings = sorted(later - earlier for earlier, later in zip(frames, frames[1:], strict=False))
+    spacings = sorted(later - earlier for earlier, later in pairwise(frames))
     return spacings[len(spacings) // 2] if spacings else 0

@@ -65,10 +65,7 @@ def insert(times: Times, pixels: Array, covariances: Array, flags: Flags, count:
 
 @njit(cache=True)
 def _regular(times: Times, flags: Flags, first: int, last: int) -> bool:
-    """Whether samples first..last are evenly enough spaced, near enough and clean enough for one polynomial.
-
-    The two inner samples of the four bracket the instant; the others only bend the curve and must be beyond doubt.
-    """
+    """Whether samples first..last are evenly enough spaced, near enough and beyond doubt enough for one curve."""
     shortest, longest = times[first + 1] - times[first], times[first + 1] - times[first]
     for k in range(first + 1, last):
         spacing = times[k + 1] - times[k]
@@ -147,7 +144,7 @@ def ingest_frame(times: Times, pixels: Array, covariances: Array, flags: Flags, 
             continue
         covariance[0, 0] += floor
         covariance[1, 1] += floor
-        t_ns = t_row0_ns + int(round(y * row_time_ns))
+        t_ns = t_row0_ns + round(y * row_time_ns)
         counts[m] = insert(times[m], pixels[m], covariances[m], flags[m], counts[m], t_ns, x, y, covariance,
                            new_flags[m])
         if is_newest:

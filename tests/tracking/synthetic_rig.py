@@ -1,0 +1,148 @@
+"""A rig without images: a moving hand's marker centres as two cameras with rolling shutters would see them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.anatomy import load_hand
+from rhot_app.hand.model import build_model
+from rhot_app.project import CameraPose, FilterSettings, Intrinsics, Rig, RigNode
+from rhot_app.simulator.body import build_body
+from rhot_app.simulator.motion import load_motion
+from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+from rhot_node.wire.messages import MarkerFlag
+
+Trajectory = Callable[[np.ndarray], np.ndarray]  # (N,) s -> (N, M, 3) m
+EPOCH_NS = 5 * 10**14
+LOST = int(MarkerFlag.LOST)
+
+
+@dataclass(frozen=True)
+class Preset:
+    fps: float
+    row_time_ns: int
+    focal: float
+
+
+WIDE = Preset(40.0, 48_000, 320 / np.tan(np.radians(31.1)))
+FAST = Preset(120.0, 10_000, 320 / np.tan(np.radians(13.25)))
+
+
+def make_rig(preset: Preset = WIDE, *, cameras: int = 2, filters: FilterSettings | None = None,
+             bodies: bool = False) -> Rig:
+    lens = Intrinsics(640, 480, preset.focal, preset.focal, 319.5, 239.5, (-0.05, 0.0, 0.0, 0.0, 0.0))
+    markers = load_markers(resource_path("markers", "rhot6.json"))
+    if not bodies:
+        markers = msgspec.structs.replace(markers, markers=tuple(
+            msgspec.structs.replace(marker, radius_mm=None, shape="blob") for marker in markers.markers))
+    nodes = tuple(RigNode(k + 1, f"camera {k + 1}", lens, CameraPose(translation_m=(0.075 * k, 0.0, 0.0)))
+                  for k in range(cameras))
+    return Rig("synthetic", nodes, markers, load_hand(resource_path("hands", "right.json")),
+               FilterSettings() if filters is None else filters)
+
+
+def hand_trajectory(rig: Rig, motion: str, seconds: float, distance_m: float = 0.6, seed: int = 1) -> Trajectory:
+    model = build_model(rig.hand)
+    body = build_body(model, rig.markers)
+    moving = load_motion(motion, model, np.array([0.0375, 0.0, distance_m]), seed)
+    times = np.arange(-0.5, seconds + 0.5, 1e-3)
+    return CubicSpline(times, body.marker_centres(body.points(*moving.sample(times))))
+
+
+def still_trajectory(points: np.ndarray) -> Trajectory:
+    return lambda times: np.broadcast_to(points, (len(times), *points.shape))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How the cameras see: phases in frame periods, pixel noise, parts of frames and markers lost, network delays."""
+
+    phases: tuple[float, ...] = (0.0, 0.37)
+    noise_px: float = 0.03
+    frame_loss: float = 0.0
+    marker_loss: float = 0.0
+    delay_s: tuple[float, float] = (0.001, 0.002)
+    seed: int = 7
+
+
+def observe(rig: Rig, preset: Preset, trajectory: Trajectory, seconds: float, sight: Sight) -> list[CameraObservations]:
+    """All frames of all cameras in the order of their arrival."""
+    rng = np.random.default_rng(sight.seed)
+    frames: list[CameraObservations] = []
+    for index, node in enumerate(rig.nodes):
+        model = CameraModel.from_rig(node.intrinsics, node.pose)
+        starts = (np.arange(int(seconds * preset.fps)) + sight.phases[index]) / preset.fps
+        for start in starts:
+            pixels = _see(model, trajectory, start, preset.row_time_ns * 1e-9)
+            pixels = pixels + rng.normal(0.0, sight.noise_px, pixels.shape)
+            lost = rng.random(len(pixels)) < sight.marker_loss
+            arrival = start + 480 * preset.row_time_ns * 1e-9 + 0.004 + rng.uniform(*sight.delay_s)
+            if rng.random() >= sight.frame_loss:
+                frames.append(frame(index, start, pixels, np.where(lost, LOST, 0), arrival, preset.row_time_ns,
+                                    max(sight.noise_px, 1e-3)))
+    return sorted(frames, key=lambda f: f.t_receive_ns)
+
+
+def _see(model: CameraModel, trajectory: Trajectory, start: float, row_time_s: float) -> np.ndarray:
+    """(M, 2) px, every marker at the time its own row is exposed."""
+    count = trajectory(np.array([start])).shape[1]
+    rows = np.full(count, 240.0)
+    for _ in range(4):  # a contraction: markers move far fewer rows per second than the shutter
+        points = trajectory(start + rows * row_time_s)[np.arange(count), np.arange(count)]
+        pixels = model.project(points)
+        rows = pixels[:, 1]
+    return pixels
+
+
+def frame(camera: int, t_row0_s: float, pixels: np.ndarray, flags: np.ndarray, arrival_s: float,
+          row_time_ns: int = WIDE.row_time_ns, sigma_px: float = 0.03) -> CameraObservations:
+    lost = (flags & LOST) != 0
+    covariances = np.tile(np.eye(2) * sigma_px**2, (len(pixels), 1, 1))
+    covariances[(flags & int(MarkerFlag.PARTIAL)) != 0] *= 10_000.0
+    return CameraObservations(
+        camera=camera, t_row0_master_ns=EPOCH_NS + round(1e9 * t_row0_s), row_time_ns=row_time_ns, clock_bound_s=1e-5,
+        t_receive_ns=EPOCH_NS + round(1e9 * arrival_s), detect_s=0.002, network_s=0.001,
+        pixels=np.where(lost[:, None], np.nan, pixels), covariances=covariances, diameters=np.full(len(pixels), 16.0),
+        qualities=np.ones(len(pixels)), flags=flags.astype(np.uint16))
+
+
+def run(tracker: Tracker, frames: list[CameraObservations]) -> list[HandState]:
+    states = []
+    for observations in frames:
+        tracker.ingest(observations)
+        state = tracker.solve()
+        if state is not None:
+            states.append(state)
+    return states
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Against the truth at the states' own times, after the first second, where measured. mm."""
+
+    marker_mm: float
+    raw_mm: float
+    fingertip_mm: float
+    measured: float
+    rate_hz: float
+
+
+def compare(rig: Rig, states: list[HandState], trajectory: Trajectory) -> Errors:
+    states = [s for s in states if s.t_master_ns >= EPOCH_NS + 10**9]
+    times = np.array([s.t_master_ns - EPOCH_NS for s in states]) * 1e-9
+    truth = trajectory(times)
+    measured = np.array([s.marker_knowledge for s in states]) == Knowledge.MEASURED
+    error = np.linalg.norm(np.array([s.marker_positions for s in states]) - truth, axis=2)[measured]
+    raw = np.linalg.norm(np.array([s.marker_raw_positions for s in states]) - truth, axis=2)[measured]
+    tips = np.linalg.norm(np.array([s.fingertip_positions for s in states]) - truth[:, :5], axis=2)[measured[:, :5]]
+    return Errors(*(1e3 * float(np.sqrt(np.mean(e**2))) for e in (error, raw, tips)), float(measured.mean()),
+                  (len(times) - 1) / (times[-1] - times[0]))
