@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rhot_app.geometry.camera import CameraModel, undistort_points
 from rhot_app.simulator.body import CAPSULE, PARAMETERS, HandBody
 from rhot_app.simulator.sensor import Sensor
-from rhot_app.simulator.trace import NODES, area_outside, extent, trace
+from rhot_app.simulator.trace import NODES, Moving, View, area_outside, canvas, outline, trace
 
 Array = NDArray[np.float64]
 
@@ -54,14 +54,11 @@ class FrameRenderer:
         height, width = camera.height, camera.width
         self.body, self.camera, self.shutter = body, camera, shutter
         self._shading, self._seed = optics.shading, seed
+        self._meta = np.stack([body.kind, body.group, body.marker], axis=1)
         self._rays = ray_table(camera)
-        self._background = np.ascontiguousarray(background, dtype=np.float32)
-        self._image = self._background.copy()
-        self._ids = np.zeros((height, width), np.int8)
-        self._edges = np.zeros((height, width), np.uint8)
-        self._masks = np.zeros((height, width), np.int64)
-        self._visible, self._whole = np.zeros(body.marker_count), np.zeros(body.marker_count)
-        self._sensor = Sensor(self._background, optics.psf_sigma_px, optics.noise_mid_grey, optics.noise_read, seed)
+        self._canvas = canvas(np.ascontiguousarray(background, dtype=np.float32), len(body.kind), body.marker_count)
+        self._sensor = Sensor(self._canvas.background, optics.psf_sigma_px, optics.noise_mid_grey, optics.noise_read,
+                              seed)
         self._frame = np.empty(height * 3 // 2 * width, np.uint8)
         light = camera.camera_from_world[:3, :3] @ LIGHT
         self._light = light / np.linalg.norm(light)
@@ -76,7 +73,7 @@ class FrameRenderer:
         image, box, visible = self.radiance(source, t_row0_s, number)
         self._sensor.expose(image, box, self._frame)
         x0, y0, x1, y1 = box
-        self._image[:, y0:y1, x0:x1] = self._background[:, y0:y1, x0:x1]
+        image[:, y0:y1, x0:x1] = self._canvas.background[:, y0:y1, x0:x1]
         return self._frame, visible
 
     def radiance(self, source: PoseSource, t_row0_s: float,
@@ -86,31 +83,31 @@ class FrameRenderer:
         span = (camera.height - 1) * shutter.row_time_s
         half = 0.5 * (span + shutter.exposure_s)
         middle = t_row0_s + 0.5 * span
-        coefficients = self._polynomials(source, middle + half * self._nodes)
-        sweep = self._sweep(coefficients, shutter.exposure_s / half)
+        series = self._polynomials(source, middle + half * self._nodes)
+        sweep = self._sweep(series, shutter.exposure_s / half)
         timing = np.array([-0.5 * span / half, shutter.row_time_s / half, shutter.exposure_s / half])
-        box = trace(coefficients, body.kind, body.group, body.marker, body.size, body.rgb, body.margin, sweep,
-                    self._rays, camera.intrinsics, timing, self._light, self._shading, self._seed * 1_000_003 + number,
-                    self._background, self._image, self._ids, self._edges, self._masks, self._visible, self._whole)
-        whole = self._whole + self._outside(coefficients, timing)
-        fractions = np.divide(self._visible, whole, out=np.zeros_like(whole), where=whole > 0.0)
-        return self._image, box, np.clip(fractions, 0.0, 1.0)
+        moving = Moving(series, self._meta, body.size, body.rgb, body.margin, sweep)
+        view = View(self._rays, camera.intrinsics, timing, self._light, self._shading)
+        box = trace(moving, view, self._canvas, self._seed * 1_000_003 + number)
+        whole = self._canvas.whole + self._outside(series, timing)
+        fractions = np.divide(self._canvas.visible, whole, out=np.zeros_like(whole), where=whole > 0.0)
+        return self._canvas.image, box, np.clip(fractions, 0.0, 1.0)
 
     def _polynomials(self, source: PoseSource, times_s: Array) -> Array:
         """(N, 12, NODES) power series in tau of the solids' parameters in the camera's frame."""
         world_from_palm, angles = source.sample(times_s)
         camera_from_palm = self.camera.camera_from_world @ world_from_palm
         values = self.body.place(camera_from_palm, angles)
-        series = self._fit @ values.reshape(NODES, -1)
-        return np.ascontiguousarray(series.reshape(NODES, -1, PARAMETERS).transpose(1, 2, 0))
+        powers = self._fit @ values.reshape(NODES, -1)
+        return np.ascontiguousarray(powers.reshape(NODES, -1, PARAMETERS).transpose(1, 2, 0))
 
-    def _sweep(self, coefficients: Array, exposure_tau: float) -> Array:
+    def _sweep(self, series: Array, exposure_tau: float) -> Array:
         """(N, 2) px: the farthest that a solid's end travels in x and y during one exposure."""
         fx, fy = self.camera.intrinsics[:2]
-        sweep = np.zeros((len(coefficients), 2))
+        sweep = np.zeros((len(series), 2))
         axis = np.where(self.body.kind == CAPSULE, 0.0, self.body.size[:, 0])[:, None]
         for tau in (-0.8, 0.0, 0.8):
-            before, after = ((coefficients @ (tau + offset) ** np.arange(NODES))
+            before, after = ((series @ (tau + offset) ** np.arange(NODES))
                              for offset in (-0.5 * exposure_tau, 0.5 * exposure_tau))
             for first in (0, 3):
                 b, a = self._end(before, first, axis), self._end(after, first, axis)
@@ -124,18 +121,21 @@ class FrameRenderer:
         cylinder = parameters[:, :3] + (1.0 if first else -1.0) * half_length * parameters[:, 3:6]
         return np.where((self.body.kind == CAPSULE)[:, None], parameters[:, first:first + 3], cylinder)
 
-    def _outside(self, coefficients: Array, timing: Array) -> Array:
+    def _outside(self, series: Array, timing: Array) -> Array:
         """(M,) px^2 of each marker beyond the image's borders."""
         width, height = self.camera.width, self.camera.height
         outside = np.zeros(self.body.marker_count)
         for n in np.flatnonzero(self.body.marker >= 0):
-            row = coefficients[n, :, 0].copy()
-            x0, x1, y0, y1 = extent(self.body.kind[n], row, self.body.size, n, self.camera.intrinsics)
-            if x0 > x1 or (x0 >= 0 and y0 >= 0 and x1 <= width - 1 and y1 <= height - 1):
+            row = series[n, :, 0].copy()
+            u0, v0, u1, v1, reach = outline(self.body.kind[n], row, self.body.size, n, self.camera.intrinsics)
+            if not reach > 0.0:
+                continue
+            x0, x1, y0, y1 = min(u0, u1) - reach, max(u0, u1) + reach, min(v0, v1) - reach, max(v0, v1) + reach
+            if x0 >= 0 and y0 >= 0 and x1 <= width - 1 and y1 <= height - 1:
                 continue
             limits = np.array([max(x0 - 2, -_OUTSIDE), max(y0 - 2, -_OUTSIDE), min(x1 + 3, width + _OUTSIDE),
                                min(y1 + 3, height + _OUTSIDE)]).astype(np.int64)
-            outside[self.body.marker[n]] = area_outside(coefficients, n, self.body.kind[n], self.body.size,
+            outside[self.body.marker[n]] = area_outside(series, n, self.body.kind[n], self.body.size,
                                                         self.camera.intrinsics, timing, width, height, limits)
         return outside
 

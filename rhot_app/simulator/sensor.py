@@ -92,27 +92,41 @@ def blur(image: Image, kernel: Image, x0: int, y0: int, x1: int, y1: int, work: 
     _, height, width = image.shape
     reach = len(kernel) // 2
     left, right = max(x0 - reach, 0), min(x1 + reach, width)
+    inner, outer = max(x0, reach), min(x1, width - reach)
     for c in range(3):
         for y in range(y0, y1):
-            target = work[c, y]
-            for x in range(left, right):
-                target[x] = kernel[reach] * image[c, y, x]
+            rows, columns = work[c, y], out[c, y]
+            _scale(rows[left:right], kernel[reach], image[c, y, left:right])
             for k in range(1, reach + 1):
-                above, below = image[c, max(y - k, 0)], image[c, min(y + k, height - 1)]
-                weight = kernel[reach + k]
-                for x in range(left, right):
-                    target[x] += weight * (above[x] + below[x])
-            source, result = work[c, y], out[c, y]
-            for x in range(x0, x1):
-                if reach <= x < width - reach:
-                    total = kernel[reach] * source[x]
-                    for k in range(1, reach + 1):
-                        total += kernel[reach + k] * (source[x - k] + source[x + k])
-                else:
-                    total = np.float32(0.0)
-                    for k in range(-reach, reach + 1):
-                        total += kernel[reach + k] * source[min(max(x + k, 0), width - 1)]
-                result[x] = total
+                _add(rows[left:right], kernel[reach + k], image[c, max(y - k, 0), left:right],
+                     image[c, min(y + k, height - 1), left:right])
+            _scale(columns[inner:outer], kernel[reach], rows[inner:outer])
+            for k in range(1, reach + 1):
+                _add(columns[inner:outer], kernel[reach + k], rows[inner - k:outer - k], rows[inner + k:outer + k])
+            _blur_border(rows, kernel, x0, inner, columns)
+            _blur_border(rows, kernel, outer, x1, columns)
+
+
+@njit(cache=True, fastmath=True)
+def _scale(target: Image, weight: float, source: Image) -> None:
+    for i in range(len(target)):
+        target[i] = weight * source[i]
+
+
+@njit(cache=True, fastmath=True)
+def _add(target: Image, weight: float, before: Image, after: Image) -> None:
+    for i in range(len(target)):
+        target[i] += weight * (before[i] + after[i])
+
+
+@njit(cache=True, fastmath=True)
+def _blur_border(source: Image, kernel: Image, x0: int, x1: int, result: Image) -> None:
+    reach, width = len(kernel) // 2, len(source)
+    for x in range(x0, x1):
+        total = np.float32(0.0)
+        for k in range(-reach, reach + 1):
+            total += kernel[reach + k] * source[min(max(x + k, 0), width - 1)]
+        result[x] = total
 
 
 @njit(cache=True, fastmath=True)

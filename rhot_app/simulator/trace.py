@@ -1,14 +1,15 @@
 """Ray tracing of one frame's hand (numba): rolling shutter by row, exposure by time samples, edges supersampled.
 
 Two passes. The first sends one ray through each pixel's centre at its row's mid-exposure and notes what it meets.
-Pixels near a change of id - as near as the solids move while exposed - are then sampled again by 16 rays. The 16
-samples are a rank-1 lattice in (x, y, time), shifted at random for each pixel: stratified in every coordinate, and
-no sub-pixel position prefers a time.
+Pixels near a change between skin, paint and background - as near as the solids move while exposed - are then sampled
+again by 16 rays. The 16 samples are a rank-1 lattice in (x, y, time), shifted at random for each pixel: stratified in
+every coordinate, and no sub-pixel position prefers a time.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,104 +20,184 @@ from rhot_app.simulator.body import CAPSULE, PALM_GROUP
 from rhot_app.simulator.raycast import NO_HIT, PREPARED, hit, lambert, prepare
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Image = NDArray[np.float32]
 
 SAMPLES = 16
-_BLOCK = 8  # px of a row that share one list of solids
 _STEP_Y, _STEP_T = 5, 7  # lattice generator (1, 5, 7) / 16: no two samples are close in any pair of coordinates
+_STILL_PX = 0.02  # what moves less while exposed is taken to stand still
+_SKIN, _PAINT = 1, 20  # ids: background 0, any skin, first marker
+NEAR_M = 0.03  # what comes nearer to the camera's plane is not drawn
 NODES = 5
 """A solid's parameters over a frame are a polynomial of this many coefficients in tau, -1..1 over the frame."""
 
 
-@njit(cache=True)
-def trace(coefficients: Array, kind: NDArray[np.int64], group: NDArray[np.int64], marker: NDArray[np.int64],
-          size: Array, rgb: Array, margin: Array, sweep: Array, rays: Array, intrinsics: Array, timing: Array,
-          light: Array, shading: float, seed: int, background: Image, image: Image, ids: NDArray[np.int8],
-          edges: NDArray[np.uint8], masks: NDArray[np.int64], visible: Array,
-          whole: Array) -> tuple[int, int, int, int]:
-    """Paint the hand over `background` into `image`, both (3, H, W), only inside the box that is returned.
+class Moving(NamedTuple):
+    """N solids during one frame, painted ones first.
 
-    `coefficients` (N, 12, NODES): parameters of the N solids in the camera's frame. `sweep` (N, 2): px that a solid
-    moves in x and y during the exposure. `rays` (H + 2, W + 2, 2): normalised coordinates of the pixel centres with a
-    border of one. `timing`: (tau of row 0's mid-exposure, tau per row, exposure in tau). `light` (3,) unit vector,
-    `shading` 0..1 its share. `ids` (H, W), `edges` (H, W) and `masks` (H, W) are work space. `visible` and `whole`
-    (M,) receive each marker's seen and unhidden area inside the image, px^2. Returns the box (x0, y0, x1, y1) of
-    changed pixels, half open; an empty box is (0, 0, 0, 0).
+    `series` (N, 12, NODES): their parameters in the camera's frame. `meta` (N, 3): kind, group, marker. `size` (N, 3),
+    `rgb` (N, 3), `margin` (N,) as in `HandBody`. `sweep` (N, 2): px travelled in x and y during the exposure.
     """
+
+    series: Array
+    meta: Indices
+    size: Array
+    rgb: Array
+    margin: Array
+    sweep: Array
+
+
+class View(NamedTuple):
+    """A camera during one frame.
+
+    `rays` (H + 2, W + 2, 2): normalised coordinates of the pixel centres with a border of one. `intrinsics` (9,).
+    `timing` (3,): tau of row 0's mid-exposure, tau per row, exposure in tau. `light` (3,): unit vector towards the
+    lamp, camera frame; `shading` 0..1: its share of the brightness.
+    """
+
+    rays: Array
+    intrinsics: Array
+    timing: Array
+    light: Array
+    shading: float
+
+
+class Canvas(NamedTuple):
+    """Images and work space of one camera, H x W; see `canvas`.
+
+    `background` and `image` (3, H, W). `ids` and `masks` (H, W): what a pixel's centre shows, and bits of the markers
+    behind it, hidden or not. `edges` (H, W): pixels to sample again. `spans` (H, N, 2) and `rows` (H, 2): half-open
+    x ranges of each solid and of all. `visible` and `whole` (M,): each marker's seen and unhidden area, px^2.
+    """
+
+    background: Image
+    image: Image
+    ids: NDArray[np.int8]
+    masks: Indices
+    edges: NDArray[np.uint8]
+    spans: Indices
+    rows: Indices
+    visible: Array
+    whole: Array
+
+
+def canvas(background: Image, solids: int, markers: int) -> Canvas:
+    """A canvas whose image is the `background` (3, H, W)."""
+    _, height, width = background.shape
+    size = (height, width)
+    return Canvas(background, background.copy(), np.zeros(size, np.int8), np.zeros(size, np.int64),
+                  np.zeros(size, np.uint8), np.zeros((height, solids, 2), np.int64),
+                  np.zeros((height, 2), np.int64), np.zeros(markers), np.zeros(markers))
+
+
+@njit(cache=True)
+def trace(moving: Moving, view: View, canvas: Canvas, seed: int) -> tuple[int, int, int, int]:
+    """Paint the hand over the background into the canvas's image; count the markers' areas inside the image.
+
+    Returns the box (x0, y0, x1, y1) of pixels that may differ from the background, half open; (0, 0, 0, 0): none.
+    """
+    canvas.visible[:] = 0.0
+    canvas.whole[:] = 0.0
+    canvas.ids[:] = 0
+    canvas.edges[:] = 0
+    top, bottom = _trace_centres(moving, view, canvas)
+    if top >= bottom:
+        return 0, 0, 0, 0
+    _mark_edges(canvas.ids, canvas.edges, canvas.rows, top, bottom, _reach(moving.meta, moving.sweep))
+    _trace_edges(moving, view, canvas, top, bottom, seed)
+    left, right = canvas.rows[top, 0], canvas.rows[top, 1]
+    for y in range(top, bottom):
+        if canvas.rows[y, 0] < canvas.rows[y, 1]:
+            left, right = min(left, canvas.rows[y, 0]), max(right, canvas.rows[y, 1])
+    return left, top, right, bottom
+
+
+@njit(cache=True, fastmath=True)
+def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int]:
+    """First pass: one ray per pixel. Returns the range of rows that the hand may touch."""
+    series, meta, size, rgb, margin, sweep = moving
+    rays, intrinsics, timing, light, shading = view
+    background, image, ids, masks, _, spans, rows, _, _ = canvas
     height, width = ids.shape
-    count = len(kind)
-    ids[:] = 0
-    edges[:] = 0
-    visible[:] = 0.0
-    whole[:] = 0.0
-    row = np.empty(12)
-    prepared = np.empty((SAMPLES, count, PREPARED))
-    active, near, nears = np.empty(count, np.int64), np.empty(count, np.int64), 0
-    spans = np.empty((height, count, 2), np.int64)
-    rows = np.zeros((height, 2), np.int64)  # half-open x range of each row
-    tied = np.zeros(PALM_GROUP + 1)
+    row, prepared = np.empty(12), np.empty((1, len(meta), PREPARED))
+    active, near = np.empty(len(meta), np.int64), np.empty(len(meta), np.int64)
+    ray, slot, met, depth, tied = _ray_batch()
     top, bottom = height, 0
     for y in range(height):
-        tau = timing[0] + y * timing[1]
         left, right, actives = width, 0, 0
-        for n in range(count):
-            _evaluate(coefficients, n, tau, kind[n], row)
-            x0, x1 = _span(kind[n], row, size, sweep, n, intrinsics, y, width)
+        for n in range(len(meta)):
+            _evaluate(series, n, timing[0] + y * timing[1], meta[n, 0], row)
+            x0, x1 = _span(meta[n, 0], row, size, sweep, n, intrinsics, y, width)
             spans[y, n, 0], spans[y, n, 1] = x0, x1
             if x0 < x1:
-                prepare(kind[n], row, size, prepared, 0, n)
+                prepare(meta[n, 0], row, size, prepared, 0, n)
                 active[actives] = n
                 actives += 1
                 left, right = min(left, x0), max(right, x1)
         rows[y, 0], rows[y, 1] = left, max(left, right)
-        if actives == 0:
-            continue
-        top, bottom = min(top, y), y + 1
-        for x in range(left, right):
-            if (x - left) % _BLOCK == 0:
-                nears = _in_block(active, actives, spans, y, x, near)
-            rx, ry = rays[y + 1, x + 1, 0], rays[y + 1, x + 1, 1]
-            winner, depth, mask = _nearest(near, nears, prepared, 0, kind, group, marker, margin, tied, rx, ry)
-            masks[y, x] = mask
-            if winner < 0:
+        if actives:
+            top, bottom = min(top, y), y + 1
+        for start in range(left, right, SAMPLES):
+            pixels = min(SAMPLES, right - start)
+            nears = _in_block(active, actives, spans, y, start, near)
+            for i in range(pixels):
+                ray[i, 0], ray[i, 1] = rays[y + 1, start + i + 1, 0], rays[y + 1, start + i + 1, 1]
+            _cast(pixels, ray, slot, near, nears, prepared, meta, margin, tied, met, depth)
+            for i in range(pixels):
+                x, winner = start + i, met[i, 0]
+                masks[y, x] = met[i, 1]
+                if winner < 0:
+                    for c in range(3):
+                        image[c, y, x] = background[c, y, x]
+                    continue
+                ids[y, x] = _SKIN if meta[winner, 2] < 0 else _PAINT + meta[winner, 2]
+                cosine = lambert(meta[winner, 0], prepared, 0, winner, ray[i, 0], ray[i, 1], depth[i], light)
+                shade = 1.0 - shading * (1.0 - cosine)
                 for c in range(3):
-                    image[c, y, x] = background[c, y, x]
-                continue
-            ids[y, x] = 1 + group[winner] if marker[winner] < 0 else 20 + marker[winner]
-            shade = 1.0 - shading * (1.0 - lambert(kind[winner], prepared, 0, winner, rx, ry, depth, light))
-            for c in range(3):
-                image[c, y, x] = shade * rgb[winner, c]
-    if top >= bottom:
-        return 0, 0, 0, 0
-    _mark_edges(ids, edges, rows, top, bottom, _reach(group, marker, sweep))
-    slots = SAMPLES if np.max(sweep) > 0.02 else 1
-    box_left, box_right = width, 0
+                    image[c, y, x] = shade * rgb[winner, c]
+    return top, bottom
+
+
+@njit(cache=True, fastmath=True)
+def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: int, seed: int) -> None:
+    """Second pass: the marked pixels again, by 16 rays over area and exposure; and the markers' areas."""
+    series, meta, size, rgb, margin, sweep = moving
+    rays, _, timing, light, shading = view
+    background, image, ids, masks, edges, spans, rows, visible, whole = canvas
+    slots = SAMPLES if np.max(sweep) > _STILL_PX else 1
+    row, prepared = np.empty(12), np.empty((slots, len(meta), PREPARED))
+    active, near = np.empty(len(meta), np.int64), np.empty(len(meta), np.int64)
+    ray, slot, met, depth, tied = _ray_batch()
     for y in range(top, bottom):
-        if rows[y, 0] >= rows[y, 1]:
-            continue
-        box_left, box_right = min(box_left, rows[y, 0]), max(box_right, rows[y, 1])
-        actives = 0
-        for n in range(count):
+        actives, nears, block = 0, 0, -1
+        for n in range(len(meta)):
             if spans[y, n, 0] < spans[y, n, 1]:
                 active[actives] = n
                 actives += 1
-                for slot in range(slots):
-                    offset = ((slot + 0.5) / slots - 0.5) * timing[2]
-                    _evaluate(coefficients, n, timing[0] + y * timing[1] + offset, kind[n], row)
-                    prepare(kind[n], row, size, prepared, slot, n)
-        block = -1
+                for k in range(slots):
+                    offset = ((k + 0.5) / slots - 0.5) * timing[2]
+                    _evaluate(series, n, timing[0] + y * timing[1] + offset, meta[n, 0], row)
+                    prepare(meta[n, 0], row, size, prepared, k, n)
         for x in range(rows[y, 0], rows[y, 1]):
-            if edges[y, x]:
-                if x // _BLOCK != block:
-                    block = x // _BLOCK
-                    nears = _in_block(active, actives, spans, y, block * _BLOCK, near)
-                _supersample(x, y, near, nears, prepared, slots, kind, group, marker, margin, rgb, tied, rays, light,
-                             shading, seed, background, image, visible, whole)
-            else:
-                if ids[y, x] >= 20:
-                    visible[ids[y, x] - 20] += 1.0
-                _count(masks[y, x], 1.0, whole)
-    return box_left, top, box_right, bottom
+            if not edges[y, x]:
+                if ids[y, x] >= _PAINT:
+                    visible[ids[y, x] - _PAINT] += 1.0
+                if masks[y, x]:
+                    _count(masks[y, x], 1.0, whole)
+                continue
+            if x // SAMPLES != block:
+                block = x // SAMPLES
+                nears = _in_block(active, actives, spans, y, block * SAMPLES, near)
+            _scatter(x, y, slots, seed, rays, ray, slot)
+            _cast(SAMPLES, ray, slot, near, nears, prepared, meta, margin, tied, met, depth)
+            _gather(x, y, ray, slot, prepared, meta, rgb, met, depth, light, shading, background, image, visible, whole)
+
+
+@njit(cache=True)
+def _ray_batch() -> tuple[Array, Indices, Indices, Array, Array]:
+    """Room for SAMPLES rays: directions, moments, what they meet, at what depth; and the margins of paint by group."""
+    return (np.empty((SAMPLES, 2)), np.zeros(SAMPLES, np.int64), np.zeros((SAMPLES, 2), np.int64), np.zeros(SAMPLES),
+            np.zeros(PALM_GROUP + 1))
 
 
 @njit(cache=True, fastmath=True)
@@ -129,92 +210,107 @@ def _evaluate(series: Array, n: int, tau: float, kind: int, row: Array) -> None:
 @njit(cache=True)
 def _span(kind: int, row: Array, size: Array, sweep: Array, n: int, intrinsics: Array, y: int,
           width: int) -> tuple[int, int]:
-    """Half-open range of pixels of row `y` that a solid may touch; generous, (0, 0) when none."""
-    x_low, x_high, y_low, y_high = extent(kind, row, size, n, intrinsics)
-    pad_y = 0.5 * sweep[n, 1] + 1.0
-    if y < y_low - pad_y or y > y_high + pad_y:
+    """Half-open range of pixels of image row `y` that a solid may touch; generous, (0, 0) when none.
+
+    The solid's image lies within a circle's way along its axis: only the part of the axis near the row counts.
+    """
+    u0, v0, u1, v1, radius = outline(kind, row, size, n, intrinsics)
+    reach = radius + 0.5 * sweep[n, 1] + 1.0
+    low, high = 0.0, 1.0
+    if abs(v1 - v0) > 1e-9:
+        enter, leave = (y - reach - v0) / (v1 - v0), (y + reach - v0) / (v1 - v0)
+        low, high = max(low, min(enter, leave)), min(high, max(enter, leave))
+    elif abs(y - v0) > reach:
         return 0, 0
-    pad_x = 0.5 * sweep[n, 0] + 1.0
-    x0 = int(max(0.0, min(float(width), math.floor(x_low - pad_x))))
-    x1 = int(max(0.0, min(float(width), math.ceil(x_high + pad_x) + 1.0)))
+    if not (radius > 0.0 and low <= high):
+        return 0, 0
+    ua, ub = u0 + low * (u1 - u0), u0 + high * (u1 - u0)
+    pad = radius + 0.5 * sweep[n, 0] + 1.0
+    x0 = int(max(0.0, min(float(width), math.floor(min(ua, ub) - pad))))
+    x1 = int(max(0.0, min(float(width), math.ceil(max(ua, ub) + pad) + 1.0)))
     return (x0, x1) if x0 < x1 else (0, 0)
 
 
 @njit(cache=True)
-def extent(kind: int, row: Array, size: Array, n: int, intrinsics: Array) -> tuple[float, float, float, float]:
-    """(x low, x high, y low, y high) px that surely contain a solid; empty when it is behind the camera."""
+def outline(kind: int, row: Array, size: Array, n: int, intrinsics: Array) -> tuple[float, float, float, float, float]:
+    """Where the ends of a solid's axis appear, (u0, v0, u1, v1) px, and how far its image may reach from the axis.
+
+    All NaN when an end is not clearly before the camera: such a solid is not drawn.
+    """
     radius = size[n, 0] if kind == CAPSULE else max(size[n, 1], size[n, 2])
-    x_low, x_high, y_low, y_high = 1e9, -1e9, 1e9, -1e9
+    if kind == CAPSULE:
+        ax, ay, az, bx, by, bz = row[0], row[1], row[2], row[3], row[4], row[5]
+    else:
+        half = size[n, 0]
+        ax, ay, az = row[0] - half * row[3], row[1] - half * row[4], row[2] - half * row[5]
+        bx, by, bz = row[0] + half * row[3], row[1] + half * row[4], row[2] + half * row[5]
+    nearest = min(az, bz) - radius
+    if not nearest > NEAR_M:
+        return math.nan, math.nan, math.nan, math.nan, math.nan
     lens = intrinsics[4:9]
-    for end in range(2):
-        if kind == CAPSULE:
-            px, py, pz = row[3 * end], row[3 * end + 1], row[3 * end + 2]
-        else:
-            sign = (2.0 * end - 1.0) * size[n, 0]
-            px, py, pz = row[0] + sign * row[3], row[1] + sign * row[4], row[2] + sign * row[5]
-        if pz < 0.02:
-            continue
-        depth = max(pz - radius, 0.02)
-        xd, yd, _, _, _, _ = distort(px / pz, py / pz, lens)
-        rx, ry = 1.1 * intrinsics[0] * radius / depth, 1.1 * intrinsics[1] * radius / depth
-        u, v = intrinsics[0] * xd + intrinsics[2], intrinsics[1] * yd + intrinsics[3]
-        x_low, x_high = min(x_low, u - rx), max(x_high, u + rx)
-        y_low, y_high = min(y_low, v - ry), max(y_high, v + ry)
-    return x_low, x_high, y_low, y_high
+    x, y, _, _, _, _ = distort(ax / az, ay / az, lens)
+    u0, v0 = intrinsics[0] * x + intrinsics[2], intrinsics[1] * y + intrinsics[3]
+    x, y, _, _, _, _ = distort(bx / bz, by / bz, lens)
+    u1, v1 = intrinsics[0] * x + intrinsics[2], intrinsics[1] * y + intrinsics[3]
+    return u0, v0, u1, v1, 1.1 * max(intrinsics[0], intrinsics[1]) * radius / nearest + 1.0
 
 
 @njit(cache=True)
-def _in_block(active: NDArray[np.int64], actives: int, spans: NDArray[np.int64], y: int, x: int,
-              near: NDArray[np.int64]) -> int:
-    """Fill `near` with the active solids that touch pixels x .. x + _BLOCK of row `y`; returns how many."""
+def _in_block(active: Indices, actives: int, spans: Indices, y: int, x: int,
+              near: Indices) -> int:
+    """Fill `near` with the active solids that touch pixels x .. x + SAMPLES - 1 of row `y`; returns how many."""
     nears = 0
     for k in range(actives):
         n = active[k]
-        if spans[y, n, 0] < x + _BLOCK and x < spans[y, n, 1]:
+        if spans[y, n, 0] < x + SAMPLES and x < spans[y, n, 1]:
             near[nears] = n
             nears += 1
     return nears
 
 
-@njit(cache=True, fastmath=True, inline="always")
-def _nearest(near: NDArray[np.int64], nears: int, prepared: Array, slot: int, kind: NDArray[np.int64],
-             group: NDArray[np.int64], marker: NDArray[np.int64], margin: Array, tied: Array, rx: float,
-             ry: float) -> tuple[int, float, int]:
-    """(solid or -1, depth, bit mask of the markers on the ray, hidden or not). Markers come first among solids."""
-    winner, depth, nearest, mask = -1, NO_HIT, NO_HIT, 0
-    for k in range(nears):
-        n = near[k]
-        t = hit(kind[n], prepared, slot, n, rx, ry)
-        if t == NO_HIT:
-            continue
-        rank = t
-        if marker[n] >= 0:
-            mask |= 1 << marker[n]
-            tied[group[n]] = margin[n]
-        elif mask:
-            rank += tied[group[n]]
-        if rank < nearest:
-            winner, depth, nearest = n, t, rank
-    if mask:
-        tied[:] = 0.0
-    return winner, depth, mask
+@njit(cache=True, fastmath=True)
+def _cast(rays: int, ray: Array, slot: Indices, near: Indices, nears: int, prepared: Array, meta: Indices,
+          margin: Array, tied: Array, met: Indices, depth: Array) -> None:
+    """What each of the first `rays` rays (x, y) meets: `met` (solid or -1, bit mask of all markers on the ray, hidden
+    or not) and the depth. Many rays in one call, because every call counts references of all its arrays.
+    """
+    for i in range(rays):
+        winner, mask, nearest = -1, 0, NO_HIT
+        for k in range(nears):
+            n = near[k]
+            t = hit(meta[n, 0], prepared, slot[i], n, ray[i, 0], ray[i, 1])
+            if t == NO_HIT:
+                continue
+            rank = t
+            if meta[n, 2] >= 0:  # markers come first among the solids
+                mask |= 1 << meta[n, 2]
+                tied[meta[n, 1]] = margin[n]
+            elif mask:
+                rank += tied[meta[n, 1]]
+            if rank < nearest:
+                winner, nearest = n, rank
+                depth[i] = t
+        met[i, 0], met[i, 1] = winner, mask
+        if mask:
+            for part in range(PALM_GROUP + 1):
+                tied[part] = 0.0
 
 
 @njit(cache=True)
-def _reach(group: NDArray[np.int64], marker: NDArray[np.int64], sweep: Array) -> NDArray[np.int64]:
+def _reach(meta: Indices, sweep: Array) -> Indices:
     """(128, 2) px around a change of id, by id, that the exposure may sweep."""
     reach = np.zeros((128, 2), np.int64)
-    for n in range(len(group)):
-        code = 1 + group[n] if marker[n] < 0 else 20 + marker[n]
+    for n in range(len(meta)):
+        code = _SKIN if meta[n, 2] < 0 else _PAINT + meta[n, 2]
         for axis in range(2):
-            pixels = math.ceil(0.5 * sweep[n, axis]) if sweep[n, axis] > 0.02 else 0
+            pixels = math.ceil(0.5 * sweep[n, axis]) if sweep[n, axis] > _STILL_PX else 0
             reach[code, axis] = max(reach[code, axis], pixels)
     return reach
 
 
 @njit(cache=True)
-def _mark_edges(ids: NDArray[np.int8], edges: NDArray[np.uint8], rows: NDArray[np.int64], top: int, bottom: int,
-                reach: NDArray[np.int64]) -> None:
+def _mark_edges(ids: NDArray[np.int8], edges: NDArray[np.uint8], rows: Indices, top: int, bottom: int,
+                reach: Indices) -> None:
     height, width = ids.shape
     for y in range(max(top - 1, 0), bottom):
         below = min(y + 1, height - 1)
@@ -233,25 +329,30 @@ def _mark_edges(ids: NDArray[np.int8], edges: NDArray[np.uint8], rows: NDArray[n
 
 
 @njit(cache=True, fastmath=True)
-def _supersample(x: int, y: int, near: NDArray[np.int64], nears: int, prepared: Array, slots: int,
-                 kind: NDArray[np.int64], group: NDArray[np.int64], marker: NDArray[np.int64], margin: Array,
-                 rgb: Array, tied: Array, rays: Array, light: Array, shading: float, seed: int, background: Image,
-                 image: Image, visible: Array, whole: Array) -> None:
+def _scatter(x: int, y: int, slots: int, seed: int, rays: Array, ray: Array, slot: Indices) -> None:
+    """Fill the pixel's 16 rays and their moments."""
     random = _hash(x, y, seed)
     shift_x, shift_y = (random & 0xFFFF) / 65536.0, ((random >> 16) & 0xFFFF) / 65536.0
     shift_t = (random >> 32) & (SAMPLES - 1)
     j, i = y + 1, x + 1
     xx, xy = 0.5 * (rays[j, i + 1, 0] - rays[j, i - 1, 0]), 0.5 * (rays[j + 1, i, 0] - rays[j - 1, i, 0])
     yx, yy = 0.5 * (rays[j, i + 1, 1] - rays[j, i - 1, 1]), 0.5 * (rays[j + 1, i, 1] - rays[j - 1, i, 1])
+    for k in range(SAMPLES):
+        ox = (k + shift_x) / SAMPLES - 0.5
+        oy = (((_STEP_Y * k) & (SAMPLES - 1)) + shift_y) / SAMPLES - 0.5
+        ray[k, 0] = rays[j, i, 0] + ox * xx + oy * xy
+        ray[k, 1] = rays[j, i, 1] + ox * yx + oy * yy
+        slot[k] = (_STEP_T * k + shift_t) & (slots - 1)
+
+
+@njit(cache=True, fastmath=True)
+def _gather(x: int, y: int, ray: Array, slot: Indices, prepared: Array, meta: Indices, rgb: Array, met: Indices,
+            depth: Array, light: Array, shading: float, background: Image, image: Image, visible: Array,
+            whole: Array) -> None:
+    """The mean colour of the pixel's 16 rays, and its share in the markers' areas."""
     red, green, blue = 0.0, 0.0, 0.0
     for k in range(SAMPLES):
-        ox = (k + shift_x) / SAMPLES
-        oy = ((_STEP_Y * k) % SAMPLES + shift_y) / SAMPLES
-        ox, oy = ox - 0.5, oy - 0.5
-        slot = (_STEP_T * k + shift_t) % slots
-        rx = rays[j, i, 0] + ox * xx + oy * xy
-        ry = rays[j, i, 1] + ox * yx + oy * yy
-        winner, depth, mask = _nearest(near, nears, prepared, slot, kind, group, marker, margin, tied, rx, ry)
+        winner, mask = met[k, 0], met[k, 1]
         if mask:
             _count(mask, 1.0 / SAMPLES, whole)
         if winner < 0:
@@ -259,9 +360,10 @@ def _supersample(x: int, y: int, near: NDArray[np.int64], nears: int, prepared: 
             green += background[1, y, x]
             blue += background[2, y, x]
             continue
-        if marker[winner] >= 0:
-            visible[marker[winner]] += 1.0 / SAMPLES
-        shade = 1.0 - shading * (1.0 - lambert(kind[winner], prepared, slot, winner, rx, ry, depth, light))
+        if meta[winner, 2] >= 0:
+            visible[meta[winner, 2]] += 1.0 / SAMPLES
+        cosine = lambert(meta[winner, 0], prepared, slot[k], winner, ray[k, 0], ray[k, 1], depth[k], light)
+        shade = 1.0 - shading * (1.0 - cosine)
         red += shade * rgb[winner, 0]
         green += shade * rgb[winner, 1]
         blue += shade * rgb[winner, 2]
@@ -291,7 +393,7 @@ def _count(mask: int, area: float, whole: Array) -> None:
 
 @njit(cache=True)
 def area_outside(coefficients: Array, n: int, kind: int, size: Array, intrinsics: Array, timing: Array, width: int,
-                 height: int, limits: NDArray[np.int64]) -> float:
+                 height: int, limits: Indices) -> float:
     """Area, px^2, of solid `n` beyond the image borders, within `limits` (x0, y0, x1, y1): one ray per pixel."""
     row, prepared = np.empty(12), np.empty((1, len(size), PREPARED))
     area = 0.0
