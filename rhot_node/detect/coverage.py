@@ -20,7 +20,7 @@ CLIP = 0.3  # coverage is clipped to -CLIP..1 + CLIP: noise must stay unbiased, 
 HOLES_MAX = 0.3  # holes (glints, noise) are filled up to this fraction of the component
 CONTRAST_MIN = 0.3  # of the marker's level; with less between paint and surroundings an edge cannot be unmixed
 FLATNESS = 4.0  # grey levels^2 that surroundings are taken to vary by at least, in every channel
-SLOPE_PIXELS = 9  # interior pixels that a shading slope is fitted to at least
+SLOPE_PIXELS = 4  # interior pixels that a shading slope is fitted to at least
 
 # Kinds of pixels in the scratch plane `kind`.
 OUTSIDE, INTERIOR, HOLE, EDGE, RIM, _REACHED = range(6)

@@ -21,7 +21,7 @@ from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 Blobs = NDArray[np.float64]
 
 AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
-AS_PLAUSIBLE = 0.5  # merit of a second blob, as a fraction of the best, that makes the choice ambiguous
+AS_PLAUSIBLE = 0.3  # merit of a second blob, as a fraction of the best, that makes the choice ambiguous
 CANDIDATES = 4  # blobs per marker that are measured until one proves to be paint
 NOISE_START = 1.5  # grey levels of chroma noise, until the first frames have told
 NOISE_MIN = 0.5  # quantisation alone leaves 0.3

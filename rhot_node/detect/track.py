@@ -17,13 +17,17 @@ Row = list[float]
 
 MEMORY_FRAMES = 40  # how long a lost marker's motion and size are held against candidates
 VELOCITY_GAIN = 0.7
-REFERENCE_GAIN = 0.3  # per frame: an approach of 5 % area per frame leaves the reference 17 % behind
-HIDDEN_DECAY = 0.985  # per frame: what looks hidden for long is believed to be that small
-PARTIAL_AREA = 0.75  # of the reference
-JUMP_AREA = 1.8  # of the reference: something else joined the marker
+AREA_GAIN, RATE_GAIN = 0.4, 0.1  # per frame, of the expected log area and its trend
+RATE_MAX = 0.08  # of log area per frame: 2 m/s of approach at 1 m, or a finger bending fast, at 40 frames/s
+HIDDEN_DECAY = 0.99  # per frame: what looks hidden for long is believed to be that small
+PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
+STEADY_AREA = 0.04  # relative change against the expectation beyond which the covariance covers what hiding,
+# uncovering or joining that much would do
+JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
 FLOOR_VARIANCE = 4e-4  # px^2: sampling and shading leave about 0.02 px
 BAND_FLOOR_VARIANCE = 3e-3  # px^2: the fit of a band's curvature magnifies them
+SMALL_AREA, SMALL_VARIANCE = 22.0, 0.01  # chroma px^2, px^2: too few inner pixels to see the shading
 NOISE_INFLATION = 1.2  # paint and surroundings are themselves means of few noisy pixels
 MARGIN = 5.0  # chroma px around a resting marker
 
@@ -42,7 +46,8 @@ class Track:
     y: float = 0.0
     vx: float = 0.0  # px per frame
     vy: float = 0.0
-    area: float = 0.0  # reference
+    area: float = 0.0  # expected in the next frame
+    rate: float = 0.0  # trend of its logarithm per frame: approach, foreshortening
     extent: float = 0.0  # length along the major axis
     level: float = 0.0
     fitted: bool = False  # a band's curvature is known
@@ -111,14 +116,15 @@ class Track:
 
     def _plausible_bias(self, row: Row, ratio: float, extent: float, flags: MarkerFlag) -> float:
         """Standard deviation, chroma px, of how far what is hidden or mistaken may have drawn the centroid."""
-        bias = 0.0
         whole = max(extent, self.extent)
+        change = 1.0 - min(ratio, 1.0 / ratio)
+        bias = 0.5 * change * whole if change > STEADY_AREA else 0.0
         if flags & MarkerFlag.PARTIAL:
-            bias = 0.5 * max(1.0 - ratio, 0.1) * whole
+            bias = max(bias, 0.05 * whole)
         if flags & MarkerFlag.EDGE:
             bias = max(bias, 0.15 * whole)
         if flags & MarkerFlag.AMBIGUOUS:
-            bias = max(bias, 0.3 * extent)
+            bias = max(bias, 0.3 * whole)
         return bias
 
     def _update(self, row: Row, x: float, y: float, extent: float, ratio: float, known: bool,
@@ -132,11 +138,13 @@ class Track:
             self.vx = self.vy = 0.0
         self.x, self.y, self.level = x, y, row[m.LEVEL]
         if not known:
-            self.area, self.extent = row[p.AREA], extent
+            self.area, self.rate, self.extent = row[p.AREA], 0.0, extent
         elif flags & (MarkerFlag.PARTIAL | MarkerFlag.EDGE) and ratio < 1.0:
-            self.area *= HIDDEN_DECAY
+            self.area, self.rate = self.area * HIDDEN_DECAY, 0.0
         else:
-            self.area += REFERENCE_GAIN * (row[p.AREA] - self.area)
+            surprise = math.log(ratio)
+            self.rate = min(max(self.rate + RATE_GAIN * surprise, -RATE_MAX), RATE_MAX)
+            self.area *= math.exp(AREA_GAIN * surprise + self.rate)
             self.extent = extent
         if not known:
             self.fitted, self.sag_x, self.sag_y = False, 0.0, 0.0
@@ -150,6 +158,8 @@ def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: f
                  flags: MarkerFlag) -> MarkerObservation:
     scale = CHROMA_TO_LUMA**2 * NOISE_INFLATION * noise**2
     floor = BAND_FLOOR_VARIANCE if row[p.FIT] else FLOOR_VARIANCE
+    if row[p.AREA] < SMALL_AREA:
+        floor += SMALL_VARIANCE
     widened = floor + (CHROMA_TO_LUMA * bias) ** 2
     area = row[p.AREA]
     quality = min(1.0, row[m.LEVEL] / (15.0 * noise)) * min(1.0, area / 12.0)

@@ -1,0 +1,194 @@
+"""What the fast detector makes of motion, hiding, borders, decoys and absence."""
+
+import math
+
+import numpy as np
+import pytest
+from marker_rendering import SKIN, Canvas, Rgb, capsule, disc
+
+from rhot_node.detect.fast import FastDetector
+from rhot_node.files import resource_path
+from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.wire.messages import MarkerFlag, MarkerObservation
+
+RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
+RGB: dict[str, Rgb] = {marker.id: marker.display_rgb for marker in RHOT6.markers}
+DOUBTS = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
+
+
+def only(name: str) -> FastDetector:
+    return FastDetector(MarkerSet(markers=(RHOT6.markers[RHOT6.ids.index(name)],)))
+
+
+def error(seen: MarkerObservation, x: float, y: float) -> float:
+    return math.hypot(seen.x - x, seen.y - y)
+
+
+def sigma(seen: MarkerObservation) -> float:
+    return math.sqrt(0.5 * (seen.cov_xx + seen.cov_yy))
+
+
+def scene(places: dict[str, tuple[float, float]], size: tuple[int, int] = (320, 240)) -> Canvas:
+    canvas = Canvas(*size)
+    for name, (x, y) in places.items():
+        canvas.paint(disc(x, y, 9), RGB[name], (x, y), 12, 0.25)
+    return canvas
+
+
+def test_all_colours_are_found_at_once_tracked_and_named() -> None:
+    detector = FastDetector(RHOT6)
+    rng = np.random.default_rng(1)
+    places = {name: (40.0 + 47 * k, 60.0 + 31 * (k % 3)) for k, name in enumerate(RHOT6.ids)}
+    first = detector.detect(scene(places).expose(rng))
+    second = detector.detect(scene(places).expose(rng))
+    for index, name in enumerate(RHOT6.ids):
+        assert first[index].index == second[index].index == index
+        assert error(second[index], *places[name]) < 0.2
+        assert first[index].flags & MarkerFlag.ACQUIRED
+        assert not second[index].flags & MarkerFlag.ACQUIRED
+
+
+def test_absent_markers_are_stated_as_lost() -> None:
+    seen = FastDetector(RHOT6).detect(scene({"ring": (100, 100)}).expose())
+    for marker, observation in zip(RHOT6.markers, seen, strict=True):
+        assert observation.found == (marker.id == "ring")
+        if not observation.found:
+            assert observation.flags == MarkerFlag.LOST
+            assert math.isnan(observation.x)
+            assert observation.quality == 0
+
+
+def test_skin_and_noise_alone_are_nothing() -> None:
+    rng = np.random.default_rng(2)
+    canvas = Canvas(320, 240, (150, 110, 70)).paint(capsule((60, 200), (200, 60), 40), SKIN, (130, 130), 140, 0.4)
+    assert not any(seen.found for seen in FastDetector(RHOT6).detect(canvas.expose(rng, noise=6.0)))
+
+
+def test_specks_are_ignored() -> None:
+    canvas = Canvas(160, 120)
+    for x in range(10, 150, 14):
+        canvas.paint(disc(x, 50, 1.5), RGB["ring"], (x, 50), 3)
+    assert not only("ring").detect(canvas.expose())[0].found
+
+
+def test_a_fast_marker_is_followed_by_prediction() -> None:
+    detector = only("ring")
+    rng = np.random.default_rng(3)
+    for step in range(24):
+        x = 320 + 250 * math.sin(0.17 * step)  # up to 43 px per frame
+        seen = detector.detect(scene({"ring": (x, 200)}, (640, 480)).expose(rng))[0]
+        assert error(seen, x, 200) < 0.25
+        if step > 2:
+            assert not seen.flags & MarkerFlag.ACQUIRED
+
+
+def test_a_jump_out_of_the_window_is_found_in_the_same_frame() -> None:
+    detector = only("ring")
+    detector.detect(scene({"ring": (40, 40)}).expose())
+    seen = detector.detect(scene({"ring": (280, 200)}).expose())[0]
+    assert error(seen, 280, 200) < 0.1
+    assert seen.flags & MarkerFlag.ACQUIRED
+
+
+@pytest.mark.parametrize("decoy_radius", [12, 22])
+def test_a_larger_blob_does_not_take_the_track_over(decoy_radius: float) -> None:
+    detector = only("ring")
+    for step in range(12):
+        x = 40.0 + 8 * step
+        canvas = scene({"ring": (x, 100)})
+        if step > 2:
+            canvas.paint(disc(200, 140, decoy_radius), RGB["ring"], (200, 140), decoy_radius + 3)
+        seen = detector.detect(canvas.expose())[0]
+        assert error(seen, x, 100) < 0.1
+
+
+def test_a_decoy_in_the_window_neither_pulls_nor_passes_silently() -> None:
+    detector = only("ring")
+    detector.detect(scene({"ring": (100, 100)}).expose())
+    canvas = scene({"ring": (100, 100)}).paint(disc(126, 100, 8), RGB["ring"], (126, 100), 11)
+    seen = detector.detect(canvas.expose())[0]
+    assert error(seen, 100, 100) < 0.1
+    far = scene({"ring": (100, 100)}).paint(disc(110, 100, 8), RGB["ring"], (110, 100), 11)
+    merged = detector.detect(far.expose())[0]
+    assert merged.flags & MarkerFlag.AMBIGUOUS or error(merged, 100, 100) < 3 * sigma(merged)
+
+
+def test_two_equal_blobs_at_the_start_are_ambiguous() -> None:
+    canvas = scene({"ring": (80, 100)}).paint(disc(220, 100, 9), RGB["ring"], (220, 100), 12)
+    seen = only("ring").detect(canvas.expose())[0]
+    assert seen.flags & MarkerFlag.AMBIGUOUS
+    assert sigma(seen) > 3
+    assert seen.quality < 0.6
+
+
+def test_hiding_is_noticed_and_the_covariance_covers_it() -> None:
+    detector = only("thumb")
+    rng = np.random.default_rng(5)
+    flagged = []
+    for step in range(24):
+        x = 114 - 3 * step
+        canvas = scene({"thumb": (80, 80)}, (200, 160)).paint(capsule((x, 20), (x, 140), 9), SKIN, (x, 80), 70)
+        seen = detector.detect(canvas.expose(rng))[0]
+        if not seen.found:
+            continue
+        flagged.append(bool(seen.flags & MarkerFlag.PARTIAL))
+        assert error(seen, 80, 80) < 0.3 + 3 * sigma(seen), step
+        if seen.diameter < 15:
+            assert seen.flags & MarkerFlag.PARTIAL
+            assert seen.quality < 0.8
+    assert any(flagged)
+    assert not flagged[0]
+    assert not flagged[-1]
+
+
+def test_a_finger_across_the_marker_leaves_one_marker_not_half_of_it() -> None:
+    detector = only("thumb")
+    big = Canvas(160, 160).paint(disc(80, 80, 16), RGB["thumb"], (80, 80), 19)
+    for _ in range(3):
+        detector.detect(big.expose())
+    seen = detector.detect(big.paint(capsule((80, 20), (80, 140), 5), SKIN, (80, 80), 70).expose())[0]
+    assert seen.flags & MarkerFlag.PARTIAL
+    assert error(seen, 80, 80) < 1.0
+
+
+def test_honest_approach_is_not_hiding() -> None:
+    detector = only("index")
+    rng = np.random.default_rng(7)
+    for step in range(60):
+        radius = 9.0 * (0.975 if step < 30 else 1.0) ** min(step, 30) * (1.025 ** max(step - 30, 0))
+        canvas = Canvas(160, 120).paint(disc(80, 60, radius), RGB["index"], (80, 60), radius + 3, 0.25)
+        seen = detector.detect(canvas.expose(rng))[0]
+        assert not seen.flags & DOUBTS, step
+        assert error(seen, 80, 60) < 0.3
+        assert sigma(seen) < 1.2
+
+
+def test_the_frame_border_is_flagged_and_covered() -> None:
+    detector = only("ring")
+    for step in range(12):
+        x = 32.0 - 3 * step
+        seen = detector.detect(Canvas(200, 160).paint(disc(x, 80, 9), RGB["ring"], (x, 80), 12).expose())[0]
+        assert bool(seen.flags & MarkerFlag.EDGE) == (x < 9.5)
+        assert error(seen, x, 80) < 0.1 + 2.5 * sigma(seen)
+
+
+def test_reset_forgets_and_all_blobs_does_not_disturb() -> None:
+    detector = only("ring")
+    image = scene({"ring": (80, 100)}).paint(disc(220, 100, 14), RGB["ring"], (220, 100), 17).expose()
+    small = scene({"ring": (80, 100)}).expose()
+    detector.detect(small)
+    assert error(detector.detect(image)[0], 80, 100) < 0.1
+    blobs = detector.all_blobs(image)
+    assert [round(blob.diameter) for blob in blobs[0]] == [28, 18]
+    assert error(detector.detect(image)[0], 80, 100) < 0.1
+    detector.reset()
+    assert error(detector.detect(image)[0], 220, 100) < 0.1
+
+
+def test_hypotheses_survive_short_hiding() -> None:
+    detector = only("ring")
+    for _ in range(3):
+        detector.detect(scene({"ring": (80, 100)}).expose())
+    decoy = Canvas(320, 240).paint(disc(250, 190, 24), RGB["ring"], (250, 190), 27)
+    seen = detector.detect(decoy.expose())[0]
+    assert not seen.found or seen.flags & MarkerFlag.AMBIGUOUS
