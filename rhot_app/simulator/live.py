@@ -45,6 +45,8 @@ class LiveCameras:
         self._renderers = [make_renderer(shot, index) for index in range(len(sockets))]
         scene = shot.scene
         self._delay_ns = available_delay_ns(scene.exposure_ns, scene.row_time_ns, scene.preset.height)
+        for renderer in self._renderers:
+            renderer.render(shot.motion, 0.0, 0)  # compiles on the first start of all; no node waits for it yet
         self._origin_ns = time.monotonic_ns()
         self._tick_ns = self._origin_ns
         self._number = 0
