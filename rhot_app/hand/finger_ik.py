@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 TOLERANCE = 5e-5
 """A finger has reached its target within this distance, m."""
 
+FAR = 3.0
+"""FABRIK that ends this many standard deviations from its target was stopped by limits: meet it before weighing it."""
+
 DESCENT_STEPS = 12
 STEP_MAX = 0.4
 """Largest change of an angle in one Gauss-Newton step, rad: beyond it the linearisation says nothing."""
@@ -146,28 +149,37 @@ def solve_arrays(angles: Array, lengths: Array, limits: Array, target: Array, me
             iterations = fabrik_thumb(angles, lengths, limits, target, near, max_iterations)
         else:
             iterations = fabrik_finger(angles, lengths, limits, target, near, max_iterations)
-    if target_sd > 0.0:
-        return _settle(angles, start, lengths, limits, target, information, target_sd), iterations
-    trial = angles.copy()
     residual = _miss(angles, lengths, target)
-    found = _descend(trial, start, lengths, limits, target, mean, information)
-    if found > tolerance:
-        # Stopped by a limit or a local minimum: once more from the middle of the range, where FABRIK began, stretched.
-        for attempt in range(3):
-            other = start.copy()
-            for k in range(count):
-                if attempt == 0:
-                    other[k] = 0.5 * (limits[k, 0] + limits[k, 1])
-                elif attempt == 2 and k > 0:
-                    other[k] = limits[k, 0]
-            missed = _descend(other, start, lengths, limits, target, mean, information)
-            if missed < found:
-                trial[:], found = other, missed
-            if found <= tolerance:
-                break
-    if found <= tolerance or found < residual:
-        angles[:], residual = trial, found
+    if target_sd == 0.0 or residual > FAR * near:
+        residual = _meet(angles, start, lengths, limits, target, mean, information, tolerance)
+    if target_sd > 0.0:
+        residual = _settle(angles, start, lengths, limits, target, information, target_sd)
     return residual, iterations
+
+
+@njit(cache=True)
+def _meet(angles: Array, start: Array, lengths: Array, limits: Array, target: Array, mean: Array, information: Array,
+          tolerance: float) -> float:
+    """Descend from `angles`, in place, until the target is met; returns the residual, m.
+
+    Stopped by a limit or a local minimum it tries again: from the middle of the range, from `start`, stretched.
+    """
+    least = _miss(angles, lengths, target)
+    for attempt in range(4):
+        trial = start.copy()
+        for k in range(angles.shape[0]):
+            if attempt == 0:
+                trial[k] = angles[k]
+            elif attempt == 1:
+                trial[k] = 0.5 * (limits[k, 0] + limits[k, 1])
+            elif attempt == 3 and k > 0:
+                trial[k] = limits[k, 0]
+        residual = _descend(trial, start, lengths, limits, target, mean, information)
+        if residual <= tolerance or residual < least:
+            angles[:], least = trial, residual
+        if residual <= tolerance:
+            break
+    return least
 
 
 @njit(cache=True)
