@@ -124,7 +124,7 @@ def wrist(offset: Offset, radius: float, tilt_deg: float, turn: float) -> tuple[
 @pytest.mark.parametrize("radius", [10.0, 20.0])
 @pytest.mark.parametrize("turn", [0.0, 0.4, -1.2])
 @pytest.mark.parametrize("tilt_deg", [-50, 0, 15, 35, 55])
-def test_a_tilted_band_is_placed_on_its_axis(radius: float, turn: float, tilt_deg: float) -> None:
+def test_a_tilted_band_is_placed_on_its_axis(radius: float, turn: float, tilt_deg: int) -> None:
     for offset in offsets(2, seed=tilt_deg + 60):
         canvas, truth = wrist(offset, radius, tilt_deg, turn)
         seen = see("wrist", canvas)

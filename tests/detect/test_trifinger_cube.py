@@ -1,0 +1,98 @@
+"""A real coloured cube in three calibrated cameras: faces near their masks' centroids, the yellow one at its place."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import from_bgr
+from rhot_node.detect_command import detect_all
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+from rhot_node.wire.messages import MarkerObservation
+
+FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "trifinger_cube"
+CUBE = load_markers(resource_path("markers", "trifinger_cube.json"))
+CAMERAS = (60, 180, 300)
+
+pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"real images are not there ({FOLDER})")
+
+
+def detect(camera: int, turns: int = 0, flip: bool = False) -> dict[str, MarkerObservation]:
+    bgr = cv2.imread(str(FOLDER / f"camera{camera}.png"))
+    assert bgr is not None
+    bgr = np.ascontiguousarray(np.rot90(bgr[:, ::-1] if flip else bgr, turns))
+    return dict(zip(CUBE.ids, FastDetector(CUBE).detect(from_bgr(np.asarray(bgr, dtype=np.uint8))), strict=True))
+
+
+def mask_centroid(name: str, camera: int) -> np.ndarray | None:
+    path = FOLDER / f"{name[0]}{camera}.png"
+    if not path.exists():
+        return None
+    alpha = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert alpha is not None
+    ys, xs = np.nonzero(alpha[:, :, 3] > 127)
+    return np.array([xs.mean(), ys.mean()])
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_every_visible_face_is_found_near_its_mask(camera: int) -> None:
+    seen = detect(camera)
+    faces = 0
+    for name in CUBE.ids:
+        truth = mask_centroid(name, camera)
+        if truth is not None:
+            faces += 1
+            assert seen[name].found
+            assert np.hypot(seen[name].x - truth[0], seen[name].y - truth[1]) < 3.0, name
+    assert faces == 3
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_the_faces_are_found_in_a_turned_and_mirrored_picture_too(camera: int) -> None:
+    plain, turned = detect(camera), detect(camera, turns=2, flip=True)
+    for name in CUBE.ids:
+        if mask_centroid(name, camera) is not None:
+            assert turned[name].x == pytest.approx(plain[name].x, abs=0.2)
+            assert turned[name].y == pytest.approx(539 - plain[name].y, abs=0.2)
+
+
+def test_the_yellow_face_triangulates_to_the_cube() -> None:
+    rows = []
+    for camera in CAMERAS:
+        intrinsics, distortion, camera_from_world = calibration(FOLDER / f"camera_calib_{camera}.yml")
+        yellow = detect(camera)["yellow"]
+        x, y = cv2.undistortPoints(np.array([[[yellow.x, yellow.y]]]), intrinsics, distortion).reshape(2)
+        rows += [x * camera_from_world[2] - camera_from_world[0], y * camera_from_world[2] - camera_from_world[1]]
+    point = np.linalg.svd(np.array(rows))[2][-1]
+    point = point[:3] / point[3]
+    assert abs(point[0] + 0.014) < 0.010
+    assert abs(point[1] + 0.024) < 0.010
+
+
+def calibration(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Intrinsics, distortion and camera_from_world of a calibration file (lists of numbers under named keys)."""
+    lists: dict[str, list[float]] = {}
+    key = ""
+    for line in path.read_text().splitlines():
+        if line and not line.startswith((" ", "-")):
+            key = line.split(":")[0]
+            lists[key] = []
+        elif line.strip().startswith("- "):
+            lists[key].append(float(line.strip()[2:]))
+    return (np.array(lists["camera_matrix"]).reshape(3, 3), np.array(lists["distortion_coefficients"]),
+            np.array(lists["tf_world_to_camera"]).reshape(4, 4))
+
+
+def test_the_command_reports_the_whole_folder_as_stills() -> None:
+    report = detect_all(FOLDER, CUBE, "fast")
+    named = {frame["file"]: frame for frame in report["frames"]}
+    for camera in CAMERAS:
+        frame = named[f"camera{camera}.png"]
+        assert (frame["width"], frame["height"]) == (540, 540)
+        for entry, (name, seen) in zip(frame["markers"], detect(camera).items(), strict=True):
+            assert entry["id"] == name
+            if seen.found:
+                assert entry["x"] == pytest.approx(seen.x, abs=0.3)
