@@ -125,7 +125,7 @@ class FrameRenderer:
         """(M,) px^2 of each marker beyond the image's borders."""
         width, height = self.camera.width, self.camera.height
         outside = np.zeros(self.body.marker_count)
-        for n in np.flatnonzero(self.body.marker >= 0):
+        for n in range(int((self.body.marker >= 0).sum())):  # painted solids come first
             row = series[n, :, 0].copy()
             u0, v0, u1, v1, reach = outline(self.body.kind[n], row, self.body.size, n, self.camera.intrinsics)
             if not reach > 0.0:

@@ -28,8 +28,8 @@ class Sensor:
         """`noise_mid_grey`: sigma of a channel at level 128, `noise_read`: at level 0, grey levels."""
         _, height, width = background.shape
         self._kernel = psf_kernel(psf_sigma_px)
-        self._read = np.float32(noise_read**2)
-        self._shot = np.float32(max(noise_mid_grey**2 - noise_read**2, 0.0) / _MID_GREY)
+        self._read = noise_read**2
+        self._shot = max(noise_mid_grey**2 - noise_read**2, 0.0) / _MID_GREY
         self._noise = np.random.default_rng([seed, 77]).standard_normal(1 << _TABLE_BITS, dtype=np.float32)
         self._random = np.random.default_rng([seed, 78])
         self._blurred = np.empty_like(background)
@@ -134,12 +134,13 @@ def to_planes(rgb: Image, read: float, shot: float, x0: int, y0: int, x1: int, y
               cr: Image, sigma_luma: Image, sigma_cb: Image, sigma_cr: Image) -> None:
     """Full-range BT.601 means and standard deviations of Y, U, V inside an even box."""
     f = np.float32
+    base, slope = f(read), f(shot)
     for y in range(y0, y1):
         for x in range(x0, x1):
             r, g, b = rgb[0, y, x], rgb[1, y, x], rgb[2, y, x]
             luma[y, x] = f(0.299) * r + f(0.587) * g + f(0.114) * b
-            sigma_luma[y, x] = math.sqrt(f(0.089401) * (read + shot * r) + f(0.344569) * (read + shot * g)
-                                         + f(0.012996) * (read + shot * b))
+            sigma_luma[y, x] = math.sqrt(f(0.089401) * (base + slope * r) + f(0.344569) * (base + slope * g)
+                                         + f(0.012996) * (base + slope * b))
     for y in range(y0 // 2, y1 // 2):
         for x in range(x0 // 2, x1 // 2):
             j, i = 2 * y, 2 * x
@@ -148,7 +149,7 @@ def to_planes(rgb: Image, read: float, shot: float, x0: int, y0: int, x1: int, y
             b = f(0.25) * (rgb[2, j, i] + rgb[2, j, i + 1] + rgb[2, j + 1, i] + rgb[2, j + 1, i + 1])
             cb[y, x] = f(128.0) - f(0.168736) * r - f(0.331264) * g + f(0.5) * b
             cr[y, x] = f(128.0) + f(0.5) * r - f(0.418688) * g - f(0.081312) * b
-            vr, vg, vb = read + shot * r, read + shot * g, read + shot * b
+            vr, vg, vb = base + slope * r, base + slope * g, base + slope * b
             sigma_cb[y, x] = f(0.5) * math.sqrt(f(0.028472) * vr + f(0.109736) * vg + f(0.25) * vb)
             sigma_cr[y, x] = f(0.5) * math.sqrt(f(0.25) * vr + f(0.175300) * vg + f(0.006612) * vb)
 

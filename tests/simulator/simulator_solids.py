@@ -1,0 +1,79 @@
+"""Single balls before a camera, with their images computed another way: outline, area and centroid."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.anatomy import load_hand
+from rhot_app.hand.dh import ROOT
+from rhot_app.hand.model import build_model
+from rhot_app.simulator.body import CAPSULE, PALM_GROUP, SKIN, HandBody
+from rhot_app.simulator.render import FrameRenderer, Optics, Shutter
+from rhot_node.files import resource_path
+
+Array = NDArray[np.float64]
+
+FOCAL = 530.5
+CAMERA = CameraModel(640, 480, np.array([FOCAL, FOCAL, 319.5, 239.5, -0.05, 0.0, 0.0, 0.0, 0.0]), np.eye(4), np.eye(4))
+STILL = Shutter(0.004, 48e-6)
+CLEAN = Optics(psf_sigma_px=0.7, noise_mid_grey=3.0, noise_read=1.5, shading=0.0)
+
+
+class Gliding:
+    """A palm that glides at constant velocity, unturned."""
+
+    def __init__(self, start: Array, velocity: Array | tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+        self._start, self._velocity = np.asarray(start), np.asarray(velocity)
+
+    def sample(self, times_s: Array) -> tuple[Array, Array]:
+        transforms = np.tile(np.eye(4), (len(times_s), 1, 1))
+        transforms[:, :3, 3] = self._start + times_s[:, None] * self._velocity
+        return transforms, np.zeros((len(times_s), 21))
+
+
+def balls(radii: list[float], places: list[tuple[float, float, float]], painted: list[bool]) -> HandBody:
+    """Balls at fixed places about the palm's origin; painted ones (white) first, the others are black skin."""
+    count = len(radii)
+    return HandBody(
+        model=build_model(load_hand(resource_path("hands", "right.json"))),
+        kind=np.full(count, CAPSULE), group=np.arange(count) % PALM_GROUP,
+        marker=np.array([k if paint else SKIN for k, paint in enumerate(painted)]),
+        size=np.array([[radius, 0.0, 0.0] for radius in radii]),
+        rgb=np.array([[255.0] * 3 if paint else [0.0] * 3 for paint in painted]),
+        margin=np.zeros(count), row=np.full(count, ROOT),
+        ends=np.array([[place, np.add(place, (0.0, 1e-7, 0.0))] for place in places]),
+        marker_point=np.zeros(sum(painted), dtype=np.int64))
+
+
+def renderer(body: HandBody, shutter: Shutter = STILL, seed: int = 1) -> FrameRenderer:
+    """A renderer of `body` before black."""
+    return FrameRenderer(body, CAMERA, np.zeros((3, CAMERA.height, CAMERA.width), np.float32), CLEAN, shutter, seed)
+
+
+def ball_image(centre: Array, radius: float) -> tuple[Array, float]:
+    """Centroid (2,) px and area px^2 of a ball's image: its tangent cone, projected by OpenCV, as a polygon."""
+    distance = float(np.linalg.norm(centre))
+    axis = centre / distance
+    side = np.cross(axis, (0.0, 1.0, 0.0))
+    side /= np.linalg.norm(side)
+    angles = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)[:, None]
+    around = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
+    half = np.arcsin(radius / distance)
+    rim = np.cos(half) * axis + np.sin(half) * around
+    outline, _ = cv2.projectPoints(rim, np.zeros(3), np.zeros(3), CAMERA.matrix, CAMERA.intrinsics[4:9])
+    x, y = outline.reshape(-1, 2).T
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    area = 0.5 * cross.sum()
+    centroid = np.array([((x + np.roll(x, -1)) * cross).sum(), ((y + np.roll(y, -1)) * cross).sum()]) / (6.0 * area)
+    return centroid, abs(float(area))
+
+
+def brightness_centroid(image: NDArray[np.float32]) -> tuple[Array, float]:
+    """Centroid (2,) px and area px^2 of what shines in a radiance image."""
+    weight = image[0].astype(np.float64) / 255.0
+    y, x = np.mgrid[:weight.shape[0], :weight.shape[1]]
+    total = float(weight.sum())
+    return np.array([(weight * x).sum(), (weight * y).sum()]) / total, total
