@@ -33,7 +33,7 @@ PALM_GROUP = len(FINGERS)
 """Group of palm, thumb base, forearm and wrist band; groups 0..4 are the fingers."""
 
 SKIN_RGB = (201.0, 152.0, 128.0)
-FOREARM_M = 0.22
+FOREARM_M = 0.45  # it reaches out of the picture, as arms do
 BAND_LENGTH_MM = 22.0  # where the marker set gives none
 
 TIP_MARGIN, BAND_MARGIN = 1.05, 2.1
