@@ -62,7 +62,7 @@ class MainToolBar(QToolBar):
         super().__init__("Main", parent)
         self.setObjectName("main toolbar")
         self.setMovable(False)
-        self.setIconSize(QSize(18, 18))
+        self.setIconSize(QSize(24, 18))
         self.setFloatable(False)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
@@ -102,8 +102,9 @@ class MainToolBar(QToolBar):
 
     def set_scheme(self, actions: Actions, scheme: Scheme, *, running: bool, recording: bool) -> None:
         """Words and icons of the two buttons that change."""
-        actions.start.setText(" Stop " if running else " Start")
-        actions.start.setIcon(shape_icon("stop" if running else "play", scheme.accent))
-        actions.record.setText(" Stop recording" if recording else " Record")
-        actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault))
+        ratio = self.devicePixelRatioF()
+        actions.start.setText("Stop" if running else "Start")
+        actions.start.setIcon(shape_icon("stop" if running else "play", scheme.accent, ratio))
+        actions.record.setText("Stop recording" if recording else "Record")
+        actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
         self.badge.set_scheme(scheme)

@@ -40,6 +40,7 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     choose_gl_platform()
     cap_software_gl()
     give_way()
+    from PySide6.QtCore import QTimer
     from PySide6.QtWidgets import QApplication
 
     from rhot_app.ui.controller import Controller
@@ -63,7 +64,8 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     controller = Controller(session, session.client)
     window = MainWindow(controller, settings)
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: window.close())
+        # a handler may run in the middle of a drawing, so closing waits for its turn
+        signal.signal(number, lambda *_: QTimer.singleShot(0, window.close))
     window.show()
     if twin is not None:
         window.open_twin(twin)

@@ -17,17 +17,15 @@ from rhot_app.project import Rig
 from rhot_app.ui.backend.live import SILENCE_S, Client, Live
 from rhot_app.ui.backend.session import Backend, Opened, TwinChoice
 from rhot_app.ui.job import Job, Progress
-from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look
-from rhot_app.ui.panels.advice_bar import Notice
 
 SAMPLE_S = 0.1
 RESTART_TRIES = 3
 RESTART_FORGET_S = 60.0
 TWIN_CHECK_S = 0.5
+RESTART_TWIN = "twin"
+RESTART_ENGINE = "engine"
 _CLOSE_WAIT_S = 15.0
 
-TWIN_GONE = "twin"
-ENGINE_GONE = "engine"
 
 
 class ClosableClient(Client, Protocol):
@@ -57,11 +55,11 @@ class Controller(QObject):
         self._job: Job | None = None
         self._commands: list[Job] = []
         self.busy: tuple[str, float] | None = None
-        self._problem = ""
+        self.problem = ""
         self._restarts: list[float] = []
         self._restarting = False
         self._was_running = False
-        self._twin_gone = False
+        self.twin_gone = False
         self._next_sample = self._next_twin_check = 0.0
         self._begin_after_opening = False
 
@@ -109,7 +107,7 @@ class Controller(QObject):
         self._start_job(text, lambda progress: op(progress.report), self._on_opened)
 
     def _start_job(self, text: str, op: Callable[[Progress], Any], done: Callable[[Any], None]) -> None:
-        self._problem = ""
+        self.problem = ""
         self._set_busy((text, 0.0))
         self._job = Job(op, done, self._on_failed, lambda t, f: self._set_busy((t, f)), self).start()
 
@@ -119,7 +117,7 @@ class Controller(QObject):
         self._connect_client()
         self.opened = opened
         self.live.clear()
-        self._twin_gone = self._restarting = False
+        self.twin_gone = self._restarting = False
         self._was_running = opened.running
         self.rig_changed.emit()
         if self._begin_after_opening and not opened.running:
@@ -138,7 +136,7 @@ class Controller(QObject):
         if not self._restarting:
             self.failed.emit(sentence)
         self._restarting = False
-        self._problem = sentence
+        self.problem = sentence
 
     def _forget_rig(self) -> None:
         self.opened = None
@@ -146,8 +144,13 @@ class Controller(QObject):
         if self._client is not None:
             self._client.close()
             self._client = None
-        self._problem = ""
+        self.problem = ""
         self.rig_changed.emit()
+
+    @property
+    def working(self) -> bool:
+        """Whether something is being opened, restarted or closed."""
+        return self._job is not None
 
     def cancel(self) -> None:
         """Give up what is being opened; whatever it has started is ended."""
@@ -175,7 +178,7 @@ class Controller(QObject):
         self._job = None
         self._set_busy(None)
         if left_running:
-            self._problem = left_running
+            self.problem = left_running
 
     def shut_down(self) -> str:
         """End everything that the app started, and wait for it; what is left running on purpose, as a sentence."""
@@ -248,14 +251,14 @@ class Controller(QObject):
         try:
             self.live.step(self._client)
         except RhotError as exc:
-            self._problem = str(exc)
+            self.problem = str(exc)
         now = time.monotonic()
         if now >= self._next_sample:
             self._next_sample = max(self._next_sample + SAMPLE_S, now)
             self.live.sample(time.monotonic_ns())
         if now >= self._next_twin_check:
             self._next_twin_check = now + TWIN_CHECK_S
-            self._twin_gone = self.opened.simulated and not self.backend.twin_alive()
+            self.twin_gone = self.opened.simulated and not self.backend.twin_alive()
         if self.engine_gone:
             self._restart(now)
         elif self.live.status is not None:
@@ -276,41 +279,10 @@ class Controller(QObject):
 
     def act(self, key: str) -> None:
         """The button of a notice."""
-        if key == TWIN_GONE:
+        if key == RESTART_TWIN:
             self.open_twin(self.twin_choice)
-        elif key == ENGINE_GONE:
+        elif key == RESTART_ENGINE:
             self._restarts = []
-
-    # -- what is to be said ----------------------------------------------------------------------------------------
-
-    def look(self) -> Look:
-        """The one word."""
-        if self.opened is None:
-            return STARTING if self._job is not None else NO_RIG
-        if self.engine_gone:
-            return NO_ENGINE
-        return condition_look(self.live.status.condition) if self.live.status is not None else STARTING
-
-    def notices(self) -> list[Notice]:
-        """The sentences of the moment: the app's own, then the engine's."""
-        notices: list[Notice] = []
-        if self.engine_gone:
-            notices.append(self._engine_notice())
-        elif self._problem:
-            notices.append(Notice("error", self._problem))
-        if self._twin_gone:
-            notices.append(Notice("error", "The simulated cameras have stopped.", "Start them again", TWIN_GONE))
-        if self.opened is not None and not self.opened.ours:
-            notices.append(Notice("info", "This engine was started outside the app; closing the app leaves it running."))
-        if self.live.status is not None and not self.engine_gone:
-            notices += [Notice(advice.level, advice.text) for advice in self.live.status.advice]
-        return notices
-
-    def _engine_notice(self) -> Notice:
-        if self._job is not None:
-            return Notice("error", "The engine stopped. The app is starting it again; the nodes re-join by themselves.")
-        reason = f" {self._problem}" if self._problem else ""
-        return Notice("error", f"The engine stopped and could not be started again.{reason}", "Try again", ENGINE_GONE)
 
     def _set_busy(self, busy: tuple[str, float] | None) -> None:
         self.busy = busy

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QByteArray, Qt, QTimer
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QWidget
 
 _AREAS = {"left": Qt.DockWidgetArea.LeftDockWidgetArea, "right": Qt.DockWidgetArea.RightDockWidgetArea,
           "bottom": Qt.DockWidgetArea.BottomDockWidgetArea}
-LEFT_PX, RIGHT_PX, BOTTOM_PX = 216, 336, 220
-_SHARES = {"left": (190, 290), "right": (270, 200), "bottom": (1,)}
+LEFT_PX, RIGHT_PX, BOTTOM_PX = 216, 372, 220
+_SHARES = {"left": (216, 260), "right": (270, 200), "bottom": (1,)}
 
 
 class Docks:
@@ -23,7 +23,8 @@ class Docks:
         self.docks: list[QDockWidget] = []
         self._areas: list[str] = []
         self._reasons: set[str] = set()
-        self._put_away: list[QDockWidget] = []
+        self._kept: QByteArray | None = None
+        self._arranged = False
 
     def add(self, name: str, widget: QWidget, area: str, *, scroll: bool = False, title: bool = True) -> QDockWidget:
         """Put `widget` into a dock; without a title it can only be moved from the View menu."""
@@ -47,14 +48,28 @@ class Docks:
         return [dock.toggleViewAction() for dock in self.docks]
 
     def arrange(self) -> None:
-        """The standard layout."""
+        """The standard layout; its sizes are taken once the window is laid out, by `set_sizes`."""
         for dock, area in zip(self.docks, self._areas, strict=True):
             dock.setFloating(False)
             self._window.removeDockWidget(dock)
             self._window.addDockWidget(_AREAS[area], dock)
             dock.setVisible(not self._reasons)
-        self._put_away = list(self.docks) if self._reasons else []
-        self.set_sizes()
+        self._kept = None
+        self._arranged = not self._reasons
+        if self._arranged:
+            self.set_sizes()
+
+    def restore(self, state: QByteArray) -> bool:
+        """A layout that `state` gave before; False when it is not one of this window."""
+        if not self._window.restoreState(state):
+            return False
+        self._arranged = True
+        self._kept = state
+        return True
+
+    def state(self) -> QByteArray:
+        """The layout, to be remembered: as it is, or as it will be when the panels come back."""
+        return self._kept if self._reasons and self._kept is not None else self._window.saveState()
 
     def set_sizes(self) -> None:
         """The standard sizes; only docks that are shown take them."""
@@ -66,19 +81,28 @@ class Docks:
             self._window.resizeDocks(by_area[area], list(_SHARES[area]), Qt.Orientation.Vertical)
 
     def put_away(self, reason: str, away: bool) -> None:
-        """Hide all panels while there is any reason to, then bring back those that were shown."""
+        """Hide all panels while there is any reason to, then bring back those that were shown, where they stood."""
         before = bool(self._reasons)
         (self._reasons.add if away else self._reasons.discard)(reason)
         if self._reasons and not before:
-            self._put_away = [dock for dock in self.docks if not dock.isHidden()]
-            for dock in self._put_away:
+            if self._arranged and self._kept is None:
+                self._kept = self._window.saveState()
+            for dock in self.docks:
                 dock.hide()
         elif before and not self._reasons:
-            for dock in self._put_away:
-                dock.show()
-            self._put_away = []
+            self._bring_back()
         for action in self.actions:
             action.setEnabled(not self._reasons)
+
+    def _bring_back(self) -> None:
+        if self._kept is not None:
+            self._window.restoreState(self._kept)
+            self._kept = None
+            return
+        for dock in self.docks:
+            dock.show()
+        self._arranged = True
+        QTimer.singleShot(0, self.set_sizes)
 
 
 def _scrolled(widget: QWidget) -> QScrollArea:

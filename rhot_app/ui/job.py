@@ -12,7 +12,7 @@ from rhot_app.errors import RhotError
 from rhot_node.errors import NodeError
 
 
-class Cancelled(RhotError):
+class CancelledError(RhotError):
     """The job was cancelled by the person at the screen."""
 
 
@@ -24,9 +24,9 @@ class Progress:
         self._cancelled = threading.Event()
 
     def report(self, text: str, fraction: float) -> None:
-        """Say what is being done and how much is done, 0..1; raises Cancelled when nobody waits for it any more."""
+        """Say what is being done and how much is done, 0..1; raises CancelledError once it was cancelled."""
         if self._cancelled.is_set():
-            raise Cancelled("Cancelled.")
+            raise CancelledError("Cancelled.")
         self._report(text, fraction)
 
     @property
@@ -83,7 +83,7 @@ class Job(QObject):
     def _run(self) -> None:
         try:
             result = self._op(self.progress)
-        except Cancelled:
+        except CancelledError:
             return
         except (RhotError, NodeError, OSError) as exc:
             self._broke.emit(str(exc))

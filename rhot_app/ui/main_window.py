@@ -16,13 +16,14 @@ from rhot_app.ui.backend.session import TwinChoice
 from rhot_app.ui.controller import Controller
 from rhot_app.ui.docks import Docks
 from rhot_app.ui.guide import GuideViewer, page_of
-from rhot_app.ui.models.rows import bytes_text
+from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.nodes_dialog import NodesDialog
-from rhot_app.ui.panels.advice_bar import AdviceBar, Notice
+from rhot_app.ui.panels.advice_bar import AdviceBar
 from rhot_app.ui.rig_dialog import RigDialog
 from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
 from rhot_app.ui.theme import apply_theme, scheme_named
+from rhot_app.ui.voice import look_of, notices_of
 from rhot_app.ui.welcome import WelcomePage
 
 TICK_MS = 16
@@ -130,8 +131,7 @@ class MainWindow(QMainWindow):
         self.screen_parts.scene.show_clouds(s.flag("clouds"))
         self.resize(*_SIZE)
         layout = s.layout()
-        self._fresh_layout = layout is None or not (self.restoreGeometry(layout[0]) and self.restoreState(layout[1]))
-        if self._fresh_layout:
+        if layout is None or not (self.restoreGeometry(layout[0]) and self.docks.restore(layout[1])):
             self.docks.arrange()
 
     # -- what the actions do ---------------------------------------------------------------------------------------
@@ -208,7 +208,6 @@ class MainWindow(QMainWindow):
         self.actions_.alone.setChecked(False)
         self.set_scheme(self.settings.scheme)
         self._restore()
-        QTimer.singleShot(0, self.docks.set_sizes)
         self._show_rig()
 
     def _show_names(self, on: bool) -> None:
@@ -229,27 +228,16 @@ class MainWindow(QMainWindow):
         self._show_buttons()
         status = self.controller.live.status
         rate = status.state_rate_hz if status is not None and not self.controller.engine_gone else None
-        self.toolbar.badge.show_look(self.controller.look(), rate)
+        self.toolbar.badge.show_look(look_of(self.controller), rate)
         self.advice.show_notices(self._notices(now))
 
     def _notices(self, now: float) -> list[Notice]:
-        notices = self.controller.notices()
-        if self._failure is not None:
-            if now < self._failure[1]:
-                notices = [self._failure[0], *(n for n in notices if n.text != self._failure[0].text)]
-            else:
-                self._failure = None
-        status = self.controller.live.status
-        if status is not None and status.log_path:
-            notices.append(Notice("info", f"Recording to {status.log_path} ({bytes_text(status.log_bytes)})."))
-        return notices or [Notice("info", self._quiet_sentence())]
-
-    def _quiet_sentence(self) -> str:
-        if self.controller.opened is None:
-            return "Choose how to begin. F1 opens the guide."
-        if not self.controller.running:
-            return "Press Start, or the space bar, to begin tracking."
-        return "Everything is in order."
+        notices = notices_of(self.controller)
+        if self._failure is not None and now >= self._failure[1]:
+            self._failure = None
+        if self._failure is None:
+            return notices
+        return [self._failure[0], *(notice for notice in notices if notice.text != self._failure[0].text)]
 
     def _show_buttons(self) -> None:
         c, a = self.controller, self.actions_
@@ -268,9 +256,6 @@ class MainWindow(QMainWindow):
         self.screen_parts.show_rig(rig)
         self.pages.setCurrentIndex(0 if rig is None else 1)
         self.docks.put_away("no rig", rig is None)
-        if rig is not None and self._fresh_layout:
-            self._fresh_layout = False
-            QTimer.singleShot(0, self.docks.set_sizes)
         self.toolbar.rig_label.setText(f"rig: {rig.name}  " if rig is not None else "")
         self.toolbar.rig_label.setToolTip(opened.rig_path if opened is not None else "")
         for action in self._rig_actions():
@@ -295,8 +280,7 @@ class MainWindow(QMainWindow):
         """Remember the layout; `app.run` ends the processes once the window is gone."""
         self._timer.stop()
         self.actions_.alone.setChecked(False)
-        self.docks.put_away("no rig", False)
-        self.settings.set_layout(self.saveGeometry(), self.saveState())
+        self.settings.set_layout(self.saveGeometry(), self.docks.state())
         self.settings.sync()
         if self._guide is not None:
             self._guide.close()

@@ -45,7 +45,10 @@ class NodesDialog(QDialog):
                        "the cameras.")
         intro.setWordWrap(True)
         intro.setTextFormat(Qt.TextFormat.RichText)
-        self.hosts, self.ports, self._marks, self.replies = [], [], [], []
+        self.hosts: list[QLineEdit] = []
+        self.ports: list[QSpinBox] = []
+        self._marks: list[ShapeMark] = []
+        self.replies: list[QLabel] = []
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(8)
@@ -131,8 +134,8 @@ class NodesDialog(QDialog):
                 reply.setText(answer.error)
         both = all(answer.found for answer in answers)
         self.save_button.setEnabled(both)
-        self.verdict.setText("Both nodes answer. The new rig starts with textbook lenses and a 75 mm baseline; calibrate "
-                             "before you trust millimetres." if both else "")
+        self.verdict.setText("Both nodes answer. The new rig starts with textbook lenses and a 75 mm baseline: "
+                             "calibrate before you trust millimetres." if both else "")
 
     def _show_error(self, sentence: str) -> None:
         self._job = None

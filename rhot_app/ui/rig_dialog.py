@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QHeaderView, QLabel, QTableWidget, QTableWidgetItem, QTabWidget
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QHeaderView,
+    QLabel,
+    QTableWidget,
+    QTableWidgetItem,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
@@ -74,8 +83,8 @@ class RigDialog(QDialog):
         self.tabs.addTab(_page(markers, f"Marker set {rig.markers.name or 'without a name'}. Nodes and master must use "
                                         "the same one."), "Markers")
         self.tabs.addTab(_page(_table(HAND_HEADS, hand_rows(rig)),
-                               f"{rig.hand.name or 'Hand'}, {rig.hand.side} side; wrist {rig.hand.wrist_breadth_mm:.0f} × "
-                               f"{rig.hand.wrist_thickness_mm:.0f} mm."), "Hand")
+                               f"{rig.hand.name or 'Hand'}, {rig.hand.side} side; wrist "
+                               f"{rig.hand.wrist_breadth_mm:.0f} × {rig.hand.wrist_thickness_mm:.0f} mm."), "Hand")
         self.tabs.setCurrentIndex(("cameras", "markers", "hand").index(page))
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         buttons.rejected.connect(self.reject)

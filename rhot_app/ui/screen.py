@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QSplitter
 
 from rhot_app.project import Rig
-from rhot_app.ui.backend.live import Live
+from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.camera_panel import CameraPanel
@@ -43,13 +43,14 @@ class Screen:
         self.plots.setProperty("guide", "plots")
         for plot in (self.jitter, self.latency, self.rate):
             self.plots.addWidget(plot)
-        self.plots.setSizes([100, 116, 100])
+        self.plots.setSizes([100, 122, 94])
         self.plots.setChildrenCollapsible(False)
         self._pacer = FramePacer()
         self.scene.frameSwapped.connect(lambda: self._pacer.end(time.monotonic()))
         self._drawn_state = self._drawn_preview = -1
         self._next_panels = self._next_plots = 0.0
         self._state_seen_at = 0.0
+        self._counted = 0
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours everywhere."""
@@ -67,6 +68,7 @@ class Screen:
         self.nodes.show_status(None)
         self.hand.show_state(None)
         self._drawn_state = self._drawn_preview = -1
+        self._state_seen_at = 0.0
 
     def refresh(self, live: Live, now_s: float) -> None:
         """Draw what is due: the scene as often as it can, pictures when they come, panels and plots a few times a
@@ -77,7 +79,7 @@ class Screen:
             self.cameras.refresh(live)
         if now_s >= self._next_panels:
             self._next_panels = now_s + PANEL_S
-            self._refresh_panels(live, now_s)
+            self._refresh_panels(live)
         if now_s >= self._next_plots and self.plots.isVisible():
             self._next_plots = now_s + PLOT_S
             now_ns = time.monotonic_ns()
@@ -87,20 +89,22 @@ class Screen:
 
     def _refresh_scene(self, live: Live, now_s: float) -> None:
         self._pacer.give_up(now_s)
-        if live.state_count != self._drawn_state:
+        if live.state is not None and live.state_count != self._counted:
+            self._counted = live.state_count
             self._state_seen_at = now_s
+        if self._state_seen_at > 0.0 and live.state_count != self._drawn_state:
             if self.scene.isVisible() and self._pacer.due(now_s):
                 self._pacer.begin(now_s)
                 self._drawn_state = live.state_count
                 self.scene.show_state(live.state)
-        elif live.state is not None and now_s - self._state_seen_at > STALE_S:
+        elif self._state_seen_at > 0.0 and now_s - self._state_seen_at > STALE_S:
             self.scene.show_state(None)
-            self._state_seen_at = float("inf")
+            self._state_seen_at = 0.0
 
-    def _refresh_panels(self, live: Live, now_s: float) -> None:
-        fresh = live.state if now_s - self._state_seen_at <= STALE_S else None
+    def _refresh_panels(self, live: Live) -> None:
+        fresh = live.state if self._state_seen_at > 0.0 else None
         if self.nodes.isVisible():
-            self.nodes.show_status(live.status)
+            self.nodes.show_status(live.status if live.silent_for_s() < SILENCE_S else None)
         if self.markers.isVisible():
             self.markers.show_state(fresh)
         if self.hand.isVisible():

@@ -92,12 +92,15 @@ def shape_pixmap(shape: str, colour: str, size: int, ratio: float = 1.0) -> QPix
     return picture
 
 
-def shape_icon(shape: str, colour: str) -> QIcon:
-    """The shape as an icon in the sizes that toolbars and menus use."""
-    icon = QIcon()
-    for size in (16, 24, 32, 48):
-        icon.addPixmap(shape_pixmap(shape, colour, size))
-    return icon
+def shape_icon(shape: str, colour: str, ratio: float = 1.0) -> QIcon:
+    """The shape as an icon of 24 x 18 px with some air at its right, where the text follows."""
+    picture = QPixmap(round(24 * ratio), round(18 * ratio))
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(picture)
+    paint_shape(painter, shape, QRectF(1, 1, 16, 16), QColor(colour))
+    painter.end()
+    return QIcon(picture)
 
 
 class ShapeMark(QWidget):
@@ -123,5 +126,6 @@ class ShapeMark(QWidget):
         """Draw from a picture, because the octagon's mark is cut out."""
         if self._shape:
             painter = QPainter(self)
-            painter.drawPixmap(0, 0, shape_pixmap(self._shape, self._colour.name(), self._side, self.devicePixelRatioF()))
+            ratio = self.devicePixelRatioF()
+            painter.drawPixmap(0, 0, shape_pixmap(self._shape, self._colour.name(), self._side, ratio))
             painter.end()

@@ -64,12 +64,14 @@ def style_sheet(s: Scheme) -> str:
     QMainWindow::separator {{ background: {s.window}; width: 6px; height: 6px; }}
     QMainWindow::separator:hover {{ background: {s.accent}; }}
     #advicebar {{ border-top: 1px solid {s.border}; border-bottom: none; padding: 0; }}
-    QToolBar {{ background: {s.panel}; border: none; border-bottom: 1px solid {s.border}; padding: 4px 8px; spacing: 4px; }}
+    QToolBar {{ background: {s.panel}; border: none; border-bottom: 1px solid {s.border}; padding: 4px 8px;
+        spacing: 4px; }}
     QToolBar QToolButton {{ padding: 6px 12px; border: 1px solid transparent; border-radius: 6px; }}
     QToolBar QToolButton:hover {{ background: {s.raised}; }}
     QToolBar QToolButton:pressed, QToolBar QToolButton:checked {{ background: {s.raised}; border-color: {s.border}; }}
     QToolBar QToolButton:focus {{ border-color: {s.accent}; }}
-    QToolBar QToolButton::menu-indicator {{ subcontrol-position: right center; subcontrol-origin: padding; right: 4px; }}
+    QToolBar QToolButton::menu-indicator {{ subcontrol-position: right center; subcontrol-origin: padding;
+        right: 4px; }}
     QToolButton[popupMode="2"] {{ padding-right: 20px; }}
     QDockWidget {{ color: {s.muted}; font-weight: 600; }}
     QDockWidget::title {{ background: {s.panel}; padding: 6px 8px; }}

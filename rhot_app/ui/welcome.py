@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QProgressBar,
     QPushButton,
+    QScrollArea,
     QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
@@ -41,10 +42,17 @@ class WelcomePage(QWidget):
         self._pages = QStackedWidget()
         self._pages.addWidget(self._choice_page(motion))
         self._pages.addWidget(self._progress_page())
+        middle = QWidget()
+        column = QVBoxLayout(middle)
+        column.addStretch(1)
+        column.addWidget(self._pages)
+        column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setWidget(middle)
         layout = QVBoxLayout(self)
-        layout.addStretch(1)
-        layout.addWidget(self._pages)
-        layout.addStretch(1)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scroll)
 
     def _choice_page(self, motion: str) -> QWidget:
         title = QLabel("How do you want to begin?")
@@ -104,8 +112,10 @@ class WelcomePage(QWidget):
         page = QWidget()
         layout = QVBoxLayout(page)
         layout.setSpacing(16)
+        layout.addStretch(1)
         for widget in (self.progress_label, self.progress_bar, note, self.cancel_button):
             layout.addWidget(widget, alignment=Qt.AlignmentFlag.AlignHCenter)
+        layout.addStretch(1)
         return page
 
     @property

@@ -6,6 +6,7 @@ import threading
 from pathlib import Path
 
 from fake_engine import FakeClient, FakeEngine
+
 from rhot_app.errors import RigError
 from rhot_app.ui.backend.session import Opened, Report, TwinChoice
 

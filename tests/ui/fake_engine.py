@@ -6,6 +6,7 @@ can move time by hand.
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Callable
@@ -58,7 +59,7 @@ def hand_pose(t_s: float) -> HandPose:
     angles = np.zeros(len(ANGLES))
     for number, name in enumerate(ANGLES):
         if "flexion" in name:
-            phase = 0.8 * t_s - 0.5 * "thumb index middle ring little".split().index(name.split("_")[0])
+            phase = 0.8 * t_s - 0.5 * ["thumb", "index", "middle", "ring", "little"].index(name.split("_")[0])
             bend = 0.5 - 0.5 * math.cos(phase)
             angles[number] = (0.25 if name.startswith("thumb") else 0.6) * bend + 0.12
     return HandPose(world_from_palm(t_s), angles)
@@ -172,7 +173,7 @@ class FakeEngine:
         cv2.fillConvexPoly(image, hull, (120, 150, 190))
         for finger in range(5):
             chain = [at(joints[k]) for k in range(1 + 4 * finger, 5 + 4 * finger)]
-            for a, b in zip(chain[:-1], chain[1:], strict=True):
+            for a, b in itertools.pairwise(chain):
                 cv2.line(image, a, b, (120, 150, 190), 10, cv2.LINE_AA)
         for marker, place in zip(self.rig.markers.markers, [*points.marker_centres, joints[0]], strict=True):
             cv2.circle(image, at(place), 6, marker.display_rgb[::-1], -1, cv2.LINE_AA)

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 SILENCE_S = 1.5
 """The engine reports ten times a second; silence longer than this means that it is gone or stuck."""
 
+_PAUSE_NS = 400_000_000
+"""No state for so long is a gap in the plots; at 10 states per second three may be late."""
+
 LATENCY_COLUMNS: tuple[str, ...] = (*(f"{stage} p50" for stage in STACKED), "all p50",
                                     *(f"{stage} p99" for stage in STACKED), "all p99")
 LOST = "lost"
@@ -64,7 +67,7 @@ class Live:
         self.jitter = Series(())
         self.latency = Series(LATENCY_COLUMNS)
         self.rates = Series(("states", LOST))
-        self._sampled = 0
+        self._state_at_ns = 0
         self._jitter_window.clear()
         self._latency_window.clear()
         self._losses.clear()
@@ -87,6 +90,7 @@ class Live:
     def _take_state(self, state: HandState) -> None:
         self.state = state
         self.state_count += 1
+        self._state_at_ns = time.monotonic_ns()
         self._jitter_window.add(state)
         self._latency_window.add(state)
         self.sights.append((state.t_master_ns, state.camera_pixels, state.camera_flags))
@@ -101,8 +105,7 @@ class Live:
 
     def sample(self, now_ns: int) -> None:
         """Add the windows' figures of this moment to the series of jitter and latency; a gap when nothing came."""
-        fresh = self.state is not None and self.state_count != self._sampled
-        self._sampled = self.state_count
+        fresh = self.state is not None and now_ns - self._state_at_ns < _PAUSE_NS
         if self.state is not None and self.state.marker_ids != self.jitter.names:
             self.jitter = Series(self.state.marker_ids)
         if fresh and self.state is not None:
@@ -114,7 +117,7 @@ class Live:
             self.latency.append(now_ns, np.full(len(LATENCY_COLUMNS), np.nan))
 
     def sight_at(self, t_master_ns: int) -> tuple[Array, NDArray[np.uint16]] | None:
-        """Pixels (C, M, 2) and flags (C, M) of the state nearest to a preview's time; None without a state within 0.25 s.
+        """Pixels (C, M, 2) and flags (C, M) of the state nearest to a preview's time; None when none is within 0.25 s.
 
         A preview is older than the newest state; drawn with the newest pixels, marks would run ahead of the picture.
         """

@@ -188,8 +188,9 @@ class Session:
         """Start the twin in the background; its ready line goes to a file, so that it outlives this process."""
         rig_path, output = self._place.path / TWIN_RIG, self._place.path / "twin.out"
         errors = self._place.path / "twin.log"
-        command = [sys.executable, "-m", "rhot_app.simulator.live", "--motion", choice.motion, "--seed", str(choice.seed),
-                   "--preset", choice.preset, "--directory", str(self._place.path), "--rig", str(rig_path)]
+        command = [sys.executable, "-m", "rhot_app.simulator.live", "--motion", choice.motion,
+                   "--seed", str(choice.seed), "--preset", choice.preset,
+                   "--directory", str(self._place.path), "--rig", str(rig_path)]
         with output.open("wb") as out, errors.open("wb") as log:
             process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=log,
                                        start_new_session=True)

@@ -14,7 +14,8 @@ TERMS: dict[str, str] = {
              "1 ms at 1 m/s is 1 mm.",
     "marker": "A coloured spot on the hand: five painted fingertips and a wrist band.",
     "jitter": "How much a marker trembles: rms over the last second of its raw position, motion removed by third "
-              "differences. It includes depth, which is the noisiest direction.",
+              "differences. It includes depth, which is the noisiest direction. There is no figure below about ten "
+              "states per second.",
     "latency": "How long each stage took for one state: median (p50) and 99th percentile (p99) of the last two "
                "seconds. Bands are stacked medians; the lines are the whole way of each state.",
     "budget": "11.1 ms is one frame at 90 fps, the rate the thesis aims at.",

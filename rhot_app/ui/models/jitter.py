@@ -27,7 +27,7 @@ def difference_weights(times_s: Array) -> Array:
 class JitterWindow:
     """Fed with every state; tells each marker's jitter over the last `span_s` seconds, m."""
 
-    def __init__(self, span_s: float = 1.0, capacity: int = 512, gap_s: float = 0.2) -> None:
+    def __init__(self, span_s: float = 1.0, capacity: int = 512, gap_s: float = 0.12) -> None:
         self._span_ns = round(span_s * 1e9)
         self._gap_ns = round(gap_s * 1e9)
         self._capacity = capacity

@@ -34,7 +34,8 @@ def place_labels(anchors: list[Point], sizes: list[Point], picture: Point, gap: 
     """
     placed: list[Box] = []
     for (x, y), (width, height) in zip(anchors, sizes, strict=True):
-        choices = [box for far in (1.0, 2.0, 3.5) for box in _around(x, y, width, height, far * gap, height * (far - 1))]
+        choices = [box for far in (1.0, 2.0, 3.5)
+                   for box in _around(x, y, width, height, far * gap, height * (far - 1))]
         free = (box for box in choices
                 if box.inside(*picture) and not any(box.overlaps(other) for other in placed))
         placed.append(next(free, choices[0]))
@@ -52,5 +53,5 @@ def _around(x: float, y: float, width: float, height: float, gap: float, rise: f
 
 def unique_prefixes(names: tuple[str, ...]) -> list[str]:
     """The shortest beginning of each name that no other name has: "t", "i", "m" … for pictures too small for names."""
-    return [next((name[:n] for n in range(1, len(name)) if sum(other.startswith(name[:n]) for other in names) == 1), name)
-            for name in names]
+    return [next((name[:n] for n in range(1, len(name)) if sum(other.startswith(name[:n]) for other in names) == 1),
+                 name) for name in names]

@@ -51,15 +51,16 @@ DARK = Scheme(
 )
 
 LIGHT = Scheme(
-    name="light", window="#eceef1", panel="#f9fafb", raised="#ffffff", border="#c3c9d1", text="#1b1f25", muted="#58616c",
-    accent="#0a6fb0", on_accent="#ffffff", good="#0b7d5b", caution="#9a6700", bad="#b8430f", fault="#c21f1f",
-    neutral="#68717c", scene="#f1f3f5", grid="#d5dae0", grid_strong="#aab2bc", shadow="#d3d7dc", hand="#d9b99b",
+    name="light", window="#eceef1", panel="#f9fafb", raised="#ffffff", border="#c3c9d1", text="#1b1f25",
+    muted="#58616c", accent="#0a6fb0", on_accent="#ffffff", good="#0b7d5b", caution="#9a6700", bad="#b8430f",
+    fault="#c21f1f", neutral="#68717c", scene="#f1f3f5", grid="#d5dae0", grid_strong="#aab2bc", shadow="#d3d7dc", hand="#d9b99b",
     guessed="#8a929b", frustum="#76818d",
 )
 
 SCHEMES: dict[str, Scheme] = {"dark": DARK, "light": LIGHT}
 
-STAGE_COLOURS: tuple[str, ...] = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#d55e00", "#b8a800", "#999999")
+STAGE_COLOURS: tuple[str, ...] = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#d55e00", "#b8a800",
+                                  "#999999")
 """Okabe and Ito's colours (yellow darkened) for lines that have no colour of their own, in drawing order."""
 
 

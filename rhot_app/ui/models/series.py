@@ -45,12 +45,12 @@ class Series:
         self._count += 1
 
     def window(self, now_ns: int, span_s: float) -> tuple[Array, Array]:
-        """Rows of the last `span_s` seconds, oldest first: seconds before now (n,), all <= 0, and values (n, columns)."""
+        """Rows of the last `span_s` seconds, oldest first: seconds from now (n,), all <= 0, and values (n, columns)."""
         n = len(self)
         order = np.arange(self._count - n, self._count) % len(self._times)
         seconds = (self._times[order] - now_ns) * 1e-9
         inside = seconds >= -span_s
-        return seconds[inside], self._rows[order][inside]
+        return np.asarray(seconds[inside], dtype=np.float64), self._rows[order][inside]
 
 
 def to_csv(seconds: Array, rows: Array, names: tuple[str, ...], unit: str) -> str:

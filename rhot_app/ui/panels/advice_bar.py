@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
+from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.shapes import ShapeMark
 
-Level = Literal["info", "warning", "error"]
 LOOKS: dict[str, tuple[str, str]] = {"info": ("info", "accent"), "warning": ("half", "caution"),
                                      "error": ("octagon", "fault")}
 SHOWN = 3
 _LEAST_PX = 34
-
-
-@dataclass(frozen=True, slots=True)
-class Notice:
-    """One sentence, with the next step as a button when `action` names one (`key` tells which)."""
-
-    level: Level
-    text: str
-    action: str = ""
-    key: str = ""
 
 
 class AdviceBar(QWidget):

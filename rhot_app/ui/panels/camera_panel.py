@@ -104,7 +104,7 @@ class CameraView(QWidget):
         painter.end()
 
     def _paint_marks(self, painter: QPainter, target: QRectF, scale: float) -> None:
-        places = [scale * (mark.place + QPointF(0.5, 0.5)) for mark in self._marks]
+        places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self._marks]
         painter.translate(target.topLeft())
         painter.setBrush(Qt.BrushStyle.NoBrush)
         for at, mark in zip(places, self._marks, strict=True):
@@ -115,7 +115,8 @@ class CameraView(QWidget):
         texts = [mark.name if target.width() >= _ROOM_FOR_NAMES_PX else mark.initial for mark in self._marks]
         metrics = QFontMetricsF(painter.font())
         sizes = [(metrics.horizontalAdvance(text) + 8, metrics.height() + 2) for text in texts]
-        boxes = place_labels([(at.x(), at.y()) for at in places], sizes, (target.width(), target.height()), _RING_PX + 3)
+        boxes = place_labels([(at.x(), at.y()) for at in places], sizes, (target.width(), target.height()),
+                             _RING_PX + 3)
         for text, box in zip(texts, boxes, strict=True):
             self._paint_tag(painter, QPointF(box.x, box.y), text)
         painter.translate(-target.topLeft())

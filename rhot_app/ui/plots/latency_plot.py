@@ -28,7 +28,7 @@ class LatencyPlot(PlotPanel):
     least_span = 15.0
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
-        super().__init__(scheme, ("p50 —", "p99 ┄"), "00.000", parent)
+        super().__init__(scheme, ("p50 —", "p99 ┄"), "00.00", parent)
         self._edges = [pg.PlotCurveItem(connect="finite") for _ in range(len(STACKED) + 1)]
         self._bands = [pg.FillBetweenItem(lower, upper) for lower, upper in zip(self._edges, self._edges[1:],
                                                                                 strict=False)]

@@ -26,7 +26,8 @@ class LegendEntry:
 class Legend(QWidget):
     """Rows of samples, names and values under optional column heads, painted in one go."""
 
-    def __init__(self, scheme: Scheme, heads: tuple[str, ...], widest_value: str, parent: QWidget | None = None) -> None:
+    def __init__(self, scheme: Scheme, heads: tuple[str, ...], widest_value: str,
+                 parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._scheme = scheme
         self._heads = heads

@@ -31,7 +31,8 @@ class PlotPanel(QWidget):
     unit = ""
     least_span = 1.0
 
-    def __init__(self, scheme: Scheme, heads: tuple[str, ...], widest_value: str, parent: QWidget | None = None) -> None:
+    def __init__(self, scheme: Scheme, heads: tuple[str, ...], widest_value: str,
+                 parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("panel", True)
         self.setProperty("guide", "plots")
@@ -41,7 +42,8 @@ class PlotPanel(QWidget):
         self.pause_button = self._button("Pause", "Stop the plot to look at it; the measurement goes on.")
         self.pause_button.setCheckable(True)
         self.reset_button = self._button("Reset", "Begin the plot anew and fit the axes.")
-        self.copy_button = self._button("Copy CSV", "Copy what the plot shows to the clipboard, as comma-separated text.")
+        self.copy_button = self._button("Copy CSV",
+                                        "Copy what the plot shows to the clipboard as comma-separated text.")
         self.reset_button.clicked.connect(self._ask_reset)
         self.copy_button.clicked.connect(self.copy_csv)
         self.plot = pg.PlotWidget()

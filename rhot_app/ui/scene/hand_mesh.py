@@ -52,7 +52,8 @@ def palm_hull(anatomy: HandAnatomy) -> Mesh:
     for name in FINGERS:
         finger = anatomy.fingers[name]
         centres.append(finger.base_mm)
-        radii.append(finger.radii_mm[0] if name == "thumb" else max(finger.radii_mm[0], 0.42 * anatomy.palm_thickness_mm))
+        least = 0.0 if name == "thumb" else 0.42 * anatomy.palm_thickness_mm
+        radii.append(max(finger.radii_mm[0], least))
     return hull_of_spheres(1e-3 * mirrored(np.array(centres), anatomy), 1e-3 * np.array(radii))
 
 
@@ -78,7 +79,7 @@ class HandMesh:
         self.faces: Faces = np.concatenate([fingers, self._palm.faces + np.uint32(len(BONES) * count)])
 
     def pose(self, state: HandState) -> PosedMesh:
-        """The skin at `state`. Segments with an unknown end and an unknown palm collapse to a point: nothing is drawn."""
+        """The skin at `state`. Segments with an unknown end, and an unknown palm, collapse to a point."""
         joints = to_display(state.joint_positions)
         near, far = np.array(BONES).T
         starts, stops = joints[near], joints[far]
@@ -110,7 +111,8 @@ class SkeletonMesh:
         count = len(self._template.directions)
         self._pairs = np.array([*BONES, *RAYS, *((k, k) for k in range(len(JOINTS)) if k not in TIPS)])
         bones = len(BONES) + len(RAYS)
-        self._radii = np.repeat([_SKELETON_RADIUS_M, _JOINT_RADIUS_M], [bones, len(self._pairs) - bones])[:, None] * np.ones(2)
+        radii = np.repeat([_SKELETON_RADIUS_M, _JOINT_RADIUS_M], [bones, len(self._pairs) - bones])
+        self._radii = radii[:, None] * np.ones(2)
         self.faces: Faces = repeat_faces(self._template.faces, count, len(self._pairs))
 
     def pose(self, state: HandState) -> PosedMesh:

@@ -56,7 +56,7 @@ class MarkerMesh:
     def pose(self, state: HandState) -> PosedMesh:
         """The markers at `state`; one without a position is not drawn."""
         places = state.marker_positions
-        known = np.isfinite(places).all(axis=1)
+        known = np.asarray(np.isfinite(places).all(axis=1))
         places = np.where(known[:, None], places, 0.0)
         axis = self._halves[:, None] * self._last_bones(state)
         centres = places[self._bodies]
@@ -92,7 +92,7 @@ class CloudMesh:
     def pose(self, state: HandState) -> PosedMesh:
         """The ellipsoids at `state`, no larger than 6 cm; unknown ones are not drawn."""
         covariances = state.marker_covariances
-        known = np.isfinite(covariances).all(axis=(1, 2)) & np.isfinite(state.marker_positions).all(axis=1)
+        known = np.asarray(np.isfinite(covariances).all(axis=(1, 2)) & np.isfinite(state.marker_positions).all(axis=1))
         values, axes = np.linalg.eigh(np.where(known[:, None, None], covariances, np.eye(3)))
         semi = np.minimum(_CLOUD_SIGMAS * np.sqrt(np.maximum(values, 1e-12)), _CLOUD_LIMIT_M) * known[:, None]
         local = self._sphere.vertices

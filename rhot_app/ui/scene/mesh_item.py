@@ -67,7 +67,7 @@ _ATTRIBUTES = ("a_position", "a_normal", "a_colour", "a_hatched")
 def _modern(source: str, fragment: bool) -> str:
     """The same shader in the words of GLSL 1.40 and ES 3.00, which core profiles demand."""
     if fragment:
-        return "out vec4 fragment_colour;\n" + source.replace("varying", "in").replace("gl_FragColor", "fragment_colour")
+        return "out vec4 f_colour;\n" + source.replace("varying", "in").replace("gl_FragColor", "f_colour")
     return source.replace("attribute", "in").replace("varying", "out")
 
 
@@ -132,7 +132,7 @@ class MeshItem(GLGraphicsItem):
                 buffer.create()
             buffer.bind()
             if buffer.size() == array.nbytes:
-                buffer.write(0, array.tobytes(), array.nbytes)
+                buffer.write(0, array.tobytes(), array.nbytes)  # type: ignore[arg-type]
             else:
                 buffer.allocate(array.tobytes(), array.nbytes)
             buffer.release()

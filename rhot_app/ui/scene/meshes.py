@@ -91,7 +91,7 @@ def sphere(sectors: int = 18, rings: int = 6) -> Mesh:
 
 
 def hull_of_spheres(centres: Array, radii: Array, sectors: int = 20, rings: int = 6) -> Mesh:
-    """Convex hull of spheres at `centres` (S, 3) with `radii` (S,), m, with the spheres' own normals: it looks round."""
+    """Convex hull of spheres at `centres` (S, 3) with `radii` (S,), m, with the spheres' normals: it looks round."""
     directions = sphere(sectors, rings).vertices
     points = (centres[:, None] + radii[:, None, None] * directions[None]).reshape(-1, 3)
     normals = np.tile(directions, (len(centres), 1))
@@ -106,7 +106,7 @@ def hull_of_spheres(centres: Array, radii: Array, sectors: int = 20, rings: int 
 
 
 def elliptic_band(semi_y: float, semi_z: float, width: float, sectors: int = 40) -> Mesh:
-    """A bracelet about the x axis: ellipse of `semi_y` and `semi_z`, `width` along x, m. Open inside, drawn two-sided."""
+    """A bracelet about the x axis: ellipse of `semi_y` and `semi_z`, `width` along x, m. Open at both ends."""
     around = np.linspace(0.0, 2 * np.pi, sectors, endpoint=False)
     ring = np.stack([np.zeros(sectors), semi_y * np.cos(around), semi_z * np.sin(around)], axis=1)
     normal = np.stack([np.zeros(sectors), np.cos(around) / semi_y, np.sin(around) / semi_z], axis=1)

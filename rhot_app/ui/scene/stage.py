@@ -31,7 +31,7 @@ def _steps(low: float, high: float, step: float) -> Array:
     return np.asarray(np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step)
 
 
-def floor_lines() -> tuple[Array, Array]:
+def floor_lines() -> tuple[Array, NDArray[np.bool_]]:
     """Segments (2 L, 3) m of the grid, and (2 L,) True where a line is a strong one (every 200 mm)."""
     segments, strong = [], []
     for x in _steps(*X_RANGE, CELL_M):
@@ -71,11 +71,12 @@ def axis_labels(length_m: float = 0.092) -> list[Label]:
 
 
 def tick_labels() -> list[Label]:
-    """Numbers along the grid's edges in the rig's axes, mm: x in front, z at the right, -y (up) at the upright scale."""
+    """Numbers along the grid's edges in the rig's axes, mm: x in front, z at the right, -y at the upright scale."""
     labels = [Label((float(x), Y_RANGE[0] - 0.035, FLOOR_M), f"{x * 1e3:.0f}") for x in _steps(*X_RANGE, TICK_M)]
     labels.append(Label((0.3, Y_RANGE[0] - 0.035, FLOOR_M), "x [mm]"))
     labels += [Label((X_RANGE[1] + 0.03, float(y), FLOOR_M), f"{y * 1e3:.0f}") for y in _steps(*Y_RANGE, TICK_M)]
     labels.append(Label((X_RANGE[1] + 0.03, 0.9, FLOOR_M), "z [mm]"))
-    labels += [Label((X_RANGE[0] - 0.05, Y_RANGE[1], float(z)), f"{abs(z) * 1e3:.0f}") for z in _steps(0.0, Z_RANGE[1], TICK_M)]
+    labels += [Label((X_RANGE[0] - 0.05, Y_RANGE[1], float(z)), f"{abs(z) * 1e3:.0f}")
+               for z in _steps(0.0, Z_RANGE[1], TICK_M)]
     labels.append(Label((X_RANGE[0] - 0.05, Y_RANGE[1], Z_RANGE[1] - 0.1), "up [mm]"))
     return labels

@@ -23,14 +23,14 @@ Array = NDArray[np.float64]
 
 _FIELD_OF_VIEW_DEG = 50.0
 _FRUSTUM_M = 0.09
-_HOME_DISTANCE_M = 0.98
-_HOME_CENTRE_M = (0.04, 0.36, -0.05)
+_HOME_DISTANCE_M = 1.05
+_HOME_CENTRE_M = (0.06, 0.38, -0.04)
 _HOME_AZIMUTH_DEG = -62.0
 _HOME_ELEVATION_DEG = 20.0
 _FRAMED_DISTANCE_M = 0.42
 
 
-class SceneView(GLViewWidget):  # type: ignore[misc]
+class SceneView(GLViewWidget):
     """`show_rig` sets what does not move, `show_state` poses the rest.
 
     Left drag turns, middle drag or Ctrl + left drag moves, the wheel zooms, the arrow keys turn.

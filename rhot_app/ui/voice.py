@@ -1,0 +1,55 @@
+"""The controller's state in words: the one word at the top, the sentences at the bottom."""
+
+from __future__ import annotations
+
+from rhot_app.ui.controller import RESTART_ENGINE, RESTART_TWIN, Controller
+from rhot_app.ui.models.notice import Notice
+from rhot_app.ui.models.rows import bytes_text
+from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look
+
+
+def look_of(controller: Controller) -> Look:
+    """The one word, its shape and its tone."""
+    if controller.opened is None:
+        return STARTING if controller.working else NO_RIG
+    if controller.engine_gone:
+        return NO_ENGINE
+    status = controller.live.status
+    return condition_look(status.condition) if status is not None else STARTING
+
+
+def notices_of(controller: Controller) -> list[Notice]:
+    """The sentences of the moment: the app's own, then the engine's; a quiet one when there is nothing to say."""
+    notices: list[Notice] = []
+    if controller.engine_gone:
+        notices.append(_engine_notice(controller))
+    elif controller.problem:
+        notices.append(Notice("error", controller.problem))
+    if controller.twin_gone:
+        notices.append(Notice("error", "The simulated cameras have stopped.", "Start them again", RESTART_TWIN))
+    if controller.opened is not None and not controller.opened.ours:
+        notices.append(Notice("info", "This engine was started outside the app; closing the app lets it run on."))
+    status = controller.live.status
+    if status is not None and not controller.engine_gone:
+        notices += [Notice(advice.level, advice.text) for advice in status.advice]
+        if status.log_path:
+            notices.append(Notice("info", f"Recording to {status.log_path} ({bytes_text(status.log_bytes)})."))
+    return notices or [Notice("info", _quiet_sentence(controller))]
+
+
+def _engine_notice(controller: Controller) -> Notice:
+    if controller.working:
+        return Notice("error", "The engine stopped. The app is starting it again; the nodes re-join by themselves.")
+    reason = f" {controller.problem}" if controller.problem else ""
+    return Notice("error", f"The engine stopped and could not be started again.{reason}", "Try again", RESTART_ENGINE)
+
+
+def _quiet_sentence(controller: Controller) -> str:
+    if controller.opened is None and controller.working:
+        return "One moment. Cancel ends what was started."
+    if controller.opened is None:
+        return "Choose how to begin. F1 opens the guide."
+    if not controller.running:
+        return "Press Start, or the space bar, to begin tracking."
+    look = look_of(controller)
+    return "Everything is in order." if look.tone == "good" else look.meaning
