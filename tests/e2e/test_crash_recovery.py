@@ -88,9 +88,8 @@ def test_a_new_engine_takes_over_from_a_killed_one(running: Running) -> None:
     assert [node.poll() for node in running.nodes] == [None, None], "nodes outlive the engine"
 
     engine = bench.start_engine("--start")
+    wait_until(client, lambda: client.status is not None and client.status.pid == engine.pid, START_S, "a new status")
     wait_until(client, running.tracks, START_S, "the nodes join the new engine")
-    assert client.status is not None
-    assert client.status.pid == engine.pid
     assert [node.poll() for node in running.nodes] == [None, None]
 
 

@@ -1,6 +1,7 @@
 """The ``rhot`` command: fast help, sentences and exit codes, the engine and the replay as real processes."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -93,7 +94,7 @@ def test_background_engine_is_killed_found_dead_and_started_again(tmp_path: Path
     directory = EngineClient(place).directory
     (started,) = started_processes(directory)
     assert (started.pid, started.role) == (pid, "engine")
-    subprocess.run(["kill", "-9", str(pid)], check=True)
+    os.kill(pid, signal.SIGKILL)
     deadline = time.monotonic() + 5.0
     while running_engine(place) is not None:
         assert time.monotonic() < deadline
