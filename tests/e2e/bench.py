@@ -28,7 +28,8 @@ BASELINE_M = 0.075
 WIDTH, HEIGHT, FPS = 640, 480, 40.0
 FOCAL_PX = 530.0
 CLOCKS = (ClockSettings(offset_s=1234.5, drift_ppm=40.0), ClockSettings(offset_s=-77.25, drift_ppm=-25.0))
-START_S = 40.0  # a first start compiles; a machine under test is busy
+START_S = 150.0  # seconds; after a change of the tracker its first start compiles it, beside other tests
+TEST_S = 300.0  # of a whole test, when it comes to that
 
 
 @dataclass

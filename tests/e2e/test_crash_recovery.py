@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pytest
-from bench import FPS, START_S, Bench, kill_hard, node_status, states_of, wait_until
+from bench import FPS, START_S, TEST_S, Bench, kill_hard, node_status, states_of, wait_until
 from scene import Scene
 
 from rhot_app.engine.client import EngineClient
@@ -64,7 +64,7 @@ def wait_ready(bench: Bench, name: str, times: int) -> None:
         time.sleep(POLL_S)
 
 
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(TEST_S)
 def test_a_killed_node_shows_within_a_second_and_joins_again(running: Running) -> None:
     bench, client = running.bench, running.client
     kill_hard(running.nodes[0])
@@ -79,7 +79,7 @@ def test_a_killed_node_shows_within_a_second_and_joins_again(running: Running) -
     wait_until(client, running.tracks, REJOINED_S, "the node joins again")
 
 
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(TEST_S)
 def test_a_new_engine_takes_over_from_a_killed_one(running: Running) -> None:
     bench, client = running.bench, running.client
     kill_hard(running.engine)
@@ -105,7 +105,7 @@ with EngineClient(Path(sys.argv[1])) as client:
 """
 
 
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(TEST_S)
 def test_a_killed_client_takes_nothing_with_it(running: Running) -> None:
     bench, client = running.bench, running.client
     watcher = bench.start_code(WATCHER, str(bench.sockets), name="watcher")

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from bench import START_S, Bench, ends, wait_until
+from bench import START_S, TEST_S, Bench, ends, wait_until
 from scene import Scene
 
 from rhot_app.engine.client import EngineClient
@@ -27,7 +27,7 @@ def refused(bench: Bench, process: subprocess.Popen[bytes], name: str, *words: s
         assert word in said
 
 
-@pytest.mark.timeout(90)
+@pytest.mark.timeout(TEST_S)
 def test_a_taken_data_port_stops_the_engine(bench: Bench) -> None:
     port = bench.rig.nodes[1].data_port
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
@@ -35,7 +35,7 @@ def test_a_taken_data_port_stops_the_engine(bench: Bench) -> None:
         refused(bench, bench.start_engine(), "engine", str(port), "right")
 
 
-@pytest.mark.timeout(90)
+@pytest.mark.timeout(TEST_S)
 @pytest.mark.parametrize("which", ["udp_port", "control_port"])
 def test_a_taken_port_stops_a_node(bench: Bench, which: str) -> None:
     node = bench.rig.nodes[0]
@@ -49,7 +49,7 @@ def test_a_taken_port_stops_a_node(bench: Bench, which: str) -> None:
         refused(bench, bench.start_node(0, f"yuv:{bench.folder}/left.yuv"), "left", str(port))
 
 
-@pytest.mark.timeout(90)
+@pytest.mark.timeout(TEST_S)
 def test_a_second_engine_in_the_same_directory_is_refused(bench: Bench) -> None:
     first = bench.start_engine()
     with EngineClient(bench.sockets) as client:
@@ -80,7 +80,7 @@ def missing(path: Path) -> None:
     path.unlink()
 
 
-@pytest.mark.timeout(90)
+@pytest.mark.timeout(TEST_S)
 @pytest.mark.parametrize("damage", [truncated, newer, foreign, missing])
 def test_bad_files_are_named(bench: Bench, damage: Callable[[Path], None]) -> None:
     node = bench.rig.nodes[0]
@@ -93,7 +93,7 @@ def test_bad_files_are_named(bench: Bench, damage: Callable[[Path], None]) -> No
     assert not list(bench.folder.glob(".*")), "no half-written file"
 
 
-@pytest.mark.timeout(90)
+@pytest.mark.timeout(TEST_S)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_polite_signal_ends_everything_cleanly(bench: Bench, number: signal.Signals) -> None:
     node = bench.rig.nodes[0]
@@ -109,7 +109,7 @@ def test_a_polite_signal_ends_everything_cleanly(bench: Bench, number: signal.Si
     assert "Traceback" not in bench.log("engine") + bench.log("left")
 
 
-@pytest.mark.timeout(90)
+@pytest.mark.timeout(TEST_S)
 @pytest.mark.parametrize("arguments", [["engine"], ["engine", "--rig"], ["dance"], ["replay"]])
 def test_a_mistyped_command_is_code_2(arguments: list[str]) -> None:
     done = subprocess.run([sys.executable, "-m", "rhot_app", *arguments], capture_output=True, text=True, check=False)

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from bench import FPS, START_S, Bench, node_status, states_of, wait_until
+from bench import FPS, START_S, TEST_S, Bench, node_status, states_of, wait_until
 from scene import PERIOD_S, Scene
 
 from rhot_app.engine.client import EngineClient
@@ -18,7 +18,7 @@ MARKER_RMS_MM = 2.5  # of the unfiltered positions; 9 mm per px of disparity at 
 STATE_AGE_S = 0.15
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(TEST_S)
 def test_a_moving_hand_arrives_at_the_cameras_rate(bench: Bench) -> None:
     scene = Scene(bench.rig, amplitude_m=0.03)
     begin = bench.folder / "begin"
@@ -51,7 +51,7 @@ def test_a_moving_hand_arrives_at_the_cameras_rate(bench: Bench) -> None:
     assert (np.diff([state.t_master_ns for _, state in received]) > 0).all()
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(TEST_S)
 def test_the_engine_knows_each_nodes_clock(bench: Bench) -> None:
     scene = Scene(bench.rig)
     for index, node in enumerate(bench.rig.nodes):

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from bench import START_S, Bench, states_of, wait_until
+from bench import START_S, TEST_S, Bench, states_of, wait_until
 from scene import Scene, project
 
 from rhot_app.engine.client import EngineClient
@@ -37,7 +37,7 @@ def send_for(bench: Bench, client: EngineClient, points_m: np.ndarray, seconds: 
     return states
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(TEST_S)
 def test_text_datagrams_move_the_markers(bench: Bench) -> None:
     bench.allow_text()
     bench.start_engine("--start")
@@ -51,7 +51,7 @@ def test_text_datagrams_move_the_markers(bench: Bench) -> None:
             assert np.linalg.norm(state.marker_raw_positions - points_m, axis=1).max() < 0.003
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(TEST_S)
 def test_garbage_between_text_datagrams_is_counted_and_dropped(bench: Bench) -> None:
     bench.allow_text()
     bench.start_engine("--start")
@@ -65,7 +65,7 @@ def test_garbage_between_text_datagrams_is_counted_and_dropped(bench: Bench) -> 
             sum(node.dropped.values()) >= 0.9 * 2.0 * RATE_HZ for node in client.status.nodes), 2.0, "every drop")
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(TEST_S)
 def test_a_rig_that_does_not_allow_text_ignores_it(bench: Bench) -> None:
     bench.start_engine("--start")
     with EngineClient(bench.sockets) as client:
