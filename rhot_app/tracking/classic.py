@@ -52,22 +52,6 @@ class ClassicTracker:
         self._last_s = 0.0
         self._measured_s: float | None = None
 
-    def warm_up(self) -> None:
-        """Run every compiled function once; they are then loaded, and the first hand is not late."""
-        cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
-        for number in range(3):
-            for camera in range(cameras):
-                self.ingest(CameraObservations(
-                    camera=camera, t_row0_master_ns=number * 10_000_000 + camera * 3_000_000, row_time_ns=0,
-                    clock_bound_s=0.0, t_receive_ns=number * 10_000_000 + 5_000_000, detect_s=0.0, network_s=0.0,
-                    pixels=np.tile(self._rig.intrinsics[camera, 2:4], (markers, 1)),
-                    covariances=np.tile(np.eye(2), (markers, 1, 1)), diameters=np.ones(markers),
-                    qualities=np.ones(markers), flags=np.zeros(markers, np.uint16)))
-                self.solve()
-        self._hand.warm_up()
-        self.reset()
-        self._sequence = 0
-
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; about 10 µs."""
         self._pairing.ingest(observations)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.finger_ik import solve_fingers
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.model import HandModel, neutral_pose
+from rhot_app.hand.model import HandModel
 from rhot_app.hand.palm_fit import fit_palm
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.tracking.state import Knowledge
@@ -48,13 +48,6 @@ class HandSolver:
         self._model = model
         self.pose: HandPose | None = None
         self._solved_s = 0.0
-
-    def warm_up(self) -> None:
-        """Solve a hand of its own twice, from nothing and from a pose, then forget it."""
-        points = forward(self._model, neutral_pose())
-        for t_s in (0.0, 0.01):
-            self.solve(t_s, points.joints[0], points.marker_centres, Knowledge.MEASURED, np.zeros(5, np.uint8))
-        self.reset()
 
     def reset(self) -> None:
         """Forget the pose."""

@@ -8,7 +8,5 @@ from rhot_app.tracking.tracker import Tracker
 
 
 def make_tracker(rig: Rig) -> Tracker:
-    """A new tracker for `rig`, compiled and warm: its first state takes no longer than the others."""
-    tracker = ClassicTracker(rig)
-    tracker.warm_up()
-    return tracker
+    """A new tracker for `rig`."""
+    return ClassicTracker(rig)

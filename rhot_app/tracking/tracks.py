@@ -25,6 +25,8 @@ MAX_GAP_NS = 100_000_000
 DOUBTFUL = int(MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS)
 """Flags of a sample whose centroid may be biased by pixels, or be another blob's."""
 
+_START = int(MarkerFlag.ACQUIRED)  # first sample of a track: what was seen before may have been another thing
+
 _MAX_SPACING_RATIO = 2.5  # more irregular spacing makes the polynomial amplify noise more than it bends
 _SAME_NS = 1_000  # a sample this near to the instant is the value at the instant
 
@@ -65,14 +67,14 @@ def insert(times: Times, pixels: Array, covariances: Array, flags: Flags, count:
 
 @njit(cache=True)
 def _regular(times: Times, flags: Flags, first: int, last: int) -> bool:
-    """Whether samples first..last are evenly enough spaced, near enough and beyond doubt enough for one curve."""
+    """Whether samples first..last are one track, beyond doubt, and evenly enough spaced for one curve."""
     shortest, longest = times[first + 1] - times[first], times[first + 1] - times[first]
     for k in range(first + 1, last):
         spacing = times[k + 1] - times[k]
         shortest = min(shortest, spacing)
         longest = max(longest, spacing)
     for k in range(first, last + 1):
-        if flags[k] & DOUBTFUL:
+        if flags[k] & DOUBTFUL or (k > first and flags[k] & _START):
             return False
     return longest <= _MAX_SPACING_RATIO * shortest and longest <= MAX_GAP_NS
 
@@ -94,7 +96,7 @@ def interpolate(times: Times, pixels: Array, covariances: Array, flags: Flags, c
 
     A cubic, because a straight line between samples leaves a dt^2 / 8: 2 mm for a hand at 2 m/s and 40 frames/s.
     Writes `pixel` (2,) and `covariance` (2, 2); returns the bracketing samples' flags, or -1 when the instant is not
-    bracketed by samples at most MAX_GAP_NS apart.
+    bracketed by samples of one track at most MAX_GAP_NS apart.
     """
     after = 0
     while after < count and times[after] < t_ns - _SAME_NS:
@@ -105,7 +107,7 @@ def interpolate(times: Times, pixels: Array, covariances: Array, flags: Flags, c
         pixel[:] = pixels[after]
         covariance[:] = covariances[after]
         return int(flags[after])
-    if after == 0 or times[after] - times[after - 1] > MAX_GAP_NS:
+    if after == 0 or times[after] - times[after - 1] > MAX_GAP_NS or flags[after] & _START:
         return -1
     first, last = _nodes(times, flags, count, after)
     pixel[:] = 0.0

@@ -14,6 +14,9 @@ Mask = NDArray[np.bool_]
 SPEED_LIMIT = 10.0
 """No hand moves faster, m/s (a boxer's fist peaks near 10): beyond it a marker jumped to another thing."""
 
+ACCELERATION_LIMIT = 120.0
+"""Nor does it change its speed faster, m/s^2: waving 30 cm wide four times a second takes 95."""
+
 JUMP_FLOOR_M = 0.02
 CONFIRMATIONS = 3
 """A jump is believed when the marker stays at the new place for this many states."""
@@ -28,21 +31,32 @@ ACCELERATION_SD = 10.0
 VELOCITY_SD = 0.05
 _VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
 
-# Columns of the memory, one row per marker: time, position, velocity, then the jump that waits for confirmation.
-_T, _X, _V, _JUMP_T, _JUMP_X, _JUMPS = 0, 1, 4, 7, 8, 11
-COLUMNS = 12
+# Columns of the memory, one row per marker: time, position, smoothed velocity, last step and its duration, then the
+# jump that waits for confirmation.
+_T, _X, _V, _STEP, _STEP_S, _JUMP_T, _JUMP_X, _JUMPS = 0, 1, 4, 7, 10, 11, 12, 15
+COLUMNS = 16
 
 
 def empty_memory(markers: int) -> Array:
-    """(M, 12) memory of markers never seen."""
+    """(M, 16) memory of markers never seen."""
     return np.full((markers, COLUMNS), np.nan)
 
 
 @njit(cache=True)
-def _reachable(position: Array, covariance: Array, since: Array, dt: float) -> bool:
-    distance = math.sqrt((position[0] - since[0]) ** 2 + (position[1] - since[1]) ** 2 + (position[2] - since[2]) ** 2)
-    spread = math.sqrt(max(covariance[0, 0] + covariance[1, 1] + covariance[2, 2], 0.0))
-    return distance <= SPEED_LIMIT * dt + 5.0 * spread + JUMP_FLOOR_M
+def _reachable(position: Array, covariance: Array, since: Array, step: Array, step_s: float, dt: float) -> bool:
+    """Whether a hand that came to `since` by `step` in `step_s` (NaN: unknown) can be at `position` after `dt` s."""
+    surprise = 0.0
+    for k in range(3):
+        surprise += (position[k] - since[k] - step[k] * dt / step_s) ** 2
+    margin = 5.0 * math.sqrt(max(covariance[0, 0] + covariance[1, 1] + covariance[2, 2], 0.0)) + JUMP_FLOOR_M
+    if _distance(position, since) > SPEED_LIMIT * dt + margin:
+        return False
+    return not math.sqrt(surprise) > 0.5 * ACCELERATION_LIMIT * dt * (dt + step_s) + margin
+
+
+@njit(cache=True)
+def _distance(a: Array, b: Array) -> float:
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @njit(cache=True)
@@ -52,6 +66,7 @@ def judge(t_s: float, positions: Array, covariances: Array, memory: Array, belie
     `positions` (M, 3) m with `covariances` (M, 3, 3), NaN where not located. Fills `believed` (M,), and `restarted`
     (M,): believed although it did not get there continuously, so filters must start anew.
     """
+    unknown = np.full(3, np.nan)
     for m in range(positions.shape[0]):
         believed[m] = restarted[m] = False
         position = positions[m]
@@ -60,9 +75,12 @@ def judge(t_s: float, positions: Array, covariances: Array, memory: Array, belie
         row = memory[m]
         dt = t_s - row[_T]
         fresh = not dt <= FORGET_S
-        if not fresh and not _reachable(position, covariances[m], row[_X:_X + 3], dt):
-            steady = (t_s - row[_JUMP_T] <= FORGET_S
-                      and _reachable(position, covariances[m], row[_JUMP_X:_JUMP_X + 3], t_s - row[_JUMP_T]))
+        steady = t_s - row[_JUMP_T] <= FORGET_S and _reachable(
+            position, covariances[m], row[_JUMP_X:_JUMP_X + 3], unknown, math.nan, t_s - row[_JUMP_T])
+        # Waiting makes every place reachable: a marker that stays where it jumped to has still jumped.
+        stayed = steady and _distance(position, row[_JUMP_X:_JUMP_X + 3]) < _distance(position, row[_X:_X + 3])
+        if not fresh and (stayed or not _reachable(position, covariances[m], row[_X:_X + 3], row[_STEP:_STEP + 3],
+                                                   row[_STEP_S], dt)):
             row[_JUMPS] = row[_JUMPS] + 1.0 if steady else 1.0
             row[_JUMP_T] = t_s
             row[_JUMP_X:_JUMP_X + 3] = position
@@ -70,11 +88,14 @@ def judge(t_s: float, positions: Array, covariances: Array, memory: Array, belie
                 continue
             fresh = True
         if fresh:
-            row[_V:_V + 3] = 0.0
+            row[_V:_STEP_S + 1] = math.nan
         elif dt > 0.0:
             weight = dt / (dt + _VELOCITY_TIME_S)
+            row[_STEP_S] = dt
             for k in range(3):
-                row[_V + k] += weight * ((position[k] - row[_X + k]) / dt - row[_V + k])
+                row[_STEP + k] = position[k] - row[_X + k]
+                speed = (position[k] - row[_X + k]) / dt
+                row[_V + k] = speed if math.isnan(row[_V + k]) else row[_V + k] + weight * (speed - row[_V + k])
         row[_T] = t_s
         row[_X:_X + 3] = position
         row[_JUMP_T] = math.nan
@@ -100,6 +121,7 @@ def predict(t_s: float, memory: Array, located: Mask, origin: Array, positions: 
             continue
         variance = (0.5 * ACCELERATION_SD * dt * dt) ** 2 + (VELOCITY_SD * dt) ** 2 + 1e-6
         for k in range(3):
-            positions[m, k] = origin[m, k] + memory[m, _V + k] * dt
+            speed = memory[m, _V + k]
+            positions[m, k] = origin[m, k] + (0.0 if math.isnan(speed) else speed * dt)
             for j in range(3):
                 covariances[m, k, j] = variance if j == k else 0.0

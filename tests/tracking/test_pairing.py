@@ -92,8 +92,8 @@ def test_a_late_frame_still_helps_to_interpolate():
 
 def test_the_rate_is_the_cameras_and_the_partner_the_nearer_one_whatever_the_phase_does():
     period, drift = 0.025, 2e-3  # one camera runs 0.2 % slow: phases pass through a whole period in 12.5 s
-    frames = sorted([shot(0, k * period) for k in range(1000)] + [shot(1, k * period * (1 + drift)) for k in range(998)],
-                    key=lambda f: f.t_receive_ns)
+    frames = [shot(0, k * period) for k in range(1000)] + [shot(1, k * period * (1 + drift)) for k in range(998)]
+    frames.sort(key=lambda f: f.t_receive_ns)
     states = feed(Pairing(2, 2), frames)
     assert len(states) == pytest.approx(1000, abs=6)
     age = np.array([s.completed_by.t_receive_ns - s.t_ns for s in states[1:]]) * 1e-9 - 0.03

@@ -8,6 +8,7 @@ from rhot_node.wire.messages import MarkerFlag
 
 MS = 1_000_000
 PARTIAL = int(MarkerFlag.PARTIAL)
+ACQUIRED = int(MarkerFlag.ACQUIRED)
 
 
 class Track:
@@ -109,6 +110,16 @@ def test_doubtful_samples_do_not_bend_the_curve_and_are_reported():
     assert track.at(10.0)[0] == PARTIAL
 
 
+def test_no_curve_crosses_the_start_of_a_track():
+    track = Track()
+    for t, x, flag in ((0, 500.0, 0), (25, 500.0, 0), (50, 50.0, ACQUIRED), (75, 75.0, 0), (100, 100.0, 0)):
+        track.add(t, x, flag=flag)
+    assert track.at(40.0)[0] == -1
+    assert track.at(50.0)[1][0] == 50.0
+    for t in (60.0, 80.0):
+        assert track.at(t)[1][0] == pytest.approx(t)
+
+
 def ingest(pixels, flags=None, covariances=None):
     count = len(pixels)
     shape = (count, tracks.LENGTH)
@@ -132,5 +143,6 @@ def test_what_is_lost_or_not_a_number_is_no_sample(poison):
     covariances[2, 0, 0] = poison if poison != 1e30 else -1.0
     covariances[3] = 0.0
     flags = np.array([0, 0, 0, 0, 1], np.uint16)
-    taken, newest, track = ingest([[1.0, poison], [poison, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0]], flags, covariances)
+    pixels = [[1.0, poison], [poison, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0]]
+    taken, newest, track = ingest(pixels, flags, covariances)
     assert taken == 0 and (newest == -1).all() and not track[4].any()
