@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 RING = 2  # chroma pixels around the half level that an edge may reach (lens, 2x2 chroma mean, some motion)
-REACH = 3  # half-width of the neighbourhood that paint and surroundings are averaged over
+REACH = 5  # half-width of the neighbourhood that paint and surroundings are averaged over
 PAD = RING + REACH  # region around the component that coverage needs
 CLIP = 0.3  # coverage is clipped to -CLIP..1 + CLIP: noise must stay unbiased, glints must not count
 HOLES_MAX = 0.3  # holes (glints, noise) are filled up to this fraction of the component
