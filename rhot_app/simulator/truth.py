@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -96,6 +97,6 @@ def load_truth(path: Path) -> Truth:
             cameras = tuple(FrameTruth(data[f"camera{k}_times_s"], data[f"camera{k}_visible"]) for k in range(count))
             return Truth(data["times_s"], data["markers"], data["joints"].astype(np.float64), data["angles"],
                          data["world_from_palm"], cameras)
-    except (OSError, KeyError, ValueError) as exc:
+    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as exc:
         raise SimulatorError(f"{path}: not a truth file of a simulated run ({exc}). "
                              "Render one with `rhot simulate --out FOLDER`.") from exc

@@ -1,0 +1,87 @@
+"""The live twin as its users meet it: a process that says when it is ready, heals its nodes, and ends with them."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rhot_app.project import load_rig
+
+READY_S = 90.0
+
+
+def children(pid: int) -> list[int]:
+    """Process ids of the children of `pid`."""
+    with contextlib.suppress(OSError):
+        return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return []
+
+
+def udp_ports_open(ports: list[int]) -> bool:
+    """Whether somebody listens on all of these UDP ports of the loopback interface."""
+    lines = Path("/proc/net/udp").read_text().splitlines()[1:]
+    bound = {int(line.split()[1].split(":")[1], 16) for line in lines}
+    return set(ports) <= bound
+
+
+@pytest.fixture
+def twin(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
+    """A live twin and its rig file."""
+    rig = tmp_path / "live.rig.json"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rhot_app.simulator.live", "--motion", "wave", "--seed", "3",
+         "--directory", str(tmp_path), "--rig", str(rig)], stdout=subprocess.PIPE)
+    try:
+        yield process, rig
+    finally:
+        process.terminate()
+        try:
+            process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        assert process.stdout is not None
+        process.stdout.close()
+
+
+def test_live_twin_gets_ready_heals_a_killed_node_and_ends_with_its_nodes(
+        twin: tuple[subprocess.Popen[bytes], Path]) -> None:
+    process, rig_path = twin
+    assert process.stdout is not None
+    ready = json.loads(process.stdout.readline())
+    assert ready["event"] == "ready" and ready["rig"] == str(rig_path)
+    ports = [node.udp_port for node in load_rig(rig_path).nodes]
+    nodes = children(process.pid)
+    assert len(nodes) == 2 and len(set(ports)) == 2 and udp_ports_open(ports)
+
+    os.kill(nodes[0], signal.SIGKILL)
+    deadline = time.monotonic() + 30.0
+    while time.monotonic() < deadline and not (len(children(process.pid)) == 2 and nodes[0] not in children(process.pid)
+                                               and udp_ports_open(ports)):
+        time.sleep(0.05)
+    healed = children(process.pid)
+    assert len(healed) == 2 and nodes[0] not in healed and nodes[1] in healed
+    assert udp_ports_open(ports), "the new node listens where the old one did"
+
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10.0) == 0
+    assert not any(Path(f"/proc/{pid}").exists() for pid in healed)
+    assert not list(rig_path.parent.glob("*.frames")), "no socket is left behind"
+
+
+def test_unknown_motion_ends_with_a_sentence(tmp_path: Path) -> None:
+    result = subprocess.run(
+        [sys.executable, "-m", "rhot_app.simulator.live", "--motion", "juggle", "--directory", str(tmp_path), "--rig",
+         str(tmp_path / "rig.json")], capture_output=True, text=True, timeout=READY_S, check=False)
+    assert result.returncode == 2
+    assert "juggle" in result.stderr and "Traceback" not in result.stderr
+    assert not (tmp_path / "rig.json").exists()
