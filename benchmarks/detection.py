@@ -86,8 +86,9 @@ def main() -> int:
     canvas, truth = build_scene()
     rng = np.random.default_rng(1)
     images = [canvas.expose(rng) for _ in range(max(options.frames, WARM_FRAMES))]
-    result: dict[str, Any] = {"frames": len(images), "size": [640, 480], "fast": measure(FastDetector(MARKERS), images, truth),
-              "reference": measure(ReferenceDetector(MARKERS), images, truth)}
+    result: dict[str, Any] = {"frames": len(images), "size": [640, 480],
+                              "fast": measure(FastDetector(MARKERS), images, truth),
+                              "reference": measure(ReferenceDetector(MARKERS), images, truth)}
     fast, reference = result["fast"], result["reference"]
     print(f"{'640x480, six markers':<28} {'fast':>10} {'reference':>10} {'ratio':>8}")
     for label, key in (("tracked frame, ms", "tracked_ms"), ("full search, ms", "search_ms")):

@@ -76,8 +76,8 @@ def test_a_fast_marker_is_followed_by_prediction() -> None:
     rng = np.random.default_rng(3)
     for step in range(24):
         x = 320 + 250 * math.sin(0.17 * step)  # up to 43 px per frame
-        seen = detector.detect(scene({"ring": (x, 200)}, (640, 480)).expose(rng))[0]
-        assert error(seen, x, 200) < 0.25
+        seen = detector.detect(scene({"ring": (x, 60)}, (640, 120)).expose(rng))[0]
+        assert error(seen, x, 60) < 0.25
         if step > 2:
             assert not seen.flags & MarkerFlag.ACQUIRED
 
@@ -154,8 +154,8 @@ def test_a_finger_across_the_marker_leaves_one_marker_not_half_of_it() -> None:
 def test_honest_approach_is_not_hiding() -> None:
     detector = only("index")
     rng = np.random.default_rng(7)
-    for step in range(60):
-        radius = 9.0 * (0.975 if step < 30 else 1.0) ** min(step, 30) * (1.025 ** max(step - 30, 0))
+    for step in range(44):
+        radius = 9.0 * 0.98 ** min(step, 20) * 1.02 ** max(step - 20, 0)
         canvas = Canvas(160, 120).paint(disc(80, 60, radius), RGB["index"], (80, 60), radius + 3, 0.25)
         seen = detector.detect(canvas.expose(rng))[0]
         assert not seen.flags & DOUBTS, step
