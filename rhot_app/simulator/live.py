@@ -65,9 +65,9 @@ class LiveCameras:
         cost = 0.0
         for index in order:
             t_ns = self._tick_ns + round(1e9 * scene.phases_s[index])
-            began = time.perf_counter()
+            began = time.thread_time()
             frame, _ = self._renderers[index].render(self._shot.motion, 1e-9 * (t_ns - self._origin_ns), self._number)
-            cost += time.perf_counter() - began
+            cost += time.thread_time() - began
             sleep_until(t_ns + self._delay_ns)
             self._sockets[index].send(StreamHeader(preset.width, preset.height, self._number, t_ns, scene.exposure_ns,
                                                    scene.row_time_ns), frame)
