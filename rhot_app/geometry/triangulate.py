@@ -146,9 +146,11 @@ def reprojection_rms(position: Array, rays: Array, cameras: Array, focal: Array,
     for c in range(rays.shape[0]):
         if not used[c]:
             continue
-        x = cameras[c, 0, :3] @ position + cameras[c, 0, 3]
-        y = cameras[c, 1, :3] @ position + cameras[c, 1, 3]
-        z = cameras[c, 2, :3] @ position + cameras[c, 2, 3]
+        x, y, z = cameras[c, 0, 3], cameras[c, 1, 3], cameras[c, 2, 3]
+        for k in range(3):  # not @: three products do not pay for a call of BLAS
+            x += cameras[c, 0, k] * position[k]
+            y += cameras[c, 1, k] * position[k]
+            z += cameras[c, 2, k] * position[k]
         total += (focal[c, 0] * (x / z - rays[c, 0])) ** 2 + (focal[c, 1] * (y / z - rays[c, 1])) ** 2
         count += 1
     return math.sqrt(total / count) if count > 0 else math.nan

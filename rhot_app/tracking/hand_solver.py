@@ -17,6 +17,9 @@ from rhot_app.tracking.state import Knowledge
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 
+# Plain numbers: looking up a member of an enumeration costs a microsecond, and this is done for every finger.
+_INFERRED, _GUESSED = int(Knowledge.INFERRED), int(Knowledge.GUESSED)
+
 FORGET_S = 0.5
 """A hand without enough markers keeps its last pose this long, as a guess."""
 
@@ -76,12 +79,12 @@ def _knowledge(wrist: int, tips: Codes, *, solved: bool) -> tuple[Codes, Codes]:
     A finger whose marker was located is inferred from it through the bones, the others keep their last angles: a
     guess. The palm's rotation is always a guess with one wrist marker, and says so itself (`palm_knowledge`).
     """
-    joints = np.full(len(JOINTS), Knowledge.GUESSED, np.uint8)
-    angles = np.full(len(ANGLES), Knowledge.GUESSED, np.uint8)
+    joints = np.full(len(JOINTS), _GUESSED, np.uint8)
+    angles = np.full(len(ANGLES), _GUESSED, np.uint8)
     if solved:
-        joints[0] = wrist if wrist <= Knowledge.INFERRED else Knowledge.GUESSED
+        joints[0] = wrist if wrist <= _INFERRED else _GUESSED
         for finger, known in enumerate(tips):
-            if known <= Knowledge.INFERRED:
-                joints[JOINT_SLICES[finger]] = Knowledge.INFERRED
-                angles[ANGLE_SLICES[finger]] = Knowledge.INFERRED
+            if known <= _INFERRED:
+                joints[JOINT_SLICES[finger]] = _INFERRED
+                angles[ANGLE_SLICES[finger]] = _INFERRED
     return joints, angles

@@ -76,14 +76,16 @@ def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array,
     count = pixels.shape[0]
     rays, ray_covariances = np.empty((count, 2)), np.empty((count, 2, 2))
     views, trial = np.empty(count, np.bool_), np.empty(count, np.bool_)
-    jacobian = np.empty((2, 2))
     for m in range(pixels.shape[1]):
         for c in range(count):
             views[c] = used[c, m]
             x, y, xu, xv, yu, yv = undistort_point(pixels[c, m, 0], pixels[c, m, 1], intrinsics[c])
             rays[c, 0], rays[c, 1] = x, y
-            jacobian[0, 0], jacobian[0, 1], jacobian[1, 0], jacobian[1, 1] = xu, xv, yu, yv
-            ray_covariances[c] = jacobian @ covariances[c, m] @ jacobian.T
+            uu, uv, vv = covariances[c, m, 0, 0], covariances[c, m, 0, 1], covariances[c, m, 1, 1]
+            ray_covariances[c, 0, 0] = xu * xu * uu + 2.0 * xu * xv * uv + xv * xv * vv
+            ray_covariances[c, 1, 1] = yu * yu * uu + 2.0 * yu * yv * uv + yv * yv * vv
+            ray_covariances[c, 0, 1] = xu * yu * uu + (xu * yv + xv * yu) * uv + xv * yv * vv
+            ray_covariances[c, 1, 0] = ray_covariances[c, 0, 1]
             if not (math.isfinite(x) and math.isfinite(y)):
                 views[c] = False
         error, outcome = _locate(rays, ray_covariances, cameras, focal, views, shapes[m], positions[m],

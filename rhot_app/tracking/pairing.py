@@ -64,6 +64,7 @@ class Pairing:
         self._counts = np.zeros((cameras, markers), np.int64)
         self._newest = np.full((cameras, markers), -1, np.int64)
         self._frames: list[list[int]] = [[] for _ in range(cameras)]
+        self._newest_frames: list[CameraObservations | None] = [None] * cameras
         self._receive_ns: list[int] = [0] * cameras
         self._stale = [0] * cameras
         self._is_new = [False] * cameras
@@ -95,6 +96,7 @@ class Pairing:
                             _SIGMA_FLOOR_PX, observations.pixels, observations.covariances, observations.flags)
         if newest:
             self._is_new[camera] = True
+            self._newest_frames[camera] = observations
             self._latest = observations
 
     def _place_frame(self, camera: int, t_row0: int, receive: int) -> bool:
@@ -128,6 +130,7 @@ class Pairing:
         self._frames[camera].clear()
         self._counts[camera] = 0
         self._newest[camera] = -1
+        self._newest_frames[camera] = None
         self._stale[camera] = 0
 
     def live(self) -> NDArray[np.bool_]:
@@ -189,11 +192,11 @@ class Pairing:
         cameras, markers = self._shape
         pixels = np.full((cameras, markers, 2), np.nan)
         flags = np.full((cameras, markers), int(MarkerFlag.LOST), np.uint16)
-        for camera, marker in zip(*np.nonzero(self._newest >= 0), strict=True):
-            place = np.searchsorted(self._times[camera, marker, :self._counts[camera, marker]],
-                                    self._newest[camera, marker])
-            pixels[camera, marker] = self._pixels[camera, marker, place]
-            flags[camera, marker] = self._flags[camera, marker, place]
+        for camera, observations in enumerate(self._newest_frames):
+            if observations is not None:
+                seen = self._newest[camera] >= 0
+                pixels[camera, seen] = observations.pixels[seen]
+                flags[camera, seen] = observations.flags[seen]
         return pixels, flags
 
 
