@@ -29,7 +29,9 @@ PAGES: dict[str, tuple[str, int, tuple[type[msgspec.Struct], ...]]] = {
 def test_the_page_names_every_field(page: str) -> None:
     format_name, version, structs = PAGES[page]
     text = (DOCS / page).read_text()
-    assert re.search(rf'`"?{format_name}"?`,( version)? `?{version}\b', text), "format and version"
+    one_line = rf'`"?{format_name}"?`,( version)? `?{version}\b'
+    two_rows = rf'`"{format_name}"` .*\n.*`version` .*`{version}`'
+    assert re.search(f"{one_line}|{two_rows}", text), f"docs/{page} does not say {format_name}, version {version}"
     missing = [f"{struct.__name__}.{field}" for struct in structs for field in struct.__struct_fields__
                if f"`{field}`" not in text]
     assert not missing, f"docs/{page} does not explain {', '.join(missing)}"
