@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -113,6 +113,17 @@ def frame(camera: int, t_row0_s: float, pixels: np.ndarray, flags: np.ndarray, a
         t_receive_ns=EPOCH_NS + round(1e9 * arrival_s), detect_s=0.002, network_s=0.001,
         pixels=np.where(lost[:, None], np.nan, pixels), covariances=covariances, diameters=np.full(len(pixels), 16.0),
         qualities=np.ones(len(pixels)), flags=flags.astype(np.uint16))
+
+
+def altered(frames, change):
+    """Frames whose pixels and flags `change(t_s, camera, pixels, flags)` has edited in place."""
+    out = []
+    for f in frames:
+        pixels, flags = f.pixels.copy(), f.flags.copy()
+        change((f.t_row0_master_ns - EPOCH_NS) * 1e-9, f.camera, pixels, flags)
+        pixels[(flags & LOST) != 0] = np.nan
+        out.append(replace(f, pixels=pixels, flags=flags))
+    return out
 
 
 def run(tracker: Tracker, frames: list[CameraObservations]) -> list[HandState]:
