@@ -14,13 +14,13 @@ from rhot_app.tracking.state import Knowledge
 from rhot_node.files import write_atomically
 
 SECONDS = 4.0  # of motion; the recordings hold a little more
-MARKER_RMS_MM = 2.5  # of the unfiltered positions; 9 mm per px of disparity at 0.6 m
+MARKER_RMS_MM = 1.0  # of the unfiltered positions; 0.3 when all is well, 1.3 when states are 10 ms off
 STATE_AGE_S = 0.15
 
 
 @pytest.mark.timeout(TEST_S)
 def test_a_moving_hand_arrives_at_the_cameras_rate(bench: Bench) -> None:
-    scene = Scene(bench.rig, amplitude_m=0.03)
+    scene = Scene(bench.rig, amplitude_m=0.06)
     begin = bench.folder / "begin"
     for index, node in enumerate(bench.rig.nodes):
         scene.record(bench.folder / f"{node.name}.yuv", node, 3 * PERIOD_S)
