@@ -26,7 +26,7 @@ Image = NDArray[np.float32]
 SAMPLES = 16
 _STEP_Y, _STEP_T = 5, 7  # lattice generator (1, 5, 7) / 16: no two samples are close in any pair of coordinates
 _STILL_PX = 0.02  # what moves less while exposed is taken to stand still
-_SKIN, _PAINT = 1, 20  # ids: background 0, any skin, first marker
+_SKIN, _PAINT = 1, 20  # ids: background 0, skin of the hand, of the forearm (its far end sweeps far), first marker
 NEAR_M = 0.03  # what comes nearer to the camera's plane is not drawn
 NODES = 5
 """A solid's parameters over a frame are a polynomial of this many coefficients in tau, -1..1 over the frame."""
@@ -150,7 +150,7 @@ def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int
                     for c in range(3):
                         image[c, y, x] = background[c, y, x]
                     continue
-                ids[y, x] = _SKIN if meta[winner, 2] < 0 else _PAINT + meta[winner, 2]
+                ids[y, x] = _SKIN + meta[winner, 0] if meta[winner, 2] < 0 else _PAINT + meta[winner, 2]
                 cosine = lambert(meta[winner, 0], prepared, 0, winner, ray[i, 0], ray[i, 1], depth[i], light)
                 shade = 1.0 - shading * (1.0 - cosine)
                 for c in range(3):
@@ -301,7 +301,7 @@ def _reach(meta: Indices, sweep: Array) -> Indices:
     """(128, 2) px around a change of id, by id, that the exposure may sweep."""
     reach = np.zeros((128, 2), np.int64)
     for n in range(len(meta)):
-        code = _SKIN if meta[n, 2] < 0 else _PAINT + meta[n, 2]
+        code = _SKIN + meta[n, 0] if meta[n, 2] < 0 else _PAINT + meta[n, 2]
         for axis in range(2):
             pixels = math.ceil(0.5 * sweep[n, axis]) if sweep[n, axis] > _STILL_PX else 0
             reach[code, axis] = max(reach[code, axis], pixels)
