@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rhot_node.detect.coverage import PAD, SUM_COLUMNS, chroma_noise, classify, unmix
+from rhot_node.detect.coverage import PAD, SUM_COLUMNS, chroma_noise, unmix
+from rhot_node.detect.outline import classify
 from rhot_node.detect.position import RESULT_COLUMNS, band_center, centroid
 from rhot_node.detect.window import (
     AREA,
