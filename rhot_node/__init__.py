@@ -2,3 +2,7 @@
 
 Runs on a Raspberry Pi. It knows pixels, colours and time, and nothing of lenses, metres or hands.
 """
+
+from rhot_node.compiled import use_own_cache
+
+use_own_cache()

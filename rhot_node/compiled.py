@@ -1,0 +1,54 @@
+"""Where compiled code is kept: a folder of its own for every state of the compiled sources.
+
+numba recompiles a function when its own file changes, but not when a function that it calls, in another file, does:
+after an update, old and new code would run mixed and nobody would notice. A folder named by a hash of all sources that
+numba compiles makes that impossible, and it is writable where the package is not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+VARIABLE = "NUMBA_CACHE_DIR"
+_KEPT = 3  # states of the sources: today's, and those of a checkout or two beside it
+_PACKAGES = ("rhot_node", "rhot_app")
+
+
+def sources_hash(folders: Sequence[Path]) -> str:
+    """16 hex digits that change with any source file in `folders` that uses numba."""
+    digest = hashlib.sha256()
+    for folder in folders:
+        for path in sorted(folder.rglob("*.py")):
+            text = path.read_bytes()
+            if b"numba" in text:
+                digest.update(str(path.relative_to(folder.parent)).encode())
+                digest.update(text)
+    return digest.hexdigest()[:16]
+
+
+def use_own_cache() -> None:
+    """Point numba at the folder of the present sources, unless the environment names one. Call before numba loads."""
+    if VARIABLE in os.environ:
+        return
+    root = Path(__file__).parent.parent
+    try:
+        from platformdirs import user_cache_path
+        base = user_cache_path("rhot") / "numba"
+        folder = base / sources_hash([root / name for name in _PACKAGES if (root / name).is_dir()])
+        if not folder.is_dir():
+            folder.mkdir(parents=True)
+            _forget_old(base)
+        folder.touch()
+    except OSError:  # no home, or a read-only one: numba then keeps to its own rules
+        return
+    os.environ[VARIABLE] = str(folder)
+
+
+def _forget_old(base: Path) -> None:
+    folders = sorted((path for path in base.iterdir() if path.is_dir()), key=lambda path: path.stat().st_mtime)
+    for folder in folders[:-_KEPT]:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,57 @@
+"""Compiled code belongs to one state of the sources: any change that could mix old and new gets a new folder."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rhot_node.compiled import VARIABLE, sources_hash
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    folder = tmp_path / "package"
+    folder.mkdir()
+    (folder / "fast.py").write_text("from numba import njit\n")
+    (folder / "slow.py").write_text("x = 1\n")
+    return folder
+
+
+def test_the_hash_follows_compiled_sources_only(package: Path) -> None:
+    before = sources_hash([package])
+    (package / "slow.py").write_text("x = 2\n")
+    assert sources_hash([package]) == before
+    (package / "fast.py").write_text("from numba import njit  # changed\n")
+    changed = sources_hash([package])
+    assert changed != before
+    (package / "fast.py").rename(package / "other.py")
+    assert sources_hash([package]) not in (before, changed)
+
+
+def start(cache: Path, **more: str) -> str:
+    environment = {key: value for key, value in os.environ.items() if key != VARIABLE}
+    environment |= {"XDG_CACHE_HOME": str(cache), **more}
+    code = f"import os, rhot_app; print(os.environ.get({VARIABLE!r}, ''))"
+    return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True,
+                          check=True).stdout.strip()
+
+
+def test_a_start_uses_its_own_folder_and_forgets_old_ones(tmp_path: Path) -> None:
+    base = tmp_path / "rhot" / "numba"
+    for k in range(5):
+        (base / f"old{k}").mkdir(parents=True)
+        os.utime(base / f"old{k}", (k, k))
+    folder = Path(start(tmp_path))
+    assert folder.is_dir() and folder.parent == base
+    assert sorted(path.name for path in base.iterdir()) == sorted(["old3", "old4", folder.name])
+    assert start(tmp_path) == str(folder)
+
+
+def test_the_environment_decides_and_a_missing_home_is_no_obstacle(tmp_path: Path) -> None:
+    assert start(tmp_path, **{VARIABLE: "/elsewhere"}) == "/elsewhere"
+    (tmp_path / "file").write_text("")
+    assert start(tmp_path / "file") == ""
