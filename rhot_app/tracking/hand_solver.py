@@ -20,6 +20,9 @@ Codes = NDArray[np.uint8]
 # Plain numbers: looking up a member of an enumeration costs a microsecond, and this is done for every finger.
 _INFERRED, _GUESSED = int(Knowledge.INFERRED), int(Knowledge.GUESSED)
 
+TARGET_SD_M = 1e-3
+"""What a located marker is worth at working distance: a nearly stretched finger is not bent to meet noise."""
+
 FORGET_S = 0.5
 """A hand without enough markers keeps its last pose this long, as a guess."""
 
@@ -50,19 +53,21 @@ class HandSolver:
     def __init__(self, model: HandModel) -> None:
         self._model = model
         self.pose: HandPose | None = None
+        self._palm: HandPose | None = None  # the last palm fit, whose own angles start the next one
         self._solved_s = 0.0
 
     def reset(self) -> None:
         """Forget the pose."""
-        self.pose = None
+        self.pose = self._palm = None
 
     def solve(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes) -> SolvedHand:
         """The hand whose wrist and finger markers are at `wrist` (3,) and `tips` (5, 3), m; NaN where unknown."""
         if self.pose is not None and t_s - self._solved_s > FORGET_S:
-            self.pose = None
-        fit = fit_palm(self._model, wrist, tips, self.pose, t_s - self._solved_s)
+            self.reset()
+        fit = fit_palm(self._model, wrist, tips, self._palm, t_s - self._solved_s)
         if fit is not None:
-            fingers = solve_fingers(self._model, fit.pose, tips)
+            fingers = solve_fingers(self._model, fit.pose, tips, target_sd=TARGET_SD_M)
+            self._palm = fit.pose
             self.pose = HandPose(fit.pose.world_from_palm, fingers.angles)
             self._solved_s = t_s
         if self.pose is None:
