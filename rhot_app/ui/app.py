@@ -40,7 +40,7 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     choose_gl_platform()
     cap_software_gl()
     give_way()
-    from PySide6.QtCore import QTimer
+    from PySide6.QtCore import Qt, QTimer
     from PySide6.QtWidgets import QApplication
 
     from rhot_app.ui.controller import Controller
@@ -54,6 +54,8 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     settings = Settings(args.settings)
     if args.reset:
         settings.reset()
+    # pyqtgraph keeps its shaders for the first context that it meets
+    QApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)
     app.setApplicationName("RHOT")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 from PySide6.QtCore import QObject, Qt, Signal
 
@@ -49,6 +49,8 @@ class Job(QObject):
     _reported = Signal(str, float)
     _finished = Signal(object)
     _broke = Signal(str)
+    _stopped = Signal()
+    _under_way: ClassVar[set[Job]] = set()  # a job lives until its last word has been heard
 
     def __init__(self, op: Callable[[Progress], Any], done: Callable[[Any], None], failed: Callable[[str], None],
                  progress: Callable[[str, float], None] | None = None, parent: QObject | None = None) -> None:
@@ -59,10 +61,12 @@ class Job(QObject):
         self._finished.connect(self._on_done, queued)
         self._broke.connect(self._on_failed, queued)
         self._reported.connect(self._on_progress, queued)
+        self._stopped.connect(self._on_stopped, queued)
         self._thread = threading.Thread(target=self._run, name="job", daemon=True)
 
     def start(self) -> Job:
         """Begin; returns itself."""
+        Job._under_way.add(self)
         self._thread.start()
         return self
 
@@ -92,6 +96,11 @@ class Job(QObject):
             raise
         else:
             self._finished.emit(result)
+        finally:
+            self._stopped.emit()
+
+    def _on_stopped(self) -> None:
+        Job._under_way.discard(self)
 
     def _on_done(self, result: Any) -> None:
         if not self.progress.cancelled:

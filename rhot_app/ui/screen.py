@@ -65,6 +65,8 @@ class Screen:
         self.markers.show_rig(rig)
         self.cameras.show_rig(rig)
         self.jitter.show_rig(rig)
+        for plot in (self.jitter, self.latency, self.rate):
+            plot.begin_anew()
         self.nodes.show_status(None)
         self.hand.show_state(None)
         self._drawn_state = self._drawn_preview = -1

@@ -24,6 +24,14 @@ class FakeBackend:
         self.gate = threading.Event()
         self.gate.set()
 
+    def calm(self) -> None:
+        """End all trouble; what runs and what was counted stays."""
+        self.alive, self.refuse = True, ""
+        self.gate.set()
+        engine = self.engine
+        engine.dead, engine.hidden, engine.advice, engine.log_path = False, {}, (), ""
+        engine.running = True
+
     def client(self) -> FakeClient:
         return FakeClient(self.engine)
 

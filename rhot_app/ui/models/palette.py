@@ -53,8 +53,8 @@ DARK = Scheme(
 LIGHT = Scheme(
     name="light", window="#eceef1", panel="#f9fafb", raised="#ffffff", border="#c3c9d1", text="#1b1f25",
     muted="#58616c", accent="#0a6fb0", on_accent="#ffffff", good="#0b7d5b", caution="#9a6700", bad="#b8430f",
-    fault="#c21f1f", neutral="#68717c", scene="#f1f3f5", grid="#d5dae0", grid_strong="#aab2bc", shadow="#d3d7dc", hand="#d9b99b",
-    guessed="#8a929b", frustum="#76818d",
+    fault="#c21f1f", neutral="#68717c", scene="#f1f3f5", grid="#d5dae0", grid_strong="#aab2bc", shadow="#d3d7dc",
+    hand="#d9b99b", guessed="#8a929b", frustum="#76818d",
 )
 
 SCHEMES: dict[str, Scheme] = {"dark": DARK, "light": LIGHT}

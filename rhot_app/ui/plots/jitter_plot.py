@@ -29,9 +29,7 @@ class JitterPlot(PlotPanel):
         self._rig: Rig | None = None
         self._curves: list[pg.PlotDataItem] = []
 
-    def set_scheme(self, scheme: Scheme) -> None:
-        """Change colours."""
-        super().set_scheme(scheme)
+    def _colour(self) -> None:
         self.show_rig(self._rig)
 
     def show_rig(self, rig: Rig | None) -> None:

@@ -40,11 +40,6 @@ class LatencyPlot(PlotPanel):
         self.legend.setToolTip("\n".join([f"{STAGES[stage]}: {tip(stage)}" for stage in STACKED] + [tip("budget")]))
         self._colour()
 
-    def set_scheme(self, scheme: Scheme) -> None:
-        """Change colours."""
-        super().set_scheme(scheme)
-        self._colour()
-
     def _colour(self) -> None:
         for edge in self._edges:
             edge.setPen(None)

@@ -44,7 +44,7 @@ class PlotPanel(QWidget):
         self.reset_button = self._button("Reset", "Begin the plot anew and fit the axes.")
         self.copy_button = self._button("Copy CSV",
                                         "Copy what the plot shows to the clipboard as comma-separated text.")
-        self.reset_button.clicked.connect(self._ask_reset)
+        self.reset_button.clicked.connect(self.begin_anew)
         self.copy_button.clicked.connect(self.copy_csv)
         self.plot = pg.PlotWidget()
         self.legend = Legend(scheme, heads, widest_value)
@@ -102,6 +102,7 @@ class PlotPanel(QWidget):
         self._scheme = scheme
         self.legend.set_scheme(scheme)
         self._style_plot()
+        self._colour()
         self._redraw()
 
     @property
@@ -123,6 +124,10 @@ class PlotPanel(QWidget):
         seconds, rows, names = self._window
         self._draw(seconds, rows, names)
 
+    def _colour(self) -> None:
+        """Give the lines the scheme's colours."""
+        raise TypeError(f"{type(self).__name__} has no colours")
+
     def _draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
         """Draw `rows` (n, columns) over `seconds` (n,)."""
         raise TypeError(f"{type(self).__name__} does not draw")
@@ -136,7 +141,7 @@ class PlotPanel(QWidget):
         high = max(scale * steps[np.searchsorted(steps, 1.05 * top / scale).clip(max=len(steps) - 1)], self.least_span)
         self.plot.setYRange(0.0, float(high), padding=0.02)
 
-    def _ask_reset(self) -> None:
+    def begin_anew(self) -> None:
         """Forget what was before this moment, and leave a pause."""
         self.pause_button.setChecked(False)
         self._reset_ns = -1

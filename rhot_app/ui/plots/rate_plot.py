@@ -31,12 +31,8 @@ class RatePlot(PlotPanel):
         self.plot.addItem(self._bars)
         self._make_curves(("states", LOST))
 
-    def set_scheme(self, scheme: Scheme) -> None:
-        """Change colours."""
-        names = self._names
-        self._names = ()
-        super().set_scheme(scheme)
-        self._make_curves(names)
+    def _colour(self) -> None:
+        self._make_curves(self._names)
 
     def _make_curves(self, names: tuple[str, ...]) -> None:
         for curve in self._curves:

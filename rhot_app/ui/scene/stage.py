@@ -28,7 +28,8 @@ class Label:
 
 
 def _steps(low: float, high: float, step: float) -> Array:
-    return np.asarray(np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step)
+    numbers = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+    return np.asarray(numbers * step + 0.0)  # turns -0.0 into 0.0
 
 
 def floor_lines() -> tuple[Array, NDArray[np.bool_]]:

@@ -1,0 +1,143 @@
+"""What every test of the window needs: one OpenGL platform, no home directory, windows on a fake engine."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_backend import FakeBackend
+
+from rhot_app.ui.environment import cap_software_gl, choose_gl_platform
+
+choose_gl_platform()
+cap_software_gl()
+
+from PySide6.QtCore import QCoreApplication, QPoint, Qt  # after the OpenGL platform was chosen  # noqa: E402
+from PySide6.QtTest import QTest  # noqa: E402
+from PySide6.QtWidgets import QWidget  # noqa: E402
+
+QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
+
+from rhot_app.ui.controller import Controller  # noqa: E402
+from rhot_app.ui.keys import SpaceKeeper  # noqa: E402
+from rhot_app.ui.main_window import MainWindow  # noqa: E402
+from rhot_app.ui.scene.surface import choose_format  # noqa: E402
+from rhot_app.ui.settings import Settings  # noqa: E402
+from rhot_app.ui.theme import apply_theme, scheme_named  # noqa: E402
+
+
+class Bench:
+    """A window on a fake engine, a person's hands, and time that passes."""
+
+    def __init__(self, folder: Path, backend: FakeBackend | None = None, scheme: str = "dark") -> None:
+        self.backend = backend or FakeBackend()
+        settings = Settings(folder / "app.ini")
+        settings.scheme = scheme
+        self.controller = Controller(self.backend, self.backend.client)
+        self.window = MainWindow(self.controller, settings)
+        self.window.set_scheme(scheme)
+        self.window.show()
+        self.window.activateWindow()
+        assert QTest.qWaitForWindowActive(self.window)
+
+    def click(self, button: QWidget) -> None:
+        """Click the middle of a button."""
+        assert button.isVisible()
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+                         QPoint(button.width() // 2, button.height() // 2))
+
+    def press(self, key: Qt.Key, widget: QWidget | None = None) -> None:
+        """Press a key in the window."""
+        QTest.keyClick(widget or self.window, key)
+
+    def until(self, condition: Callable[[], Any], timeout_s: float = 8.0) -> None:
+        """Let the window run until `condition` holds; the last look happens after the time is up."""
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end and not condition():
+            QTest.qWait(10)
+        assert condition()
+
+    def run(self, seconds: float) -> None:
+        """Let the window run for a while."""
+        QTest.qWait(round(1000 * seconds))
+
+    def track(self) -> None:
+        """Bring the window to the simulated rig, tracking, with nothing wrong, from wherever it is."""
+        self.backend.calm()
+        if self.controller.rig is None:
+            self.until(lambda: self.window.welcome.twin_button.isVisible())
+            self.click(self.window.welcome.twin_button)
+        self.until(lambda: self.window.toolbar.badge.word == "TRACKING"
+                   and self.window.advice.texts == ["Everything is in order."])
+        self.backend.calls.clear()
+        self.backend.engine.commands.clear()
+
+    def close(self) -> None:
+        """Close the window and end what it started."""
+        self.backend.gate.set()
+        self.window.close()
+        self.controller.shut_down()
+        self.window.deleteLater()
+
+
+@pytest.fixture(scope="session")
+def themed(qapp: Any) -> Any:
+    """The application in its own colours."""
+    choose_format()
+    apply_theme(qapp, scheme_named("dark"))
+    keeper = SpaceKeeper(qapp)
+    qapp.installEventFilter(keeper)
+    return qapp
+
+
+@pytest.fixture(autouse=True)
+def no_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Recordings of the tests never land in the user's own folders."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("XDG_DOCUMENTS_DIR", raising=False)
+
+
+@pytest.fixture
+def make_bench(themed: Any, tmp_path: Path) -> Iterator[Callable[..., Bench]]:
+    """Makes windows that share one settings file; all are closed in the end."""
+    benches: list[Bench] = []
+
+    def make(backend: FakeBackend | None = None, scheme: str = "dark") -> Bench:
+        benches.append(Bench(tmp_path, backend, scheme))
+        return benches[-1]
+
+    yield make
+    for bench in benches:
+        bench.close()
+
+
+@pytest.fixture
+def bench(make_bench: Callable[..., Bench]) -> Bench:
+    """One window on its first page."""
+    return make_bench()
+
+
+@pytest.fixture(scope="module")
+def shared_bench(themed: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """One window for all tests of a module; making one takes a second with software OpenGL."""
+    bench = Bench(tmp_path_factory.mktemp("window"))
+    yield bench
+    bench.close()
+
+
+@pytest.fixture
+def tracking(shared_bench: Bench) -> Bench:
+    """The simulated rig, tracking, nothing wrong, all panels shown."""
+    shared_bench.track()
+    if shared_bench.window.actions_.alone.isChecked():
+        shared_bench.window.actions_.alone.trigger()
+    for dock in shared_bench.window.docks.docks:
+        dock.show()
+    parts = shared_bench.window.screen_parts
+    for plot in (parts.jitter, parts.latency, parts.rate):
+        plot.pause_button.setChecked(False)
+    shared_bench.window.setFocus()
+    return shared_bench

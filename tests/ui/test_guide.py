@@ -1,0 +1,45 @@
+"""The guide: every page is there, F1 opens the one that fits, links between pages work."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from PySide6.QtCore import Qt, QUrl
+
+from rhot_app.ui.guide import GUIDE, PAGES, page_of, page_path
+
+
+@pytest.mark.parametrize("name", [name for name, _ in PAGES])
+def test_every_page_is_written(name):
+    text = page_path(name).read_text()
+    assert text.startswith("# ") and len(text) > 300
+
+
+def test_no_page_is_left_out():
+    assert {path.stem for path in GUIDE.glob("*.md")} - {"README"} == {name for name, _ in PAGES}
+
+
+def test_the_key_table_matches_the_window(bench):
+    text = page_path("keys").read_text()
+    keys = set(re.findall(r"^\| `([^`]+)`", text, re.MULTILINE))
+    window = bench.window
+    actions = [*window.actions_.all(), *window.docks.actions]
+    assert {action.shortcut().toString() for action in actions if not action.shortcut().isEmpty()} <= keys
+
+
+def test_f1_opens_the_page_of_the_panel_in_use(bench):
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.controller.rig is not None)
+    parts = bench.window.screen_parts
+    for widget, page in ((parts.jitter.pause_button, "plots"), (parts.scene, "scene"),
+                         (parts.cameras.views["left"], "cameras"), (bench.window.welcome.twin_button, "start"),
+                         (bench.window, "window")):
+        assert page_of(widget) == page
+    parts.scene.setFocus()
+    bench.until(parts.scene.hasFocus)
+    bench.press(Qt.Key.Key_F1)
+    assert bench.window.guide_page == "scene"
+    bench.window._guide._follow(QUrl("troubles.md"))
+    assert bench.window.guide_page == "troubles"
+    assert "wrong" in bench.window._guide.browser.toPlainText()

@@ -1,0 +1,63 @@
+"""One-shot work: done or failed in the window's thread, never both, and neither after a cancel."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from rhot_app.errors import RigError
+from rhot_app.ui.job import Job
+
+
+@pytest.fixture
+def heard():
+    return []
+
+
+def test_progress_then_done_in_the_windows_thread(qtbot, heard):
+    here = threading.get_ident()
+
+    def op(progress):
+        progress.report("half", 0.5)
+        assert threading.get_ident() != here
+        return 42
+
+    Job(op, lambda result: heard.append(("done", result, threading.get_ident() == here)), heard.append,
+        lambda text, fraction: heard.append((text, fraction))).start()
+    qtbot.waitUntil(lambda: len(heard) == 2)
+    assert heard == [("half", 0.5), ("done", 42, True)]
+
+
+def test_our_errors_are_told_as_they_are(qtbot, heard):
+    def op(progress):
+        raise RigError("desk.json: no such file.")
+
+    Job(op, heard.append, lambda sentence: heard.append(("failed", sentence))).start()
+    qtbot.waitUntil(lambda: bool(heard))
+    assert heard == [("failed", "desk.json: no such file.")]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_programming_mistake_is_a_sentence_too(qtbot, heard):
+    def op(progress):
+        return 1 // 0
+
+    Job(op, heard.append, heard.append).start()
+    qtbot.waitUntil(lambda: bool(heard))
+    assert "ZeroDivisionError" in heard[0] and heard[0].endswith("Please report it.")
+
+
+def test_a_cancelled_job_is_silent(qtbot, heard):
+    gate = threading.Event()
+
+    def op(progress):
+        gate.wait(5.0)
+        progress.report("too late", 1.0)
+
+    job = Job(op, heard.append, heard.append, lambda *args: heard.append(args)).start()
+    job.cancel()
+    gate.set()
+    assert job.wait(5.0)
+    qtbot.wait(50)
+    assert heard == [] and not job.running

@@ -1,0 +1,297 @@
+"""The window as a person uses it: buttons are clicked, keys are pressed, sentences are read."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from fake_backend import FakeBackend
+from fake_engine import FakeEngine, synthetic_rig
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QFileDialog
+
+from rhot_app.engine.status import Advice
+from rhot_app.project import save_rig
+
+
+def test_the_first_page_offers_three_ways(bench):
+    welcome = bench.window.welcome
+    assert bench.window.pages.currentWidget() is welcome
+    assert welcome.twin_button.isVisible() and welcome.file_button.isVisible() and welcome.nodes_button.isVisible()
+    assert not welcome.last_button.isVisible()
+    assert bench.window.toolbar.badge.word == "NO RIG"
+    assert not bench.window.actions_.start.isEnabled()
+    assert not any(dock.isVisible() for dock in bench.window.docks.docks)
+
+
+def test_the_simulated_rig_tracks_at_one_click(bench):
+    window = bench.window
+    bench.click(window.welcome.twin_button)
+    bench.until(lambda: window.toolbar.badge.word == "TRACKING")
+    assert bench.backend.calls == ["twin grasp"]
+    assert ("start", {}) in bench.backend.engine.commands
+    bench.until(lambda: window.toolbar.badge.rate == "40 Hz")
+    bench.until(lambda: window.screen_parts.markers.words == ["ok"] * 6)
+    assert [card.row.name for card in window.screen_parts.nodes.cards] == ["left", "right"]
+    bench.until(lambda: set(window.screen_parts.cameras.views["left"].marked) ==
+                   {"thumb", "index", "middle", "ring", "little", "wrist"})
+    bench.until(lambda: window.screen_parts.hand.cells[0].text().endswith("°"))
+    bench.until(lambda: window.advice.texts == ["Everything is in order."])
+
+
+def test_the_chosen_motion_is_used_and_remembered(bench):
+    box = bench.window.welcome.motion_box
+    box.setCurrentIndex(box.findData("pinch"))
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.backend.calls[:1] == ["twin pinch"])
+    assert bench.window.settings.motion == "pinch"
+
+
+def test_space_stops_and_starts(tracking):
+    tracking.press(Qt.Key.Key_Space)
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "IDLE")
+    assert "Start" in tracking.window.actions_.start.text()
+    tracking.until(lambda: tracking.window.screen_parts.scene.start_button.isVisible())
+    tracking.until(lambda: "space bar" in tracking.window.advice.texts[0])
+    tracking.click(tracking.window.screen_parts.scene.start_button)
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
+    assert "Stop" in tracking.window.actions_.start.text()
+
+
+def test_a_focused_button_keeps_its_space_bar(tracking):
+    pause = tracking.window.screen_parts.jitter.pause_button
+    pause.setFocus(Qt.FocusReason.TabFocusReason)
+    tracking.press(Qt.Key.Key_Space, pause)
+    assert pause.isChecked() and tracking.backend.engine.running
+
+
+def test_r_records_and_ends_the_recording(tracking):
+    engine = tracking.backend.engine
+    tracking.press(Qt.Key.Key_R)
+    tracking.until(lambda: any(name == "record" for name, _ in engine.commands))
+    path = Path(next(args["path"] for name, args in engine.commands if name == "record"))
+    assert path.is_absolute() and path.suffix == ".rhotlog" and path.parent.is_dir()
+    engine.log_path = str(path)
+    tracking.until(lambda: any(str(path) in text and "120.0 kB" in text for text in tracking.window.advice.texts))
+    tracking.press(Qt.Key.Key_R)
+    tracking.until(lambda: any(name == "record_stop" for name, _ in engine.commands))
+
+
+def test_numbers_show_and_hide_panels(tracking):
+    docks = tracking.window.docks.docks
+    for number, dock in enumerate(docks, start=1):
+        assert dock.isVisible()
+        tracking.press(getattr(Qt.Key, f"Key_{number}"))
+        assert not dock.isVisible()
+        tracking.press(getattr(Qt.Key, f"Key_{number}"))
+        assert dock.isVisible()
+
+
+def test_six_leaves_the_scene_alone(tracking):
+    docks = tracking.window.docks.docks
+    tracking.press(Qt.Key.Key_4)
+    tracking.press(Qt.Key.Key_6)
+    assert not any(dock.isVisible() for dock in docks)
+    tracking.press(Qt.Key.Key_6)
+    assert [dock.isVisible() for dock in docks] == [True, True, True, False, True]
+
+
+def test_a_hidden_camera_panel_asks_for_no_pictures(tracking):
+    tracking.press(Qt.Key.Key_3)
+    tracking.until(lambda: ("preview", {"on": False}) in tracking.backend.engine.commands)
+    tracking.press(Qt.Key.Key_3)
+    tracking.until(lambda: tracking.backend.engine.commands[-1] == ("preview", {"on": True}))
+
+
+def test_f_frames_the_hand_and_home_resets(tracking):
+    scene = tracking.window.screen_parts.scene
+    far = scene.cameraParams()["distance"]
+    tracking.press(Qt.Key.Key_F)
+    assert scene.cameraParams()["distance"] < far
+    tracking.press(Qt.Key.Key_Home)
+    assert scene.cameraParams()["distance"] == far
+
+
+def test_advice_comes_and_goes(tracking):
+    sentence = "Right camera saw no wrist marker for 12 s: it is behind the forearm. Turn the hand or add rhot8."
+    tracking.backend.engine.hidden = {"wrist": "right"}
+    tracking.backend.engine.advice = (Advice("warning", sentence),)
+    tracking.until(lambda: tracking.window.advice.texts == [sentence])
+    tracking.until(lambda: tracking.window.screen_parts.markers.words[-1] == "left only")
+    assert tracking.window.toolbar.badge.word == "PARTIAL"
+    tracking.backend.engine.hidden = {}
+    tracking.backend.engine.advice = ()
+    tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
+
+
+def test_a_vanished_engine_is_said_and_started_again(tracking):
+    backend = tracking.backend
+    backend.gate.clear()
+    backend.engine.dead = True
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "NO ENGINE")
+    tracking.until(lambda: "starting it again" in tracking.window.advice.texts[0])
+    tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not seen yet"] * 6)
+    assert not tracking.window.actions_.start.isEnabled()
+    backend.gate.set()
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
+    assert "restart start=True" in backend.calls
+    assert tracking.window.advice.texts == ["Everything is in order."]
+
+
+def test_an_engine_that_cannot_be_started_again_waits_for_a_click(tracking):
+    backend = tracking.backend
+    tracking.controller._restarts.clear()
+    backend.refuse = "The rig file is gone."
+    backend.engine.dead = True
+    tracking.until(lambda: backend.calls.count("restart start=True") == 3)
+    tracking.until(lambda: "could not be started again. The rig file is gone." in tracking.window.advice.texts[0])
+    backend.refuse = ""
+    button = next(button for *_, button in tracking.window.advice._lines if button.isVisible())
+    assert button.text() == "Try again"
+    tracking.click(button)
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
+
+
+def test_simulated_cameras_that_stopped_can_be_started_again(tracking):
+    tracking.backend.alive = False
+    tracking.until(lambda: "The simulated cameras have stopped." in tracking.window.advice.texts)
+    tracking.backend.alive = True
+    tracking.controller.act("twin")
+    tracking.until(lambda: tracking.backend.calls.count("twin grasp") == 1)
+
+
+def test_opening_shows_progress_and_can_be_cancelled(bench):
+    bench.backend.gate.clear()
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.window.welcome.progress_bar.isVisible())
+    bench.until(lambda: bench.window.welcome.progress_label.text() == "Starting the engine …")
+    assert bench.window.welcome.progress_bar.value() == 40
+    assert bench.window.toolbar.badge.word == "STARTING"
+    bench.click(bench.window.welcome.cancel_button)
+    bench.until(lambda: "give up" in bench.backend.calls and bench.window.welcome.twin_button.isVisible())
+    bench.run(0.2)
+    assert bench.controller.opened is None and bench.window.toolbar.badge.word == "NO RIG"
+
+
+def test_a_rig_that_cannot_be_opened_is_a_sentence(bench):
+    bench.backend.refuse = "/tmp/x.json: line 3: not valid JSON. Is the file complete?"
+    bench.window.open_rig(Path("/tmp/x.json"))
+    bench.until(lambda: bench.window.advice.texts[:1] == [bench.backend.refuse])
+    assert bench.window.welcome.twin_button.isVisible()
+
+
+def test_a_rig_file_is_opened_and_offered_again(make_bench, tmp_path, monkeypatch):
+    path = tmp_path / "desk.json"
+    save_rig(path, synthetic_rig())
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *args: (str(path), ""))
+    bench = make_bench()
+    bench.click(bench.window.welcome.file_button)
+    bench.until(lambda: bench.controller.rig is not None)
+    assert bench.backend.calls == ["open desk.json"]
+    assert "test bench" in bench.window.toolbar.rig_label.text()
+    bench.window.close()
+    again = make_bench()
+    assert again.window.welcome.last_button.text() == "Open desk.json"
+    again.click(again.window.welcome.last_button)
+    again.until(lambda: again.backend.calls == ["open desk.json"])
+
+
+def test_attaching_shows_the_running_state_at_once(make_bench):
+    backend = FakeBackend(FakeEngine(running=True))
+    backend.ours = False
+    bench = make_bench(backend)
+    bench.controller.attach()
+    bench.until(lambda: bench.window.toolbar.badge.word == "TRACKING")
+    bench.until(lambda: any("lets it run on" in text for text in bench.window.advice.texts))
+    assert not any(name == "start" for name, _ in backend.engine.commands)
+    bench.window.close()
+    assert "goes on running" in bench.controller.shut_down()
+
+
+def test_closing_the_rig_ends_everything_and_returns_to_the_first_page(tracking):
+    tracking.window.actions_.close_rig.trigger()
+    tracking.until(lambda: "close" in tracking.backend.calls and tracking.window.welcome.twin_button.isVisible())
+    assert tracking.window.toolbar.badge.word == "NO RIG"
+
+
+def test_a_plot_pauses_resets_and_copies(tracking):
+    plot = tracking.window.screen_parts.jitter
+    tracking.until(lambda: len(plot.csv().splitlines()) > 12)
+    tracking.click(plot.pause_button)
+    standing = plot.csv()
+    tracking.run(0.7)
+    assert plot.csv() == standing
+    tracking.click(plot.copy_button)
+    lines = QGuiApplication.clipboard().text().splitlines()
+    names = ("thumb", "index", "middle", "ring", "little", "wrist")
+    assert lines[0] == ",".join(["time [s]", *(f"{name} [mm rms]" for name in names)])
+    assert lines == standing.splitlines() and float(lines[-1].split(",")[1]) > 0.1
+    tracking.click(plot.reset_button)
+    assert not plot.paused
+    tracking.until(lambda: 1 < len(plot.csv().splitlines()) < 8)
+
+
+def test_every_plot_has_names_units_and_values(tracking):
+    parts = tracking.window.screen_parts
+    tracking.until(lambda: all(any(value[0] not in ("", "–") for value in plot.legend.values)
+                               for plot in (parts.jitter, parts.latency, parts.rate)))
+    for plot in (parts.jitter, parts.latency, parts.rate):
+        item = plot.plot.getPlotItem()
+        assert item.getAxis("left").labelText == plot.unit and "[s]" in item.getAxis("bottom").labelText
+    assert [entry.name for entry in parts.rate.legend.entries] == ["states", "left", "right", "lost /s"]
+    assert parts.latency.legend.entries[-1].name == "detect"
+
+
+def test_layout_and_look_are_remembered_and_can_be_reset(make_bench):
+    bench = make_bench()
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.controller.rig is not None)
+    bench.press(Qt.Key.Key_4)
+    bench.window.actions_.names.setChecked(False)
+    bench.window.actions_.light.trigger()
+    bench.window.close()
+    again = make_bench(scheme="light")
+    again.click(again.window.welcome.twin_button)
+    again.until(lambda: again.controller.rig is not None)
+    assert not again.window.docks.docks[3].isVisible() and again.window.docks.docks[0].isVisible()
+    assert not again.window.actions_.names.isChecked() and again.window.actions_.light.isChecked()
+    again.window.actions_.reset.trigger()
+    assert again.window.docks.docks[3].isVisible() and again.window.actions_.dark.isChecked()
+    assert again.window.actions_.names.isChecked()
+
+
+def test_the_calibrate_menu_shows_what_the_rig_says(tracking):
+    window = tracking.window
+    for action, tab in ((window.actions_.cameras, 0), (window.actions_.markers, 1), (window.actions_.hand, 2)):
+        action.trigger()
+        dialog = next(w for w in tracking.window.children() if type(w).__name__ == "RigDialog" and w.isVisible())
+        assert dialog.tabs.currentIndex() == tab
+        dialog.close()
+        tracking.run(0.05)
+
+
+def test_a_hand_that_stands_still_for_a_second_is_taken_away(tracking):
+    scene = tracking.window.screen_parts.scene
+    tracking.until(lambda: scene._actors.items[0].visible())
+    tracking.backend.engine.hidden = dict.fromkeys(tracking.backend.engine.rig.markers.ids, "both")
+    tracking.until(lambda: not scene._actors.items[0].visible())
+    assert tracking.window.toolbar.badge.word == "LOST"
+
+
+def test_the_window_stays_quick(tracking):
+    """No tick of the timer may hold the window for long, software OpenGL included."""
+    costs = []
+    tick = tracking.window.tick
+
+    def timed():
+        begin = time.perf_counter()
+        tick()
+        costs.append(time.perf_counter() - begin)
+
+    tracking.window._timer.timeout.disconnect()
+    tracking.window._timer.timeout.connect(timed)
+    tracking.run(2.0)
+    tracking.window._timer.timeout.disconnect()
+    tracking.window._timer.timeout.connect(tick)
+    assert sorted(costs)[len(costs) // 2] < 0.05

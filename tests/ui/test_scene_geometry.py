@@ -1,0 +1,119 @@
+"""Meshes and frames of the scene, without OpenGL."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_engine import FakeEngine, synthetic_rig
+
+from rhot_app.project import CameraPose
+from rhot_app.tracking.state import Knowledge
+from rhot_app.ui.scene import stage
+from rhot_app.ui.scene.frames import DISPLAY_FROM_RIG, frustum_lines, rotation_of, to_display
+from rhot_app.ui.scene.hand_mesh import HandMesh, SkeletonMesh, palm_hull
+from rhot_app.ui.scene.marker_mesh import CloudMesh, MarkerMesh
+from rhot_app.ui.scene.meshes import capsule_template, elliptic_band, pose_capsules, sphere
+
+
+@pytest.fixture(scope="module")
+def engine():
+    return FakeEngine(clock=lambda: 0.0)
+
+
+def outward(vertices, normals, faces):
+    """Share of triangles that turn the same way as their corners' normals."""
+    corners = vertices[faces]
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(facing, axis=1)
+    dots = np.einsum("fi,fi->f", facing, normals[faces].mean(axis=1))
+    return (dots[area > 1e-12] > 0).mean()
+
+
+def test_up_in_the_rig_is_up_in_the_scene():
+    assert np.linalg.det(DISPLAY_FROM_RIG) == pytest.approx(1.0)
+    assert to_display(np.array([0.0, -1.0, 0.0])).tolist() == [0.0, 0.0, 1.0]
+    assert to_display(np.array([0.1, 0.0, 2.0])).tolist() == [0.1, 2.0, 0.0]
+
+
+def test_a_frustum_opens_along_the_cameras_axis():
+    node = synthetic_rig().nodes[1]
+    lines = frustum_lines(node.intrinsics, node.pose, 0.1)
+    assert len(lines) == 20
+    assert lines[0] == pytest.approx(to_display(np.array([0.075, 0.0, 0.0])))
+    assert lines[1::2][:4, 1] == pytest.approx([0.1] * 4)
+    turned = frustum_lines(node.intrinsics, CameraPose(rotation_wxyz=(np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)), 0.1)
+    assert turned[1::2][:4, 0] == pytest.approx([0.1] * 4)  # a camera turned about y by 90 deg looks along x
+    assert rotation_of((1.0, 0.0, 0.0, 0.0)) == pytest.approx(np.eye(3))
+
+
+@pytest.mark.parametrize("mesh", [sphere(), elliptic_band(0.03, 0.02, 0.02)], ids=["sphere", "band"])
+def test_triangles_look_outward(mesh):
+    assert outward(mesh.vertices, mesh.normals, mesh.faces) == 1.0
+    assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0)
+
+
+def test_a_capsule_runs_from_end_to_end():
+    template = capsule_template()
+    vertices, normals = pose_capsules(template, np.array([[0.0, 0.0, 0.0]]), np.array([[0.1, 0.0, 0.0]]),
+                                      np.array([[0.01, 0.02]]))
+    assert vertices[:, 0].min() == pytest.approx(-0.01) and vertices[:, 0].max() == pytest.approx(0.12)
+    assert outward(vertices, normals, template.faces) == 1.0
+
+
+def test_the_palm_is_closed_and_as_large_as_the_anatomy(engine):
+    hull = palm_hull(engine.rig.hand)
+    edges = np.sort(hull.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    assert np.ptp(hull.vertices[:, 1]) > 0.06 and np.ptp(hull.vertices[:, 0]) > 0.08
+
+
+def test_the_skin_covers_the_joints(engine):
+    state = engine.state(2.0)
+    posed = HandMesh(engine.rig.hand).pose(state)
+    low, high = posed.vertices.min(axis=0), posed.vertices.max(axis=0)
+    joints = to_display(state.joint_positions)
+    assert (joints >= low - 1e-3).all() and (joints <= high + 1e-3).all()
+    assert np.isfinite(posed.vertices).all()
+    assert set(np.unique(posed.knowledge)) == {Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED}
+
+
+def test_what_is_unknown_is_not_drawn_and_nothing_is_nan(engine):
+    state = engine.state(2.0)
+    joints = state.joint_positions.copy()
+    joints[5:9] = np.nan
+    positions = state.marker_positions.copy()
+    positions[1] = np.nan
+    blank = replace(state, joint_positions=joints, marker_positions=positions,
+                    marker_covariances=np.full((6, 3, 3), np.nan), world_from_palm=np.full((4, 4), np.nan))
+    rig = engine.rig
+    for mesh in (HandMesh(rig.hand), SkeletonMesh(), MarkerMesh(rig.markers, rig.hand), CloudMesh(rig.markers)):
+        posed = mesh.pose(blank)
+        assert np.isfinite(posed.vertices).all() and np.isfinite(posed.normals).all()
+    index = HandMesh(rig.hand).pose(blank).vertices.reshape(-1, 3)
+    count = len(capsule_template(12, 3).directions)
+    assert np.ptp(index[3 * count:4 * count], axis=0).max() == 0.0  # the first segment of the index finger
+
+
+def test_markers_lie_where_they_were_measured_in_their_own_colours(engine):
+    state = engine.state(2.0)
+    mesh = MarkerMesh(engine.rig.markers, engine.rig.hand)
+    posed = mesh.pose(state)
+    thumb = (mesh.colours[:, :3] == engine.rig.markers.markers[0].display_rgb).all(axis=1)
+    middle = 0.5 * (posed.vertices[thumb].min(axis=0) + posed.vertices[thumb].max(axis=0))
+    assert middle == pytest.approx(to_display(state.marker_positions[0]), abs=1e-3)
+
+
+def test_clouds_show_three_sigma(engine):
+    state = engine.state(2.0)
+    covariances = np.tile(np.diag([1e-6, 4e-6, 9e-6]), (6, 1, 1))
+    posed = CloudMesh(engine.rig.markers).pose(replace(state, marker_covariances=covariances))
+    first = posed.vertices.reshape(6, -1, 3)[0]
+    assert np.ptp(first, axis=0) == pytest.approx([0.006, 0.018, 0.012], rel=0.05)  # x, z (depth), y of the rig
+
+
+def test_the_floor_has_ticks_in_millimetres():
+    texts = [label.text for label in stage.tick_labels()]
+    assert {"-400", "400", "1000", "x [mm]", "z [mm]", "up [mm]"} <= set(texts)
+    assert "-0" not in texts

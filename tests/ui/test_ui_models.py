@@ -1,0 +1,170 @@
+"""Windows, words, colours and rows without Qt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_engine import FakeEngine
+
+from rhot_app.tracking.state import LATENCY_STAGES, Condition, Knowledge
+from rhot_app.ui.models import glossary, words
+from rhot_app.ui.models.label_layout import Box, place_labels, unique_prefixes
+from rhot_app.ui.models.latency import STACKED, LatencyWindow
+from rhot_app.ui.models.pacing import FramePacer
+from rhot_app.ui.models.palette import SCHEMES, contrast, visible_on
+from rhot_app.ui.models.rates import LossMeter, rate_row
+from rhot_app.ui.models.rows import bytes_text, clock_text, marker_rows, node_row
+from rhot_app.ui.models.series import Series, to_csv
+from rhot_node.wire.messages import MarkerFlag
+
+SECOND = 1_000_000_000
+
+
+@pytest.fixture
+def engine():
+    return FakeEngine(clock=lambda: 0.0)
+
+
+def test_a_gap_in_a_series_is_a_row_of_nan():
+    series = Series(("a",), gap_s=0.5)
+    for t in (0, SECOND // 10, 3 * SECOND):
+        series.append(t, np.array([1.0]))
+    seconds, rows = series.window(3 * SECOND, 10.0)
+    assert seconds[-1] == 0.0 and (np.diff(seconds) > 0).all()
+    assert np.isnan(rows[2, 0]) and len(rows) == 4
+
+
+def test_a_series_forgets_the_oldest_and_ignores_the_past():
+    series = Series(("a",), capacity=3, gap_s=10.0)
+    for t in (1, 2, 3, 4, 2):
+        series.append(t * SECOND, np.array([float(t)]))
+    assert series.window(4 * SECOND, 60.0)[1][:, 0].tolist() == [2.0, 3.0, 4.0]
+
+
+def test_csv_has_units_and_empty_fields():
+    text = to_csv(np.array([-0.1, 0.0]), np.array([[1.5, np.nan], [2.0, 3.0]]), ("thumb", "index"), "mm")
+    assert text.splitlines() == ["time [s],thumb [mm],index [mm]", "-0.100,1.5,", "0.000,2,3"]
+
+
+def test_latency_sums_each_state_before_taking_percentiles(engine):
+    window = LatencyWindow(span_s=10.0)
+    state = engine.state(1.0)
+    for k in range(100):
+        slow = dict.fromkeys(LATENCY_STAGES, 0.001)
+        slow[STACKED[k % 2]] = 0.010  # either the first or the second stage is slow, never both
+        window.add(replace(state, t_master_ns=SECOND + k, latency_s=slow))
+    p50, p99 = window.summary(SECOND + 100)
+    whole = 0.010 + (len(STACKED) - 1) * 0.001
+    assert p99[-1] == pytest.approx(whole) and p50[-1] == pytest.approx(whole)
+    assert p99[0] == pytest.approx(0.010) and p50[3] == pytest.approx(0.001)
+
+
+def test_latency_without_states_is_unknown():
+    assert np.isnan(LatencyWindow().summary(SECOND)[0]).all()
+
+
+def test_losses_are_per_second_and_never_negative(engine):
+    meter = LossMeter()
+    first = engine.status(1.0)
+    assert np.isnan(meter.per_second(first))
+    engine.lost["right"] = 6
+    assert meter.per_second(engine.status(3.0)) == pytest.approx(3.0)
+    engine.lost["right"] = 0
+    assert np.isnan(meter.per_second(engine.status(4.0)))
+
+
+def test_silence_is_a_gap_in_the_rates(engine):
+    engine.running = False
+    assert np.isnan(rate_row(engine.status(1.0))).all()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=lambda s: s.name)
+def test_text_and_states_stand_out(scheme):
+    for ground in (scheme.panel, scheme.window, scheme.raised):
+        assert contrast(scheme.text, ground) >= 7.0
+        assert contrast(scheme.muted, ground) >= 4.5
+        for tone in ("good", "caution", "bad", "fault", "neutral", "accent"):
+            assert contrast(scheme.tone(tone), ground) >= 3.0, (tone, ground)
+    assert contrast(scheme.on_accent, scheme.accent) >= 4.5
+
+
+def test_a_dark_marker_is_made_visible():
+    assert visible_on("#000000", SCHEMES["dark"].panel) != "#000000"
+    assert visible_on("#ffffff", SCHEMES["dark"].panel) == "#ffffff"
+
+
+def test_every_condition_has_its_own_word_and_shape():
+    looks = [words.CONDITIONS[condition.value] for condition in Condition]
+    assert len({look.shape for look in looks}) == len(looks)
+    assert {look.word for look in looks} == {condition.value for condition in Condition}
+    assert set(words.KNOWLEDGE) == set(Knowledge)
+    assert words.condition_look("ODD").tone == "fault"
+
+
+def test_every_stage_is_explained():
+    assert all(glossary.tip(stage) for stage in STACKED)
+
+
+@pytest.mark.parametrize(("hidden", "word"),
+                         [({}, "ok"), ({"index": "right"}, "left only"), ({"index": "both"}, "lost")])
+def test_a_marker_says_who_sees_it(engine, hidden, word):
+    engine.hidden = hidden
+    rows = {row.name: row for row in marker_rows(engine.state(1.0))}
+    assert rows["index"].look.word == word
+    assert rows["thumb"].look.word == "ok"
+
+
+def test_a_half_hidden_marker_is_not_ok(engine):
+    state = engine.state(1.0)
+    flags = state.camera_flags.copy()
+    flags[0, 1], flags[1, 2] = int(MarkerFlag.PARTIAL), int(MarkerFlag.AMBIGUOUS)
+    looks = [row.look.word for row in marker_rows(replace(state, camera_flags=flags))]
+    assert looks[:3] == ["ok", "half hidden", "ambiguous"]
+
+
+def test_node_rows_carry_units(engine):
+    row = node_row(engine.status(1.0).nodes[0])
+    assert (row.rate, row.losses, row.clock) == ("40 /s", "0 lost", "clock ± 0.11 ms")
+    text_node = replace(engine.status(1.0).nodes[0], text_datagrams=True, dropped={"length": 3})
+    assert clock_text(text_node) == "no clock (text)"
+    assert "3 rejected" in node_row(text_node).losses and "3 × length" in node_row(text_node).tooltip
+
+
+def test_bytes_are_told_in_the_right_unit():
+    assert [bytes_text(n) for n in (12, 3400, 5_600_000, 2_100_000_000)] == ["12 B", "3.4 kB", "5.6 MB", "2.1 GB"]
+
+
+def test_labels_keep_clear_of_each_other():
+    anchors = [(100.0, 100.0 + 2 * k) for k in range(6)]
+    boxes = place_labels(anchors, [(50.0, 18.0)] * 6, (400.0, 300.0), 10.0)
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    assert all(box.inside(400.0, 300.0) for box in boxes)
+    assert Box(0, 0, 10, 10).overlaps(Box(9, 9, 5, 5)) and not Box(0, 0, 10, 10).overlaps(Box(10, 0, 5, 5))
+
+
+def test_initials_are_the_shortest_that_tell_apart():
+    assert unique_prefixes(("thumb", "index", "middle")) == ["t", "i", "m"]
+    assert unique_prefixes(("tip_a", "tip_b")) == ["tip_a", "tip_b"]
+
+
+def test_drawing_takes_no_more_than_its_share():
+    pacer = FramePacer(most_hz=50.0, share=0.5)
+    assert pacer.due(0.0)
+    pacer.begin(0.0)
+    assert not pacer.due(1.0)
+    pacer.end(0.030)
+    assert not pacer.due(0.055) and pacer.due(0.061)
+    pacer.begin(0.061)
+    pacer.end(0.062)
+    assert not pacer.due(0.078) and pacer.due(0.082)
+
+
+def test_a_frame_that_never_came_is_given_up():
+    pacer = FramePacer()
+    pacer.begin(0.0)
+    pacer.give_up(0.2)
+    assert not pacer.due(0.2)
+    pacer.give_up(1.0)
+    assert pacer.due(1.0)
