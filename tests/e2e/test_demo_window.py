@@ -1,0 +1,103 @@
+"""``rhot demo`` as a person starts it: a window with a moving hand, which may crash, and which cleans up behind itself.
+
+With RHOT_UPDATE_SCREENSHOTS=1 the picture of the README is made anew.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from bench import START_S, TEST_S, Bench, ends, kill_hard, states_of, wait_until
+
+from rhot_app.engine.client import EngineClient
+from rhot_app.engine.directory import EngineDirectory
+from rhot_app.engine.process import StartedProcess, start_ticks, started_processes
+from rhot_app.tracking.state import Condition
+
+README_PICTURE = Path(__file__).parents[2] / "docs" / "screenshots" / "demo.png"
+GRAB = """
+import sys
+from PySide6.QtGui import QGuiApplication
+app = QGuiApplication(["grab"])
+app.primaryScreen().grabWindow(0).save(sys.argv[1])
+"""
+
+pytestmark = [
+    pytest.mark.timeout(2 * TEST_S),
+    pytest.mark.skipif(not os.environ.get("DISPLAY"), reason="no screen: Xvfb is not installed"),
+]
+
+
+def grab(path: Path) -> np.ndarray:
+    """The whole screen as (H, W, 3) BGR, also written to `path`."""
+    subprocess.run([sys.executable, "-c", GRAB, str(path)], check=True, timeout=60, capture_output=True)
+    picture = cv2.imread(str(path))
+    assert picture is not None
+    return np.asarray(picture)
+
+
+def tracks(client: EngineClient) -> bool:
+    """Whether the newest state is a hand that is being tracked."""
+    state = client.state
+    return state is not None and state.condition in (Condition.TRACKING, Condition.PARTIAL)
+
+
+def alive(processes: list[StartedProcess]) -> list[str]:
+    """Roles of those that still run."""
+    return [process.role for process in processes if start_ticks(process.pid) == process.started_ticks]
+
+
+def running_in(folder: Path) -> list[str]:
+    """Command lines of all processes on this machine that name a test's folder."""
+    lines = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            lines.append(path.read_bytes().replace(b"\0", b" ").decode(errors="replace"))
+    return [line for line in lines if str(folder) in line]
+
+
+def test_the_demo_shows_a_moving_hand_and_survives_crashes(bench: Bench) -> None:
+    options = ["--directory", str(bench.sockets), "--settings", str(bench.folder / "layout.ini")]
+    window = bench.start(["rhot_app", "demo", *options], "window")
+    with EngineClient(bench.sockets) as client:
+        wait_until(client, lambda: tracks(client), START_S, "the demo tracks the hand")
+        states_of(client, 3.0)  # until the window has drawn it
+        first = grab(bench.folder / "first.png")
+        time.sleep(0.7)
+        second = grab(bench.folder / "second.png")
+        assert len(np.unique(first.reshape(-1, 3) >> 4, axis=0)) > 200, "the window is nearly blank"
+        scene = np.s_[80:540, 220:900]
+        assert (np.abs(first[scene].astype(int) - second[scene]).max(axis=2) > 40).sum() > 100, "the hand does not move"
+        if os.environ.get("RHOT_UPDATE_SCREENSHOTS") == "1":
+            states_of(client, 30.0)  # until the plots are full
+            grab(README_PICTURE)
+
+        started = started_processes(EngineDirectory(bench.sockets))
+        assert {process.role for process in started} >= {"engine"}
+        assert sum("rhot_node" in line for line in running_in(bench.folder)) == 2
+        kill_hard(window)
+        assert states_of(client, 2.0), "states go on without the window"
+        assert len(alive(started)) == len(started), "engine and nodes outlive the window"
+
+        second_window = bench.start(["rhot_app", *options], "second window")
+        time.sleep(5.0)
+        (engine,) = [process for process in started if process.role == "engine"]
+        os.kill(engine.pid, 9)
+        wait_until(client, lambda: client.status is not None and client.status.pid != engine.pid, START_S,
+                   "the window starts another engine")
+        wait_until(client, lambda: tracks(client), START_S, "the nodes join the new engine")
+
+    second_window.terminate()
+    assert ends(second_window, 20.0), bench.log("second window")
+    deadline = time.monotonic() + 5.0
+    while running_in(bench.folder) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert running_in(bench.folder) == [], "nothing is left running"
