@@ -16,7 +16,7 @@ class Actions(QObject):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
-        self.start = self._make("Start", "Space", "Tell the nodes to stream, or to stop (Space).")
+        self.start = self._make("Start", "", "Tell the nodes to stream, or to stop (Space).")
         self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it (R).")
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
         self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")

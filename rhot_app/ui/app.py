@@ -44,7 +44,6 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     from PySide6.QtWidgets import QApplication
 
     from rhot_app.ui.controller import Controller
-    from rhot_app.ui.keys import SpaceKeeper
     from rhot_app.ui.main_window import MainWindow
     from rhot_app.ui.scene.surface import choose_format
     from rhot_app.ui.settings import Settings
@@ -61,8 +60,6 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     app.setApplicationName("RHOT")
     choose_format()
     apply_theme(app, scheme_named(settings.scheme))
-    keeper = SpaceKeeper(app)
-    app.installEventFilter(keeper)
     controller = Controller(session, session.client)
     window = MainWindow(controller, settings)
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -205,8 +205,8 @@ class Controller(QObject):
         self._command("stop")
 
     def start_or_stop(self) -> None:
-        """The toolbar's first button."""
-        if self.opened is not None:
+        """The toolbar's first button; nothing happens without a rig and an engine that answers."""
+        if self.opened is not None and not self.engine_gone:
             if self.running:
                 self.stop()
             else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QImage, QKeySequence, QShortcut, QTextDocument
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QTextBrowser, QVBoxLayout, QWidget
 
 GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide"
@@ -17,6 +17,9 @@ PAGES: tuple[tuple[str, str], ...] = (
     ("keys", "Keys"),
 )
 """Name of each page's file and its title, in reading order."""
+
+
+_MARGIN_PX = 16
 
 
 def page_path(name: str) -> Path:
@@ -34,22 +37,39 @@ def page_of(widget: QWidget | None) -> str:
     return "window"
 
 
+class PageBrowser(QTextBrowser):
+    """Shows pictures no wider than the page."""
+
+    def loadResource(self, kind: int, url: QUrl | str) -> object:  # noqa: N802
+        """A picture beside the guide's pages, made as narrow as the page; everything else as Qt does."""
+        address = QUrl(url)
+        if kind == QTextDocument.ResourceType.ImageResource.value and address.isRelative():
+            picture = QImage(str(GUIDE / address.path()))
+            width = round((self.viewport().width() - 2 * _MARGIN_PX) * self.devicePixelRatioF())
+            if picture.width() > width > 0:
+                picture = picture.scaledToWidth(width, Qt.TransformationMode.SmoothTransformation)
+            picture.setDevicePixelRatio(self.devicePixelRatioF())
+            return picture
+        return super().loadResource(kind, address)
+
+
 class GuideViewer(QDialog):
     """A list of pages on the left, the page on the right. Stays open beside the window."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("RHOT guide")
-        self.resize(880, 640)
+        self.resize(960, 680)
         self.list = QListWidget()
         self.list.setFixedWidth(210)
         for name, title in PAGES:
             item = QListWidgetItem(title)
             item.setData(Qt.ItemDataRole.UserRole, name)
             self.list.addItem(item)
-        self.browser = QTextBrowser()
+        self.list.setSpacing(3)
+        self.browser = PageBrowser()
         self.browser.setOpenLinks(False)
-        self.browser.document().setDocumentMargin(16)
+        self.browser.document().setDocumentMargin(_MARGIN_PX)
         self.browser.anchorClicked.connect(self._follow)
         self.list.currentItemChanged.connect(self._show_current)
         layout = QHBoxLayout()

@@ -8,8 +8,16 @@ from pathlib import Path
 
 from platformdirs import user_documents_path
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QAction, QCloseEvent
-from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QStackedWidget, QToolBar
+from PySide6.QtGui import QAction, QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QComboBox,
+    QFileDialog,
+    QMainWindow,
+    QStackedWidget,
+    QToolBar,
+)
 
 from rhot_app.ui.actions import Actions, MainToolBar
 from rhot_app.ui.backend.session import TwinChoice
@@ -90,6 +98,7 @@ class MainWindow(QMainWindow):
         self.addActions(a.all())
         self.addActions(self.docks.actions)
         a.start.triggered.connect(c.start_or_stop)
+        QShortcut(QKeySequence(Qt.Key.Key_Space), self).activated.connect(self._press_space)
         a.record.triggered.connect(self.record_or_stop)
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)
@@ -135,6 +144,16 @@ class MainWindow(QMainWindow):
             self.docks.arrange()
 
     # -- what the actions do ---------------------------------------------------------------------------------------
+
+    def _press_space(self) -> None:
+        """Start or stop, unless the key means something where the focus is."""
+        focus = QApplication.focusWidget()
+        if isinstance(focus, QAbstractButton):
+            focus.click()
+        elif isinstance(focus, QComboBox):
+            focus.showPopup()
+        else:
+            self.controller.start_or_stop()
 
     def open_twin(self, choice: TwinChoice) -> None:
         """Start the simulated rig and the tracking."""

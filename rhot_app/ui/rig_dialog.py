@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QDialog,
-    QDialogButtonBox,
     QHeaderView,
     QLabel,
+    QPushButton,
     QTableWidget,
     QTableWidgetItem,
     QTabWidget,
@@ -86,11 +87,11 @@ class RigDialog(QDialog):
                                f"{rig.hand.name or 'Hand'}, {rig.hand.side} side; wrist "
                                f"{rig.hand.wrist_breadth_mm:.0f} × {rig.hand.wrist_thickness_mm:.0f} mm."), "Hand")
         self.tabs.setCurrentIndex(("cameras", "markers", "hand").index(page))
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        buttons.rejected.connect(self.reject)
+        close = QPushButton("Close")
+        close.clicked.connect(self.reject)
         layout = QVBoxLayout(self)
         layout.addWidget(self.tabs)
-        layout.addWidget(buttons)
+        layout.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
 
 
 def _table(heads: tuple[str, ...], rows: Rows) -> QTableWidget:

@@ -84,7 +84,7 @@ def style_sheet(s: Scheme) -> str:
     QPushButton:hover {{ border-color: {s.accent}; }}
     QPushButton:focus {{ border-color: {s.accent}; }}
     QPushButton:default, QPushButton[primary="true"] {{ background: {s.accent}; color: {s.on_accent};
-        border-color: {s.accent}; font-weight: 600; }}
+        border-color: {s.accent}; }}
     QPushButton:disabled {{ color: {s.muted}; border-color: {s.border}; background: {s.panel}; }}
     QPushButton[flat="true"] {{ background: transparent; border: 1px solid transparent; padding: 2px 6px; }}
     QPushButton[flat="true"]:hover, QPushButton[flat="true"]:focus {{ border-color: {s.accent}; }}

@@ -22,7 +22,6 @@ from PySide6.QtWidgets import QWidget  # noqa: E402
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
 from rhot_app.ui.controller import Controller  # noqa: E402
-from rhot_app.ui.keys import SpaceKeeper  # noqa: E402
 from rhot_app.ui.main_window import MainWindow  # noqa: E402
 from rhot_app.ui.scene.surface import choose_format  # noqa: E402
 from rhot_app.ui.settings import Settings  # noqa: E402
@@ -88,8 +87,6 @@ def themed(qapp: Any) -> Any:
     """The application in its own colours."""
     choose_format()
     apply_theme(qapp, scheme_named("dark"))
-    keeper = SpaceKeeper(qapp)
-    qapp.installEventFilter(keeper)
     return qapp
 
 

@@ -85,7 +85,7 @@ def test_progress_page(bench):
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_tracking(shown, scheme):
     shown.window.set_scheme(scheme)
-    shown.run(12.0 if UPDATE else 0.5)
+    shown.run(20.0 if UPDATE else 0.5)
     assert scene_colours(shown) > 40
     check("tracking" if scheme == "dark" else "tracking-light", picture_of(shown.window), 80)
 

@@ -21,23 +21,30 @@ class Box:
         return (self.x < other.x + other.width and other.x < self.x + self.width
                 and self.y < other.y + other.height and other.y < self.y + self.height)
 
+    def covers(self, point: Point, reach: float) -> bool:
+        """Whether a mark at `point` that reaches so far to all sides touches it."""
+        return (self.x - reach < point[0] < self.x + self.width + reach
+                and self.y - reach < point[1] < self.y + self.height + reach)
+
     def inside(self, width: float, height: float) -> bool:
         """Whether it lies wholly in a picture of that size."""
         return self.x >= 0 and self.y >= 0 and self.x + self.width <= width and self.y + self.height <= height
 
 
 def place_labels(anchors: list[Point], sizes: list[Point], picture: Point, gap: float) -> list[Box]:
-    """A box for each label near its anchor, in order; earlier labels choose first.
+    """A box for each label near its anchor and clear of the other anchors; earlier labels choose first.
 
     Tried in turn: right, left, above, below, and the same farther away. When nothing is free the first choice is
     taken, covered or not: a label in the wrong place would be worse.
     """
     placed: list[Box] = []
-    for (x, y), (width, height) in zip(anchors, sizes, strict=True):
+    for own, ((x, y), (width, height)) in enumerate(zip(anchors, sizes, strict=True)):
+        others = [anchor for k, anchor in enumerate(anchors) if k != own]
         choices = [box for far in (1.0, 2.0, 3.5)
                    for box in _around(x, y, width, height, far * gap, height * (far - 1))]
         free = (box for box in choices
-                if box.inside(*picture) and not any(box.overlaps(other) for other in placed))
+                if box.inside(*picture) and not any(box.overlaps(other) for other in placed)
+                and not any(box.covers(anchor, 0.6 * gap) for anchor in others))
         placed.append(next(free, choices[0]))
     return placed
 

@@ -25,6 +25,10 @@ RAYS: tuple[tuple[int, int], ...] = tuple((0, 1 + 4 * f) for f in range(5))
 TIPS: tuple[int, ...] = tuple(4 + 4 * f for f in range(5))
 """Joint numbers of the fingertips; they get no ball, it would stick out of the skin."""
 
+_UNDER_PAINT_M = 0.003
+"""The skin of a fingertip ends so much before the tip, so that it does not stick out of the painted marker."""
+
+_LAST_BONE = 0.7  # of its length is drawn in the skeleton, for the same reason
 _SKELETON_RADIUS_M = 0.0017
 _JOINT_RADIUS_M = 0.0034
 
@@ -73,7 +77,7 @@ class HandMesh:
         self._template = capsule_template(12, 3)
         self._palm = palm_hull(anatomy)
         self._radii = finger_radii(anatomy)
-        self._shortening = np.array([0.0, 0.0, 1.0] * 5) * self._radii[:, 1]
+        self._shortening = np.array([0.0, 0.0, 1.0] * 5) * (self._radii[:, 1] + _UNDER_PAINT_M)
         count = len(self._template.directions)
         fingers = repeat_faces(self._template.faces, count, len(BONES))
         self.faces: Faces = np.concatenate([fingers, self._palm.faces + np.uint32(len(BONES) * count)])
@@ -113,13 +117,15 @@ class SkeletonMesh:
         bones = len(BONES) + len(RAYS)
         radii = np.repeat([_SKELETON_RADIUS_M, _JOINT_RADIUS_M], [bones, len(self._pairs) - bones])
         self._radii = radii[:, None] * np.ones(2)
+        self._share = np.where(np.isin(self._pairs[:, 1], TIPS), _LAST_BONE, 1.0)[:, None]
         self.faces: Faces = repeat_faces(self._template.faces, count, len(self._pairs))
 
     def pose(self, state: HandState) -> PosedMesh:
         """The skeleton at `state`; parts with an unknown end are not drawn."""
         joints = to_display(state.joint_positions)
         near, far = self._pairs.T
-        starts, stops = joints[near], joints[far]
+        starts = joints[near]
+        stops = starts + self._share * (joints[far] - starts)
         known = np.isfinite(starts).all(axis=1) & np.isfinite(stops).all(axis=1)
         starts, stops = np.where(known[:, None], starts, 0.0), np.where(known[:, None], stops, 0.0)
         vertices, normals = pose_capsules(self._template, starts, stops, self._radii * known[:, None])
