@@ -61,16 +61,17 @@ def step(t_s: float, values: Array, parameters: Array, state: Array, gap_s: floa
 class OneEuroFilter:
     """N channels with their own parameters and a common clock.
 
-    `min_cutoff_hz`, `beta` and `derivative_cutoff_hz` are numbers or (N,) arrays; `channels` is N.
+    `min_cutoff_hz`, `beta` and `derivative_cutoff_hz` are numbers or (N,) arrays; `channels` is N. Compiled code that
+    filters among other things passes `parameters` and `state` to `step` itself.
     """
 
     def __init__(self, channels: int, min_cutoff_hz: ArrayLike, beta: ArrayLike, derivative_cutoff_hz: ArrayLike = 1.0,
                  *, gap_s: float = RESET_GAP_S) -> None:
-        self._parameters = np.empty((channels, 3))
+        self.parameters = np.empty((channels, 3))
         for column, value in enumerate((min_cutoff_hz, beta, derivative_cutoff_hz)):
-            self._parameters[:, column] = value
-        self._state = np.full((channels, 3), np.nan)
-        self._gap_s = gap_s
+            self.parameters[:, column] = value
+        self.state = np.full((channels, 3), np.nan)
+        self.gap_s = gap_s
 
     @classmethod
     def from_settings(cls, settings: Sequence[OneEuroSettings], *, gap_s: float = RESET_GAP_S) -> OneEuroFilter:
@@ -81,14 +82,14 @@ class OneEuroFilter:
     def __call__(self, t_s: float, values: Array) -> Array:
         """Filtered values (N,) of the samples `values` (N,) taken at `t_s`; NaN where there is no sample."""
         out = np.empty_like(values)
-        step(t_s, values, self._parameters, self._state, self._gap_s, out)
+        step(t_s, values, self.parameters, self.state, self.gap_s, out)
         return out
 
     @property
     def derivatives(self) -> Array:
         """(N,) filtered derivatives, unit/s; NaN before the first sample."""
-        return self._state[:, 2].copy()
+        return self.state[:, 2].copy()
 
     def reset(self, channels: NDArray[np.bool_] | None = None) -> None:
         """Forget the given channels (mask (N,)), or all."""
-        self._state[slice(None) if channels is None else channels] = np.nan
+        self.state[slice(None) if channels is None else channels] = np.nan

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 TOLERANCE = 5e-5
 """A finger has reached its target within this distance, m."""
 
+FABRIK_ITERATIONS = 10
+
 FAR = 3.0
 """FABRIK that ends this many standard deviations from its target was stopped by limits: meet it before weighing it."""
 
@@ -62,7 +64,7 @@ class FingersSolution:
 
 
 def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_angles: Array, target: Array,
-                 tolerance: float = TOLERANCE, max_iterations: int = 10) -> FingerSolution:
+                 tolerance: float = TOLERANCE, max_iterations: int = FABRIK_ITERATIONS) -> FingerSolution:
     """Bring the marker of one finger (index into skeleton.FINGERS) to `target` (3,) m, world.
 
     `start_angles` (4,) or (5,) are the last known ones: nearby targets then give nearby angles. A target out of
@@ -85,7 +87,7 @@ def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_an
 
 
 def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: float = TOLERANCE,
-                  max_iterations: int = 10, target_sd: float = 0.0) -> FingersSolution:
+                  max_iterations: int = FABRIK_ITERATIONS, target_sd: float = 0.0) -> FingersSolution:
     """`solve_finger` for every finger with a target: `targets` (5, 3) m world, NaN rows keep the pose's angles.
 
     `target_sd` is the standard deviation of the targets, m. Zero meets them exactly. A nearly stretched or fully
@@ -224,8 +226,6 @@ def _descend(angles: Array, start: Array, lengths: Array, limits: Array, target:
         angles[:] = best
         return least
     return residual
-
-
 
 
 @njit(cache=True)

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import TWIST, forward, forward_arrays, jacobian_arrays
+from rhot_app.hand.kinematics import TWIST, forward, forward_arrays, jacobian_arrays, move, rotation_vector
 from rhot_app.hand.linear import factorise, solve_in_box, substitute
 from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
@@ -31,6 +31,9 @@ ANGLE_DRIFT = 0.8
 TRANSLATION_DRIFT = 0.15
 """Random walks of palm rotation and joint angles, rad/sqrt(s), and of the palm's place, m/sqrt(s): standard
 deviations of the change since the previous pose. A walk weighs the past alike at every frame rate."""
+
+SHORTEST_S = 1e-3
+"""Poses nearer in time are weighed as if this far apart."""
 
 STEPS_WARM = 8
 STEPS_COLD = 40
@@ -61,13 +64,11 @@ def fit_palm(model: HandModel, wrist: Array, tips: Array, previous: HandPose | N
     `previous` is the pose `dt_s` seconds ago, None to start from nothing. None is returned when nothing can be said:
     without a wrist unless there are a previous pose and four tips, and with neither tips nor previous pose.
     """
-    has_wrist = bool(np.isfinite(wrist).all())
-    tip_count = int(np.isfinite(tips).all(axis=1).sum())
-    if (not has_wrist and (previous is None or tip_count < TIPS_WITHOUT_WRIST)) or (
-            previous is None and tip_count == 0):
-        return None
     if previous is not None:
-        return _fit_from(model, wrist, tips, previous, previous, dt_s, STEPS_WARM)
+        return (_fit_from(model, wrist, tips, previous, previous, dt_s, STEPS_WARM)
+                if enough_markers(wrist, tips) else None)
+    if not (np.isfinite(wrist).all() and np.isfinite(tips).all(axis=1).any()):
+        return None
     fits = [_fit_from(model, wrist, tips, start, None, dt_s, STEPS_COLD) for start in start_poses(model, wrist, tips)]
     return min(fits, key=lambda fit: fit.cost)
 
@@ -106,7 +107,7 @@ def _fit_from(model: HandModel, wrist: Array, tips: Array, start: HandPose, prev
     before = previous or start
     cost, deviation, converged = fit_arrays(
         model.dh, model.limits, model.natural.mean, model.natural.information, wrist, tips, before.world_from_palm,
-        before.angles, max(dt_s, 1e-3) if previous is not None else math.inf, steps, world, angles)
+        before.angles, max(dt_s, SHORTEST_S) if previous is not None else math.inf, steps, world, angles)
     return PalmFit(HandPose(world, angles), deviation, cost, converged)
 
 
@@ -114,10 +115,45 @@ def _fit_from(model: HandModel, wrist: Array, tips: Array, start: HandPose, prev
 def fit_arrays(dh: DhArrays, limits: Array, mean: Array, information: Array, wrist: Array, tips: Array,
                previous_world: Array, previous_angles: Array, dt: float, steps: int, world: Array,
                angles: Array) -> tuple[float, float, bool]:
+    """`descend_arrays`; returns cost, rotation's standard deviation (rad) and whether the last step was small."""
+    converged = descend_arrays(dh, limits, mean, information, wrist, tips, previous_world, previous_angles, dt, steps,
+                               world, angles)
+    cost, deviation = _judge(dh, world, angles, mean, information, wrist, tips)
+    return cost, deviation, converged
+
+
+@njit(cache=True)
+def enough_markers(wrist: Array, tips: Array) -> bool:
+    """Whether `wrist` (3,) and `tips` (5, 3), NaN where missing, say anything about a hand whose pose was known."""
+    count = 0
+    for finger in range(tips.shape[0]):
+        count += not math.isnan(tips[finger, 0] + tips[finger, 1] + tips[finger, 2])
+    return count >= TIPS_WITHOUT_WRIST or not math.isnan(wrist[0] + wrist[1] + wrist[2])
+
+
+@njit(cache=True)
+def track_arrays(dh: DhArrays, limits: Array, mean: Array, information: Array, wrist: Array, tips: Array, dt_s: float,
+                 world: Array, angles: Array) -> None:
+    """`fit_palm` from a previous pose `dt_s` seconds ago, `world` (4, 4) and `angles` (21,), in place and without its
+    judgement, which costs as much as two steps."""
+    previous_world, previous_angles = world.copy(), angles.copy()
+    if not math.isnan(wrist[0] + wrist[1] + wrist[2]):
+        for i in range(3):
+            world[i, 3] = wrist[i]
+    for i in range(angles.shape[0]):
+        angles[i] = min(max(angles[i], limits[i, 0]), limits[i, 1])
+    descend_arrays(dh, limits, mean, information, wrist, tips, previous_world, previous_angles, max(dt_s, SHORTEST_S),
+                   STEPS_WARM, world, angles)
+
+
+@njit(cache=True)
+def descend_arrays(dh: DhArrays, limits: Array, mean: Array, information: Array, wrist: Array, tips: Array,
+                   previous_world: Array, previous_angles: Array, dt: float, steps: int, world: Array,
+                   angles: Array) -> bool:
     """Levenberg-Marquardt from `world` (4, 4) and `angles` (21,), in place; dt is inf without a previous pose.
 
-    Returns cost, rotation's standard deviation (rad) and whether the last step was small. Unknowns: palm twist in
-    world axes (see kinematics.TWIST), then the angles.
+    Returns whether the last step was small. Unknowns: palm twist in world axes (see kinematics.TWIST), then the
+    angles.
     """
     frames, points = np.empty((dh.parent.shape[0], 3, 4)), np.empty((dh.point_row.shape[0], 3))
     jacobian = np.empty((points.shape[0], 3, SIZE))
@@ -142,7 +178,7 @@ def fit_arrays(dh: DhArrays, limits: Array, mean: Array, information: Array, wri
             for i in range(SIZE):
                 damped[i, i] *= 1.0 + damping
             solve_in_box(damped, right, low, high, step)
-            _move(world, angles, step, trial_world, trial_angles)
+            move(world, angles, step, trial_world, trial_angles)
             forward_arrays(dh, trial_world, trial_angles, frames, points)
             trial_cost = _cost(points, trial_world, trial_angles, mean, information, wrist, tips, previous_world,
                                previous_angles, dt)
@@ -151,7 +187,6 @@ def fit_arrays(dh: DhArrays, limits: Array, mean: Array, information: Array, wri
                 break
             damping = max(10.0 * damping, 1e-3)
         if not accepted:
-            forward_arrays(dh, world, angles, frames, points)
             converged = True
             break
         gain, cost = cost - trial_cost, trial_cost
@@ -160,14 +195,17 @@ def fit_arrays(dh: DhArrays, limits: Array, mean: Array, information: Array, wri
         if np.abs(step).max() < 1e-4 or gain < 1e-5 * (1.0 + cost):
             converged = True
             break
-    return _judge(dh, world, angles, frames, points, jacobian, mean, information, wrist, tips, matrix, right, converged)
+    return converged
 
 
 @njit(cache=True)
-def _judge(dh: DhArrays, world: Array, angles: Array, frames: Array, points: Array, jacobian: Array, mean: Array,
-           information: Array, wrist: Array, tips: Array, matrix: Array, right: Array,
-           converged: bool) -> tuple[float, float, bool]:
+def _judge(dh: DhArrays, world: Array, angles: Array, mean: Array, information: Array, wrist: Array,
+           tips: Array) -> tuple[float, float]:
     """Cost and rotation's standard deviation without the previous pose, whose error is not independent."""
+    frames, points = np.empty((dh.parent.shape[0], 3, 4)), np.empty((dh.point_row.shape[0], 3))
+    jacobian = np.empty((points.shape[0], 3, SIZE))
+    matrix, right = np.empty((SIZE, SIZE)), np.empty(SIZE)
+    forward_arrays(dh, world, angles, frames, points)
     cost = _cost(points, world, angles, mean, information, wrist, tips, world, angles, np.inf)
     jacobian_arrays(dh, world, frames, points, jacobian)
     _normal_equations(points, jacobian, world, angles, mean, information, wrist, tips, world, angles, np.inf, matrix,
@@ -182,7 +220,7 @@ def _judge(dh: DhArrays, world: Array, angles: Array, frames: Array, points: Arr
         right[axis] = 1.0
         substitute(matrix, right, right)
         variance += right[axis]
-    return cost, math.sqrt(variance), converged
+    return cost, math.sqrt(variance)
 
 
 @njit(cache=True)
@@ -262,37 +300,3 @@ def _add_residual(slope: Array, residual: float, weight: float, first: int, last
 def _pull(column: int, residual: float, deviation: float, matrix: Array, right: Array) -> None:
     matrix[column, column] += 1.0 / deviation ** 2
     right[column] += residual / deviation ** 2
-
-
-@njit(cache=True)
-def _move(world: Array, angles: Array, step: Array, out_world: Array, out_angles: Array) -> None:
-    """Apply a step of twist (rotation on the manifold, in world axes) and angles."""
-    out_world[:] = world
-    angle = math.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
-    c = math.cos(angle)
-    s = math.sin(angle) / angle if angle > 1e-12 else 1.0
-    v = (1.0 - c) / angle ** 2 if angle > 1e-6 else 0.5
-    x, y, z = step[3], step[4], step[5]
-    for j in range(3):
-        a, b, d = world[0, j], world[1, j], world[2, j]
-        along = v * (x * a + y * b + z * d)
-        out_world[0, j] = c * a + s * (y * d - z * b) + along * x
-        out_world[1, j] = c * b + s * (z * a - x * d) + along * y
-        out_world[2, j] = c * d + s * (x * b - y * a) + along * z
-        out_world[j, 3] = world[j, 3] + step[j]
-    for i in range(angles.shape[0]):
-        out_angles[i] = angles[i] + step[TWIST + i]
-
-
-@njit(cache=True)
-def rotation_vector(to: Array, origin: Array) -> tuple[float, float, float]:
-    """The turn, rad in world axes, that takes the rotation of `origin` (4, 4) to that of `to` (4, 4)."""
-    r = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            r[i, j] = to[i, 0] * origin[j, 0] + to[i, 1] * origin[j, 1] + to[i, 2] * origin[j, 2]
-    x, y, z = 0.5 * (r[2, 1] - r[1, 2]), 0.5 * (r[0, 2] - r[2, 0]), 0.5 * (r[1, 0] - r[0, 1])
-    sine = math.sqrt(x * x + y * y + z * z)
-    angle = math.atan2(sine, 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0))
-    scale = angle / sine if sine > 1e-9 else 1.0
-    return x * scale, y * scale, z * scale

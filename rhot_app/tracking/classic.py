@@ -8,18 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.filters.one_euro import OneEuroFilter
-from rhot_app.geometry.silhouette import ellipsoid
 from rhot_app.hand.model import build_model
 from rhot_app.project import Rig
-from rhot_app.tracking import locate, trust
+from rhot_app.tracking import stages, trust
 from rhot_app.tracking.hand_solver import HandSolver, SolvedHand
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.tracking.stages import Sheet
+from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LOST_AFTER_S = 0.5
 """No marker measured for this long: the hand is lost, not merely hidden."""
@@ -37,6 +36,7 @@ class ClassicTracker:
         self._filtering = rig.filters.enabled
         self._pixel_filter = OneEuroFilter.from_settings([s for _ in range(cameras) for s in pixel for _ in range(2)])
         self._position_filter = OneEuroFilter.from_settings([s for s in position for _ in range(3)])
+        self._turned_shapes = self._rig.shapes.copy()
         self._sequence = 0
         self.reset()
 
@@ -51,6 +51,7 @@ class ClassicTracker:
         self._epoch_ns: int | None = None
         self._last_s = 0.0
         self._measured_s: float | None = None
+        self._all_measured = False
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; about 10 µs."""
@@ -65,7 +66,6 @@ class ClassicTracker:
         t_s = self._seconds(paired.t_ns)
         clock.lap("pair")
         markers = self._locate(t_s, paired, clock)
-        self._predict(t_s, markers)
         hand = self._solve_hand(t_s, markers)
         clock.lap("solve")
         return self._state(t_s, paired, markers, hand, clock)
@@ -84,82 +84,58 @@ class ClassicTracker:
         self._last_s = t_s
         return t_s
 
-    def _locate(self, t_s: float, paired: Paired, clock: _Stopwatch) -> _Markers:
+    def _locate(self, t_s: float, paired: Paired, clock: _Stopwatch) -> Sheet:
         """Raw positions decide what to believe; believed pixels are filtered and located again."""
-        markers = _Markers(len(self._rig.cameras), len(self._rig.marker_ids))
-        shapes = self._shapes()
-        locate.choose_views(paired.flags, paired.live, markers.used, markers.doubtful)
-        self._triangulate(paired.pixels, paired.covariances, shapes, markers.used, markers.raw, markers.covariances,
-                          markers.errors)
-        trust.judge(t_s, markers.raw, markers.covariances, self._memory, markers.believed, markers.restarted)
-        markers.raw[~markers.believed] = np.nan
-        markers.used &= markers.believed
+        rig, shapes = self._rig, self._shapes()
+        markers = Sheet(len(rig.cameras), len(rig.marker_ids))
+        stages.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
+                          rig.cameras, rig.focal, shapes, self._memory, markers.used, markers.doubtful,
+                          markers.believed, markers.restarted, markers.raw, markers.covariances, markers.errors)
         clock.lap("triangulate")
         if not self._filtering:
             markers.positions[:] = markers.raw
             return markers
-        self._restart_filters(markers.restarted)
-        pixels = np.where(markers.used[:, :, None], paired.pixels, np.nan)
-        pixels = self._pixel_filter(t_s, pixels.reshape(-1)).reshape(pixels.shape)
+        pixel, position = self._pixel_filter, self._position_filter
+        pixels = np.empty_like(paired.pixels)
+        stages.filter_pixels(t_s, markers.used, markers.restarted, paired.pixels, pixel.parameters, pixel.state,
+                             position.state, pixel.gap_s, pixels)
         clock.lap("filter")
-        self._triangulate(pixels, paired.covariances, shapes, markers.used.copy(), markers.positions,
-                          np.empty_like(markers.covariances), np.empty_like(markers.errors))
+        stages.locate_filtered(pixels, paired.covariances, markers.used, rig.intrinsics, rig.cameras, rig.focal,
+                               shapes, markers.positions)
         clock.lap("triangulate")
-        markers.positions = self._position_filter(t_s, markers.positions.reshape(-1)).reshape(-1, 3)
+        stages.filter_positions(t_s, markers.positions, position.parameters, position.state, position.gap_s,
+                                markers.believed)
         clock.lap("filter")
-        markers.believed &= np.isfinite(markers.positions).all(axis=1)
         return markers
-
-    def _triangulate(self, pixels: Array, pixel_covariances: Array, shapes: Array, used: Mask, positions: Array,
-                     covariances: Array, errors: Array) -> None:
-        rig = self._rig
-        locate.locate_all(pixels, pixel_covariances, used, rig.intrinsics, rig.cameras, rig.focal, shapes, positions,
-                          covariances, errors)
 
     def _shapes(self) -> Array:
         """The markers' bodies; a band lies as the hand's last pose says."""
-        pose = self._hand.pose
-        if pose is None or self._rig.band_half_axes is None:
+        pose, band = self._hand.pose, self._rig.band_half_axes
+        if pose is None or band is None:
             return self._rig.shapes
-        shapes = self._rig.shapes.copy()
-        shapes[self._rig.wrist] = ellipsoid(pose.world_from_palm[:3, :3], self._rig.band_half_axes)
-        return shapes
+        stages.turn_band(pose.world_from_palm, band, self._turned_shapes[self._rig.wrist])
+        return self._turned_shapes
 
-    def _restart_filters(self, restarted: Mask) -> None:
-        if restarted.any():
-            cameras = len(self._rig.cameras)
-            self._pixel_filter.reset(np.tile(np.repeat(restarted, 2), cameras))
-            self._position_filter.reset(np.repeat(restarted, 3))
-
-    def _predict(self, t_s: float, markers: _Markers) -> None:
-        """Say where the markers out of sight should be, and how each is known."""
-        self._anchors[markers.believed] = markers.positions[markers.believed]
-        trust.predict(t_s, self._memory, markers.believed, self._anchors, markers.positions, markers.covariances)
-        known = np.isfinite(markers.positions).all(axis=1)
-        markers.knowledge[known] = Knowledge.INFERRED
-        markers.knowledge[markers.believed & ~markers.doubtful] = Knowledge.MEASURED
-        if (markers.knowledge == Knowledge.MEASURED).any():
-            self._measured_s = t_s
-
-    def _solve_hand(self, t_s: float, markers: _Markers) -> SolvedHand:
+    def _solve_hand(self, t_s: float, markers: Sheet) -> SolvedHand:
+        """Say how each marker is known, those out of sight too, and solve the hand that wears them."""
         rig = self._rig
-        wrist, wrist_knowledge = np.full(3, np.nan), int(Knowledge.UNKNOWN)
-        if rig.wrist >= 0:
-            wrist, wrist_knowledge = markers.positions[rig.wrist], int(markers.knowledge[rig.wrist])
-        tips, tip_knowledge = np.full((5, 3), np.nan), np.full(5, Knowledge.UNKNOWN, np.uint8)
-        worn = rig.tips >= 0
-        tips[worn] = markers.positions[rig.tips[worn]]
-        tip_knowledge[worn] = markers.knowledge[rig.tips[worn]]
+        wrist, tips, tip_knowledge = np.empty(3), np.empty((5, 3)), np.empty(5, np.uint8)
+        measured, wrist_knowledge = stages.conclude(
+            t_s, self._memory, markers.believed, markers.doubtful, self._anchors, markers.positions,
+            markers.covariances, markers.knowledge, rig.wrist, rig.tips, wrist, tips, tip_knowledge)
+        if measured:
+            self._measured_s = t_s
+        self._all_measured = measured == len(markers.knowledge)
         return self._hand.solve(t_s, wrist, tips, wrist_knowledge, tip_knowledge)
 
-    def _condition(self, t_s: float, paired: Paired, knowledge: NDArray[np.uint8]) -> Condition:
+    def _condition(self, t_s: float, paired: Paired) -> Condition:
         if self._measured_s is None:
             return Condition.SEARCHING
-        if paired.live.sum() < 2 or t_s - self._measured_s > LOST_AFTER_S:
+        if np.count_nonzero(paired.live) < 2 or t_s - self._measured_s > LOST_AFTER_S:
             return Condition.LOST
-        return Condition.TRACKING if (knowledge == Knowledge.MEASURED).all() else Condition.PARTIAL
+        return Condition.TRACKING if self._all_measured else Condition.PARTIAL
 
-    def _state(self, t_s: float, paired: Paired, markers: _Markers, hand: SolvedHand, clock: _Stopwatch) -> HandState:
+    def _state(self, t_s: float, paired: Paired, markers: Sheet, hand: SolvedHand, clock: _Stopwatch) -> HandState:
         pixels, flags = self._pairing.last_seen()
         self._sequence += 1
         completed = paired.completed_by
@@ -167,7 +143,7 @@ class ClassicTracker:
             sequence=self._sequence - 1,
             t_master_ns=paired.t_ns,
             t_receive_ns=completed.t_receive_ns,
-            condition=self._condition(t_s, paired, markers.knowledge),
+            condition=self._condition(t_s, paired),
             marker_ids=self._rig.marker_ids,
             marker_positions=markers.positions,
             marker_raw_positions=markers.raw,
@@ -186,21 +162,6 @@ class ClassicTracker:
             epipolar_error_px=markers.errors,
             latency_s={"detect": completed.detect_s, "network": completed.network_s, **clock.laps},
         )
-
-
-class _Markers:
-    """Work sheet of one state: C cameras, M markers."""
-
-    def __init__(self, cameras: int, markers: int) -> None:
-        self.used = np.zeros((cameras, markers), np.bool_)
-        self.doubtful = np.zeros(markers, np.bool_)
-        self.believed = np.zeros(markers, np.bool_)
-        self.restarted = np.zeros(markers, np.bool_)
-        self.raw = np.empty((markers, 3))
-        self.positions = np.empty((markers, 3))
-        self.covariances = np.empty((markers, 3, 3))
-        self.errors = np.empty(markers)
-        self.knowledge = np.full(markers, Knowledge.UNKNOWN, np.uint8)
 
 
 class _Stopwatch:

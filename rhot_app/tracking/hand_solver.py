@@ -5,20 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_ik import solve_fingers
-from rhot_app.hand.kinematics import forward
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.finger_ik import FABRIK_ITERATIONS, TOLERANCE, solve_fingers_arrays
+from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.palm_fit import fit_palm
+from rhot_app.hand.palm_fit import enough_markers, fit_palm, track_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.tracking.state import Knowledge
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 
-# Plain numbers: looking up a member of an enumeration costs a microsecond, and this is done for every finger.
 _INFERRED, _GUESSED = int(Knowledge.INFERRED), int(Knowledge.GUESSED)
+_JOINTS_OF = np.array([(joints.start, joints.stop) for joints in JOINT_SLICES])
+_ANGLES_OF = np.array([(angles.start, angles.stop) for angles in ANGLE_SLICES])
 
 TARGET_SD_M = 1e-3
 """What a located marker is worth at working distance: a nearly stretched finger is not bent to meet noise."""
@@ -64,32 +67,68 @@ class HandSolver:
         """The hand whose wrist and finger markers are at `wrist` (3,) and `tips` (5, 3), m; NaN where unknown."""
         if self.pose is not None and t_s - self._solved_s > FORGET_S:
             self.reset()
-        fit = fit_palm(self._model, wrist, tips, self._palm, t_s - self._solved_s)
-        if fit is not None:
-            fingers = solve_fingers(self._model, fit.pose, tips, target_sd=TARGET_SD_M)
-            self._palm = fit.pose
-            self.pose = HandPose(fit.pose.world_from_palm, fingers.angles)
-            self._solved_s = t_s
-        if self.pose is None:
-            return no_hand()
-        points = forward(self._model, self.pose)
-        joints, angles = _knowledge(wrist_knowledge, tip_knowledge, solved=fit is not None)
-        return SolvedHand(points.joints, joints, points.marker_centres, self.pose.angles, angles,
-                          self.pose.world_from_palm, Knowledge.GUESSED)
+        palm, dt_s = self._palm, t_s - self._solved_s
+        if palm is None:  # a cold start, from many poses: it takes milliseconds, once
+            fit = fit_palm(self._model, wrist, tips, None, 0.0)
+            if fit is None:
+                return no_hand()
+            palm, dt_s = fit.pose, 0.0
+        return self._follow(t_s, wrist, tips, wrist_knowledge, tip_knowledge, palm, dt_s)
+
+    def _follow(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes,
+                palm: HandPose, dt_s: float) -> SolvedHand:
+        """One call of compiled code: between two frames the interpreter's own code and data leave the caches."""
+        model, natural = self._model, self._model.natural
+        last = palm if self.pose is None else self.pose
+        palm_world, palm_angles = palm.world_from_palm.copy(), palm.angles.copy()
+        world, angles = last.world_from_palm.copy(), last.angles.copy()
+        points = np.empty((len(JOINTS) + 5, 3))
+        joints, known = np.empty(len(JOINTS), np.uint8), np.empty(len(ANGLES), np.uint8)
+        solved = follow(model.dh, model.limits, natural.mean, natural.information, model.mirror, model.base,
+                        model.base_rotation, model.chain, wrist, tips, wrist_knowledge, tip_knowledge, dt_s,
+                        self.pose is not None, palm_world, palm_angles, world, angles, points, joints, known)
+        if solved:
+            self._palm, self.pose, self._solved_s = HandPose(palm_world, palm_angles), HandPose(world, angles), t_s
+        return SolvedHand(points[:len(JOINTS)], joints, points[len(JOINTS):], angles, known, world, Knowledge.GUESSED)
 
 
-def _knowledge(wrist: int, tips: Codes, *, solved: bool) -> tuple[Codes, Codes]:
-    """Knowledge of (21,) joints and (21,) angles.
+@njit(cache=True)
+def follow(dh: DhArrays, limits: Array, mean: Array, information: Array, mirror: float, base: Array,
+           base_rotation: Array, chain: Array, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes,
+           dt_s: float, warm: bool, palm_world: Array, palm_angles: Array, world: Array, angles: Array, points: Array,
+           joint_knowledge: Codes, angle_knowledge: Codes) -> bool:
+    """Palm fit, fingers, forward kinematics and knowledge of the next hand; returns whether it was solved.
+
+    `palm_world` (4, 4) and `palm_angles` (21,): the palm fit `dt_s` seconds ago when `warm`, else this instant's,
+    which stays. `world` (4, 4) and `angles` (21,): the last pose, kept when too few markers are known. All four are
+    updated; `points` (26, 3) m, `joint_knowledge` (21,) and `angle_knowledge` (21,) are filled.
+    """
+    solved = not warm
+    if warm and enough_markers(wrist, tips):
+        track_arrays(dh, limits, mean, information, wrist, tips, dt_s, palm_world, palm_angles)
+        solved = True
+    if solved:
+        world[:], angles[:] = palm_world, palm_angles
+        solve_fingers_arrays(angles, world, mirror, base, base_rotation, chain, limits, tips, mean, information,
+                             TOLERANCE, FABRIK_ITERATIONS, TARGET_SD_M, np.empty(5), np.empty(5, np.int64))
+    forward_arrays(dh, world, angles, np.empty((dh.parent.shape[0], 3, 4)), points)
+    _know(wrist_knowledge, tip_knowledge, solved, joint_knowledge, angle_knowledge)
+    return solved
+
+
+@njit(cache=True)
+def _know(wrist: int, tips: Codes, solved: bool, joints: Codes, angles: Codes) -> None:
+    """Fill the knowledge of (21,) joints and (21,) angles.
 
     A finger whose marker was located is inferred from it through the bones, the others keep their last angles: a
     guess. The palm's rotation is always a guess with one wrist marker, and says so itself (`palm_knowledge`).
     """
-    joints = np.full(len(JOINTS), _GUESSED, np.uint8)
-    angles = np.full(len(ANGLES), _GUESSED, np.uint8)
-    if solved:
-        joints[0] = wrist if wrist <= _INFERRED else _GUESSED
-        for finger, known in enumerate(tips):
-            if known <= _INFERRED:
-                joints[JOINT_SLICES[finger]] = _INFERRED
-                angles[ANGLE_SLICES[finger]] = _INFERRED
-    return joints, angles
+    joints[:], angles[:] = _GUESSED, _GUESSED
+    if not solved:
+        return
+    if wrist <= _INFERRED:
+        joints[0] = wrist
+    for finger in range(5):
+        if tips[finger] <= _INFERRED:
+            joints[_JOINTS_OF[finger, 0]:_JOINTS_OF[finger, 1]] = _INFERRED
+            angles[_ANGLES_OF[finger, 0]:_ANGLES_OF[finger, 1]] = _INFERRED

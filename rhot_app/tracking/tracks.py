@@ -20,7 +20,15 @@ LENGTH = 32
 """Samples kept: 0.26 s at 120 fps, more than any camera may lag behind another and still count as live."""
 
 MAX_GAP_NS = 100_000_000
-"""Never interpolate across more: a finger reverses its direction in that time."""
+"""No curve is laid through samples further apart: a finger reverses its direction in that time. A camera that is
+slower than this is interpolated in straight lines, and pays for it with its covariance."""
+
+SLOW_PERIODS = 2.5
+SLOWEST_GAP_NS = 600_000_000
+"""A slow camera's samples are one track over this many of its own frame periods, and never over more ns."""
+
+ACCELERATION_PX = 8_000.0
+"""What a hand's acceleration looks like, standard deviation in px/s^2: 10 m/s^2 at 0.7 m through a 560 px lens."""
 
 DOUBTFUL = int(MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS)
 """Flags of a sample whose centroid may be biased by pixels, or be another blob's."""
@@ -90,13 +98,20 @@ def _nodes(times: Times, flags: Flags, count: int, after: int) -> tuple[int, int
 
 
 @njit(cache=True)
-def interpolate(times: Times, pixels: Array, covariances: Array, flags: Flags, count: int, t_ns: int,
-                pixel: Array, covariance: Array) -> int:
+def longest_gap_ns(period_ns: int) -> int:
+    """The longest gap to be interpolated in the tracks of a camera of this frame period, ns."""
+    return max(MAX_GAP_NS, min(round(SLOW_PERIODS * period_ns), SLOWEST_GAP_NS))
+
+
+@njit(cache=True)
+def interpolate(times: Times, pixels: Array, covariances: Array, flags: Flags, count: int, gap_ns: int,
+                t_ns: int, pixel: Array, covariance: Array) -> int:
     """The position of one track (K, ...) at `t_ns`, by the Lagrange polynomial of up to four neighbouring samples.
 
     A cubic, because a straight line between samples leaves a dt^2 / 8: 2 mm for a hand at 2 m/s and 40 frames/s.
     Writes `pixel` (2,) and `covariance` (2, 2); returns the bracketing samples' flags, or -1 when the instant is not
-    bracketed by samples of one track at most MAX_GAP_NS apart.
+    bracketed by samples of one track at most `gap_ns` apart. Over more than MAX_GAP_NS the line is straight, and the
+    covariance holds what an acceleration bends it by: a u v / 2 at u and v seconds from the two samples.
     """
     after = 0
     while after < count and times[after] < t_ns - _SAME_NS:
@@ -107,7 +122,7 @@ def interpolate(times: Times, pixels: Array, covariances: Array, flags: Flags, c
         pixel[:] = pixels[after]
         covariance[:] = covariances[after]
         return int(flags[after])
-    if after == 0 or times[after] - times[after - 1] > MAX_GAP_NS or flags[after] & _START:
+    if after == 0 or times[after] - times[after - 1] > gap_ns or flags[after] & _START:
         return -1
     first, last = _nodes(times, flags, count, after)
     pixel[:] = 0.0
@@ -119,6 +134,10 @@ def interpolate(times: Times, pixels: Array, covariances: Array, flags: Flags, c
                 weight *= float(t_ns - times[j]) / float(times[k] - times[j])
         pixel += weight * pixels[k]
         covariance += weight * weight * covariances[k]
+    if times[after] - times[after - 1] > MAX_GAP_NS:
+        bend = 0.5e-18 * ACCELERATION_PX * float(t_ns - times[after - 1]) * float(times[after] - t_ns)
+        covariance[0, 0] += bend * bend
+        covariance[1, 1] += bend * bend
     return int(flags[after - 1] | flags[after])
 
 
@@ -157,12 +176,14 @@ def ingest_frame(times: Times, pixels: Array, covariances: Array, flags: Flags, 
 
 @njit(cache=True)
 def interpolate_all(times: Times, pixels: Array, covariances: Array, flags: Flags, counts: NDArray[np.int64],
-                    t_ns: int, out_pixels: Array, out_covariances: Array, out_flags: NDArray[np.int64]) -> None:
-    """`interpolate` for every camera and marker; NaN pixels and flags -1 where the instant is not bracketed."""
+                    gaps_ns: Times, t_ns: int, out_pixels: Array, out_covariances: Array,
+                    out_flags: NDArray[np.int64]) -> None:
+    """`interpolate` for every camera, with its own longest gap (C,), and marker; NaN pixels and flags -1 where the
+    instant is not bracketed."""
     for c in range(counts.shape[0]):
         for m in range(counts.shape[1]):
-            flag = interpolate(times[c, m], pixels[c, m], covariances[c, m], flags[c, m], counts[c, m], t_ns,
-                               out_pixels[c, m], out_covariances[c, m])
+            flag = interpolate(times[c, m], pixels[c, m], covariances[c, m], flags[c, m], counts[c, m], gaps_ns[c],
+                               t_ns, out_pixels[c, m], out_covariances[c, m])
             out_flags[c, m] = flag
             if flag < 0:
                 out_pixels[c, m] = np.nan

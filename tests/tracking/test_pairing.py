@@ -161,3 +161,15 @@ def test_last_seen_is_the_newest_frame_with_what_it_lost():
     assert np.isnan(pixels[0, 0]).all() and flags[0, 0] == LOST
     np.testing.assert_array_equal(pixels[0, 1], POINTS[1] + 1.0)
     np.testing.assert_array_equal(pixels[1], POINTS)
+
+
+@pytest.mark.parametrize("rate_hz", [5.0, 9.0, 60.0])
+def test_cameras_of_any_rate_are_paired(rate_hz):
+    period = 1.0 / rate_hz
+    states = feed(Pairing(2, 2), two_cameras(30, phase=0.4, period=period))
+    assert len(states) == 30
+    for state in states[2:]:
+        assert (state.flags == 0).all() and np.isfinite(state.pixels).all()
+        spread_px = np.sqrt(state.covariances[:, 0, 0, 0])
+        assert spread_px[0] < 0.05  # the instant is this camera's own
+        assert (spread_px[1] > 10.0) == (rate_hz < 10.0)

@@ -20,6 +20,7 @@ class Track:
         self.covariances = np.zeros((length, 2, 2))
         self.flags = np.zeros(length, np.uint16)
         self.count = 0
+        self.period_ms = 25.0
 
     def add(self, t_ms: float, x: float, y: float = 0.0, flag: int = 0, sigma: float = 0.1) -> None:
         self.count = tracks.insert(self.times, self.pixels, self.covariances, self.flags, self.count,
@@ -27,7 +28,8 @@ class Track:
 
     def at(self, t_ms: float):
         pixel, covariance = np.full(2, np.nan), np.full((2, 2), np.nan)
-        flag = tracks.interpolate(self.times, self.pixels, self.covariances, self.flags, self.count, round(t_ms * MS),
+        flag = tracks.interpolate(self.times, self.pixels, self.covariances, self.flags, self.count,
+                                  tracks.longest_gap_ns(round(self.period_ms * MS)), round(t_ms * MS),
                                   pixel, covariance)
         return flag, pixel, covariance
 
@@ -90,6 +92,28 @@ def test_nothing_is_interpolated_over_a_long_gap_or_beyond_the_ends():
     assert track.at(-1.0)[0] == -1
     assert track.at(186.0)[0] == -1
     assert track.at(170.0)[0] == 0
+
+
+@pytest.mark.parametrize(("period_ms", "gap_ms", "tracked"), [
+    (40.0, 100.0, True), (40.0, 101.0, False), (125.0, 312.0, True), (125.0, 313.0, False), (400.0, 599.0, True),
+    (400.0, 601.0, False)])
+def test_a_slow_camera_may_leave_longer_gaps(period_ms, gap_ms, tracked):
+    track = filled((0.0, gap_ms))
+    track.period_ms = period_ms
+    assert (track.at(0.5 * gap_ms)[0] == 0) is tracked
+
+
+def test_over_a_long_gap_the_covariance_holds_what_acceleration_does():
+    acceleration = tracks.ACCELERATION_PX * 1e-6  # px/ms^2
+    track = filled((0.0, 100.0, 300.0), lambda t: 0.5 * acceleration * t**2)
+    track.period_ms = 125.0
+    for t_ms in (100.001, 150.0, 200.0, 299.0):
+        flag, pixel, covariance = track.at(t_ms)
+        missed = pixel[0] - 0.5 * acceleration * t_ms**2
+        assert flag == 0 and missed == pytest.approx(0.5 * acceleration * (t_ms - 100.0) * (300.0 - t_ms), abs=0.01)
+        assert covariance[0, 0] == pytest.approx(missed**2 + 0.01, rel=0.02, abs=0.006)
+        assert covariance[1, 1] == pytest.approx(covariance[0, 0]) and covariance[0, 1] == 0.0
+    assert track.at(50.0)[2][0, 0] < 0.01  # not over a gap that every camera may leave
 
 
 def test_uneven_spacing_falls_back_to_a_line():
