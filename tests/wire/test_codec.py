@@ -9,6 +9,7 @@ import struct
 import timeit
 from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -165,7 +166,7 @@ def test_a_lost_marker_carries_nothing_whatever_the_detector_said() -> None:
     said = MarkerObservation(0, 3.0, math.nan, math.nan, 1.0, 0.0, math.inf, 0.5, MarkerFlag.LOST | MarkerFlag.EDGE)
     message = decode(encode(observations((said,))))
     assert isinstance(message, Observations)
-    assert message.markers == (dataclasses.replace(lost(0), flags=MarkerFlag.LOST | MarkerFlag.EDGE),)
+    assert message.markers == (msgspec.structs.replace(lost(0), flags=MarkerFlag.LOST | MarkerFlag.EDGE),)
 
 
 f32 = st.floats(width=32, allow_nan=False, allow_infinity=False)
@@ -177,7 +178,7 @@ times = st.integers(-(2**62) + 1, 2**62 - 1)
 def markers(draw: st.DrawFn, index: int) -> MarkerObservation:
     flags = MarkerFlag(draw(st.integers(0, 63)))
     if flags & MarkerFlag.LOST:
-        return dataclasses.replace(lost(index), flags=flags)
+        return msgspec.structs.replace(lost(index), flags=flags)
     xx, yy = (draw(st.floats(0.0009765625, 64.0, width=32)) for _ in range(2))
     correlation = draw(st.floats(-0.99, 0.99))
     (xy,) = struct.unpack("<f", struct.pack("<f", correlation * math.sqrt(xx * yy)))
