@@ -95,13 +95,14 @@ class Pipeline:
         frames = [frame for frame in frames if len(frame.pixels) == markers]  # some may be of the rig before
         for k, frame in enumerate(frames, start=1):
             work.tracker.ingest(frame)
-            work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = now_ns
             # Live, only the newest instant matters to anybody; a replay leaves none out.
             if not live or k == len(frames):
                 solved = work.tracker.solve()
                 if solved is not None:
                     self._send(solved, live)
                     state = solved
+        for frame in frames:  # once the state is out: nobody waits for this
+            work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = now_ns
         return state
 
     def _send(self, state: HandState, live: bool) -> None:

@@ -20,6 +20,7 @@ from rhot_app.engine.directory import EngineDirectory, EngineLock, open_director
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.server import Server, StatePublisher
 from rhot_app.project import Rig
+from rhot_app.sources.realtime import hurry_this_thread
 from rhot_app.tracking.make import make_tracker
 
 SWITCH_INTERVAL_S = 1e-4
@@ -72,6 +73,7 @@ def prepare_process() -> None:
 
 
 def _run_pipeline(engine: Engine, ending: threading.Event) -> None:
+    hurry_this_thread()
     collected_s = time.monotonic()
     while not ending.is_set():
         try:

@@ -11,6 +11,7 @@ from queue import Empty, SimpleQueue
 
 from rhot_app.errors import SourceError
 from rhot_app.sources.door import NodeDoor, Verified
+from rhot_app.sources.realtime import hurry_this_thread
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 
@@ -137,5 +138,6 @@ class NodeReceiver:
         self._socket.close()
 
     def _run(self) -> None:
+        hurry_this_thread()
         while not self._ending.is_set():
             self.step()
