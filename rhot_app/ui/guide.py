@@ -20,6 +20,7 @@ PAGES: tuple[tuple[str, str], ...] = (
 
 
 _MARGIN_PX = 16
+_SCROLL_BAR_PX = 24
 
 
 def page_path(name: str) -> Path:
@@ -45,7 +46,7 @@ class PageBrowser(QTextBrowser):
         address = QUrl(url)
         if kind == QTextDocument.ResourceType.ImageResource.value and address.isRelative():
             picture = QImage(str(GUIDE / address.path()))
-            width = round((self.viewport().width() - 2 * _MARGIN_PX) * self.devicePixelRatioF())
+            width = round((self.width() - 2 * _MARGIN_PX - _SCROLL_BAR_PX) * self.devicePixelRatioF())
             if picture.width() > width > 0:
                 picture = picture.scaledToWidth(width, Qt.TransformationMode.SmoothTransformation)
             picture.setDevicePixelRatio(self.devicePixelRatioF())

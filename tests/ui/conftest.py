@@ -91,10 +91,9 @@ def themed(qapp: Any) -> Any:
 
 
 @pytest.fixture(autouse=True)
-def no_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def own_documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Recordings of the tests never land in the user's own folders."""
-    monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.delenv("XDG_DOCUMENTS_DIR", raising=False)
+    monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path))
 
 
 @pytest.fixture

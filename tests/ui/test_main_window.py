@@ -66,12 +66,12 @@ def test_a_focused_button_keeps_its_space_bar(tracking):
     assert pause.isChecked() and tracking.backend.engine.running
 
 
-def test_r_records_and_ends_the_recording(tracking):
+def test_r_records_and_ends_the_recording(tracking, tmp_path):
     engine = tracking.backend.engine
     tracking.press(Qt.Key.Key_R)
     tracking.until(lambda: any(name == "record" for name, _ in engine.commands))
     path = Path(next(args["path"] for name, args in engine.commands if name == "record"))
-    assert path.is_absolute() and path.suffix == ".rhotlog" and path.parent.is_dir()
+    assert path.suffix == ".rhotlog" and path.parent == tmp_path / "RHOT" and path.parent.is_dir()
     engine.log_path = str(path)
     tracking.until(lambda: any(str(path) in text and "120.0 kB" in text for text in tracking.window.advice.texts))
     tracking.press(Qt.Key.Key_R)
@@ -295,3 +295,11 @@ def test_the_window_stays_quick(tracking):
     tracking.window._timer.timeout.disconnect()
     tracking.window._timer.timeout.connect(tick)
     assert sorted(costs)[len(costs) // 2] < 0.05
+
+
+def test_small_values_keep_their_unit(tracking):
+    """The axis says millimetres, so it must not turn to micrometres by itself when values are small."""
+    axis = tracking.window.screen_parts.jitter.plot.getPlotItem().getAxis("left")
+    axis.setRange(0.0, 0.001)
+    tracking.window.set_scheme("dark")
+    assert axis.autoSIPrefixScale == 1.0

@@ -31,7 +31,10 @@ from rhot_app.project import Rig, load_rig, parse_rig
 
 ENGINE_ROLE = "engine"
 TWIN_ROLE = "simulated nodes"
-TWIN_TIMEOUT_S = 60.0
+START_TIMEOUT_S = 180.0
+"""The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
+
+TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.live")
 TWIN_RIG = "simulated.rig.json"
 
 Report = Callable[[str, float], None]
@@ -147,7 +150,7 @@ class Session:
         if not path:
             raise EngineError("The engine had no rig file, so it cannot be started again. Open a rig.")
         report("Starting the engine again …", 0.3)
-        ensure_engine(Path(path), self._place.path, start=start)
+        ensure_engine(Path(path), self._place.path, start=start, timeout_s=START_TIMEOUT_S)
         return self.attach(report)
 
     def twin_alive(self) -> bool:
@@ -180,7 +183,7 @@ class Session:
 
     def _start_engine(self, path: Path, report: Report) -> Opened:
         report("Starting the engine …", 0.5)
-        ensure_engine(path, self._place.path)
+        ensure_engine(path, self._place.path, timeout_s=START_TIMEOUT_S)
         report("Asking the engine for its rig …", 0.9)
         return self.attach(lambda text, fraction: None)
 
@@ -188,7 +191,7 @@ class Session:
         """Start the twin in the background; its ready line goes to a file, so that it outlives this process."""
         rig_path, output = self._place.path / TWIN_RIG, self._place.path / "twin.out"
         errors = self._place.path / "twin.log"
-        command = [sys.executable, "-m", "rhot_app.simulator.live", "--motion", choice.motion,
+        command = [*TWIN_COMMAND, "--motion", choice.motion,
                    "--seed", str(choice.seed), "--preset", choice.preset,
                    "--directory", str(self._place.path), "--rig", str(rig_path)]
         with output.open("wb") as out, errors.open("wb") as log:
@@ -206,7 +209,7 @@ class Session:
 
     def _await_ready(self, process: subprocess.Popen[bytes], output: Path, errors: Path, report: Report) -> None:
         begin = time.monotonic()
-        while time.monotonic() - begin < TWIN_TIMEOUT_S:
+        while time.monotonic() - begin < START_TIMEOUT_S:
             if _has_ready_line(output):
                 return
             if process.poll() is not None:
@@ -215,7 +218,7 @@ class Session:
                                      f"{words[-1] if words else f'they said nothing; see {errors}'}")
             report("Starting two simulated cameras …", 0.15 + 0.3 * min(1.0, (time.monotonic() - begin) / 15.0))
             time.sleep(0.05)
-        raise SimulatorError(f"The simulated cameras were not ready within {TWIN_TIMEOUT_S:.0f} s; see {errors}.")
+        raise SimulatorError(f"The simulated cameras were not ready within {START_TIMEOUT_S:.0f} s; see {errors}.")
 
 
 def _has_ready_line(output: Path) -> bool:

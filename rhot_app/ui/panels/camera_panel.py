@@ -140,6 +140,7 @@ class CameraPanel(QWidget):
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("panel", True)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("guide", "cameras")
         self._scheme = scheme
         self._rig: Rig | None = None

@@ -58,6 +58,7 @@ class HandPanel(QWidget):
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("panel", True)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("guide", "hand")
         self._scheme = scheme
         self.cells: list[AngleCell] = []

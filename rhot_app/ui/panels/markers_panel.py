@@ -46,6 +46,7 @@ class MarkersPanel(QWidget):
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("panel", True)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("guide", "markers")
         self.setToolTip(tip("marker"))
         self._scheme = scheme

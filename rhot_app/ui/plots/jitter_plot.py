@@ -50,6 +50,6 @@ class JitterPlot(PlotPanel):
             rows = np.full((len(seconds), len(self._curves)), np.nan)
         for k, curve in enumerate(self._curves):
             curve.setData(seconds, rows[:, k])
-        self.legend.set_values([(number(newest(rows, k), 2),) for k in range(len(self._curves))])
+        self.legend.set_values([(number(newest(seconds, rows, k), 2),) for k in range(len(self._curves))])
         finite = rows[np.isfinite(rows)]
         self._fit(float(np.percentile(finite, 99)) if len(finite) else float("nan"))

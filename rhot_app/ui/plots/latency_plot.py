@@ -69,6 +69,7 @@ class LatencyPlot(PlotPanel):
         self._whole[0].setData(seconds, p50[:, -1])
         self._whole[1].setData(seconds, p99[:, -1])
         order = [stages, *reversed(range(stages))]
-        self.legend.set_values([(number(newest(p50, k), 2), number(newest(p99, k), 2)) for k in order])
+        self.legend.set_values([(number(newest(seconds, p50, k), 2), number(newest(seconds, p99, k), 2))
+                                for k in order])
         finite = p99[:, -1][np.isfinite(p99[:, -1])]
         self._fit(float(np.percentile(finite, 98)) if len(finite) else float("nan"))

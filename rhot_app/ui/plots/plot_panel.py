@@ -17,6 +17,7 @@ from rhot_app.ui.plots.legend import Legend
 Array = NDArray[np.float64]
 
 SPAN_S = 30.0
+_OLD_S = 1.5  # a figure older than this is not the present one any more
 DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine, Qt.PenStyle.DashDotLine)
 
 
@@ -35,6 +36,7 @@ class PlotPanel(QWidget):
                  parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("panel", True)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("guide", "plots")
         self._scheme = scheme
         self._window: tuple[Array, Array, tuple[str, ...]] = (np.empty(0), np.empty((0, 0)), ())
@@ -92,9 +94,11 @@ class PlotPanel(QWidget):
             axis = item.getAxis(side)
             axis.setPen(pg.mkPen(self._scheme.border))
             axis.setTextPen(pg.mkPen(self._scheme.muted))
-            axis.enableAutoSIPrefix(False)
         item.setLabel("left", self.unit, **style)
         item.setLabel("bottom", "time before now [s]", **style)
+        for side in ("left", "bottom"):  # after the labels, which reset it; switching it off would keep an old scale
+            item.getAxis(side).setSIPrefixEnableRanges(())
+            item.getAxis(side).updateAutoSIPrefix()
         item.getAxis("left").setWidth(48)
 
     def set_scheme(self, scheme: Scheme) -> None:
@@ -157,9 +161,9 @@ class PlotPanel(QWidget):
         QGuiApplication.clipboard().setText(self.csv())
 
 
-def newest(rows: Array, column: int) -> float:
-    """Last value of a column; NaN when there is none."""
-    return float(rows[-1, column]) if len(rows) else float("nan")
+def newest(seconds: Array, rows: Array, column: int) -> float:
+    """Last value of a column; NaN when there is none or it is old."""
+    return float(rows[-1, column]) if len(rows) and seconds[-1] > -_OLD_S else float("nan")
 
 
 def number(value: float, digits: int) -> str:

@@ -57,6 +57,6 @@ class RatePlot(PlotPanel):
         lost = rows[:, -1]
         some = np.isfinite(lost) & (lost > 0)
         self._bars.setOpts(x=seconds[some], height=lost[some], width=0.1)
-        self.legend.set_values([(number(newest(rows, k), 1),) for k in range(len(self._names))])
+        self.legend.set_values([(number(newest(seconds, rows, k), 1),) for k in range(len(self._names))])
         finite = rows[np.isfinite(rows)]
         self._fit(float(finite.max()) if len(finite) else float("nan"))

@@ -1,0 +1,125 @@
+"""The real processes behind the window: started, found again, restarted, and ended with nothing left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from fake_engine import synthetic_rig
+
+from rhot_app.engine.process import running_engine, start_ticks, started_processes
+from rhot_app.errors import EngineError, RigError, SimulatorError
+from rhot_app.project import save_rig
+from rhot_app.ui.backend import session as session_module
+from rhot_app.ui.backend.session import Session, TwinChoice
+
+
+def quiet(text: str, fraction: float) -> None:
+    """Nobody looks."""
+
+
+def wait_until(condition, timeout_s: float = 5.0) -> None:
+    """Wait for something that the system does in its own time."""
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline and not condition():
+        time.sleep(0.02)
+    assert condition()
+
+
+@pytest.fixture
+def session(tmp_path):
+    session = Session(tmp_path / "e")
+    yield session
+    session.close()
+    assert started_processes(session._place) == []
+
+
+@pytest.fixture
+def rig_path(tmp_path):
+    save_rig(tmp_path / "desk.json", synthetic_rig())
+    return tmp_path / "desk.json"
+
+
+def test_an_engine_is_started_found_restarted_and_ended(session, rig_path):
+    opened = session.open_rig(rig_path, quiet)
+    assert (opened.rig.name, opened.ours, opened.simulated, opened.running) == ("test bench", True, False, False)
+    first = running_engine(session.directory)
+    later = Session(session.directory)
+    assert later.found() and later.attach(quiet).ours
+    os.kill(first, signal.SIGKILL)
+    wait_until(lambda: not later.found())
+    assert later.restart_engine(str(rig_path), True, quiet).running
+    second = running_engine(session.directory)
+    assert second not in (None, first)
+    assert later.close() == ""
+    assert not session.found() and start_ticks(second) is None
+
+
+def test_an_engine_started_by_hand_is_left_running(session, rig_path):
+    process = subprocess.Popen([sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path), "--directory",
+                                str(session.directory), "--json"], stdout=subprocess.PIPE)
+    try:
+        assert process.stdout is not None and process.stdout.readline()
+        assert not session.attach(quiet).ours
+        with pytest.raises(EngineError, match="started by hand"):
+            session.open_rig(rig_path, quiet)
+        assert "goes on running" in session.close()
+        assert process.poll() is None
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def test_a_missing_rig_starts_nothing(session, tmp_path):
+    with pytest.raises(RigError, match="no such file"):
+        session.open_rig(tmp_path / "none.json", quiet)
+    assert not session.found()
+
+
+STAND_IN = """
+import pathlib, shutil, sys, time
+arguments = dict(zip(sys.argv[2::2], sys.argv[3::2]))
+assert arguments["--motion"] in ("rest", "slow"), "there is no such motion"
+shutil.copy(sys.argv[1], arguments["--rig"])
+time.sleep(30.0 if arguments["--motion"] == "slow" else 0.2)
+print('{"nodes": ["left", "right"]}', flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.fixture
+def stand_in(tmp_path, rig_path, monkeypatch):
+    """A program in the twin's place that does nothing but be there; the real one has its own end-to-end test."""
+    script = tmp_path / "twin.py"
+    script.write_text(STAND_IN)
+    monkeypatch.setattr(session_module, "TWIN_COMMAND", (sys.executable, str(script), str(rig_path)))
+
+
+def test_simulated_nodes_are_started_watched_and_ended(session, stand_in):
+    opened = session.open_twin(TwinChoice(motion="rest"), quiet)
+    assert opened.simulated and opened.ours and session.twin_alive()
+    assert {process.role for process in started_processes(session._place)} == {"engine", session_module.TWIN_ROLE}
+    twin = next(process for process in started_processes(session._place) if process.role == session_module.TWIN_ROLE)
+    os.kill(twin.pid, signal.SIGKILL)
+    wait_until(lambda: not session.twin_alive())
+
+
+def test_a_twin_that_cannot_start_says_why(session, stand_in):
+    with pytest.raises(SimulatorError, match=r"did not start.*no such motion"):
+        session.open_twin(TwinChoice(motion="no_such_motion"), quiet)
+    assert not session.found() and session.twin_alive()
+
+
+def test_a_cancelled_start_leaves_nothing(session, stand_in):
+    def stop_soon(text: str, fraction: float) -> None:
+        if fraction > 0.16:
+            raise RigError("cancelled by the test")
+
+    with pytest.raises(RigError):
+        session.open_twin(TwinChoice(motion="slow"), stop_soon)
+    assert started_processes(session._place) == [] and not Path(session.directory / "session.json").exists()
