@@ -39,6 +39,9 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     """
     choose_gl_platform()
     cap_software_gl()
+    from rhot_app.ui.job import workers
+
+    workers()
     give_way()
     from PySide6.QtCore import Qt, QTimer
     from PySide6.QtWidgets import QApplication

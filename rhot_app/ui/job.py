@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+import logging
+import queue
 import threading
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -11,9 +14,38 @@ from PySide6.QtCore import QObject, Qt, Signal
 from rhot_app.errors import RhotError
 from rhot_node.errors import NodeError
 
+log = logging.getLogger(__name__)
+
 
 class CancelledError(RhotError):
     """The job was cancelled by the person at the screen."""
+
+
+class Workers:
+    """A few threads that wait for work. Made before the window gives way (`environment.give_way`): on Linux each thread
+    has a niceness of its own and hands it down, and the engine that a job starts must not be as nice as the window."""
+
+    def __init__(self, count: int = 6) -> None:
+        self._waiting: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        for number in range(count):
+            threading.Thread(target=self._run, name=f"worker {number}", daemon=True).start()
+
+    def submit(self, work: Callable[[], None]) -> None:
+        """Have the next free thread do `work`."""
+        self._waiting.put(work)
+
+    def _run(self) -> None:
+        while True:
+            try:
+                self._waiting.get()()
+            except Exception:
+                log.exception("a job failed")
+
+
+@functools.cache
+def workers() -> Workers:
+    """The app's own threads, made at the first call."""
+    return Workers()
 
 
 class Progress:
@@ -40,10 +72,10 @@ class Progress:
 
 
 class Job(QObject):
-    """Runs `op(progress)` in a thread of its own; `done(result)` or `failed(sentence)` follow in the window's thread.
+    """Runs `op(progress)` in a worker's thread; `done(result)` or `failed(sentence)` follow in the window's thread.
 
     Exactly one of the two is called, except after `cancel`: then neither is. An error that is not one of ours is
-    shown as a sentence too, with its kind, and is raised in the worker's thread for the log.
+    shown as a sentence too, with its kind, and logged whole.
     """
 
     _reported = Signal(str, float)
@@ -62,12 +94,12 @@ class Job(QObject):
         self._broke.connect(self._on_failed, queued)
         self._reported.connect(self._on_progress, queued)
         self._stopped.connect(self._on_stopped, queued)
-        self._thread = threading.Thread(target=self._run, name="job", daemon=True)
+        self._ended = threading.Event()
 
     def start(self) -> Job:
         """Begin; returns itself."""
         Job._under_way.add(self)
-        self._thread.start()
+        workers().submit(self._run)
         return self
 
     def cancel(self) -> None:
@@ -75,14 +107,13 @@ class Job(QObject):
         self.progress.cancel()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for the thread's end, at most `timeout_s`; whether it has ended."""
-        self._thread.join(timeout_s)
-        return not self._thread.is_alive()
+        """Wait for the end of `op`, at most `timeout_s`; whether it has ended."""
+        return self._ended.wait(timeout_s)
 
     @property
     def running(self) -> bool:
-        """Whether `op` still runs."""
-        return self._thread.is_alive()
+        """Whether `op` has not ended yet."""
+        return not self._ended.is_set()
 
     def _run(self) -> None:
         try:
@@ -97,6 +128,7 @@ class Job(QObject):
         else:
             self._finished.emit(result)
         finally:
+            self._ended.set()
             self._stopped.emit()
 
     def _on_stopped(self) -> None:

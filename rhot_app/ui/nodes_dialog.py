@@ -88,6 +88,7 @@ class NodesDialog(QDialog):
         host.textChanged.connect(self._forget_answers)
         port.setRange(1, 65535)
         port.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
+        port.setPrefix("port ")
         port.setValue(CONTROL_PORT)
         port.setToolTip("The node's control port; 47801 unless its settings say otherwise.")
         port.setAccessibleName(f"Control port of the {side} node")

@@ -63,7 +63,7 @@ def style_sheet(s: Scheme) -> str:
     QToolTip {{ background: {s.raised}; color: {s.text}; border: 1px solid {s.border}; padding: 4px 8px; }}
     QMainWindow::separator {{ background: {s.window}; width: 6px; height: 6px; }}
     QMainWindow::separator:hover {{ background: {s.accent}; }}
-    #advicebar {{ border-top: 1px solid {s.border}; border-bottom: none; padding: 0; }}
+    #advicebar {{ border-top: 1px solid {s.border}; border-bottom: none; padding: 1px 0 0 0; }}
     QToolBar {{ background: {s.panel}; border: none; border-bottom: 1px solid {s.border}; padding: 4px 8px;
         spacing: 4px; }}
     QToolBar QToolButton {{ padding: 6px 12px; border: 1px solid transparent; border-radius: 6px; }}
@@ -96,9 +96,9 @@ def style_sheet(s: Scheme) -> str:
     QTableView {{ background: {s.panel}; border: none; gridline-color: {s.border}; }}
     QHeaderView::section {{ background: {s.panel}; color: {s.muted}; border: none; padding: 2px 4px; }}
     QStatusBar {{ background: {s.panel}; border-top: 1px solid {s.border}; }}
-    QLineEdit, QSpinBox, QComboBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
+    QLineEdit, QComboBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
         padding: 4px 8px; min-height: 20px; }}
-    QLineEdit:focus, QSpinBox:focus, QComboBox:focus {{ border-color: {s.accent}; }}
+    QLineEdit:focus, QComboBox:focus {{ border-color: {s.accent}; }}
     QProgressBar {{ border: 1px solid {s.border}; border-radius: 4px; background: {s.panel}; height: 8px; }}
     QProgressBar::chunk {{ background: {s.accent}; border-radius: 3px; }}
     """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -38,14 +40,14 @@ def test_our_errors_are_told_as_they_are(qtbot, heard):
     assert heard == [("failed", "desk.json: no such file.")]
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
-def test_a_programming_mistake_is_a_sentence_too(qtbot, heard):
+def test_a_programming_mistake_is_a_sentence_too_and_logged(qtbot, heard, caplog):
     def op(progress):
         return 1 // 0
 
     Job(op, heard.append, heard.append).start()
     qtbot.waitUntil(lambda: bool(heard))
     assert "ZeroDivisionError" in heard[0] and heard[0].endswith("Please report it.")
+    qtbot.waitUntil(lambda: "a job failed" in caplog.text)
 
 
 def test_a_cancelled_job_is_silent(qtbot, heard):
@@ -61,3 +63,23 @@ def test_a_cancelled_job_is_silent(qtbot, heard):
     assert job.wait(5.0)
     qtbot.wait(50)
     assert heard == [] and not job.running
+
+
+def test_what_a_job_starts_is_not_as_nice_as_the_window():
+    """In a process of its own, because niceness cannot be taken back."""
+    program = """
+import os, subprocess, sys, threading
+from rhot_app.ui.environment import NICENESS, give_way
+from rhot_app.ui.job import workers
+before = os.getpriority(os.PRIO_PROCESS, 0)
+workers()
+give_way()
+assert os.getpriority(os.PRIO_PROCESS, 0) == min(before + NICENESS, 19)
+done = threading.Event()
+def start():
+    print(int(subprocess.check_output([sys.executable, "-c", "import os; print(os.nice(0))"])) - before)
+    done.set()
+workers().submit(start)
+assert done.wait(20)
+"""
+    assert subprocess.check_output([sys.executable, "-c", program], text=True).strip() == "0"

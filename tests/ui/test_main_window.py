@@ -291,7 +291,7 @@ def test_the_window_stays_quick(tracking):
 
     tracking.window._timer.timeout.disconnect()
     tracking.window._timer.timeout.connect(timed)
-    tracking.run(2.0)
+    tracking.run(1.0)
     tracking.window._timer.timeout.disconnect()
     tracking.window._timer.timeout.connect(tick)
     assert sorted(costs)[len(costs) // 2] < 0.05

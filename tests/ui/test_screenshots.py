@@ -56,7 +56,7 @@ def shown(tracking):
     tracking.window.set_scheme("dark")
     tracking.window.screen_parts.scene.reset_view()
     tracking.window.docks.arrange()
-    tracking.run(1.0)
+    tracking.run(0.4)
     return tracking
 
 
