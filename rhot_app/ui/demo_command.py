@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from rhot_app.errors import SimulatorError
 from rhot_app.ui.app import add_window_arguments, open_window
@@ -14,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot demo``."""
     names = ", ".join(info.name for info in shipped_motions())
     parser.add_argument("--motion", default=TwinChoice().motion, metavar="M",
-                        help=f"what the hand does: {names} (default {TwinChoice().motion})")
+                        help=f"what the hand does: {names}, or a motion file (default {TwinChoice().motion})")
     parser.add_argument("--seed", type=int, default=TwinChoice().seed, metavar="N",
                         help=f"seed of noise, clocks and cloth (default {TwinChoice().seed})")
     add_window_arguments(parser)
@@ -23,6 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Open the window; raises SimulatorError for a motion that there is not."""
     names = [info.name for info in shipped_motions()]
-    if args.motion not in names:
-        raise SimulatorError(f"There is no motion {args.motion!r}; there are {', '.join(names)}.")
-    return open_window(args, rig=None, twin=TwinChoice(motion=args.motion, seed=args.seed))
+    motion = args.motion
+    if motion not in names:
+        if not Path(motion).exists():
+            raise SimulatorError(f"There is no motion {motion!r}; there are {', '.join(names)}, and motion files.")
+        motion = str(Path(motion).absolute())
+    return open_window(args, rig=None, twin=TwinChoice(motion=motion, seed=args.seed))

@@ -157,7 +157,8 @@ class MainWindow(QMainWindow):
 
     def open_twin(self, choice: TwinChoice) -> None:
         """Start the simulated rig and the tracking."""
-        self.settings.motion = choice.motion
+        if self.welcome.motion_box.findData(choice.motion) >= 0:
+            self.settings.motion = choice.motion
         self.controller.open_twin(choice)
 
     def choose_rig(self) -> None:

@@ -76,7 +76,7 @@ class Screen:
         """Draw what is due: the scene as often as it can, pictures when they come, panels and plots a few times a
         second."""
         self._refresh_scene(live, now_s)
-        if live.preview_count != self._drawn_preview and self.cameras.isVisible():
+        if self.cameras.isVisible() and (live.preview_count != self._drawn_preview or now_s >= self._next_panels):
             self._drawn_preview = live.preview_count
             self.cameras.refresh(live)
         if now_s >= self._next_panels:

@@ -145,6 +145,7 @@ class CameraPanel(QWidget):
         self._scheme = scheme
         self._rig: Rig | None = None
         self._shown: dict[str, int] = {}
+        self._unmarked: set[str] = set()
         self.views: dict[str, CameraView] = {}
         self.empty = EmptyState("Pictures appear here once a rig is open and its nodes answer.")
         self._layout = QBoxLayout(QBoxLayout.Direction.TopToBottom, self)
@@ -165,6 +166,7 @@ class CameraPanel(QWidget):
             view.deleteLater()
         self.views = {node.name: CameraView(node.name, self._scheme) for node in (rig.nodes if rig else ())}
         self._shown = {}
+        self._unmarked = set()
         for view in self.views.values():
             self._layout.addWidget(view, 1)
         self.empty.setVisible(rig is None)
@@ -179,19 +181,28 @@ class CameraPanel(QWidget):
         super().resizeEvent(event)
 
     def refresh(self, live: Live) -> None:
-        """Show new previews with the marks that belong to their instant."""
+        """Show new previews, and the marks that belong to their instant as soon as a state of that instant is there."""
         if self._rig is None:
             return
-        markers = self._rig.markers
-        colours = [visible_on(hex_of(marker.display_rgb), "#000000", 3.0) for marker in markers.markers]
         for camera, (name, view) in enumerate(self.views.items()):
             preview = live.previews.get(name)
-            if preview is None or self._shown.get(name) == preview.t_master_ns:
+            if preview is None:
                 continue
-            self._shown[name] = preview.t_master_ns
-            view.show_preview(preview)
-            sight = live.sight_at(preview.t_master_ns)
-            if sight is None or len(sight[0]) <= camera or sight[0].shape[1] != len(markers.ids):
+            if self._shown.get(name) != preview.t_master_ns:
+                self._shown[name] = preview.t_master_ns
+                self._unmarked.add(name)
+                view.show_preview(preview)
                 view.clear_marks()
-            else:
-                view.show_marks(sight[0][camera], sight[1][camera], markers.ids, colours)
+            if name in self._unmarked:
+                self._mark(view, camera, preview, live)
+
+    def _mark(self, view: CameraView, camera: int, preview: Preview, live: Live) -> None:
+        assert self._rig is not None
+        markers = self._rig.markers
+        sight = live.sight_at(preview.t_master_ns)
+        if sight is None or len(sight[0]) <= camera or sight[0].shape[1] != len(markers.ids):
+            return
+        colours = [visible_on(hex_of(marker.display_rgb), "#000000", 3.0) for marker in markers.markers]
+        view.show_marks(sight[0][camera], sight[1][camera], markers.ids, colours)
+        if live.state is not None and live.state.t_master_ns >= preview.t_master_ns:
+            self._unmarked.discard(view.name)

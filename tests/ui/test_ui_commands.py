@@ -1,0 +1,52 @@
+"""The two commands that open the window: what they accept, what they refuse."""
+
+from __future__ import annotations
+
+import pytest
+
+from rhot_app.__main__ import main
+from rhot_app.ui import app, demo_command
+from rhot_app.ui.backend.session import TwinChoice
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    calls = []
+
+    def open_window(args, *, rig, twin):
+        calls.append((rig, twin))
+        return 0
+
+    monkeypatch.setattr(app, "open_window", open_window)
+    monkeypatch.setattr(demo_command, "open_window", open_window)
+    return calls
+
+
+def test_the_demo_takes_a_motion_and_a_seed(opened):
+    assert main(["demo", "--motion", "pinch", "--seed", "7"]) == 0
+    assert opened == [(None, TwinChoice(motion="pinch", seed=7))]
+
+
+def test_the_demo_takes_a_motion_file(opened, tmp_path):
+    path = tmp_path / "mine.json"
+    path.write_text("{}")
+    assert main(["demo", "--motion", str(path)]) == 0
+    assert opened[0][1].motion == str(path)
+
+
+def test_a_motion_that_is_not_there_is_named(opened, capsys):
+    assert main(["demo", "--motion", "juggle"]) == 2
+    assert "no motion 'juggle'" in capsys.readouterr().err and opened == []
+
+
+def test_the_app_opens_a_rig_or_the_first_page(opened, tmp_path):
+    assert main(["--rig", str(tmp_path / "desk.json")]) == 0
+    assert main([]) == 0
+    assert opened == [(tmp_path / "desk.json", None), (None, None)]
+
+
+def test_a_directory_that_others_can_read_is_refused(tmp_path, capsys):
+    shared = tmp_path / "shared"
+    shared.mkdir(mode=0o755)
+    assert main(["--directory", str(shared)]) == 2
+    assert "open to other users" in capsys.readouterr().err
