@@ -17,6 +17,7 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.simulator.film import make_renderer, make_shot
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.tracking.make import make_tracker
+from rhot_node.compiled import mark_complete
 from rhot_node.detect.fast import FastDetector
 from rhot_node.files import resource_path
 from rhot_node.warm_up import warm_up as rehearse_detector
@@ -54,6 +55,7 @@ def main() -> int:
     with ProcessPoolExecutor(min(len(STEPS), os.cpu_count() or 1), get_context("spawn")) as pool:
         for line in pool.map(warm, STEPS):
             print(line, flush=True)
+    mark_complete()
     return 0
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 VARIABLE = "NUMBA_CACHE_DIR"
 _KEPT = 3  # states of the sources: today's, and those of a checkout or two beside it
 _PACKAGES = ("rhot_node", "rhot_app")
+_COMPLETE = "complete"
 
 
 def sources_hash(folders: Sequence[Path]) -> str:
@@ -46,6 +47,17 @@ def use_own_cache() -> None:
     except OSError:  # no home, or a read-only one: numba then keeps to its own rules
         return
     os.environ[VARIABLE] = str(folder)
+
+
+def is_complete() -> bool:
+    """Whether everything has been compiled for the present sources (`mark_complete`)."""
+    return VARIABLE in os.environ and (Path(os.environ[VARIABLE]) / _COMPLETE).exists()
+
+
+def mark_complete() -> None:
+    """Note that everything has been compiled for the present sources. Raises OSError."""
+    if VARIABLE in os.environ:
+        (Path(os.environ[VARIABLE]) / _COMPLETE).touch()
 
 
 def _forget_old(base: Path) -> None:

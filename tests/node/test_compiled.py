@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rhot_node.compiled import VARIABLE, sources_hash
+from rhot_node.compiled import VARIABLE, is_complete, mark_complete, sources_hash
 
 
 @pytest.fixture
@@ -55,3 +55,15 @@ def test_the_environment_decides_and_a_missing_home_is_no_obstacle(tmp_path: Pat
     assert start(tmp_path, **{VARIABLE: "/elsewhere"}) == "/elsewhere"
     (tmp_path / "file").write_text("")
     assert start(tmp_path / "file") == ""
+
+
+def test_complete_belongs_to_one_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    assert not is_complete()
+    mark_complete()
+    assert is_complete()
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "next"))
+    assert not is_complete()
+    monkeypatch.delenv(VARIABLE)
+    assert not is_complete()
+    mark_complete()
