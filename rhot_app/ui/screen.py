@@ -45,8 +45,8 @@ class Screen:
             self.plots.addWidget(plot)
         self.plots.setSizes([100, 122, 94])
         self.plots.setChildrenCollapsible(False)
-        self._pacer = FramePacer()
-        self.scene.frameSwapped.connect(lambda: self._pacer.end(time.monotonic()))
+        self.pacer = FramePacer()
+        self.scene.frameSwapped.connect(lambda: self.pacer.end(time.monotonic()))
         self._drawn_state = self._drawn_preview = -1
         self._next_panels = self._next_plots = 0.0
         self._state_seen_at = 0.0
@@ -90,13 +90,13 @@ class Screen:
             self.rate.refresh(live.rates, now_ns)
 
     def _refresh_scene(self, live: Live, now_s: float) -> None:
-        self._pacer.give_up(now_s)
+        self.pacer.give_up(now_s)
         if live.state is not None and live.state_count != self._counted:
             self._counted = live.state_count
             self._state_seen_at = now_s
         if self._state_seen_at > 0.0 and live.state_count != self._drawn_state:
-            if self.scene.isVisible() and self._pacer.due(now_s):
-                self._pacer.begin(now_s)
+            if self.scene.isVisible() and self.pacer.due(now_s):
+                self.pacer.begin(now_s)
                 self._drawn_state = live.state_count
                 self.scene.show_state(live.state)
         elif self._state_seen_at > 0.0 and now_s - self._state_seen_at > STALE_S:
@@ -115,4 +115,4 @@ class Screen:
     @property
     def frame_cost_s(self) -> float:
         """What one drawing of the scene costs, s."""
-        return self._pacer.cost_s
+        return self.pacer.cost_s

@@ -16,13 +16,15 @@ choose_gl_platform()
 cap_software_gl()
 
 from PySide6.QtCore import QCoreApplication, QPoint, Qt  # after the OpenGL platform was chosen  # noqa: E402
+from PySide6.QtGui import QPalette  # noqa: E402
 from PySide6.QtTest import QTest  # noqa: E402
-from PySide6.QtWidgets import QWidget  # noqa: E402
+from PySide6.QtWidgets import QApplication, QWidget  # noqa: E402
 
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
 from rhot_app.ui.controller import Controller  # noqa: E402
 from rhot_app.ui.main_window import MainWindow  # noqa: E402
+from rhot_app.ui.models.pacing import FramePacer  # noqa: E402
 from rhot_app.ui.scene.surface import choose_format  # noqa: E402
 from rhot_app.ui.settings import Settings  # noqa: E402
 from rhot_app.ui.theme import apply_theme, scheme_named  # noqa: E402
@@ -37,7 +39,9 @@ class Bench:
         settings.scheme = scheme
         self.controller = Controller(self.backend, self.backend.client)
         self.window = MainWindow(self.controller, settings)
-        self.window.set_scheme(scheme)
+        if QApplication.palette().color(QPalette.ColorRole.Window).name() != scheme_named(scheme).window:
+            self.window.set_scheme(scheme)
+        self.window.screen_parts.pacer = FramePacer(most_hz=4.0)  # software OpenGL is slow, and few tests look at it
         self.window.show()
         self.window.activateWindow()
         assert QTest.qWaitForWindowActive(self.window)

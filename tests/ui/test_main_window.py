@@ -8,7 +8,6 @@ from pathlib import Path
 from fake_backend import FakeBackend
 from fake_engine import FakeEngine, synthetic_rig
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog
 
 from rhot_app.engine.status import Advice
@@ -215,34 +214,6 @@ def test_closing_the_rig_ends_everything_and_returns_to_the_first_page(tracking)
     assert tracking.window.toolbar.badge.word == "NO RIG"
 
 
-def test_a_plot_pauses_resets_and_copies(tracking):
-    plot = tracking.window.screen_parts.jitter
-    tracking.until(lambda: len(plot.csv().splitlines()) > 12)
-    tracking.click(plot.pause_button)
-    standing = plot.csv()
-    tracking.run(0.7)
-    assert plot.csv() == standing
-    tracking.click(plot.copy_button)
-    lines = QGuiApplication.clipboard().text().splitlines()
-    names = ("thumb", "index", "middle", "ring", "little", "wrist")
-    assert lines[0] == ",".join(["time [s]", *(f"{name} [mm rms]" for name in names)])
-    assert lines == standing.splitlines() and float(lines[-1].split(",")[1]) > 0.1
-    tracking.click(plot.reset_button)
-    assert not plot.paused
-    tracking.until(lambda: 1 < len(plot.csv().splitlines()) < 8)
-
-
-def test_every_plot_has_names_units_and_values(tracking):
-    parts = tracking.window.screen_parts
-    tracking.until(lambda: all(any(value[0] not in ("", "–") for value in plot.legend.values)
-                               for plot in (parts.jitter, parts.latency, parts.rate)))
-    for plot in (parts.jitter, parts.latency, parts.rate):
-        item = plot.plot.getPlotItem()
-        assert item.getAxis("left").labelText == plot.unit and "[s]" in item.getAxis("bottom").labelText
-    assert [entry.name for entry in parts.rate.legend.entries] == ["states", "left", "right", "lost /s"]
-    assert parts.latency.legend.entries[-1].name == "detect"
-
-
 def test_layout_and_look_are_remembered_and_can_be_reset(make_bench):
     bench = make_bench()
     bench.click(bench.window.welcome.twin_button)
@@ -295,11 +266,3 @@ def test_the_window_stays_quick(tracking):
     tracking.window._timer.timeout.disconnect()
     tracking.window._timer.timeout.connect(tick)
     assert sorted(costs)[len(costs) // 2] < 0.05
-
-
-def test_small_values_keep_their_unit(tracking):
-    """The axis says millimetres, so it must not turn to micrometres by itself when values are small."""
-    axis = tracking.window.screen_parts.jitter.plot.getPlotItem().getAxis("left")
-    axis.setRange(0.0, 0.001)
-    tracking.window.set_scheme("dark")
-    assert axis.autoSIPrefixScale == 1.0

@@ -1,0 +1,41 @@
+"""The plots as a person uses them: paused, begun anew, copied, read."""
+
+from __future__ import annotations
+
+from PySide6.QtGui import QGuiApplication
+
+
+def test_a_plot_pauses_resets_and_copies(tracking):
+    plot = tracking.window.screen_parts.jitter
+    tracking.until(lambda: len(plot.csv().splitlines()) > 12)
+    tracking.click(plot.pause_button)
+    standing = plot.csv()
+    tracking.run(0.7)
+    assert plot.csv() == standing
+    tracking.click(plot.copy_button)
+    lines = QGuiApplication.clipboard().text().splitlines()
+    names = ("thumb", "index", "middle", "ring", "little", "wrist")
+    assert lines[0] == ",".join(["time [s]", *(f"{name} [mm rms]" for name in names)])
+    assert lines == standing.splitlines() and float(lines[-1].split(",")[1]) > 0.1
+    tracking.click(plot.reset_button)
+    assert not plot.paused
+    tracking.until(lambda: 1 < len(plot.csv().splitlines()) < 8)
+
+
+def test_every_plot_has_names_units_and_values(tracking):
+    parts = tracking.window.screen_parts
+    tracking.until(lambda: all(any(value[0] not in ("", "–") for value in plot.legend.values)
+                               for plot in (parts.jitter, parts.latency, parts.rate)))
+    for plot in (parts.jitter, parts.latency, parts.rate):
+        item = plot.plot.getPlotItem()
+        assert item.getAxis("left").labelText == plot.unit and "[s]" in item.getAxis("bottom").labelText
+    assert [entry.name for entry in parts.rate.legend.entries] == ["states", "left", "right", "lost /s"]
+    assert parts.latency.legend.entries[-1].name == "detect"
+
+
+def test_small_values_keep_their_unit(tracking):
+    """The axis says millimetres, so it must not turn to micrometres by itself when values are small."""
+    axis = tracking.window.screen_parts.jitter.plot.getPlotItem().getAxis("left")
+    axis.setRange(0.0, 0.001)
+    tracking.window.set_scheme("dark")
+    assert axis.autoSIPrefixScale == 1.0
