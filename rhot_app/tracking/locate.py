@@ -20,6 +20,10 @@ GATE_FLOOR_PX = 2.5
 """A reprojection error below this (rms over cameras; half the epipolar distance of a pair) is never an outlier:
 calibrations drift that far before anybody notices."""
 
+DOUBT_PX = 1.0
+"""Rays that miss each other by more (rms over cameras) are no outlier yet, but something is hidden in one view or the
+calibration has drifted: such a place is inferred, not measured."""
+
 GATE_SIGMAS = 6.0
 
 

@@ -55,6 +55,7 @@ def locate_raw(t_s: float, flags: NDArray[np.int64], live: Mask, pixels: Array, 
     locate.locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, raw, raw_covariances, errors)
     trust.judge(t_s, raw, raw_covariances, memory, believed, restarted)
     for m in range(raw.shape[0]):
+        doubtful[m] |= errors[m] > locate.DOUBT_PX
         if not believed[m]:
             raw[m] = math.nan
             used[:, m] = False

@@ -98,6 +98,17 @@ def test_rays_that_miss_each_other_are_not_measured():
     assert all(s.marker_knowledge[3] != MEASURED for s in states if seconds(s) > 0.53)
 
 
+def test_rays_that_nearly_meet_are_inferred():
+    """A marker hidden so slowly that no node noticed: its views disagree by more than calibrations do."""
+    def shift(t, camera, pixels, _flags):
+        if camera == 1 and t > 0.5:
+            pixels[3, 1] += 3.0
+
+    last = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.0, Sight()), shift))[-1]
+    assert last.marker_knowledge[3] == INFERRED
+    assert (np.delete(last.marker_knowledge, 3) == MEASURED).all()
+
+
 def test_one_wrong_camera_of_three_is_given_up():
     def shift(_t, camera, pixels, _flags):
         if camera == 2:
