@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import sys
 from pathlib import Path
 
 from rhot_app.engine.command import add_serving_arguments
@@ -42,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
     with serving(rig, rig_path, lambda rig: LogReplay(args.path, rig, args.speed), args.directory) as (
             engine, server, _):
         engine.start()
+        print(f"replaying {args.path} for clients (the app, or EngineClient); it stays after the log's end. "
+              "Ctrl+C ends it. For a summary: --json", file=sys.stderr, flush=True)
         server.run()
     return 0
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from rhot_app.engine.directory import default_directory
+from rhot_app.project import load_rig
 from rhot_app.ui.backend.session import Session, TwinChoice
 from rhot_app.ui.environment import cap_software_gl, choose_gl_platform, give_way
 
@@ -28,7 +29,9 @@ def add_window_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Open the window and return its exit code when it is closed."""
+    """Open the window and return its exit code when it is closed. Raises RigError before there is a window."""
+    if args.rig is not None:
+        load_rig(args.rig)
     return open_window(args, rig=args.rig, twin=None)
 
 
