@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rhot_app.__main__ import main
+from rhot_node.files import resource_path
 from rhot_app.ui import app, demo_command
 from rhot_app.ui.backend.session import TwinChoice
 
@@ -40,9 +41,15 @@ def test_a_motion_that_is_not_there_is_named(opened, capsys):
 
 
 def test_the_app_opens_a_rig_or_the_first_page(opened, tmp_path):
-    assert main(["--rig", str(tmp_path / "desk.json")]) == 0
+    rig = resource_path("rigs", "two_pis.json")
+    assert main(["--rig", str(rig)]) == 0
     assert main([]) == 0
-    assert opened == [(tmp_path / "desk.json", None), (None, None)]
+    assert opened == [(rig, None), (None, None)]
+
+
+def test_a_rig_that_is_not_there_opens_no_window(opened, tmp_path, capsys):
+    assert main(["--rig", str(tmp_path / "desk.json")]) == 2
+    assert "desk.json: no such file" in capsys.readouterr().err and opened == []
 
 
 def test_a_directory_that_others_can_read_is_refused(tmp_path, capsys):
