@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_node.files import resource_path
 from rhot_app.ui import app, demo_command
 from rhot_app.ui.backend.session import TwinChoice
+from rhot_node.files import resource_path
 
 
 @pytest.fixture
