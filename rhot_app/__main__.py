@@ -29,6 +29,7 @@ SUBCOMMANDS = {
     "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
+    "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
     "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "play a simulated run and compare with its truth"),
 }
 

@@ -23,3 +23,7 @@ class SimulatorError(RhotError):
 
 class EngineError(RhotError):
     """The engine cannot be started, reached, or refused a command."""
+
+
+class CalibrationError(RhotError):
+    """A calibration cannot begin or end: its input is missing, unreadable, or does not determine the answer."""

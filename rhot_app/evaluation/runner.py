@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 from rhot_app.evaluation.report import figures_of
 from rhot_app.evaluation.trial import run_trial
+from rhot_app.progress import ProgressLine
 from rhot_app.simulator.film import film, make_shot, read_shot
-from rhot_app.simulator.progress import ProgressLine
 from rhot_app.simulator.scene import Scene
 
 Detector = Literal["fast", "reference"]

@@ -54,8 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Render; Ctrl-C leaves nothing half-written."""
+    from rhot_app.progress import ProgressLine
     from rhot_app.simulator.film import film, make_shot
-    from rhot_app.simulator.progress import ProgressLine
 
     began = time.monotonic()
     shot = make_shot(scene_of(args), args.motion, args.seconds, frozenset(args.hide))

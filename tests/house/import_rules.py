@@ -10,7 +10,8 @@ from pathlib import Path
 # What a room may import of this project, besides itself. A name stands for everything beneath it. The longest matching
 # name decides, so a row for one file (rhot_node.markers) overrides the row of its package.
 NODE_BASE = ("rhot_node.errors", "rhot_node.files", "rhot_node.clock", "rhot_node.markers", "resources")
-APP_BASE = ("rhot_node", "resources", "rhot_app.errors", "rhot_app.project")
+APP_BASE = ("rhot_node", "resources", "rhot_app.errors", "rhot_app.progress", "rhot_app.project",
+            "rhot_app.rig_history")
 MODELS = ("rhot_app.geometry", "rhot_app.filters")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects", "rhot_app.barehand")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
@@ -27,6 +28,8 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_node": ("rhot_node", "resources"),
     # the app, from the bottom up
     "rhot_app.errors": (),
+    "rhot_app.progress": (),
+    "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project"),
     "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy"),
     "rhot_app.geometry": APP_BASE,
     "rhot_app.filters": APP_BASE,

@@ -1,12 +1,21 @@
-"""Progress of long work on a terminal: one line that is rewritten, with the time that remains."""
+"""Progress of long work: how solvers report it, and how a terminal shows it on one line that is rewritten."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from typing import TextIO
 
+Progress = Callable[[str, float], None]
+"""Called by long work with what it does and how much is done, 0..1. Whoever wants it to stop raises from here: the work
+passes every exception on and leaves nothing half-done."""
+
 _EVERY_S = 0.2
+
+
+def silent(text: str, fraction: float) -> None:
+    """The progress of work that nobody watches."""
 
 
 class ProgressLine:
@@ -17,6 +26,11 @@ class ProgressLine:
         self._stream = stream or sys.stderr
         self._began = time.monotonic()
         self._shown = 0.0
+
+    def report(self, text: str, fraction: float) -> None:
+        """Show a solver's progress; a `Progress`."""
+        self._what = text
+        self(round(1000 * fraction), 1000)
 
     def __call__(self, done: int, total: int) -> None:
         """Report progress; calls may be frequent."""

@@ -1,0 +1,28 @@
+"""``rhot calibrate``: hands each calibration to its own command."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from types import ModuleType
+
+KINDS: dict[str, str] = {
+}
+"""Name of each calibration, as of its module in `commands`, and what it is for."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """One subcommand per calibration."""
+    kinds = parser.add_subparsers(dest="kind", metavar="KIND", title="kinds", required=True)
+    for kind, summary in KINDS.items():
+        room = kinds.add_parser(kind, help=summary, description=f"Calibrate {summary}.")
+        _module(kind).add_arguments(room)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the chosen calibration; exit code 2 when its result may not be used."""
+    return int(_module(args.kind).run(args))
+
+
+def _module(kind: str) -> ModuleType:
+    return importlib.import_module(f"rhot_app.calibration.commands.{kind}")

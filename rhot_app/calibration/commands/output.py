@@ -1,0 +1,37 @@
+"""What every calibration command prints: one JSON object, or the verdict in words."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from rhot_app.calibration.verdict import Verdict
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    """``--json``, the same everywhere."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+
+
+def show(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json: bool, written: str = "") -> int:
+    """Print a calibration's result and return the exit code: 0, or 2 when the verdict forbids its use.
+
+    `fields` are the JSON's, the verdict's own are added; `lines` the figures for people; `written` the file that was
+    written, empty for none.
+    """
+    if as_json:
+        print(json.dumps({**fields, **verdict.to_json(), "written": written or None}))
+    else:
+        print(verdict.sentence)
+        for finding in verdict.findings:
+            print(f"  [{finding.grade.value}] {finding.sentence}")
+        print(*lines, sep="\n")
+        if written:
+            print(f"Written: {written}")
+    if verdict.acceptable:
+        return 0
+    worst = verdict.findings[0].sentence
+    print(f"rhot: nothing was written, because the result must not be used. {worst}", file=sys.stderr)
+    return 2

@@ -1,0 +1,92 @@
+"""Earlier versions of a rig file: kept when a calibration is accepted, so that what was there can be brought back.
+
+They lie beside the rig in ``NAME.history/``, one whole rig file per version, oldest first by name.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rhot_app.errors import RigError
+from rhot_app.project import Rig, load_rig, save_rig
+
+KEPT = 50  # versions; the oldest go first
+
+_NAME = re.compile(r"^(\d{8}T\d{6}\d{6}Z)-(.*)\.json$")
+_STAMP = "%Y%m%dT%H%M%S%fZ"
+
+
+@dataclass(frozen=True, slots=True)
+class Version:
+    """One earlier state of a rig file: where it is kept, when it was replaced and by what."""
+
+    path: Path
+    replaced_at: datetime
+    replaced_by: str
+
+
+def accept(path: Path, rig: Rig, reason: str) -> Version | None:
+    """Write `rig` to `path` and keep what was there; `reason` names the calibration ("stereo calibration").
+
+    Returns the kept version, None when `path` did not exist or already said the same. Raises RigError when the folder
+    cannot be written; the rig file is then as it was.
+    """
+    try:
+        if not path.exists():
+            save_rig(path, rig)
+            return None
+        if _same(path, rig):
+            return None
+        kept = _keep(path, reason)
+        save_rig(path, rig)
+    except OSError as exc:
+        raise RigError(f"{path}: cannot be written ({exc.strerror}); nothing was changed.") from exc
+    return kept
+
+
+def versions(path: Path) -> list[Version]:
+    """What can be brought back, newest first."""
+    found = []
+    for file in sorted(_folder(path).glob("*.json"), reverse=True):
+        match = _NAME.match(file.name)
+        if match:
+            when = datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC)
+            found.append(Version(file, when, match[2].replace("-", " ")))
+    return found
+
+
+def restore(path: Path, version: Version) -> Rig:
+    """Bring `version` back to `path`; what was there is kept as a version itself. Returns the rig that is now there.
+
+    Raises RigError when the version cannot be read or the rig not written.
+    """
+    rig = load_rig(version.path)
+    accept(path, rig, "restoring an earlier version")
+    return rig
+
+
+def _folder(path: Path) -> Path:
+    return path.with_name(f"{path.name}.history")
+
+
+def _same(path: Path, rig: Rig) -> bool:
+    try:
+        return load_rig(path) == rig
+    except RigError:
+        return False  # what a person broke by hand is worth keeping too
+
+
+def _keep(path: Path, reason: str) -> Version:
+    folder = _folder(path)
+    folder.mkdir(exist_ok=True)
+    now = datetime.now(UTC)
+    words = re.sub(r"[^a-z0-9]+", "-", reason.lower()).strip("-") or "change"
+    target = folder / f"{now.strftime(_STAMP)}-{words}.json"
+    shutil.copy2(path, target)
+    for old in versions(path)[KEPT:]:
+        old.path.unlink(missing_ok=True)
+    return Version(target, now, words.replace("-", " "))
