@@ -76,6 +76,8 @@ def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     name = status.name
     if facts.buffer_bytes is None:
         return []
+    if status.state == "ready" and status.text_datagrams:
+        return [Advice("info", f"Node {name}: text datagrams arrive, but tracking is not started: press Start.")]
     if status.state == "silent" and status.text_datagrams:
         return [Advice("info", f"Node {name}: no text datagrams come in; send them to its data port.")]
     if status.state == "silent":

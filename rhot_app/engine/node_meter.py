@@ -67,7 +67,8 @@ class NodeMeter:
         return 1e9 * (last.accepted - first.accepted) / span_ns if span_ns else 0.0
 
     def status(self, now_ns: int, message: str) -> NodeStatus:
-        """The node as clients see it; `message`: its own words."""
+        """The node as clients see it; `message`: its own words. A text node whose datagrams wait for the start is
+        ready."""
         link, clock = self.link, self.link.clock
         return NodeStatus(
             node_id=link.node.node_id, name=link.node.name, state=self._word(now_ns),
@@ -79,7 +80,8 @@ class NodeMeter:
         if self.receiver is None:  # a replay: its times are not of now
             return "streaming" if self.rate_hz() > 0.0 else "silent"
         if self.link.silent(now_ns):
-            return "silent"
+            waits = self.link.node.text_datagrams and not self.link.wanted and self.recent().dropped.get("not_started")
+            return "ready" if waits else "silent"
         if self.link.node.text_datagrams or self.link.state is None:
             return "streaming"
         return _WORDS[self.link.state]

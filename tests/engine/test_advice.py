@@ -36,6 +36,7 @@ def test_a_well_node_needs_no_words() -> None:
     (replace(WELL, status=replace(STATUS, clock_bound_s=0.004)), ["±4.0 ms"]),
     (replace(WELL, status=replace(STATUS, clock_bound_s=None)), ["waiting for its clock"]),
     (replace(WELL, status=replace(STATUS, text_datagrams=True)), ["untrusted"]),
+    (replace(WELL, status=replace(STATUS, text_datagrams=True, state="ready")), ["text datagrams", "press Start"]),
     (replace(WELL, buffer_bytes=212992), ["208 KiB", "sysctl -w net.core.rmem_max=4194304"]),
     (replace(WELL, recent=Recent(100, 0, {"kernel_overflow": 9}, 0)), ["kernel drops"]),
     (replace(WELL, unseen_s=(0.0, 12.0, 0.0)), ["Camera left", "index", "12 s"]),
