@@ -2,8 +2,8 @@
 
     python benchmarks/flood.py [--rate 10000] [--seconds 10] [--json FILE]
 
-The sender is a process of its own on the same machine; the receiver has its thread, a consumer beside it and the
-engine's process settings. Prints a table; exits with 1 when a datagram was lost, refused or not counted.
+The sender is a process of its own on the same machine; the receiver's thread feeds a tracker, with the engine's process
+settings. Prints a table; exits with 1 when a datagram was lost, refused or not counted.
 """
 
 from __future__ import annotations
@@ -14,16 +14,19 @@ import multiprocessing
 import resource
 import socket
 import sys
-import threading
 import time
 from dataclasses import replace
 from pathlib import Path
 
 from rhot_app.engine.serve import prepare_process
+from rhot_app.engine.warm_up import warm_up
+from rhot_app.project import Rig
 from rhot_app.simulator.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.door import NodeDoor
-from rhot_app.sources.receiver import FrameQueue, NodeReceiver, open_data_socket
+from rhot_app.sources.receiver import NodeReceiver, open_data_socket
+from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import MarkerObservation, Observations
 
@@ -61,12 +64,9 @@ def run(rate: int, seconds: float) -> dict[str, object]:
     rig = synthetic_rig()
     door = NodeDoor(rig, 0, clock)
     door.expect_session(SESSION)
-    frames = FrameQueue()
-    receiver = NodeReceiver(open_data_socket(0, "left"), door, frames, "left")
-    ending = threading.Event()
-    tracked = [0]
-    consumer = threading.Thread(target=_consume, args=(frames, ending, tracked))
-    consumer.start()
+    receiver = NodeReceiver(open_data_socket(0, "left"), door, "left")
+    consumer = Consumer(rig)
+    receiver.deliver = consumer.take
     prepare_process()
     receiver.start()
     sender = multiprocessing.get_context("spawn").Process(target=send, args=(receiver.port, rate, seconds))
@@ -76,18 +76,27 @@ def run(rate: int, seconds: float) -> dict[str, object]:
     time.sleep(0.5)
     after = resource.getrusage(resource.RUSAGE_SELF)
     receiver.close()
-    ending.set()
-    consumer.join()
     cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return {"rate_hz": rate, "seconds": seconds, "sent": round(rate * seconds), "received": door.received,
             "verified": door.accepted, "dropped": door.dropped, "sequence_lost": door.sequence.lost,
-            "kernel_overflow": receiver.overflowed, "handed_to_tracker": tracked[0], "skipped": receiver.skipped,
+            "kernel_overflow": receiver.overflowed, "handed_to_tracker": consumer.count, "skipped": receiver.skipped,
             "cpu_us_per_datagram": 1e6 * cpu_s / max(1, door.received), "buffer_bytes": receiver.buffer_bytes}
 
 
-def _consume(frames: FrameQueue, ending: threading.Event, tracked: list[int]) -> None:
-    while not ending.is_set():
-        tracked[0] += len(frames.take(0.05))
+class Consumer:
+    """The tracker, as the engine feeds it."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.count = 0
+        self._tracker = make_tracker(rig)
+        warm_up(self._tracker, rig)
+
+    def take(self, frames: list[CameraObservations]) -> None:
+        """Take what the receiver hands on."""
+        self.count += len(frames)
+        for frame in frames:
+            self._tracker.ingest(frame)
+        self._tracker.solve()
 
 
 def main() -> int:

@@ -36,8 +36,8 @@ class KernelTime:
         self.overflowed = 0  # datagrams the kernel dropped because the buffer was full
         self._difference_ns, self._measured_ns = _measure()
 
-    def receive_time_ns(self, ancillary: Ancillary) -> int:
-        """Monotonic time at which the kernel received the datagram that was just read, ns."""
+    def receive_time_ns(self, ancillary: Ancillary) -> tuple[int, int]:
+        """Monotonic time at which the kernel received the datagram that was just read, and now, ns."""
         stamp_ns = None
         for _, kind, data in ancillary:
             if kind == SO_TIMESTAMPNS and len(data) >= _TIMESPEC.size:
@@ -50,10 +50,10 @@ class KernelTime:
         steady = change_ns < _STEP_NS + _SLEW * (now_ns - self._measured_ns)
         self._difference_ns, self._measured_ns = difference_ns, now_ns
         if stamp_ns is None or not steady:
-            return now_ns
+            return now_ns, now_ns
         t_ns = stamp_ns - difference_ns
         # The difference is read with some noise: a datagram cannot have come after now.
-        return min(t_ns, now_ns) if now_ns - _OLDEST_NS < t_ns < now_ns + _STEP_NS else now_ns
+        return (min(t_ns, now_ns) if now_ns - _OLDEST_NS < t_ns < now_ns + _STEP_NS else now_ns), now_ns
 
 
 def _measure() -> tuple[int, int]:

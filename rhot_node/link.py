@@ -80,7 +80,7 @@ class UdpLink:
                 except OSError as exc:
                     log.debug("link: %s", exc)
                     break
-                self._take(data, sender, kernel_time.receive_time_ns(ancillary))
+                self._take(data, sender, kernel_time.receive_time_ns(ancillary)[0])
 
     def start(self) -> None:
         """Answer in a thread of its own until `close`."""

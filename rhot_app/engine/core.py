@@ -1,10 +1,11 @@
 """The engine: one rig, its source, tracker and log; started, stopped and changed by commands. No sockets to clients.
 
-`step` is the pipeline's and belongs to one thread; everything else is called by another one (the server's).
+Frames pass through in the source's threads; everything here is called by another one (the server's).
 """
 
 from __future__ import annotations
 
+import functools
 import threading
 import time
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from rhot_app.engine.observer import NodeMessage, Observer
-from rhot_app.engine.pipeline import Pipeline, PublishState, Work
+from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
 from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import EngineError
@@ -22,7 +23,6 @@ from rhot_app.project import Rig, save_rig
 from rhot_app.recording.recorder import Recorder
 from rhot_app.sources.links import new_session
 from rhot_app.sources.source import ObservationSource, same_network
-from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import Tracker
 
 MakeSource = Callable[[Rig], ObservationSource]
@@ -33,8 +33,12 @@ class Engine:
     """Everything between the nodes and the clients."""
 
     def __init__(self, rig: Rig, rig_path: Path | None, make_source: MakeSource, make_tracker: MakeTracker,
-                 publish: PublishState, node_message: NodeMessage = lambda node_id: "") -> None:
-        """Open the source and warm the tracker up; raises SourceError when a port is taken."""
+                 publish: PublishState, node_message: NodeMessage = lambda node_id: "",
+                 after_state: AfterState = lambda: None) -> None:
+        """Open the source and warm the tracker up; raises SourceError when a port is taken.
+
+        `publish` and `after_state` are called in the source's threads, by one at a time.
+        """
         self.rig = rig
         self.rig_path = rig_path
         self.running = False
@@ -47,15 +51,12 @@ class Engine:
         self._lock = threading.RLock()
         self._source = make_source(rig)
         try:
-            self._pipeline = Pipeline(self._work(rig), publish)
+            self._pipeline = Pipeline(self._work(rig), publish, after_state)
         except BaseException:
             self._source.close()
             raise
+        self._listen()
         self._observer = Observer(rig, self._source, self._pipeline)
-
-    def step(self, timeout_s: float) -> HandState | None:
-        """One step of the pipeline, see `Pipeline.step`."""
-        return self._pipeline.step(timeout_s)
 
     def start(self) -> int:
         """Have the nodes stream in a new session; returns its number. Starting again begins another one."""
@@ -114,6 +115,7 @@ class Engine:
                     raise EngineError("other nodes cannot be used while recording; stop the recording first.")
                 work = self._change_source(rig)
             self._pipeline.use(work)
+            self._listen()
             self.rig = rig
             self._observer = Observer(rig, self._source, self._pipeline)
             if self.running and not kept:
@@ -141,10 +143,6 @@ class Engine:
             return self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
                                          self._node_message, extra)
 
-    def fail(self, sentence: str) -> None:
-        """Note that the tracker broke over a frame; it forgets everything and goes on. Shown until the next start."""
-        self._pipeline.fail(sentence)
-
     def close(self) -> None:
         """Stop the nodes, finish the log, close all ports. May be called twice."""
         with self._lock:
@@ -152,6 +150,9 @@ class Engine:
                 self.stop()
             self.record_stop()
             self._source.close()
+
+    def _listen(self) -> None:
+        self._source.deliver_to(functools.partial(self._pipeline.take, self._source))
 
     def _work(self, rig: Rig) -> Work:
         tracker = self._make_tracker(rig)
@@ -172,6 +173,7 @@ class Engine:
             self._source.close()
             self._source = self._make_source(old_rig)
             self._pipeline.use(self._work(old_rig))
+            self._listen()
             self._observer = Observer(old_rig, self._source, self._pipeline)
             if self.running:
                 self.start()

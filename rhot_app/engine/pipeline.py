@@ -1,7 +1,8 @@
-"""A frame's way through the engine: from the source's queue into the tracker, and the state out to the clients."""
+"""A frame's way through the engine: from the source into the tracker, and the state out to the clients."""
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -17,6 +18,9 @@ from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import CameraObservations, Tracker
 
 PublishState = Callable[[bytes], None]
+AfterState = Callable[[], None]
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +33,10 @@ class Work:
 
 
 class Pipeline:
-    """Ingests all frames that wait, solves once, publishes. `step` belongs to one thread; the meters may be read."""
+    """Ingests frames, solves once, publishes. `take` may be called by any thread; the meters may be read."""
 
-    def __init__(self, work: Work, publish: PublishState) -> None:
-        """`publish` takes a state's bytes and must not block."""
+    def __init__(self, work: Work, publish: PublishState, after_state: AfterState = lambda: None) -> None:
+        """`publish` takes a state's bytes and must not block; `after_state` is called when nobody waits for one."""
         self.states = RateMeter()
         self.latency = LatencyMeter()
         self.last_state: HandState | None = None
@@ -40,6 +44,7 @@ class Pipeline:
         self.failure = ""
         self._work = work
         self._publish = publish
+        self._after_state = after_state
         self._changes = work.source.changes
         self._previous: dict[str, float] = {}
         self._lock = threading.Lock()
@@ -66,22 +71,23 @@ class Pipeline:
             self.failure = ""
             self._previous = {}
 
-    def fail(self, sentence: str) -> None:
-        """Note that a step raised; the tracker may be in any state, so it forgets everything."""
+    def take(self, source: ObservationSource, frames: list[CameraObservations]) -> None:
+        """Take frames of one camera in and publish the state that is due, if any. Never raises: a tracker's fault must
+        not end the stream for good. Frames of a source that has been replaced are ignored."""
         with self._lock:
-            self.failure = sentence
-            self._work.tracker.reset()
-
-    def step(self, timeout_s: float) -> HandState | None:
-        """Wait for frames (at most `timeout_s`), take all that wait, publish the state that is due, if any."""
-        work = self._work
-        frames = work.source.frames.take(timeout_s)
-        if not frames:
-            return None
-        with self._lock:
-            if work is not self._work:
-                return None
-            return self._process(work, frames)
+            work = self._work
+            if work.source is not source:
+                return
+            try:
+                state = self._process(work, frames)
+            except Exception as exc:
+                log.exception("the tracker failed over a frame")
+                self.failure = (f"The tracker failed over a frame ({type(exc).__name__}: {exc}) and began anew. "
+                                "Record a log and report this.")
+                work.tracker.reset()  # it may be in any state
+                return
+            if state is not None:
+                self._after_state()
 
     def _process(self, work: Work, frames: list[CameraObservations]) -> HandState | None:
         if work.source.changes != self._changes:

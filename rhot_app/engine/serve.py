@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import logging
 import os
 import signal
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,22 +18,18 @@ from rhot_app.engine.directory import EngineDirectory, EngineLock, open_director
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.server import Server, StatePublisher
 from rhot_app.project import Rig
-from rhot_app.sources.realtime import hurry_this_thread
 from rhot_app.tracking.make import make_tracker
 
 SWITCH_INTERVAL_S = 1e-4
 """A receiver that wakes up waits no longer than this for the interpreter (Python's default is 5 ms)."""
 
 _COLLECT_S = 5.0
-_STEP_S = 0.05
-
-log = logging.getLogger(__name__)
 
 
 @contextlib.contextmanager
 def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
             directory: Path | None) -> Iterator[tuple[Engine, Server, EngineDirectory]]:
-    """An engine in its directory, warmed up, its pipeline running; the caller runs the server.
+    """An engine in its directory, warmed up, frames passing; the caller runs the server.
 
     Raises EngineError when another engine holds the directory, SourceError when a port is taken.
     """
@@ -47,18 +41,13 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
         stack.callback(context.destroy, 0)
         publish = StatePublisher(context, place)
         nodes = NodeControl(context)
-        engine = Engine(rig, rig_path, make_source, make_tracker, publish, nodes.message)
+        engine = Engine(rig, rig_path, make_source, make_tracker, publish, nodes.message, GarbageMan())
         stack.callback(engine.close)
         server = Server(context, place, engine, nodes)
         stack.callback(server.close)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: server.end())
         prepare_process()
-        ending = threading.Event()
-        pipeline = threading.Thread(target=_run_pipeline, args=(engine, ending), name="pipeline", daemon=True)
-        pipeline.start()
-        stack.callback(pipeline.join)
-        stack.callback(ending.set)
         yield engine, server, place
 
 
@@ -69,21 +58,17 @@ def prepare_process() -> None:
         os.nice(-5)
     gc.collect()
     gc.freeze()
-    gc.disable()  # collected between states, see `_run_pipeline`
+    gc.disable()  # collected between states, by the `GarbageMan`
 
 
-def _run_pipeline(engine: Engine, ending: threading.Event) -> None:
-    hurry_this_thread()
-    collected_s = time.monotonic()
-    while not ending.is_set():
-        try:
-            state = engine.step(_STEP_S)
-        except Exception as exc:  # a tracker's fault must not end the stream for good
-            log.exception("the tracker failed over a frame")
-            engine.fail(f"The tracker failed over a frame ({type(exc).__name__}: {exc}) and began anew. "
-                        "Record a log and report this.")
-            continue
-        # The moment after a state is the longest one before the next frame.
-        if state is not None and time.monotonic() - collected_s > _COLLECT_S:
+class GarbageMan:
+    """Collects garbage now and then. Called after a state: that is the longest moment before the next frame."""
+
+    def __init__(self) -> None:
+        self._collected_s = time.monotonic()
+
+    def __call__(self) -> None:
+        """Collect when it is due."""
+        if time.monotonic() - self._collected_s > _COLLECT_S:
             gc.collect()
-            collected_s = time.monotonic()
+            self._collected_s = time.monotonic()

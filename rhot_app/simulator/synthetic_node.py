@@ -123,7 +123,7 @@ class SyntheticNode:
         except (TimeoutError, BlockingIOError):
             pass
         else:
-            self._take(data, sender, self._kernel_time.receive_time_ns(ancillary))
+            self._take(data, sender, self._kernel_time.receive_time_ns(ancillary)[0])
         if self._target is not None and time.monotonic_ns() >= self._due_ns:
             self.send_frame(time.monotonic_ns())
             self._due_ns += self._period_ns

@@ -146,7 +146,7 @@ class NodeLinks:
 
     def _receive(self, flags: int) -> None:
         data, ancillary, _, _ = self._socket.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE, flags)
-        t_receive_ns = self._kernel_time.receive_time_ns(ancillary)
+        t_receive_ns, _ = self._kernel_time.receive_time_ns(ancillary)
         try:
             reply = decode(data)
         except WireError as exc:

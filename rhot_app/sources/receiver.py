@@ -7,7 +7,6 @@ import socket
 import struct
 import threading
 from collections.abc import Callable
-from queue import Empty, SimpleQueue
 
 from rhot_app.errors import SourceError
 from rhot_app.sources.door import NodeDoor, Verified
@@ -21,10 +20,12 @@ RECEIVE_BUFFER = 4 << 20
 BURST = 256
 """Datagrams taken at once before the newest are handed on."""
 
+FRESH_NS = 400_000
+"""A datagram that came less than this ago is handed on at once: asking the socket for another one would cost it a
+twentieth of a millisecond. When datagrams pile up they are older, and all are taken before any is handed on."""
+
 NEWEST = 8
 """Of one burst at most so many are handed on: when flooded, count everything, track the newest."""
-
-QUEUE_LIMIT = 256  # frames that may wait for the tracker; then the oldest go
 
 DATAGRAM_MAX = 4096  # bytes; 64 markers need 2.1 kB, and a longer datagram is refused for its length
 
@@ -34,34 +35,12 @@ _WAIT = struct.pack("@ll", 0, 200_000)  # a blocked read returns after 0.2 s to 
 DatagramTap = Callable[[int, bytes], None]
 """``tap(t_receive_ns, data)``: sees every datagram before it is judged."""
 
+Deliver = Callable[[list[CameraObservations]], None]
+"""Takes verified frames of one camera, oldest first, in the thread that received them. May take as long as a state."""
 
-class FrameQueue:
-    """Frames on their way from the receivers to the tracker: many writers, one reader, bounded, never blocking."""
 
-    def __init__(self) -> None:
-        self._queue: SimpleQueue[CameraObservations] = SimpleQueue()
-        self.overrun = 0  # frames thrown away because the tracker could not keep up
-
-    def __len__(self) -> int:
-        """Frames that wait now."""
-        return self._queue.qsize()
-
-    def put(self, frame: CameraObservations) -> None:
-        """Add a frame; the oldest goes when too many wait."""
-        if self._queue.qsize() >= QUEUE_LIMIT:
-            with contextlib.suppress(Empty):
-                self._queue.get_nowait()
-                self.overrun += 1
-        self._queue.put(frame)
-
-    def take(self, timeout_s: float) -> list[CameraObservations]:
-        """All waiting frames, oldest first; waits up to `timeout_s` for the first one."""
-        frames: list[CameraObservations] = []
-        with contextlib.suppress(Empty):
-            frames.append(self._queue.get(timeout=timeout_s) if timeout_s > 0.0 else self._queue.get_nowait())
-            while True:
-                frames.append(self._queue.get_nowait())
-        return frames
+def to_nobody(frames: list[CameraObservations]) -> None:
+    """The `Deliver` of a source that nobody listens to yet."""
 
 
 def open_data_socket(port: int, node_name: str) -> socket.socket:
@@ -88,16 +67,20 @@ def granted_buffer(sock: socket.socket) -> int:
 
 
 class NodeReceiver:
-    """Drains one data socket in bursts. `step` is one burst; `start` runs it in a thread until `close`."""
+    """Drains one data socket in bursts. `step` is one burst; `start` runs it in a thread until `close`.
 
-    def __init__(self, sock: socket.socket, door: NodeDoor, frames: FrameQueue, name: str) -> None:
+    The thread that received a frame carries it on through the tracker: handing it to another one costs as much as the
+    tracker's own work.
+    """
+
+    def __init__(self, sock: socket.socket, door: NodeDoor, name: str) -> None:
         self.door = door
         self.tap: DatagramTap | None = None
+        self.deliver: Deliver = to_nobody
         self.port: int = sock.getsockname()[1]
         self.buffer_bytes = granted_buffer(sock)
         self.skipped = 0  # verified and counted, but not tracked because newer ones had come already
         self._socket = sock
-        self._frames = frames
         self._kernel_time = KernelTime()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"receive {name}", daemon=True)
@@ -114,16 +97,18 @@ class NodeReceiver:
         with contextlib.suppress(BlockingIOError):
             while count < BURST:
                 data, ancillary, _, _ = self._socket.recvmsg(DATAGRAM_MAX, ANCILLARY_SIZE, flags)
-                t_receive_ns = self._kernel_time.receive_time_ns(ancillary)
+                t_receive_ns, now_ns = self._kernel_time.receive_time_ns(ancillary)
                 count, flags = count + 1, socket.MSG_DONTWAIT
                 if self.tap is not None:
                     self.tap(t_receive_ns, data)
                 frame = self.door.verify(data, t_receive_ns)
                 if frame is not None:
                     verified.append(frame)
-        self.skipped += max(0, len(verified) - NEWEST)
-        for frame in verified[-NEWEST:]:
-            self._frames.put(self.door.convert(frame))
+                if now_ns - t_receive_ns < FRESH_NS:
+                    break
+        if verified:
+            self.skipped += max(0, len(verified) - NEWEST)
+            self.deliver([self.door.convert(frame) for frame in verified[-NEWEST:]])
         return count
 
     def start(self) -> None:

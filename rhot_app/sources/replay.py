@@ -12,14 +12,12 @@ from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.node_link import NodeLink
-from rhot_app.sources.receiver import FrameQueue, NodeReceiver
+from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
 from rhot_app.sources.tap import Tap
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import decode
 from rhot_node.wire.messages import ClockReply, ClockRequest, Start
-
-_WAITING_MAX = 64  # frames that may wait for the tracker when replaying as fast as it can
 
 
 class LogDoor:
@@ -84,7 +82,7 @@ class LogReplay:
 
     def __init__(self, path: Path, rig: Rig, speed: float | None = 1.0) -> None:
         """Open the log; raises RecordingError when it is none."""
-        self.frames = FrameQueue()
+        self._deliver: Deliver = to_nobody
         self.receivers: tuple[NodeReceiver, ...] = ()
         LogReader(path).close()
         self._path = path
@@ -99,6 +97,10 @@ class LogReplay:
     def changes(self) -> int:
         """Sessions in the log so far, and clocks that were set."""
         return self._door.changes
+
+    def deliver_to(self, deliver: Deliver) -> None:
+        """Hand frames to `deliver` from now on, in the replay's own thread."""
+        self._deliver = deliver
 
     def notices(self) -> list[str]:
         """That the log is over, broken or torn."""
@@ -155,13 +157,11 @@ class LogReplay:
                 return
             frame = self._door.feed(record)
             if frame is not None:
-                self.frames.put(frame)
+                self._deliver([frame])
 
     def _wait(self, elapsed_log_ns: int, begun_ns: int) -> bool:
         """Wait until the record is due; True when the replay shall end."""
         if self._speed is None:
-            while len(self.frames) > _WAITING_MAX and not self._ending.wait(0.001):
-                pass
             return self._ending.is_set()
         wait_s = 1e-9 * (begun_ns + elapsed_log_ns / self._speed - time.monotonic_ns())
         return self._ending.wait(wait_s) if wait_s > 0.0 else self._ending.is_set()

@@ -7,16 +7,15 @@ from typing import Protocol
 
 from rhot_app.project import Rig
 from rhot_app.sources.node_link import NodeLink
-from rhot_app.sources.receiver import FrameQueue, NodeReceiver
+from rhot_app.sources.receiver import Deliver, NodeReceiver
 from rhot_app.sources.tap import Tap
 
 
 class ObservationSource(Protocol):
-    """Delivers verified frames of all cameras of a rig into `frames`, from threads of its own."""
+    """Delivers verified frames of all cameras of a rig from threads of its own."""
 
-    @property
-    def frames(self) -> FrameQueue:
-        """Where the frames go."""
+    def deliver_to(self, deliver: Deliver) -> None:
+        """Hand frames to `deliver` from now on, possibly from several threads at once; before, they go nowhere."""
         ...
 
     @property

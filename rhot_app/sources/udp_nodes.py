@@ -9,7 +9,7 @@ from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.links import NodeLinks
 from rhot_app.sources.node_link import NodeLink
-from rhot_app.sources.receiver import DatagramTap, FrameQueue, NodeReceiver, open_data_socket
+from rhot_app.sources.receiver import DatagramTap, Deliver, NodeReceiver, open_data_socket
 from rhot_app.sources.tap import Tap
 
 
@@ -20,7 +20,6 @@ class UdpNodes:
 
     def __init__(self, rig: Rig) -> None:
         """Open all ports. Raises SourceError when one is taken; nothing stays open then."""
-        self.frames = FrameQueue()
         self.links = tuple(NodeLink(rig, camera) for camera in range(len(rig.nodes)))
         self._starts = 0
         with contextlib.ExitStack() as stack:
@@ -28,7 +27,7 @@ class UdpNodes:
             for node in rig.nodes:
                 sockets.append(open_data_socket(node.data_port, node.name))
                 stack.callback(sockets[-1].close)
-            self.receivers = tuple(NodeReceiver(sock, link.door, self.frames, link.node.name)
+            self.receivers = tuple(NodeReceiver(sock, link.door, link.node.name)
                                    for sock, link in zip(sockets, self.links, strict=True))
             self._commands = NodeLinks(rig, list(self.links), [receiver.port for receiver in self.receivers])
             stack.pop_all()
@@ -40,6 +39,11 @@ class UdpNodes:
     def changes(self) -> int:
         """Starts so far, and clocks that were set or came anew."""
         return self._starts + sum(link.clock_changes for link in self.links)
+
+    def deliver_to(self, deliver: Deliver) -> None:
+        """Hand frames to `deliver` from now on, each camera's in its own thread."""
+        for receiver in self.receivers:
+            receiver.deliver = deliver
 
     def notices(self) -> list[str]:
         """A live source has nothing to say about itself: its links and receivers do."""

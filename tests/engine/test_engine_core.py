@@ -38,12 +38,12 @@ class Bench:
         deadline = time.monotonic() + timeout_s
         while not condition():
             assert time.monotonic() < deadline, self.engine.status()
-            self.engine.step(0.01)
+            time.sleep(0.01)
 
     def run_for(self, seconds: float) -> None:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            self.engine.step(0.01)
+            time.sleep(0.01)
             self.engine.status()
 
 
@@ -110,13 +110,11 @@ def test_broken_tracker_is_reported_and_begins_anew(bench: Bench, nodes: list[Sy
     bench.engine.start()
     bench.run_until(lambda: len(bench.published) > 3)
     tracker = bench.trackers[-1]
-    tracker.broken = True
-    with pytest.raises(FloatingPointError):
-        bench.run_for(2.0)
     resets = tracker.resets
-    bench.engine.fail("The tracker failed.")
-    assert tracker.resets == resets + 1
-    assert bench.engine.status().condition == "FAULT"
+    tracker.broken = True
+    bench.run_until(lambda: bench.engine.status().condition == "FAULT")
+    assert tracker.resets > resets
+    assert any("numbers went wrong" in advice.text for advice in bench.engine.status().advice)
     tracker.broken = False
     bench.engine.start()
     bench.run_until(lambda: bench.engine.status().condition == "TRACKING")
@@ -163,14 +161,13 @@ def test_replay_source_serves_like_nodes(tmp_path: Path, rig: Rig, bench: Bench,
         deadline = time.monotonic() + 10.0
         while not any("over" in advice.text for advice in engine.status().advice):
             assert time.monotonic() < deadline
-            engine.step(0.01)
-        engine.step(0.0)
+            time.sleep(0.01)
         count = len(published)
         assert count > 25 and "receive_to_state" not in engine.status().latency
         engine.start()  # once more from the beginning
         while len(published) < count + 20:
             assert time.monotonic() < deadline
-            engine.step(0.01)
+            time.sleep(0.01)
         with pytest.raises(RecordingError):
             engine.record(tmp_path / "c.log")
         engine.close()

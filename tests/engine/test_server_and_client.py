@@ -74,20 +74,12 @@ class Bench:
         publisher = StatePublisher(self.context, place)
         self.engine = Engine(rig, None, UdpNodes, FakeTracker, publisher, nodes.message)
         self.server = Server(self.context, place, self.engine, nodes)
-        self.ending = False
-        self.threads = [threading.Thread(target=self.server.run), threading.Thread(target=self._pipeline)]
-        for thread in self.threads:
-            thread.start()
-
-    def _pipeline(self) -> None:
-        while not self.ending:
-            self.engine.step(0.02)
+        self.thread = threading.Thread(target=self.server.run)
+        self.thread.start()
 
     def close(self) -> None:
-        self.ending = True
         self.server.end()
-        for thread in self.threads:
-            thread.join()
+        self.thread.join()
         self.server.close()
         self.engine.close()
         self.context.destroy(0)

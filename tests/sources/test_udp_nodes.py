@@ -13,6 +13,7 @@ from rhot_app.simulator.synthetic_node import SyntheticNode, hand_markers, synth
 from rhot_app.sources.links import new_session
 from rhot_app.sources.node_link import SILENT_NS
 from rhot_app.sources.udp_nodes import UdpNodes
+from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import NodeState, Start, StartEntry
@@ -55,11 +56,12 @@ def ready(source: UdpNodes) -> bool:
 
 
 def test_frames_of_both_cameras_in_master_time(rig: Rig, source: UdpNodes, nodes: list[SyntheticNode]) -> None:
+    frames: list[CameraObservations] = []
+    source.deliver_to(frames.extend)
     eventually(lambda: ready(source))
     source.start(new_session())
     time.sleep(0.5)
     source.stop()
-    frames = source.frames.take(0.0)
     assert {frame.camera for frame in frames} == {0, 1}
     # A busy machine delivers late, never early; the quickest frame shows the true age.
     ages_ns = [frame.t_receive_ns - frame.t_row0_master_ns for frame in frames]
@@ -113,10 +115,12 @@ def test_fault_is_seen(rig: Rig, source: UdpNodes) -> None:
 def test_text_node_needs_no_start_message(rig: Rig) -> None:
     text = msgspec.structs.replace(rig.nodes[0], text_datagrams=True)
     source = UdpNodes(msgspec.structs.replace(rig, nodes=(text, rig.nodes[1])))
+    frames: list[CameraObservations] = []
+    source.deliver_to(frames.extend)
     source.start(new_session())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as typed:
         typed.sendto(b"1,2;3,4;5,6;7,8;9,10;11,12\n", ("127.0.0.1", source.receivers[0].port))
-    (frame,) = source.frames.take(1.0)
-    assert frame.camera == 0
-    assert frame.pixels[5].tolist() == [11.0, 12.0]
+    eventually(lambda: len(frames) == 1)
+    assert frames[0].camera == 0
+    assert frames[0].pixels[5].tolist() == [11.0, 12.0]
     source.close()
