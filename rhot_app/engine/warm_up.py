@@ -8,6 +8,10 @@ from rhot_app.engine.codec import encode
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import Rig, RigNode
 from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_node.wire.codec import decode as decode_datagram
+from rhot_node.wire.codec import encode as encode_datagram
+from rhot_node.wire.marker_table import MarkerTable
+from rhot_node.wire.messages import MarkerObservation, Observations
 
 FRAMES = 24
 _PERIOD_NS = 8_333_333
@@ -30,6 +34,16 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
             if state is not None:
                 encode(state)
     tracker.reset()
+    _read_one(rig)
+
+
+def _read_one(rig: Rig) -> None:
+    """A datagram's way through the wire's compiled code."""
+    markers = [MarkerObservation(k, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0) for k in range(len(rig.markers.markers))]
+    message = decode_datagram(encode_datagram(Observations(1, 1, 0, 0, 0, 0, 0, 0, 640, 480, 0, 0, markers)))
+    assert isinstance(message, Observations)
+    assert isinstance(message.markers, MarkerTable)
+    message.markers.columns()
 
 
 def _see(points_m: np.ndarray, camera: int, node: RigNode, t_ns: int) -> CameraObservations:

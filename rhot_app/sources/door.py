@@ -5,8 +5,6 @@ No sockets and no threads. Nothing in a datagram raises past `NodeDoor.admit`.
 
 from __future__ import annotations
 
-import numpy as np
-
 from rhot_app.project import Rig, RigNode
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.sequence import SequenceWindow, Verdict
@@ -14,6 +12,7 @@ from rhot_app.sources.text_frames import TextReader
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import decode
+from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import Observations
 
 OLDEST_FRAME_NS = 1_000_000_000
@@ -132,18 +131,10 @@ class NodeDoor:
 
     def _build(self, message: Observations, t_row0_ns: int, t_send_ns: int, t_receive_ns: int,
                bound_s: float) -> CameraObservations:
-        markers = message.markers
-        count = len(markers)
-        flat = [value for m in markers for value in (m.x, m.y)]
-        flat += [value for m in markers for value in (m.cov_xx, m.cov_xy, m.cov_xy, m.cov_yy)]
-        flat += [m.diameter for m in markers]
-        flat += [m.quality for m in markers]
-        values = np.array(flat)  # one array, cut into contiguous parts: four separate ones cost four times as much
+        assert isinstance(message.markers, MarkerTable)  # as everything that was decoded
+        pixels, covariances, diameters, qualities, flags = message.markers.columns()
         return CameraObservations(
             camera=self._camera, t_row0_master_ns=t_row0_ns, row_time_ns=message.row_time_ns,
             clock_bound_s=bound_s, t_receive_ns=t_receive_ns,
             detect_s=1e-9 * message.processing_ns, network_s=1e-9 * (t_receive_ns - t_send_ns),
-            pixels=values[:2 * count].reshape(count, 2),
-            covariances=values[2 * count:6 * count].reshape(count, 2, 2),
-            diameters=values[6 * count:7 * count], qualities=values[7 * count:],
-            flags=np.array([m.flags for m in markers], dtype=np.uint16))
+            pixels=pixels, covariances=covariances, diameters=diameters, qualities=qualities, flags=flags)

@@ -8,11 +8,11 @@ from struct import Struct
 from struct import error as struct_error
 
 from rhot_node.errors import WireError
+from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
     MarkerFlag,
-    MarkerObservation,
     Message,
     NodeState,
     Observations,
@@ -33,8 +33,6 @@ TYPE_STOP = 5
 
 MARKERS_MAX = 64
 IMAGE_SIZE_MAX = 16384  # px
-IMAGE_MARGIN = 64.0  # px; the centre of a marker cut by the border may lie this far outside
-COVARIANCE_MAX = 1e8  # px^2; also keeps the determinant finite in single precision
 TIME_MAX_NS = 1 << 62  # the difference of two times must fit 64 bits
 FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
 
@@ -48,7 +46,6 @@ _START_ENTRY = Struct("<IHHq")
 
 _ZEROS = b"\0\0\0"
 _LOST = int(MarkerFlag.LOST)
-_FLAGS = tuple(MarkerFlag(bits) for bits in range(2 * int(max(MarkerFlag))))  # building one takes a microsecond
 _STATES = {int(state): state for state in NodeState}
 
 
@@ -173,31 +170,9 @@ def _decode_observations(payload: memoryview, node_id: int, session: int, sequen
         raise WireError("time", f"sent {(t_send - t_frame) / 1e9:.3f} s after its exposure")
     if not (0 < width <= IMAGE_SIZE_MAX and 0 < height <= IMAGE_SIZE_MAX):
         raise WireError("size", f"{width} x {height} px")
-    markers = _decode_markers(payload[_OBSERVATIONS.size:], width, height)
+    markers = MarkerTable(bytes(payload[_OBSERVATIONS.size:]), width, height)
     return Observations(node_id, session, sequence, t_frame, t_send, processing, exposure, row_time, width, height,
                         frame_number, checksum, markers)
-
-
-def _decode_markers(payload: memoryview, width: int, height: int) -> tuple[MarkerObservation, ...]:
-    markers = []
-    x_max, y_max, diameter_max = width - 1 + IMAGE_MARGIN, height - 1 + IMAGE_MARGIN, 2.0 * max(width, height)
-    for position, fields in enumerate(_MARKER.iter_unpack(payload)):
-        index, bits, x, y, diameter, xx, xy, yy, quality = fields
-        if index != position:
-            raise WireError("index", f"marker {index} at position {position}")
-        if bits >= len(_FLAGS):
-            raise WireError("flags", f"unknown marker flags {bits:#06x}")
-        if bits & _LOST:
-            if x == x or y == y or fields[4:] != (0.0, 0.0, 0.0, 0.0, 0.0):
-                raise WireError("marker", f"marker {index} is lost and yet has values")
-            x = y = math.nan  # one NaN object, so that equal messages compare equal
-        elif not (-IMAGE_MARGIN <= x <= x_max and -IMAGE_MARGIN <= y <= y_max
-                  and 0.0 < diameter <= diameter_max and 0.0 <= quality <= 1.0
-                  and 0.0 <= xx <= COVARIANCE_MAX and 0.0 <= yy <= COVARIANCE_MAX
-                  and xy * xy <= xx * yy * (1.0 + 1e-6) + 1e-30):  # room for rounding to single precision
-            raise WireError("marker", f"marker {index} is not plausible: {fields[2:]}")
-        markers.append(MarkerObservation(index, x, y, diameter, xx, xy, yy, quality, _FLAGS[bits]))
-    return tuple(markers)
 
 
 def _decode_clock_request(payload: memoryview, node_id: int, session: int, sequence: int) -> ClockRequest:

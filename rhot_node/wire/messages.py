@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -77,7 +78,7 @@ class Observations:
     height: int
     frame_number: int
     marker_checksum: int
-    markers: tuple[MarkerObservation, ...]
+    markers: Sequence[MarkerObservation]
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import timeit
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,6 +18,7 @@ from wire_samples import RHOT6_CHECKSUM, SAMPLES, SESSION, SIX, found, lost, obs
 
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import decode, encode
+from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
@@ -167,6 +169,19 @@ def test_a_lost_marker_carries_nothing_whatever_the_detector_said() -> None:
     message = decode(encode(observations((said,))))
     assert isinstance(message, Observations)
     assert message.markers == (msgspec.structs.replace(lost(0), flags=MarkerFlag.LOST | MarkerFlag.EDGE),)
+
+
+def test_columns_say_what_the_markers_say() -> None:
+    message = decode(packet("observations_some_lost"))
+    assert isinstance(message, Observations)
+    assert isinstance(message.markers, MarkerTable)
+    pixels, covariances, diameters, qualities, flags = message.markers.columns()
+    rows = zip(message.markers, pixels, covariances, diameters, qualities, flags, strict=True)
+    for marker, pixel, covariance, diameter, quality, bits in rows:
+        np.testing.assert_array_equal(pixel, [marker.x, marker.y])
+        assert covariance.tolist() == [[marker.cov_xx, marker.cov_xy], [marker.cov_xy, marker.cov_yy]]
+        assert (diameter, quality, bits) == (marker.diameter, marker.quality, marker.flags)
+    assert message.markers[1:3] == list(message.markers)[1:3]
 
 
 f32 = st.floats(width=32, allow_nan=False, allow_infinity=False)

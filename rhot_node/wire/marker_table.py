@@ -1,0 +1,121 @@
+"""The markers of one datagram as a table over its bytes: checked, and read into arrays, in one compiled call each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_node.errors import WireError
+from rhot_node.wire.messages import MarkerFlag, MarkerObservation
+
+RECORD_SIZE = 32  # bytes of one marker: index u16, flags u16, then x, y, diameter, cov_xx, cov_xy, cov_yy, quality f32
+IMAGE_MARGIN = 64.0  # px; the centre of a marker cut by the border may lie this far outside
+COVARIANCE_MAX = 1e8  # px^2; also keeps the determinant finite in single precision
+
+_LOST = int(MarkerFlag.LOST)
+_FLAGS = tuple(MarkerFlag(bits) for bits in range(2 * int(max(MarkerFlag))))  # building one takes a microsecond
+_KNOWN_FLAGS = len(_FLAGS)
+_SOUND, _INDEX, _UNKNOWN_FLAGS, _LOST_WITH_VALUES, _IMPLAUSIBLE = range(5)
+
+Array = NDArray[np.float64]
+Words = NDArray[np.uint16]  # (M, 16), of which the first two are index and flags
+Values = NDArray[np.float32]  # (M, 8), of which the first is index and flags
+
+
+class MarkerTable(Sequence[MarkerObservation]):
+    """The markers of a datagram, in its order; a sequence of `MarkerObservation` that equals any other such."""
+
+    __slots__ = ("_values", "_words")
+
+    def __init__(self, records: bytes, width: int, height: int) -> None:
+        """`records`: RECORD_SIZE bytes per marker, of an image of `width` x `height` px.
+
+        Raises WireError (index, flags or marker) when any of it is not plausible.
+        """
+        self._words: Words = np.frombuffer(records, "<u2").reshape(-1, 16)
+        self._values: Values = np.frombuffer(records, "<f4").reshape(-1, 8)
+        row, fault = _first_fault(self._words, self._values, width, height)
+        if fault:
+            self._refuse(row, fault)
+
+    def __len__(self) -> int:
+        return len(self._words)
+
+    @overload
+    def __getitem__(self, item: int) -> MarkerObservation: ...
+    @overload
+    def __getitem__(self, item: slice) -> list[MarkerObservation]: ...
+    def __getitem__(self, item: int | slice) -> MarkerObservation | list[MarkerObservation]:
+        if isinstance(item, slice):
+            return [self[row] for row in range(*item.indices(len(self)))]
+        index, bits = self._words[item, :2].tolist()
+        x, y, diameter, xx, xy, yy, quality = self._values[item, 1:].tolist()
+        if bits & _LOST:
+            x = y = math.nan  # one NaN object, so that equal markers compare equal
+        return MarkerObservation(index, x, y, diameter, xx, xy, yy, quality, _FLAGS[bits])
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and list(self) == list(other)
+
+    __hash__ = None  # type: ignore[assignment]  # as a list's
+
+    def columns(self) -> tuple[Array, Array, Array, Array, NDArray[np.uint16]]:
+        """Pixels (M, 2), NaN when lost, covariances (M, 2, 2) px^2, diameters (M,) px, qualities and flags (M,)."""
+        count = len(self)
+        numbers, flags = np.empty(8 * count), np.empty(count, np.uint16)
+        _read(self._words, self._values, numbers, flags)
+        return (numbers[:2 * count].reshape(count, 2), numbers[2 * count:6 * count].reshape(count, 2, 2),
+                numbers[6 * count:7 * count], numbers[7 * count:], flags)
+
+    def _refuse(self, row: int, fault: int) -> None:
+        index, bits = self._words[row, :2].tolist()
+        if fault == _INDEX:
+            raise WireError("index", f"marker {index} at position {row}")
+        if fault == _UNKNOWN_FLAGS:
+            raise WireError("flags", f"unknown marker flags {bits:#06x}")
+        if fault == _LOST_WITH_VALUES:
+            raise WireError("marker", f"marker {index} is lost and yet has values")
+        raise WireError("marker", f"marker {index} is not plausible: {tuple(self._values[row, 1:].tolist())}")
+
+
+@njit(cache=True)
+def _first_fault(words: Words, values: Values, width: int, height: int) -> tuple[int, int]:
+    """Row and kind of the first fault, (0, _SOUND) without one."""
+    x_max, y_max = width - 1 + IMAGE_MARGIN, height - 1 + IMAGE_MARGIN
+    diameter_max = 2.0 * max(width, height)
+    for row in range(words.shape[0]):
+        x, y, diameter = float(values[row, 1]), float(values[row, 2]), float(values[row, 3])
+        xx, xy, yy = float(values[row, 4]), float(values[row, 5]), float(values[row, 6])
+        quality = float(values[row, 7])
+        if words[row, 0] != row:
+            return row, _INDEX
+        if words[row, 1] >= _KNOWN_FLAGS:
+            return row, _UNKNOWN_FLAGS
+        if words[row, 1] & _LOST:
+            silent = diameter == 0.0 and xx == 0.0 and xy == 0.0 and yy == 0.0 and quality == 0.0
+            if not (math.isnan(x) and math.isnan(y) and silent):
+                return row, _LOST_WITH_VALUES
+        elif not (-IMAGE_MARGIN <= x <= x_max and -IMAGE_MARGIN <= y <= y_max
+                  and 0.0 < diameter <= diameter_max and 0.0 <= quality <= 1.0
+                  and 0.0 <= xx <= COVARIANCE_MAX and 0.0 <= yy <= COVARIANCE_MAX
+                  and xy * xy <= xx * yy * (1.0 + 1e-6) + 1e-30):  # room for rounding to single precision
+            return row, _IMPLAUSIBLE
+    return 0, _SOUND
+
+
+@njit(cache=True)
+def _read(words: Words, values: Values, numbers: Array, flags: NDArray[np.uint16]) -> None:
+    """Fill `numbers` (8 M,), as `MarkerTable.columns` cuts it, and `flags` (M,)."""
+    count = words.shape[0]
+    for row in range(count):
+        numbers[2 * row], numbers[2 * row + 1] = values[row, 1], values[row, 2]
+        place = 2 * count + 4 * row
+        numbers[place], numbers[place + 3] = values[row, 4], values[row, 6]
+        numbers[place + 1] = numbers[place + 2] = values[row, 5]
+        numbers[6 * count + row], numbers[7 * count + row] = values[row, 3], values[row, 7]
+        flags[row] = words[row, 1]
