@@ -20,7 +20,10 @@ class Actions(QObject):
         self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it (R).")
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
         self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")
-        self.find = self._make("Find nodes …", "", "Enter the addresses of nodes and see whether they answer.")
+        self.nodes = self._make("Connect nodes …", "", "Enter the addresses of two nodes, see whether they answer, and "
+                                "write a rig file for them.")
+        self.save_rig = self._make("Save rig", "Ctrl+S", "Write the rig as it is now to its file; what stood there is "
+                                   "kept beside it.")
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
         self.quit = self._make("Quit", "Ctrl+Q", "End what the app started and close it.")
         self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
@@ -70,7 +73,7 @@ class MainToolBar(QToolBar):
         self.addAction(actions.record)
         self.addSeparator()
         a = actions
-        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.find, None, a.close_rig, a.quit])
+        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.save_rig, a.close_rig, None, a.quit])
         self.calibrate_button = self._add_menu("Calibrate", [a.cameras, a.markers, a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, None,
                                                    a.dark, a.light, None, a.reset])
@@ -81,6 +84,7 @@ class MainToolBar(QToolBar):
         self.rig_label = QLabel("")
         self.rig_label.setProperty("muted", True)
         self.addWidget(self.rig_label)
+        self.show_rig("", "", edited=False)
         self.badge = StateBadge(scheme)
         self.addWidget(self.badge)
         self.set_scheme(actions, scheme, running=False, recording=False)
@@ -99,6 +103,14 @@ class MainToolBar(QToolBar):
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.addWidget(button)
         return button
+
+    def show_rig(self, name: str, path: str, *, edited: bool) -> None:
+        """Name of the rig, "" for none; `edited` says that its file does not say the same."""
+        text = f"rig: {name}{' (edited)' if edited else ''}  " if name else ""
+        if text != self.rig_label.text() or path not in self.rig_label.toolTip():
+            self.rig_label.setText(text)
+            unsaved = "\nThe engine's rig differs from this file; Rig, Save rig writes it." if edited else ""
+            self.rig_label.setToolTip(f"{path}{unsaved}")
 
     def set_scheme(self, actions: Actions, scheme: Scheme, *, running: bool, recording: bool) -> None:
         """Words and icons of the two buttons that change."""

@@ -8,14 +8,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
-from rhot_app.ui.backend.live import SILENCE_S, Client, Live
-from rhot_app.ui.backend.session import Backend, Opened, TwinChoice
+from rhot_app.ui.backend.live import SILENCE_S, Live
+from rhot_app.ui.backend.session import Backend, Opened, TwinChoice, TwinPace
+from rhot_app.ui.engine_link import ClosableClient, EngineLink
 from rhot_app.ui.job import Job, Progress
 
 SAMPLE_S = 0.1
@@ -25,15 +26,6 @@ TWIN_CHECK_S = 0.5
 RESTART_TWIN = "twin"
 RESTART_ENGINE = "engine"
 _CLOSE_WAIT_S = 15.0
-
-
-
-class ClosableClient(Client, Protocol):
-    """The engine's client, which can be closed."""
-
-    def close(self) -> None:
-        """Disconnect."""
-        ...
 
 
 class Controller(QObject):
@@ -50,16 +42,15 @@ class Controller(QObject):
         self.live = Live()
         self.opened: Opened | None = None
         self.twin_choice = TwinChoice()
-        self._connect = connect
-        self._client: ClosableClient | None = None
+        self.link = EngineLink(connect, self._on_command_failed, self)
         self._job: Job | None = None
-        self._commands: list[Job] = []
         self.busy: tuple[str, float] | None = None
         self.problem = ""
         self._restarts: list[float] = []
         self._restarting = False
         self._was_running = False
         self.twin_gone = False
+        self.twin_pace: TwinPace | None = None
         self._next_sample = self._next_twin_check = 0.0
         self._begin_after_opening = False
 
@@ -114,7 +105,7 @@ class Controller(QObject):
     def _on_opened(self, opened: Opened) -> None:
         self._job = None
         self._set_busy(None)
-        self._connect_client()
+        self.link.open()
         self.opened = opened
         self.live.clear()
         self.twin_gone = self._restarting = False
@@ -123,11 +114,6 @@ class Controller(QObject):
         if self._begin_after_opening and not opened.running:
             self.start()
         self._begin_after_opening = False
-
-    def _connect_client(self) -> None:
-        if self._client is not None:
-            self._client.close()
-        self._client = self._connect()
 
     def _on_failed(self, sentence: str) -> None:
         self._job = None
@@ -139,11 +125,9 @@ class Controller(QObject):
         self.problem = sentence
 
     def _forget_rig(self) -> None:
-        self.opened = None
+        self.opened = self.twin_pace = None
         self.live.clear()
-        if self._client is not None:
-            self._client.close()
-            self._client = None
+        self.link.close()
         self.problem = ""
         self.rig_changed.emit()
 
@@ -185,11 +169,10 @@ class Controller(QObject):
         if self._job is not None:
             self._job.cancel()
         sentence = self.backend.close()
-        for job in [*([self._job] if self._job is not None else []), *self._commands]:
-            job.wait(_CLOSE_WAIT_S)
-        if self._client is not None:
-            self._client.close()
-            self._client = None
+        if self._job is not None:
+            self._job.wait(_CLOSE_WAIT_S)
+        self.link.wait(_CLOSE_WAIT_S)
+        self.link.close()
         return self.backend.close() or sentence
 
     # -- commands --------------------------------------------------------------------------------------------------
@@ -197,12 +180,12 @@ class Controller(QObject):
     def start(self) -> None:
         """Tell the nodes to stream."""
         self._was_running = True
-        self._command("start")
+        self.link.command("start")
 
     def stop(self) -> None:
         """Tell the nodes to stop."""
         self._was_running = False
-        self._command("stop")
+        self.link.command("stop")
 
     def start_or_stop(self) -> None:
         """The toolbar's first button; nothing happens without a rig and an engine that answers."""
@@ -214,29 +197,25 @@ class Controller(QObject):
 
     def record(self, path: Path) -> None:
         """Write the raw log of all datagrams to `path`."""
-        self._command("record", path=str(path))
+        self.link.command("record", path=str(path))
 
     def stop_recording(self) -> None:
         """End the log."""
-        self._command("record_stop")
+        self.link.command("record_stop")
 
     def set_preview(self, on: bool) -> None:
         """Have the nodes send pictures, or not: nobody looks while the panel is hidden."""
         if self.opened is not None and not self.engine_gone:
-            self._command("preview", on=on)
+            self.link.command("preview", on=on)
 
-    def _command(self, name: str, **args: Any) -> None:
-        client = self._client
-        if client is None:
-            return
-        self._run_quietly(lambda: client.command(name, **args))
+    def save_rig(self, done: Callable[[str], None]) -> None:
+        """Have the engine write its rig to the file it came from; `done` hears the file's path."""
+        self.link.work(lambda client: client.command("save_rig"), lambda answer: done(str(answer.get("path", ""))))
 
-    def _run_quietly(self, op: Callable[[], Any]) -> None:
-        """Run something short in a worker; only its failure is shown."""
-        self._commands = [job for job in self._commands if job.running]
-        job = Job(lambda progress: op(), lambda result: None, self._on_command_failed, None, self)
-        self._commands.append(job)
-        job.start()
+    def take_rig(self, opened: Opened) -> None:
+        """Show another rig that the engine has gone over to."""
+        self.opened = opened
+        self.rig_changed.emit()
 
     def _on_command_failed(self, sentence: str) -> None:
         if not self.engine_gone:
@@ -246,10 +225,10 @@ class Controller(QObject):
 
     def step(self) -> None:
         """Pull what arrived, sample the windows ten times a second, watch over engine and simulated nodes."""
-        if self._client is None or self.opened is None:
+        if self.link.client is None or self.opened is None:
             return
         try:
-            self.live.step(self._client)
+            self.live.step(self.link.client)
         except RhotError as exc:
             self.problem = str(exc)
         now = time.monotonic()
@@ -259,6 +238,7 @@ class Controller(QObject):
         if now >= self._next_twin_check:
             self._next_twin_check = now + TWIN_CHECK_S
             self.twin_gone = self.opened.simulated and not self.backend.twin_alive()
+            self.twin_pace = self.backend.twin_pace() if self.opened.simulated else None
         if self.engine_gone:
             self._restart(now)
         elif self.live.status is not None:

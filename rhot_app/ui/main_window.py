@@ -3,40 +3,38 @@
 from __future__ import annotations
 
 import time
-from datetime import datetime
 from pathlib import Path
 
-from platformdirs import user_documents_path
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction, QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QComboBox,
-    QFileDialog,
     QMainWindow,
     QStackedWidget,
     QToolBar,
 )
 
 from rhot_app.ui.actions import Actions, MainToolBar
+from rhot_app.ui.appearance import Appearance
 from rhot_app.ui.backend.session import TwinChoice
 from rhot_app.ui.controller import Controller
+from rhot_app.ui.dialogs import Dialogs
 from rhot_app.ui.docks import Docks
-from rhot_app.ui.guide import GuideViewer, page_of
+from rhot_app.ui.guide import page_of
 from rhot_app.ui.models.notice import Notice
-from rhot_app.ui.nodes_dialog import NodesDialog
+from rhot_app.ui.models.passing import PassingNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar
-from rhot_app.ui.rig_dialog import RigDialog
+from rhot_app.ui.recordings import SHOW_FOLDER, Recordings
+from rhot_app.ui.rig_watch import RigWatch
 from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
-from rhot_app.ui.theme import apply_theme, scheme_named
+from rhot_app.ui.theme import scheme_named
 from rhot_app.ui.voice import look_of, notices_of
 from rhot_app.ui.welcome import WelcomePage
 
 TICK_MS = 16
-FAILURE_S = 15.0
-LOG_SUFFIX = ".rhotlog"
 _SIZE = (1280, 800)
 
 
@@ -47,14 +45,18 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.controller = controller
         self.settings = settings
-        self._scheme = scheme_named(settings.scheme)
-        self._failure: tuple[Notice, float] | None = None
         self._buttons_shown: tuple[bool, bool] | None = None
-        self._guide: GuideViewer | None = None
+        self.passing = PassingNotices()
+        self.dialogs = Dialogs(self)
+        self.recordings = Recordings(controller, self.tell)
+        self.rig_watch = RigWatch(controller)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
-        self.screen_parts = Screen(self._scheme)
+        scheme = scheme_named(settings.scheme)
+        self.screen_parts = Screen(scheme)
+        self.advice = AdviceBar(scheme)
         self.actions_ = Actions(self)
+        self.appearance = Appearance(settings, self.actions_, self.screen_parts, self.advice, self)
         self.welcome = WelcomePage(settings.motion)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.welcome)
@@ -62,9 +64,8 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(self.pages)
         self.docks = Docks(self)
         self._add_docks()
-        self.toolbar = MainToolBar(self.actions_, self.docks.actions, self._scheme, self)
+        self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.toolbar)
-        self.advice = AdviceBar(self._scheme)
         self._add_advice_bar()
         self._connect_actions()
         self._restore()
@@ -99,10 +100,11 @@ class MainWindow(QMainWindow):
         self.addActions(self.docks.actions)
         a.start.triggered.connect(c.start_or_stop)
         QShortcut(QKeySequence(Qt.Key.Key_Space), self).activated.connect(self._press_space)
-        a.record.triggered.connect(self.record_or_stop)
+        a.record.triggered.connect(self.recordings.begin_or_end)
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)
-        a.find.triggered.connect(self.find_nodes)
+        a.nodes.triggered.connect(self.connect_nodes)
+        a.save_rig.triggered.connect(self.save_rig)
         a.close_rig.triggered.connect(c.close_rig)
         a.quit.triggered.connect(self.close)
         for action, page in ((a.cameras, "cameras"), (a.markers, "markers"), (a.hand, "hand")):
@@ -110,36 +112,28 @@ class MainWindow(QMainWindow):
         a.files.triggered.connect(lambda: self.open_guide("calibration"))
         a.frame.triggered.connect(self.screen_parts.scene.frame_hand)
         a.home.triggered.connect(self.screen_parts.scene.reset_view)
-        a.names.toggled.connect(self._show_names)
-        a.clouds.toggled.connect(self._show_clouds)
         a.alone.toggled.connect(lambda on: self.docks.put_away("scene alone", on))
-        a.dark.triggered.connect(lambda: self.set_scheme("dark"))
-        a.light.triggered.connect(lambda: self.set_scheme("light"))
         a.reset.triggered.connect(self.reset_settings)
         a.guide.triggered.connect(lambda: self.open_guide(page_of(QApplication.focusWidget())))
         w = self.welcome
         w.twin_asked.connect(self.open_twin)
         w.file_asked.connect(self.choose_rig)
         w.last_asked.connect(lambda: self.open_rig(Path(self.settings.last_rig)))
-        w.nodes_asked.connect(self.find_nodes)
+        w.nodes_asked.connect(self.connect_nodes)
         w.cancel_asked.connect(c.cancel)
         self.screen_parts.scene.start_button.clicked.connect(c.start)
-        self.advice.acted.connect(c.act)
+        self.advice.acted.connect(self._act)
         c.rig_changed.connect(self._show_rig)
         c.busy_changed.connect(self._show_busy)
         c.failed.connect(self._show_failure)
+        self.appearance.scheme_changed.connect(self._recolour_buttons)
         self.docks.docks[2].visibilityChanged.connect(c.set_preview)
 
     def _restore(self) -> None:
         """Layout and switches as they were left."""
-        a, s = self.actions_, self.settings
-        (a.light if s.scheme == "light" else a.dark).setChecked(True)
-        a.names.setChecked(s.flag("names"))
-        a.clouds.setChecked(s.flag("clouds"))
-        self.screen_parts.scene.show_names(s.flag("names"))
-        self.screen_parts.scene.show_clouds(s.flag("clouds"))
+        self.appearance.restore()
         self.resize(*_SIZE)
-        layout = s.layout()
+        layout = self.settings.layout()
         if layout is None or not (self.restoreGeometry(layout[0]) and self.docks.restore(layout[1])):
             self.docks.arrange()
 
@@ -163,80 +157,61 @@ class MainWindow(QMainWindow):
 
     def choose_rig(self) -> None:
         """Ask for a rig file and open it."""
-        last = Path(self.settings.last_rig)
-        start = str(last.parent) if self.settings.last_rig and last.parent.is_dir() else str(Path.home())
-        name, _ = QFileDialog.getOpenFileName(self, "Open a rig file", start, "Rig files (*.json);;All files (*)")
-        if name:
-            self.open_rig(Path(name))
+        path = self.dialogs.choose_rig(self.settings.last_rig)
+        if path is not None:
+            self.open_rig(path)
 
     def open_rig(self, path: Path) -> None:
         """Open a rig file."""
         self.controller.open_rig(path)
 
-    def find_nodes(self) -> None:
+    def connect_nodes(self) -> None:
         """Ask two nodes and open the rig file written for them."""
-        dialog = NodesDialog(self._scheme, self)
-        if dialog.exec() and dialog.rig_path is not None:
-            self.open_rig(dialog.rig_path)
+        path = self.dialogs.connect_nodes(self.appearance.scheme)
+        if path is not None:
+            self.open_rig(path)
 
-    def record_or_stop(self) -> None:
-        """Begin a log in the documents folder, named by date and time; or end it."""
-        if self.controller.recording:
-            self.controller.stop_recording()
-            return
-        folder = user_documents_path() / "RHOT"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as exc:
-            self._show_failure(f"{folder}: cannot be made ({exc.strerror}), so nothing is recorded.")
-            return
-        self.controller.record(folder / f"{datetime.now():%Y-%m-%d_%H-%M-%S}{LOG_SUFFIX}")
+    def save_rig(self) -> None:
+        """Write the rig as the engine has it to its file."""
+        self.controller.save_rig(self._confirm_saved)
+
+    def _confirm_saved(self, path: str) -> None:
+        self.rig_watch.look_soon()
+        self.tell(Notice("info", f"The rig was saved to {path}. What stood there before is kept in "
+                                 f"{Path(path).name}.history."))
 
     def show_rig_file(self, page: str) -> None:
         """What the rig file says, to read."""
         if self.controller.rig is not None:
-            dialog = RigDialog(self.controller.rig, page, self)
-            dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-            dialog.open()
+            self.dialogs.show_rig(self.controller.rig, page)
 
     def open_guide(self, page: str) -> None:
         """A page of the guide beside the window."""
-        if self._guide is None:
-            self._guide = GuideViewer(self)
-        self._guide.open_page(page)
+        self.dialogs.open_guide(page)
 
     @property
     def guide_page(self) -> str:
         """The page of the guide that is open, "" for none."""
-        return self._guide.page if self._guide is not None and self._guide.isVisible() else ""
+        return self.dialogs.guide_page
 
-    def set_scheme(self, name: str) -> None:
-        """Dark or light."""
-        self.settings.scheme = name
-        self._scheme = scheme_named(name)
-        app = QApplication.instance()
-        if isinstance(app, QApplication):
-            apply_theme(app, self._scheme)
-        self.screen_parts.set_scheme(self._scheme)
-        self.advice.set_scheme(self._scheme)
-        self._buttons_shown = None
-        self._show_buttons()
+    def tell(self, notice: Notice) -> None:
+        """Show a sentence for a while: something was done, or could not be done."""
+        self.passing.show(notice, time.monotonic())
+
+    def _act(self, key: str) -> None:
+        """The button of a sentence."""
+        if key == SHOW_FOLDER:
+            self.recordings.show_folder()
+        else:
+            self.controller.act(key)
 
     def reset_settings(self) -> None:
         """As on the first start: layout, switches, last rig."""
         self.settings.reset()
         self.actions_.alone.setChecked(False)
-        self.set_scheme(self.settings.scheme)
+        self.appearance.set_scheme(self.settings.scheme)
         self._restore()
         self._show_rig()
-
-    def _show_names(self, on: bool) -> None:
-        self.settings.set_flag("names", on)
-        self.screen_parts.scene.show_names(on)
-
-    def _show_clouds(self, on: bool) -> None:
-        self.settings.set_flag("clouds", on)
-        self.screen_parts.scene.show_clouds(on)
 
     # -- showing ---------------------------------------------------------------------------------------------------
 
@@ -244,27 +219,26 @@ class MainWindow(QMainWindow):
         """Pull and show."""
         self.controller.step()
         now = time.monotonic()
+        self.recordings.step()
+        self.rig_watch.step(now)
         self.screen_parts.refresh(self.controller.live, now)
         self._show_buttons()
+        self._show_rig_name()
         status = self.controller.live.status
         rate = status.state_rate_hz if status is not None and not self.controller.engine_gone else None
         self.toolbar.badge.show_look(look_of(self.controller), rate)
-        self.advice.show_notices(self._notices(now))
+        self.advice.show_notices(notices_of(self.controller, self.passing.current(now)))
 
-    def _notices(self, now: float) -> list[Notice]:
-        notices = notices_of(self.controller)
-        if self._failure is not None and now >= self._failure[1]:
-            self._failure = None
-        if self._failure is None:
-            return notices
-        return [self._failure[0], *(notice for notice in notices if notice.text != self._failure[0].text)]
+    def _recolour_buttons(self) -> None:
+        self._buttons_shown = None
+        self._show_buttons()
 
     def _show_buttons(self) -> None:
         c, a = self.controller, self.actions_
         shown = (c.running, c.recording)
         if shown != self._buttons_shown:
             self._buttons_shown = shown
-            self.toolbar.set_scheme(a, self._scheme, running=c.running, recording=c.recording)
+            self.toolbar.set_scheme(a, self.appearance.scheme, running=c.running, recording=c.recording)
         usable = c.opened is not None and not c.engine_gone
         self.screen_parts.scene.offer_start(usable and not c.running)
         for action in (a.start, a.record):
@@ -276,14 +250,19 @@ class MainWindow(QMainWindow):
         self.screen_parts.show_rig(rig)
         self.pages.setCurrentIndex(0 if rig is None else 1)
         self.docks.put_away("no rig", rig is None)
-        self.toolbar.rig_label.setText(f"rig: {rig.name}  " if rig is not None else "")
-        self.toolbar.rig_label.setToolTip(opened.rig_path if opened is not None else "")
+        self._show_rig_name()
         for action in self._rig_actions():
             action.setEnabled(rig is not None)
         if opened is not None and opened.rig_path and not opened.simulated:
             self.settings.last_rig = opened.rig_path
         last = Path(self.settings.last_rig)
         self.welcome.show_last(last.name if self.settings.last_rig and last.exists() else "")
+
+    def _show_rig_name(self) -> None:
+        opened, edited = self.controller.opened, self.rig_watch.edited
+        self.toolbar.show_rig(opened.rig.name if opened is not None else "",
+                              opened.rig_path if opened is not None else "", edited=edited)
+        self.actions_.save_rig.setEnabled(edited and not self.controller.engine_gone)
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
@@ -294,7 +273,7 @@ class MainWindow(QMainWindow):
             self.welcome.show_busy(self.controller.busy)
 
     def _show_failure(self, sentence: str) -> None:
-        self._failure = (Notice("error", sentence), time.monotonic() + FAILURE_S)
+        self.tell(Notice("error", sentence))
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Remember the layout; `app.run` ends the processes once the window is gone."""
@@ -302,6 +281,5 @@ class MainWindow(QMainWindow):
         self.actions_.alone.setChecked(False)
         self.settings.set_layout(self.saveGeometry(), self.docks.state())
         self.settings.sync()
-        if self._guide is not None:
-            self._guide.close()
+        self.dialogs.close()
         event.accept()

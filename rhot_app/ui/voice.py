@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from rhot_app.ui.backend.session import TwinPace
 from rhot_app.ui.controller import RESTART_ENGINE, RESTART_TWIN, Controller
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
@@ -18,8 +21,15 @@ def look_of(controller: Controller) -> Look:
     return condition_look(status.condition) if status is not None else STARTING
 
 
-def notices_of(controller: Controller) -> list[Notice]:
-    """The sentences of the moment: the app's own, then the engine's; a quiet one when there is nothing to say."""
+def notices_of(controller: Controller, passing: Sequence[Notice] = ()) -> list[Notice]:
+    """The sentences of the moment: those that pass by, the app's own, then the engine's; a quiet one when there is
+    nothing to say."""
+    told = {notice.text for notice in passing}
+    notices = [*passing, *(notice for notice in _lasting_notices(controller) if notice.text not in told)]
+    return notices or [Notice("info", _quiet_sentence(controller))]
+
+
+def _lasting_notices(controller: Controller) -> list[Notice]:
     notices: list[Notice] = []
     if controller.engine_gone:
         notices.append(_engine_notice(controller))
@@ -34,7 +44,14 @@ def notices_of(controller: Controller) -> list[Notice]:
         notices += [Notice(advice.level, advice.text) for advice in status.advice]
         if status.log_path:
             notices.append(Notice("info", f"Recording to {status.log_path} ({bytes_text(status.log_bytes)})."))
-    return notices or [Notice("info", _quiet_sentence(controller))]
+    if controller.twin_pace is not None and controller.running:
+        notices.append(_pace_notice(controller.twin_pace))
+    return notices
+
+
+def _pace_notice(pace: TwinPace) -> Notice:
+    return Notice("info", f"This computer renders the simulated cameras at {pace.achieved_hz:.0f} of "
+                          f"{pace.preset_hz:.0f} Hz; the tracking is real all the same.")
 
 
 def _engine_notice(controller: Controller) -> Notice:

@@ -27,7 +27,7 @@ _CARD_WIDTH_PX = 300
 
 
 class WelcomePage(QWidget):
-    """Simulated rig, open a rig file, find nodes; the last rig too when there is one."""
+    """Simulated rig, open a rig file, connect nodes; the last rig too when there is one."""
 
     twin_asked = Signal(object)
     file_asked = Signal()
@@ -77,7 +77,7 @@ class WelcomePage(QWidget):
         self.file_button.clicked.connect(self.file_asked)
         self.last_button = QPushButton()
         self.last_button.clicked.connect(self.last_asked)
-        self.nodes_button = QPushButton("Find nodes …")
+        self.nodes_button = QPushButton("Connect nodes …")
         self.nodes_button.clicked.connect(self.nodes_asked)
         self.show_last("")
         cards = QGridLayout()

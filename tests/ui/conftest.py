@@ -40,7 +40,7 @@ class Bench:
         self.controller = Controller(self.backend, self.backend.client)
         self.window = MainWindow(self.controller, settings)
         if QApplication.palette().color(QPalette.ColorRole.Window).name() != scheme_named(scheme).window:
-            self.window.set_scheme(scheme)
+            self.window.appearance.set_scheme(scheme)
         self.window.screen_parts.pacer = FramePacer(most_hz=4.0)  # software OpenGL is slow, and few tests look at it
         self.window.show()
         self.window.activateWindow()
@@ -52,9 +52,10 @@ class Bench:
         QTest.mouseClick(button, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
                          QPoint(button.width() // 2, button.height() // 2))
 
-    def press(self, key: Qt.Key, widget: QWidget | None = None) -> None:
+    def press(self, key: Qt.Key, widget: QWidget | None = None,
+              modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
         """Press a key in the window."""
-        QTest.keyClick(widget or self.window, key)
+        QTest.keyClick(widget or self.window, key, modifier)
 
     def until(self, condition: Callable[[], Any], timeout_s: float = 8.0) -> None:
         """Let the window run until `condition` holds; the last look happens after the time is up."""
@@ -70,6 +71,7 @@ class Bench:
     def track(self) -> None:
         """Bring the window to the simulated rig, tracking, with nothing wrong, from wherever it is."""
         self.backend.calm()
+        self.window.passing.clear()
         if self.controller.rig is None:
             self.until(lambda: self.window.welcome.twin_button.isVisible())
             self.click(self.window.welcome.twin_button)

@@ -8,7 +8,7 @@ from pathlib import Path
 from fake_engine import FakeClient, FakeEngine
 
 from rhot_app.errors import RigError
-from rhot_app.ui.backend.session import Opened, Report, TwinChoice
+from rhot_app.ui.backend.session import Opened, Report, TwinChoice, TwinPace
 
 
 class FakeBackend:
@@ -20,13 +20,14 @@ class FakeBackend:
         self.already_running = False
         self.ours = True
         self.alive = True
+        self.pace: TwinPace | None = None
         self.refuse = ""
         self.gate = threading.Event()
         self.gate.set()
 
     def calm(self) -> None:
         """End all trouble; what runs and what was counted stays."""
-        self.alive, self.refuse = True, ""
+        self.alive, self.refuse, self.pace = True, "", None
         self.gate.set()
         engine = self.engine
         engine.dead, engine.hidden, engine.advice, engine.log_path = False, {}, (), ""
@@ -50,7 +51,7 @@ class FakeBackend:
     def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
         self.calls.append(f"twin {choice.motion}")
         self._work(report)
-        return self._opened("/tmp/simulated.rig.json", simulated=True)
+        return self._opened("", simulated=True)
 
     def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
         self.calls.append(f"restart start={start}")
@@ -61,6 +62,9 @@ class FakeBackend:
 
     def twin_alive(self) -> bool:
         return self.alive
+
+    def twin_pace(self) -> TwinPace | None:
+        return self.pace
 
     def give_up(self) -> None:
         self.calls.append("give up")
@@ -78,4 +82,5 @@ class FakeBackend:
         report("Asking the engine for its rig …", 0.9)
 
     def _opened(self, path: str, *, simulated: bool) -> Opened:
+        self.engine.rig_path = path
         return Opened(self.engine.rig, path, self.engine.running, self.ours, simulated)

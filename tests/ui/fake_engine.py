@@ -10,9 +10,11 @@ import itertools
 import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import cv2
+import msgspec
 import numpy as np
 
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, Preview
@@ -22,6 +24,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.rig_history import accept
 from rhot_app.tracking.state import LATENCY_STAGES, Condition, HandState, Knowledge
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
@@ -209,12 +212,22 @@ class FakeClient:
         return messages
 
     def command(self, name: str, **args: Any) -> dict[str, Any]:
-        """Start, stop and record as the engine would; raises EngineError when it is dead."""
+        """Start, stop, and tell or save the rig as the engine would; raises EngineError when it is dead."""
         if self.engine.dead:
             raise EngineError("The engine does not answer.")
+        if name == "rig":
+            return {"document": msgspec.to_builtins(self.engine.rig), "path": self.engine.rig_path}
         self.engine.commands.append((name, args))
         if name in ("start", "stop"):
             self.engine.running = name == "start"
+        if name == "record":
+            Path(args["path"]).write_bytes(bytes(120_000))
+            self.engine.log_path = args["path"]
+        if name == "record_stop":
+            self.engine.log_path = ""
+        if name == "save_rig":
+            accept(Path(self.engine.rig_path), self.engine.rig, "a change")
+            return {"path": self.engine.rig_path}
         return {}
 
     def close(self) -> None:

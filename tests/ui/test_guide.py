@@ -40,6 +40,6 @@ def test_f1_opens_the_page_of_the_panel_in_use(bench):
     bench.until(parts.scene.hasFocus)
     bench.press(Qt.Key.Key_F1)
     assert bench.window.guide_page == "scene"
-    bench.window._guide._follow(QUrl("troubles.md"))
+    bench.window.dialogs.guide._follow(QUrl("troubles.md"))
     assert bench.window.guide_page == "troubles"
-    assert "wrong" in bench.window._guide.browser.toPlainText()
+    assert "wrong" in bench.window.dialogs.guide.browser.toPlainText()

@@ -65,18 +65,6 @@ def test_a_focused_button_keeps_its_space_bar(tracking):
     assert pause.isChecked() and tracking.backend.engine.running
 
 
-def test_r_records_and_ends_the_recording(tracking, tmp_path):
-    engine = tracking.backend.engine
-    tracking.press(Qt.Key.Key_R)
-    tracking.until(lambda: any(name == "record" for name, _ in engine.commands))
-    path = Path(next(args["path"] for name, args in engine.commands if name == "record"))
-    assert path.suffix == ".rhotlog" and path.parent == tmp_path / "RHOT" and path.parent.is_dir()
-    engine.log_path = str(path)
-    tracking.until(lambda: any(str(path) in text and "120.0 kB" in text for text in tracking.window.advice.texts))
-    tracking.press(Qt.Key.Key_R)
-    tracking.until(lambda: any(name == "record_stop" for name, _ in engine.commands))
-
-
 def test_numbers_show_and_hide_panels(tracking):
     docks = tracking.window.docks.docks
     for number, dock in enumerate(docks, start=1):

@@ -37,5 +37,5 @@ def test_small_values_keep_their_unit(tracking):
     """The axis says millimetres, so it must not turn to micrometres by itself when values are small."""
     axis = tracking.window.screen_parts.jitter.plot.getPlotItem().getAxis("left")
     axis.setRange(0.0, 0.001)
-    tracking.window.set_scheme("dark")
+    tracking.window.appearance.set_scheme("dark")
     assert axis.autoSIPrefixScale == 1.0

@@ -54,7 +54,7 @@ def shown(tracking):
     tracking.window.resize(SIZE)
     tracking.window.move(0, 0)
     if tracking.window.settings.scheme != "dark":
-        tracking.window.set_scheme("dark")
+        tracking.window.appearance.set_scheme("dark")
     tracking.window.screen_parts.scene.reset_view()
     tracking.window.docks.arrange()
     tracking.run(0.4)
@@ -86,7 +86,7 @@ def test_progress_page(bench):
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_tracking(shown, scheme):
     if scheme != "dark":
-        shown.window.set_scheme(scheme)
+        shown.window.appearance.set_scheme(scheme)
     shown.run(20.0 if UPDATE else 0.5)
     assert scene_colours(shown) > 40
     check("tracking" if scheme == "dark" else "tracking-light", picture_of(shown.window), 80)
@@ -126,4 +126,4 @@ def test_dialogs(qtbot, bench):
         check(name, dialog.grab().toImage(), 10)
     bench.window.open_guide("window")
     bench.run(0.3)
-    check("guide", bench.window._guide.grab().toImage(), 12)
+    check("guide", bench.window.dialogs.guide.grab().toImage(), 12)

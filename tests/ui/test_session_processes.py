@@ -16,7 +16,7 @@ from rhot_app.engine.process import running_engine, start_ticks, started_process
 from rhot_app.errors import EngineError, RigError, SimulatorError
 from rhot_app.project import save_rig
 from rhot_app.ui.backend import session as session_module
-from rhot_app.ui.backend.session import Session, TwinChoice
+from rhot_app.ui.backend.session import Session, TwinChoice, TwinPace
 
 
 def quiet(text: str, fraction: float) -> None:
@@ -88,6 +88,8 @@ assert arguments["--motion"] in ("rest", "slow"), "there is no such motion"
 shutil.copy(sys.argv[1], arguments["--rig"])
 time.sleep(30.0 if arguments["--motion"] == "slow" else 0.2)
 print('{"nodes": ["left", "right"]}', flush=True)
+print('{"event": "slow", "achieved_hz": 11.25, "preset_hz": 40}', flush=True)
+print('{"event": "slow", "achi', end="", flush=True)
 time.sleep(600)
 """
 
@@ -103,6 +105,7 @@ def stand_in(tmp_path, rig_path, monkeypatch):
 def test_simulated_nodes_are_started_watched_and_ended(session, stand_in):
     opened = session.open_twin(TwinChoice(motion="rest"), quiet)
     assert opened.simulated and opened.ours and session.twin_alive()
+    wait_until(lambda: session.twin_pace() == TwinPace(11.25, 40.0))
     assert {process.role for process in started_processes(session._place)} == {"engine", session_module.TWIN_ROLE}
     twin = next(process for process in started_processes(session._place) if process.role == session_module.TWIN_ROLE)
     os.kill(twin.pid, signal.SIGKILL)

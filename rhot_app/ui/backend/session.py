@@ -36,6 +36,7 @@ START_TIMEOUT_S = 180.0
 
 TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.live")
 TWIN_RIG = "simulated.rig.json"
+TWIN_OUTPUT = "twin.out"
 
 Report = Callable[[str, float], None]
 """``report(text, fraction)``; raises when the work is to be given up."""
@@ -59,6 +60,14 @@ class TwinChoice:
     motion: str = "grasp"
     seed: int = 1
     preset: str = "wide"
+
+
+@dataclass(frozen=True, slots=True)
+class TwinPace:
+    """How fast the simulated cameras are rendered when that is slower than their preset asks for."""
+
+    achieved_hz: float
+    preset_hz: float
 
 
 class Backend(Protocol):
@@ -86,6 +95,10 @@ class Backend(Protocol):
 
     def twin_alive(self) -> bool:
         """Whether the simulated nodes, if any were started, still run."""
+        ...
+
+    def twin_pace(self) -> TwinPace | None:
+        """How fast the simulated cameras are rendered; None when as fast as they should be."""
         ...
 
     def give_up(self) -> None:
@@ -157,6 +170,10 @@ class Session:
         """True unless simulated nodes were started and have ended since."""
         return not self._twin_started or any(process.role == TWIN_ROLE for process in started_processes(self._place))
 
+    def twin_pace(self) -> TwinPace | None:
+        """What the simulated nodes said last about falling short of their preset; None when nothing."""
+        return _pace_in(self._place.path / TWIN_OUTPUT) if self._twin_started else None
+
     def give_up(self) -> None:
         """End everything that the app started; what waits for it then fails and is forgotten."""
         self._twin_started = False
@@ -189,7 +206,7 @@ class Session:
 
     def _start_twin(self, choice: TwinChoice, report: Report) -> Path:
         """Start the twin in the background; its ready line goes to a file, so that it outlives this process."""
-        rig_path, output = self._place.path / TWIN_RIG, self._place.path / "twin.out"
+        rig_path, output = self._place.path / TWIN_RIG, self._place.path / TWIN_OUTPUT
         errors = self._place.path / "twin.log"
         command = [*TWIN_COMMAND, "--motion", choice.motion,
                    "--seed", str(choice.seed), "--preset", choice.preset,
@@ -219,6 +236,17 @@ class Session:
             report("Starting two simulated cameras …", 0.15 + 0.3 * min(1.0, (time.monotonic() - begin) / 15.0))
             time.sleep(0.05)
         raise SimulatorError(f"The simulated cameras were not ready within {START_TIMEOUT_S:.0f} s; see {errors}.")
+
+
+def _pace_in(output: Path) -> TwinPace | None:
+    """The newest whole line about the pace: ``{"event": "slow", "achieved_hz": …, "preset_hz": …}``."""
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        whole_lines, _, _ = output.read_text().rpartition("\n")
+        for line in reversed(whole_lines.splitlines()):
+            event = json.loads(line)
+            if event.get("event") == "slow":
+                return TwinPace(float(event["achieved_hz"]), float(event["preset_hz"]))
+    return None
 
 
 def _has_ready_line(output: Path) -> bool:

@@ -1,0 +1,57 @@
+"""The dialogs and other windows that the main window opens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from rhot_app.project import Rig
+from rhot_app.ui.guide import GuideViewer
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.nodes_dialog import NodesDialog
+from rhot_app.ui.rig_dialog import RigDialog
+
+
+class Dialogs:
+    """Each asks one thing, or shows one thing, on top of `parent`."""
+
+    def __init__(self, parent: QWidget) -> None:
+        self._parent = parent
+        self.guide: GuideViewer | None = None
+
+    def choose_rig(self, last_rig: str) -> Path | None:
+        """A rig file, looked for beside the one opened last; None when the person thought better of it."""
+        last = Path(last_rig)
+        start = str(last.parent) if last_rig and last.parent.is_dir() else str(Path.home())
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a rig file", start,
+                                              "Rig files (*.json);;All files (*)")
+        return Path(name) if name else None
+
+    def connect_nodes(self, scheme: Scheme) -> Path | None:
+        """The rig file written for two nodes that answered; None when there is none."""
+        dialog = NodesDialog(scheme, self._parent)
+        return dialog.rig_path if dialog.exec() else None
+
+    def show_rig(self, rig: Rig, page: str) -> None:
+        """What the rig says, to read; `page` is "cameras", "markers" or "hand"."""
+        dialog = RigDialog(rig, page, self._parent)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+    def open_guide(self, page: str) -> None:
+        """A page of the guide beside the window."""
+        if self.guide is None:
+            self.guide = GuideViewer(self._parent)
+        self.guide.open_page(page)
+
+    @property
+    def guide_page(self) -> str:
+        """The page of the guide that is open, "" for none."""
+        return self.guide.page if self.guide is not None and self.guide.isVisible() else ""
+
+    def close(self) -> None:
+        """Close what stands beside the window."""
+        if self.guide is not None:
+            self.guide.close()

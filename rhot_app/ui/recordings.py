@@ -1,0 +1,68 @@
+"""Recordings as the person at the screen makes them: a new file each, and a word about it when it is finished."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from platformdirs import user_documents_path
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+
+from rhot_app.ui.controller import Controller
+from rhot_app.ui.models.notice import Level, Notice
+from rhot_app.ui.models.rows import bytes_text
+
+LOG_SUFFIX = ".rhotlog"
+SHOW_FOLDER = "show the recording's folder"
+
+
+class Recordings:
+    """`tell` takes the sentences that are to be shown for a while."""
+
+    def __init__(self, controller: Controller, tell: Callable[[Notice], None]) -> None:
+        self._controller = controller
+        self._tell = tell
+        self._log_path = ""
+        self._finished = Path()
+
+    def begin_or_end(self) -> None:
+        """Begin a log in the documents folder, named by date and time; or end the one that is being written."""
+        if self._controller.recording:
+            self._controller.stop_recording()
+            return
+        folder = user_documents_path() / "RHOT"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as exc:
+            self._say("error", f"{folder}: cannot be made ({exc.strerror}), so nothing is recorded.")
+            return
+        self._controller.record(folder / f"{datetime.now():%Y-%m-%d_%H-%M-%S}{LOG_SUFFIX}")
+
+    def step(self) -> None:
+        """Watch the engine's log; whoever ended it, and however, the person hears where the file is."""
+        status = self._controller.live.status
+        if status is None or status.log_path == self._log_path:
+            return
+        finished, self._log_path = self._log_path, status.log_path
+        if finished:
+            self._confirm(Path(finished))
+
+    def _confirm(self, path: Path) -> None:
+        self._finished = path
+        try:
+            size = bytes_text(path.stat().st_size)
+        except OSError as exc:
+            self._say("error", f"{path}: the recording cannot be found ({exc.strerror}).")
+            return
+        self._tell(Notice("info", f"Recorded {size} to {path}.", "Show in folder", SHOW_FOLDER))
+
+    def show_folder(self) -> None:
+        """Open the folder of the last recording in the desktop's own file manager."""
+        folder = self._finished.parent
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+            self._say("info", f"This desktop opens no folders. The recording lies in {folder}.")
+
+    def _say(self, level: Level, sentence: str) -> None:
+        self._tell(Notice(level, sentence))

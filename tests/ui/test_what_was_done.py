@@ -1,0 +1,79 @@
+"""What the person at the screen hears after something was done: recorded, saved, slowed down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fake_engine import synthetic_rig
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QDesktopServices
+
+from rhot_app.project import load_rig, save_rig
+from rhot_app.ui.backend.session import TwinPace
+from rhot_app.ui.models.notice import Notice
+from rhot_app.ui.models.passing import PassingNotices
+
+
+def test_r_records_and_says_where_the_file_is(tracking, tmp_path, monkeypatch):
+    engine, advice = tracking.backend.engine, tracking.window.advice
+    tracking.press(Qt.Key.Key_R)
+    tracking.until(lambda: engine.log_path)
+    path = Path(engine.log_path)
+    assert path.suffix == ".rhotlog" and path.parent == tmp_path / "RHOT"
+    tracking.until(lambda: advice.texts == [f"Recording to {path} (120.0 kB)."])
+    tracking.press(Qt.Key.Key_R)
+    tracking.until(lambda: advice.texts == [f"Recorded 120.0 kB to {path}."])
+    opened = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: bool(opened.append(url.toLocalFile())))
+    tracking.click(button_of(tracking, "Show in folder"))
+    assert opened == [str(path.parent)]
+    tracking.until(lambda: any(f"lies in {path.parent}" in text for text in advice.texts))
+
+
+def button_of(bench, text):
+    """The button of a sentence at the bottom."""
+    return next(button for *_, button in bench.window.advice._lines if button.isVisible() and button.text() == text)
+
+
+def test_a_recording_that_vanished_is_said(tracking):
+    tracking.press(Qt.Key.Key_R)
+    tracking.until(lambda: tracking.controller.recording)
+    Path(tracking.backend.engine.log_path).unlink()
+    tracking.press(Qt.Key.Key_R)
+    tracking.until(lambda: "cannot be found" in tracking.window.advice.texts[0])
+
+
+def test_a_rig_that_differs_from_its_file_is_marked_and_saved(make_bench, tmp_path):
+    path = tmp_path / "desk.json"
+    save_rig(path, synthetic_rig())
+    bench = make_bench()
+    bench.window.open_rig(path)
+    bench.until(lambda: bench.controller.rig is not None)
+    label, action = bench.window.toolbar.rig_label, bench.window.actions_.save_rig
+    bench.run(0.3)
+    assert label.text().strip() == "rig: test bench" and not action.isEnabled()
+    bench.backend.engine.rig = synthetic_rig("moved cameras")
+    bench.until(lambda: label.text().strip() == "rig: moved cameras (edited)" and action.isEnabled())
+    assert bench.controller.rig.name == "moved cameras" and load_rig(path).name == "test bench"
+    bench.press(Qt.Key.Key_S, modifier=Qt.KeyboardModifier.ControlModifier)
+    bench.until(lambda: label.text().strip() == "rig: moved cameras" and not action.isEnabled())
+    assert load_rig(path).name == "moved cameras"
+    assert any(f"saved to {path}" in text for text in bench.window.advice.texts)
+
+
+def test_slow_simulated_cameras_are_told_calmly(tracking):
+    tracking.backend.pace = TwinPace(11.2, 40.0)
+    sentence = "This computer renders the simulated cameras at 11 of 40 Hz; the tracking is real all the same."
+    tracking.until(lambda: tracking.window.advice.texts == [sentence])
+    tracking.backend.pace = None
+    tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
+
+
+def test_a_sentence_passes_by():
+    passing, done, failed = PassingNotices(), Notice("info", "done"), Notice("error", "failed")
+    passing.show(done, 100.0)
+    passing.show(failed, 101.0)
+    assert passing.current(109.9) == [failed, done]
+    passing.show(done, 109.0)
+    assert passing.current(115.9) == [done, failed] and passing.current(116.1) == [done]
+    assert passing.current(120.0) == []
