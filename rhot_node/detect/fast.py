@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
+from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.labels import acquisition_table, directions, sector_table
-from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN, Searcher
+from rhot_node.detect.labels import directions, sector_table
+from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
 from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, Track, lost_observation
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
 Blobs = NDArray[np.float64]
 
-AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
 AS_PLAUSIBLE = 0.3  # merit of a second blob, as a fraction of the best, that makes the choice ambiguous
 CANDIDATES = 4  # blobs per marker that are measured until one proves to be paint
 NOISE_START = 1.5  # grey levels of chroma noise, until the first frames have told
@@ -35,8 +35,7 @@ class FastDetector:
         self._markers = markers.markers
         self._directions = directions(markers)
         self._sector = sector_table(markers)
-        limits = np.array([(mark.chroma.luma_min, mark.chroma.luma_max) for mark in self._markers], dtype=np.uint8)
-        self._searcher = Searcher(acquisition_table(markers), limits)
+        self._gate = ColourGate(markers)
         self._request = np.zeros(m.REQUEST_COLUMNS)
         self._row = np.zeros(m.MEASURE_COLUMNS)
         self._scratch = m.Scratch(0, 0)
@@ -66,7 +65,7 @@ class FastDetector:
         """Every blob of every marker's colour, largest first, without regard to tracks; a list per marker."""
         self._fit_scratch(image)
         everything: list[list[MarkerObservation]] = []
-        blobs = self._search(image, range(len(self._markers))).copy()
+        blobs = self._gate.blobs(image, range(len(self._markers))).copy()
         for index, marker in enumerate(self._markers):
             own = []
             for blob in blobs[blobs[:, LABEL] == index + 1]:
@@ -97,7 +96,7 @@ class FastDetector:
 
     def _acquire(self, image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
         """Search the whole frame for the lost markers and state each as found or lost."""
-        blobs = self._search(image, lost).copy()
+        blobs = self._gate.blobs(image, lost).copy()
         for index in lost:
             track = self._tracks[index]
             ranked, flags = self._rank(index, blobs[blobs[:, LABEL] == index + 1])
@@ -109,11 +108,6 @@ class FastDetector:
             else:
                 track.lose()
                 found[index] = lost_observation(index)
-
-    def _search(self, image: YuvImage, indices: list[int] | range) -> Blobs:
-        wanted = np.zeros(len(self._markers) + 1, dtype=np.bool_)
-        wanted[np.asarray(indices, dtype=np.intp) + 1] = True
-        return self._searcher.find(image.y, image.u, image.v, wanted, AREA_MIN)
 
     def _rank(self, index: int, blobs: Blobs) -> tuple[Blobs, MarkerFlag]:
         """The blobs from the likeliest on: by motion and size while the marker is remembered, else by `_merits`."""

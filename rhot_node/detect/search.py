@@ -41,6 +41,17 @@ class Searcher:
 
 
 @njit(cache=True)
+def label_at(y, u, v, row, column, table, luma_limits):
+    """1 + the index of the marker that a chroma pixel is taken for, 0 for none: hue and magnitude, then luma."""
+    label = int(table[u[row, column], v[row, column]])
+    if label != 0:
+        luma = y[2 * row, 2 * column]
+        if luma < luma_limits[label - 1, 0] or luma > luma_limits[label - 1, 1]:
+            return 0
+    return label
+
+
+@njit(cache=True)
 def label_runs(y, u, v, table, wanted, luma_limits, runs):
     """Fill `runs` with the runs of equal wanted label, each joined to its neighbours above; return how many."""
     height, width = u.shape
@@ -51,15 +62,8 @@ def label_runs(y, u, v, table, wanted, luma_limits, runs):
         row_start = count
         current = 0
         for column in range(width):
-            label = int(table[u[row, column], v[row, column]])
-            if label != 0:
-                if not wanted[label]:
-                    label = 0
-                else:
-                    luma = y[2 * row, 2 * column]
-                    if luma < luma_limits[label - 1, 0] or luma > luma_limits[label - 1, 1]:
-                        label = 0
-            if label == 0:
+            label = label_at(y, u, v, row, column, table, luma_limits)
+            if not wanted[label]:
                 current = 0
                 continue
             if label != current:

@@ -1,0 +1,56 @@
+"""The gate of the full search: which pixels of a picture it takes for which marker's paint.
+
+`FastDetector` searches with it, and whoever shows or judges the colours asks the same object: what is drawn as the mask is
+what the detector computes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.labels import Table, acquisition_table
+from rhot_node.detect.search import Searcher, label_at
+from rhot_node.markers import MarkerSet
+
+AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
+
+Labels = NDArray[np.uint8]
+
+
+class ColourGate:
+    """The colours of one marker set: hue sectors, magnitude and luma gates, and the search for their blobs.
+
+    Holds buffers: one thread only.
+    """
+
+    def __init__(self, markers: MarkerSet) -> None:
+        self.table: Table = acquisition_table(markers)
+        self.luma_limits = np.array([(mark.chroma.luma_min, mark.chroma.luma_max) for mark in markers.markers],
+                                    dtype=np.uint8)
+        self._searcher = Searcher(self.table, self.luma_limits)
+
+    def labels(self, image: YuvImage) -> Labels:
+        """(H/2, W/2) for every chroma pixel 1 + the index of the marker it is taken for, 0 for none."""
+        out = np.empty(image.u.shape, dtype=np.uint8)
+        label_plane(image.y, image.u, image.v, self.table, self.luma_limits, out)
+        return out
+
+    def blobs(self, image: YuvImage, indices: list[int] | range) -> NDArray[np.float64]:
+        """(N, 10) blobs of the markers `indices`, columns as in rhot_node.detect.search; a view, valid until the next.
+
+        A blob has at least AREA_MIN chroma pixels.
+        """
+        wanted = np.zeros(len(self.luma_limits) + 1, dtype=np.bool_)
+        wanted[np.asarray(indices, dtype=np.intp) + 1] = True
+        return self._searcher.find(image.y, image.u, image.v, wanted, AREA_MIN)
+
+
+@njit(cache=True)
+def label_plane(y, u, v, table, luma_limits, out):
+    """Write the label of every chroma pixel to `out`."""
+    for row in range(u.shape[0]):
+        for column in range(u.shape[1]):
+            out[row, column] = label_at(y, u, v, row, column, table, luma_limits)

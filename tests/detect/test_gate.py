@@ -1,0 +1,44 @@
+"""The gate as others may ask it: the mask is made of the very pixels that the search joins into blobs."""
+
+from __future__ import annotations
+
+import numpy as np
+from marker_rendering import SKIN, Canvas, capsule, disc
+
+from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.search import AREA, LABEL
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+
+RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
+
+
+def picture() -> YuvImage:
+    canvas = Canvas(320, 240).paint(capsule((40, 200), (280, 60), 22), SKIN, (160, 130), 180, 0.3)
+    for k, marker in enumerate(RHOT6.markers):
+        canvas.paint(disc(30 + 50 * k, 60 + 20 * k, 11), marker.display_rgb, (30 + 50 * k, 60 + 20 * k), 14, 0.3)
+    return canvas.expose(np.random.default_rng(4))
+
+
+def test_labels_are_the_pixels_of_the_blobs() -> None:
+    image, gate = picture(), ColourGate(RHOT6)
+    labels, blobs = gate.labels(image), gate.blobs(image, range(6)).copy()
+    assert set(blobs[:, LABEL]) == {1, 2, 3, 4, 5, 6}
+    for label in range(1, 7):
+        in_blobs = blobs[blobs[:, LABEL] == label, AREA].sum()
+        specks = (labels == label).sum() - in_blobs
+        assert in_blobs > 60
+        assert 0 <= specks <= 6  # what the search leaves out as noise
+
+
+def test_only_the_wanted_markers_are_searched() -> None:
+    blobs = ColourGate(RHOT6).blobs(picture(), [3])
+    assert set(blobs[:, LABEL]) == {4}
+
+
+def test_too_dark_and_too_bright_pixels_are_nobodys() -> None:
+    image = picture()
+    luma = image.y.copy()
+    luma[:, :160], luma[:, 160:] = 5, 253
+    assert not ColourGate(RHOT6).labels(YuvImage(luma, image.u, image.v)).any()
