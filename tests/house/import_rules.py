@@ -35,6 +35,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.filters": APP_BASE,
     "rhot_app.hand": (*APP_BASE, *MODELS),
     "rhot_app.calibration": (*APP_BASE, *MODELS, "rhot_app.hand"),
+    "rhot_app.calibration.commands": BELOW_ENGINE,  # they read logs
     "rhot_app.objects": (*APP_BASE, *MODELS),
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand"),
     "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS),

@@ -33,8 +33,8 @@ class Preset:
     focal: float
 
 
-WIDE = Preset(40.0, 48_000, 320 / np.tan(np.radians(31.1)))
-FAST = Preset(120.0, 10_000, 320 / np.tan(np.radians(13.25)))
+WIDE = Preset(40.0, 48_000, float(320 / np.tan(np.radians(31.1))))
+FAST = Preset(120.0, 10_000, float(320 / np.tan(np.radians(13.25))))
 
 
 def make_rig(preset: Preset = WIDE, *, cameras: int = 2, filters: FilterSettings | None = None,
