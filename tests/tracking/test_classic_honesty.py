@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from grasping_hand import GRASP, INFERRED, MEASURED, REST, RIG, UNKNOWN, seconds, states_of
 from synthetic_rig import (
     EPOCH_NS,
     LOST,
@@ -12,7 +13,6 @@ from synthetic_rig import (
     Sight,
     altered,
     compare,
-    hand_trajectory,
     make_rig,
     observe,
     run,
@@ -24,19 +24,6 @@ from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import Condition, Knowledge
 from rhot_node.wire.messages import MarkerFlag
-
-RIG = make_rig()
-GRASP = hand_trajectory(RIG, "grasp", 5.0)
-REST = GRASP(np.array([0.0]))[0]
-MEASURED, INFERRED, UNKNOWN = Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.UNKNOWN
-
-
-def states_of(sight=Sight(), rig=RIG, preset=WIDE, trajectory=GRASP, seconds=4.0):  # noqa: B008 - frozen
-    return run(make_tracker(rig), observe(rig, preset, trajectory, seconds, sight))
-
-
-def seconds(state):
-    return (state.t_master_ns - EPOCH_NS) * 1e-9
 
 
 def test_every_part_says_how_it_is_known():

@@ -1,0 +1,27 @@
+"""The grasping hand that most tests of the tracker look at, and what the tracker makes of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from synthetic_rig import EPOCH_NS, WIDE, Preset, Sight, Trajectory, hand_trajectory, make_rig, observe, run
+
+from rhot_app.project import Rig
+from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.state import HandState, Knowledge
+
+RIG = make_rig()
+GRASP = hand_trajectory(RIG, "grasp", 5.0)
+REST = GRASP(np.array([0.0]))[0]
+MEASURED, INFERRED, UNKNOWN = Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.UNKNOWN
+SIGHT = Sight()
+
+
+def states_of(sight: Sight = SIGHT, rig: Rig = RIG, preset: Preset = WIDE, trajectory: Trajectory = GRASP,
+              seconds: float = 4.0) -> list[HandState]:
+    """What a new tracker says of this trajectory."""
+    return run(make_tracker(rig), observe(rig, preset, trajectory, seconds, sight))
+
+
+def seconds(state: HandState) -> float:
+    """Since the trajectory's begin, s."""
+    return (state.t_master_ns - EPOCH_NS) * 1e-9
