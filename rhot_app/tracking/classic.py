@@ -30,7 +30,7 @@ class ClassicTracker:
     def __init__(self, rig: Rig) -> None:
         self._rig = compile_rig(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
-        self._pairing = Pairing(cameras, markers, self._rig.time_offsets_ns)
+        self._pairing = Pairing(cameras, markers)
         self._hand = HandSolver(build_model(rig.hand))
         pixel, position = filter_settings(rig)
         self._filtering = rig.filters.enabled

@@ -46,9 +46,8 @@ class Paired:
 class Pairing:
     """Tracks of C cameras and M markers, and the clockwork that says when the next state is due."""
 
-    def __init__(self, cameras: int, markers: int, time_offsets_ns: NDArray[np.int64] | None = None) -> None:
+    def __init__(self, cameras: int, markers: int) -> None:
         self._shape = (cameras, markers)
-        self._time_offsets_ns = np.zeros(cameras, np.int64) if time_offsets_ns is None else time_offsets_ns
         length = tracks.LENGTH
         self._times = np.zeros((cameras, markers, length), np.int64)
         self._pixels = np.zeros((cameras, markers, length, 2))
@@ -81,10 +80,10 @@ class Pairing:
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame into the tracks. Duplicates are ignored, late frames are put in their place."""
         camera = observations.camera
-        if _ingest(camera, observations.t_row0_master_ns + int(self._time_offsets_ns[camera]),
-                   observations.t_receive_ns, observations.row_time_ns, observations.pixels, observations.covariances,
-                   observations.flags, self._frames, self._book, self._marks, self._times, self._pixels,
-                   self._covariances, self._flags, self._counts, self._newest, self._seen_pixels, self._seen_flags):
+        if _ingest(camera, observations.t_row0_master_ns, observations.t_receive_ns, observations.row_time_ns,
+                   observations.pixels, observations.covariances, observations.flags, self._frames,
+                   self._book, self._marks, self._times, self._pixels, self._covariances, self._flags, self._counts,
+                   self._newest, self._seen_pixels, self._seen_flags):
             self._latest = observations
 
     def due(self) -> Paired | None:

@@ -23,10 +23,10 @@ _ROUND = ("sphere", "capsule", "band")
 class RigArrays:
     """C cameras, M markers. Read-only.
 
-    `cameras` (C, 3, 4) camera_from_world m; `intrinsics` (C, 9) as `CameraModel`; `focal` (C, 2) px;
-    `time_offsets_ns` (C,). `shapes` (M, 3, 3) m^2: the markers' bodies as far as known without the hand's pose, zero
-    for flat ones. `tips` (5,): marker index of each finger's tip, -1 without one; `wrist`: the same for the wrist.
-    `band_half_axes` (3,) m along the palm's x, y, z; None when the wrist wears no band.
+    `cameras` (C, 3, 4) camera_from_world m; `intrinsics` (C, 9) as `CameraModel`; `focal` (C, 2) px.
+    `shapes` (M, 3, 3) m^2: the markers' bodies as far as known without the hand's pose, zero for flat ones. `tips`
+    (5,): marker index of each finger's tip, -1 without one; `wrist`: the same for the wrist. `band_half_axes`
+    (3,) m along the palm's x, y, z; None when the wrist wears no band.
     """
 
     camera_names: tuple[str, ...]
@@ -34,7 +34,6 @@ class RigArrays:
     cameras: Array
     intrinsics: Array
     focal: Array
-    time_offsets_ns: NDArray[np.int64]
     shapes: Array
     tips: NDArray[np.int64]
     wrist: int
@@ -53,7 +52,6 @@ def compile_rig(rig: Rig) -> RigArrays:
         cameras=np.array([model.camera_from_world[:3] for model in models]),
         intrinsics=np.array([model.intrinsics for model in models]),
         focal=np.array([model.intrinsics[:2] for model in models]),
-        time_offsets_ns=np.array([round(1e9 * node.time_offset_s) for node in rig.nodes], dtype=np.int64),
         shapes=np.array([_shape(marker) for marker in markers]),
         tips=np.array([roles.index(role) if role in roles else -1 for role in TIP_ROLES], dtype=np.int64),
         wrist=wrist,

@@ -103,16 +103,6 @@ def test_a_marker_without_a_place_on_the_hand_is_a_free_point():
     assert (last.joint_knowledge[JOINT_SLICES[1]] >= Knowledge.GUESSED).all()
 
 
-def test_time_offsets_of_the_rig_are_applied():
-    shift = 0.006
-    second = msgspec.structs.replace(RIG.nodes[1], time_offset_s=shift)
-    moved = msgspec.structs.replace(RIG, nodes=(RIG.nodes[0], second))
-    frames = [replace(f, t_row0_master_ns=f.t_row0_master_ns - round(1e9 * shift)) if f.camera == 1 else f
-              for f in observe(RIG, WIDE, GRASP, 3.0, Sight())]
-    assert compare(moved, run(make_tracker(moved), frames), GRASP).marker_mm < 0.5
-    assert compare(RIG, run(make_tracker(RIG), frames), GRASP).marker_mm > 0.7
-
-
 def test_a_flood_of_frames_is_taken_in_quickly():
     tracker = make_tracker(RIG)
     frames = observe(RIG, WIDE, GRASP, 5.0, Sight())

@@ -147,13 +147,6 @@ def test_a_small_new_estimate_of_the_clock_is_taken_smoothly():
     assert len(states) == 40 and all(np.isfinite(s.pixels).all() for s in states[1:])
 
 
-def test_calibrated_time_offsets_are_added():
-    pairing = Pairing(2, 2, np.array([0, 7 * MS]))
-    states = feed(pairing, two_cameras(10, phase=0.0))
-    assert seconds(states[-1]) == pytest.approx(9 * 0.025)
-    assert pairing._newest[1, 0] - pairing._newest[0, 0] == 7 * MS
-
-
 def test_last_seen_is_the_newest_frame_with_what_it_lost():
     pairing = Pairing(2, 2)
     feed(pairing, [*two_cameras(3), shot(0, 0.075, flags=(LOST, 0), pixels=POINTS + 1.0)])
