@@ -1,7 +1,6 @@
 """The whole classic tracker on synthetic sights: accuracy, times, and the work it takes."""
 
 import time
-from dataclasses import replace
 
 import msgspec
 import numpy as np
