@@ -1,4 +1,8 @@
-"""Film a scene to disk: both cameras' frames as raw YUV recordings, one process per camera, and the truth."""
+"""Film a scene to disk: both cameras' frames as raw YUV recordings, one process per camera, and the truth.
+
+Beside them lie a rig file and each node's settings with ports of their own, so that the shot can be played to real
+daemons on one machine (docs/twin.md).
+"""
 
 from __future__ import annotations
 
@@ -23,14 +27,16 @@ from rhot_app.simulator.body import HandBody, build_body
 from rhot_app.simulator.motion import Motion, load_motion
 from rhot_app.simulator.nodes import NodePorts
 from rhot_app.simulator.render import FrameRenderer, Optics, Shutter
-from rhot_app.simulator.scene import Scene, TwinSettings, build_rig, make_scene
+from rhot_app.simulator.scene import Scene, TwinSettings, build_rig, make_scene, node_settings
 from rhot_app.simulator.truth import FrameTruth, save_truth, true_hand
 from rhot_node.capture.yuv import YuvWriter
+from rhot_node.config import save_settings
 from rhot_node.files import read_document, write_document
 
 TRUTH_NAME = "truth.npz"
 RIG_NAME = "rig.json"
 SHOT_NAME = "shot.json"
+FIRST_PORT = 47810  # of the first node of a shot; ten more for each further one, beside those of real nodes
 
 FORMAT: Final = "rhot-shot"
 VERSION: Final = 1
@@ -93,7 +99,8 @@ def make_renderer(shot: Shot, index: int) -> FrameRenderer:
 def film(shot: Shot, folder: Path, progress: Progress | None = None) -> None:
     """Render the shot into the new `folder`: one recording per camera, ``truth.npz``, ``rig.json``, ``shot.json``.
 
-    The folder appears only when all is complete; an interrupt or error leaves nothing behind. Raises SimulatorError.
+    The nodes' settings are in ``NAME.json``, their ports those of the rig file. The folder appears only when all is
+    complete; an interrupt or error leaves nothing behind. Raises SimulatorError.
     """
     if folder.exists():
         raise SimulatorError(f"{folder} exists already; choose another folder or remove it.")
@@ -103,13 +110,22 @@ def film(shot: Shot, folder: Path, progress: Progress | None = None) -> None:
     try:
         cameras = _film_cameras(shot, work, progress)
         save_truth(work / TRUTH_NAME, true_hand(shot.motion, shot.body(), shot.seconds, cameras))
-        save_rig(work / RIG_NAME, build_rig(shot.scene, (NodePorts(47800, 47801, 47802),) * len(cameras)))
+        _save_nodes(shot.scene, work)
         write_document(work / SHOT_NAME, ShotFile(shot.motion.name, shot.seconds, shot.scene.seed,
                                                   sorted(shot.hidden), shot.scene.settings))
         work.chmod(0o755)
         work.replace(folder)
     finally:
         shutil.rmtree(work, ignore_errors=True)
+
+
+def _save_nodes(scene: Scene, folder: Path) -> None:
+    """The rig file and the settings of its nodes."""
+    firsts = [FIRST_PORT + 10 * index for index in range(len(scene.names))]
+    ports = tuple(NodePorts(first, first + 1, first + 2) for first in firsts)
+    for index, name in enumerate(scene.names):
+        save_settings(folder / f"{name}.json", node_settings(scene, index, ports=ports[index]))
+    save_rig(folder / RIG_NAME, build_rig(scene, ports))
 
 
 def _film_cameras(shot: Shot, folder: Path, progress: Progress | None) -> tuple[FrameTruth, ...]:

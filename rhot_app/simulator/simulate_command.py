@@ -46,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scene_arguments(parser)
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="length of the recording (default 10)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR",
-                        help="new folder for the frames (DIR/left, DIR/right), truth.npz, rig.json and shot.json")
+                        help="new folder for the frames (DIR/left, DIR/right), truth.npz, shot.json, and, to play it to two "
+                             "nodes on this machine, their settings (left.json, right.json) and rig.json")
     parser.add_argument("--hide", action="append", default=[], metavar="ID",
                         help="leave a marker unpainted; repeatable")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")

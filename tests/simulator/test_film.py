@@ -15,6 +15,7 @@ from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.simulator.truth import load_truth
 from rhot_node.capture.yuv import YuvRecording, read_header
 from rhot_node.clock import NodeClock
+from rhot_node.config import load_settings
 
 SMALL = {"width": 320, "height": 240}
 
@@ -36,7 +37,8 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Shot, Path]:
 
 def test_folder_holds_both_recordings_truth_rig_and_shot(filmed: tuple[Shot, Path]) -> None:
     shot, folder = filmed
-    assert sorted(path.name for path in folder.iterdir()) == ["left", "rig.json", "right", "shot.json", "truth.npz"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "left", "left.json", "rig.json", "right", "right.json", "shot.json", "truth.npz"]
     truth = load_truth(folder / "truth.npz")
     for index, name in enumerate(("left", "right")):
         header = read_header(folder / name)
@@ -46,6 +48,18 @@ def test_folder_holds_both_recordings_truth_rig_and_shot(filmed: tuple[Shot, Pat
         assert truth.cameras[index].visible.shape == (len(header.times_ns), 6)
     assert load_rig(folder / "rig.json").nodes[1].pose.translation_m[0] == pytest.approx(0.075)
     assert read_shot(folder)[1].seed == 7
+
+
+def test_node_settings_fit_the_rig_and_share_no_port(filmed: tuple[Shot, Path]) -> None:
+    _, folder = filmed
+    rig = load_rig(folder / "rig.json")
+    nodes = [load_settings(folder / f"{node.name}.json") for node in rig.nodes]
+    for node, settings in zip(rig.nodes, nodes, strict=True):
+        assert (node.node_id, node.address, settings.bind_address) == (settings.node_id, "127.0.0.1", "127.0.0.1")
+        assert (node.udp_port, node.control_port, node.preview_port) == (
+            settings.udp_port, settings.control_port, settings.preview_port)
+    ports = [port for one in nodes for port in (one.udp_port, one.control_port, one.preview_port)]
+    assert len(set(ports)) == 6 and not {47799, 47800, 47801, 47802} & set(ports)
 
 
 def test_markers_are_seen_where_the_truth_projects_them(filmed: tuple[Shot, Path]) -> None:
