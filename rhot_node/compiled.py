@@ -54,6 +54,11 @@ def is_complete() -> bool:
     return VARIABLE in os.environ and (Path(os.environ[VARIABLE]) / _COMPLETE).exists()
 
 
+def is_cold() -> bool:
+    """Whether nothing has been compiled yet for the present sources, so that the first start takes long."""
+    return VARIABLE not in os.environ or not (is_complete() or any(Path(os.environ[VARIABLE]).rglob("*.nbi")))
+
+
 def mark_complete() -> None:
     """Note that everything has been compiled for the present sources. Raises OSError."""
     if VARIABLE in os.environ:

@@ -123,6 +123,8 @@ class MainWindow(QMainWindow):
         w.cancel_asked.connect(c.cancel)
         self.screen_parts.scene.start_button.clicked.connect(c.start)
         self.advice.acted.connect(self._act)
+        for plot in self.screen_parts.all_plots:
+            plot.copied.connect(lambda sentence: self.tell(Notice("info", sentence)))
         c.rig_changed.connect(self._show_rig)
         c.busy_changed.connect(self._show_busy)
         c.failed.connect(self._show_failure)

@@ -1,4 +1,4 @@
-"""Enter the addresses of two nodes, ask whether they are there, and write a first rig file for them."""
+"""Connect two nodes: enter their addresses, ask whether they are there, and write a first rig file for them."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ class NodesDialog(QDialog):
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Find nodes")
+        self.setWindowTitle("Connect nodes")
         self.setProperty("guide", "nodes")
         self._scheme = scheme
         self._answers: list[NodeAnswer] = []
         self._job: Job | None = None
         self.rig_path: Path | None = None
-        intro = QLabel("Nodes are not discovered by themselves: enter the address of each Raspberry Pi. It stands on "
-                       "the node's console, or ask it with <b>hostname -I</b>. Left and right are as seen from behind "
-                       "the cameras.")
+        intro = QLabel("Enter the address of each Raspberry Pi that runs rhot-node; nodes are not found by themselves. "
+                       "The address stands on the node's console, and <b>hostname -I</b> prints it there. Left and "
+                       "right are as seen from behind the cameras.")
         intro.setWordWrap(True)
         intro.setTextFormat(Qt.TextFormat.RichText)
         self.hosts: list[QLineEdit] = []
@@ -52,11 +52,21 @@ class NodesDialog(QDialog):
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(8)
-        for row, side in enumerate(SIDES):
+        for column, head in enumerate(("camera", "address or host name", "control port", "", "answer")):
+            label = QLabel(head)
+            label.setProperty("muted", True)
+            grid.addWidget(label, 0, column)
+        for row, side in enumerate(SIDES, start=1):
             self._add_row(grid, row, side)
         grid.setColumnStretch(4, 1)
+        default = QLabel(f"The control port is {CONTROL_PORT} unless the node's settings file says otherwise "
+                         "(control_port).")
+        default.setWordWrap(True)
+        default.setProperty("muted", True)
         self.ask_button = QPushButton("Ask the nodes")
         self.ask_button.setDefault(True)
+        self.ask_button.setEnabled(False)
+        self.ask_button.setToolTip("Possible once both addresses are entered. Nothing is changed on the nodes.")
         self.ask_button.clicked.connect(self.ask)
         self.save_button = QPushButton("Write a rig file and open it …")
         self.save_button.setEnabled(False)
@@ -76,21 +86,21 @@ class NodesDialog(QDialog):
         layout.setSpacing(16)
         layout.addWidget(intro)
         layout.addLayout(grid)
+        layout.addWidget(default)
         layout.addWidget(self.verdict)
         layout.addLayout(buttons)
-        self.resize(720, 260)
+        self.resize(760, 320)
 
     def _add_row(self, grid: QGridLayout, row: int, side: str) -> None:
         host, port, mark, reply = QLineEdit(), QSpinBox(), ShapeMark(14), QLabel("not asked yet")
-        host.setPlaceholderText(f"192.168.1.{11 + row}")
+        host.setPlaceholderText(f"e.g. 192.168.1.{10 + row}")
         host.setAccessibleName(f"Address of the {side} node")
         host.setMinimumWidth(180)
         host.textChanged.connect(self._forget_answers)
         port.setRange(1, 65535)
         port.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
-        port.setPrefix("port ")
         port.setValue(CONTROL_PORT)
-        port.setToolTip("The node's control port; 47801 unless its settings say otherwise.")
+        port.setToolTip("Where the node takes orders. The default is right unless its settings file says otherwise.")
         port.setAccessibleName(f"Control port of the {side} node")
         port.valueChanged.connect(self._forget_answers)
         reply.setWordWrap(True)
@@ -106,10 +116,11 @@ class NodesDialog(QDialog):
     def _forget_answers(self) -> None:
         self._answers = []
         self.save_button.setEnabled(False)
+        self.ask_button.setEnabled(self._job is None and all(host.text().strip() for host in self.hosts))
 
     def addresses(self) -> list[NodeAddress]:
         """What was entered."""
-        return [NodeAddress(host.text().strip() or host.placeholderText(), port.value())
+        return [NodeAddress(host.text().strip(), port.value())
                 for host, port in zip(self.hosts, self.ports, strict=True)]
 
     def ask(self) -> None:

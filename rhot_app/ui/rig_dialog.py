@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QShowEvent
 from PySide6.QtWidgets import (
     QDialog,
     QHeaderView,
@@ -23,7 +23,11 @@ from rhot_app.ui.models.palette import hex_of
 
 Rows = list[list[str]]
 
-CAMERA_HEADS = ("camera", "picture [px]", "field of view", "focal length [px]", "centre [px]", "k1, k2", "address")
+_MARGIN_PX = 40
+_HEAD_PX = 190  # tabs, sentence, column heads and button
+
+CAMERA_HEADS = ("camera", "picture [px]", "field of view", "focal length [px]", "centre [px]", "k1, k2",
+                "address : port")
 MARKER_HEADS = ("marker", "colour", "place", "shape", "radius [mm]")
 HAND_HEADS = ("finger", "first bone [mm]", "second [mm]", "last [mm]", "marker to last joint [mm]")
 
@@ -71,7 +75,6 @@ class RigDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle(f"Rig {rig.name}")
         self.setProperty("guide", "calibration")
-        self.resize(860, 420)
         self.tabs = QTabWidget()
         self.tabs.addTab(_page(_table(CAMERA_HEADS, camera_rows(rig)), baseline_text(rig)), "Cameras")
         markers = _table(MARKER_HEADS, marker_rows(rig))
@@ -93,17 +96,41 @@ class RigDialog(QDialog):
         layout.addWidget(self.tabs)
         layout.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
 
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Only now are fonts and paddings known."""
+        self._fit()
+        super().showEvent(event)
+
+    def _fit(self) -> None:
+        """Wide and tall enough for every table, as far as the screen allows; beyond that they scroll."""
+        tables = self.findChildren(QTableWidget)
+        width = max(_width_of(table) for table in tables) + 2 * _MARGIN_PX
+        height = max(table.verticalHeader().length() for table in tables) + _HEAD_PX
+        room = self.screen().availableSize()
+        self.resize(min(max(width, 480), room.width() - _MARGIN_PX), min(height, room.height() - _MARGIN_PX))
+
 
 def _table(heads: tuple[str, ...], rows: Rows) -> QTableWidget:
     table = QTableWidget(len(rows), len(heads))
     table.setHorizontalHeaderLabels(list(heads))
     table.verticalHeader().setVisible(False)
     table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-    table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+    table.setWordWrap(False)
+    table.setSelectionMode(QTableWidget.SelectionMode.NoSelection)
+    table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     for r, row in enumerate(rows):
         for c, text in enumerate(row):
             table.setItem(r, c, QTableWidgetItem(text))
+    header = table.horizontalHeader()
+    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    header.setStretchLastSection(True)
     return table
+
+
+def _width_of(table: QTableWidget) -> int:
+    header = table.horizontalHeader()
+    return sum(max(table.sizeHintForColumn(k), header.sectionSizeHint(k)) for k in range(table.columnCount()))
 
 
 def _page(table: QTableWidget, sentence: str) -> QWidget:

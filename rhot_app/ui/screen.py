@@ -17,6 +17,7 @@ from rhot_app.ui.panels.markers_panel import MarkersPanel
 from rhot_app.ui.panels.nodes_panel import NodesPanel
 from rhot_app.ui.plots.jitter_plot import JitterPlot
 from rhot_app.ui.plots.latency_plot import LatencyPlot
+from rhot_app.ui.plots.plot_panel import PlotPanel
 from rhot_app.ui.plots.rate_plot import RatePlot
 from rhot_app.ui.scene.view import SceneView
 
@@ -41,7 +42,8 @@ class Screen:
         self.rate = RatePlot(scheme)
         self.plots = QSplitter(Qt.Orientation.Horizontal)
         self.plots.setProperty("guide", "plots")
-        for plot in (self.jitter, self.latency, self.rate):
+        self.all_plots: tuple[PlotPanel, ...] = (self.jitter, self.latency, self.rate)
+        for plot in self.all_plots:
             self.plots.addWidget(plot)
         self.plots.setSizes([100, 122, 94])
         self.plots.setChildrenCollapsible(False)
@@ -54,9 +56,10 @@ class Screen:
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours everywhere."""
-        for part in (self.scene, self.nodes, self.markers, self.cameras, self.hand, self.jitter, self.latency,
-                     self.rate):
+        for part in (self.scene, self.nodes, self.markers, self.cameras, self.hand):
             part.set_scheme(scheme)
+        for plot in self.all_plots:
+            plot.set_scheme(scheme)
         self._drawn_preview = -1
 
     def show_rig(self, rig: Rig | None) -> None:
@@ -65,7 +68,7 @@ class Screen:
         self.markers.show_rig(rig)
         self.cameras.show_rig(rig)
         self.jitter.show_rig(rig)
-        for plot in (self.jitter, self.latency, self.rate):
+        for plot in self.all_plots:
             plot.begin_anew()
         self.nodes.show_status(None)
         self.hand.show_state(None)
@@ -108,7 +111,8 @@ class Screen:
         if self.nodes.isVisible():
             self.nodes.show_status(live.status if live.silent_for_s() < SILENCE_S else None)
         if self.markers.isVisible():
-            self.markers.show_state(fresh)
+            running = live.status is not None and live.status.running and live.silent_for_s() < SILENCE_S
+            self.markers.show_state(fresh, running=running)
         if self.hand.isVisible():
             self.hand.show_state(fresh)
 

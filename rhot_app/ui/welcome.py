@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from rhot_app.ui.backend.session import TwinChoice
 from rhot_app.ui.models.motions import shipped_motions
 from rhot_app.ui.theme import app_font
+from rhot_node.compiled import is_cold
 
 _TITLE_PT = 20.0
 _CARD_WIDTH_PX = 300
@@ -104,16 +105,16 @@ class WelcomePage(QWidget):
         self.progress_bar.setRange(0, 100)
         self.progress_bar.setTextVisible(False)
         self.progress_bar.setFixedWidth(420)
-        note = QLabel("The first start of all takes up to a minute: the numerical code is compiled once.")
-        note.setProperty("muted", True)
-        note.setAlignment(Qt.AlignmentFlag.AlignHCenter)
+        self.compile_note = QLabel("The first start of all takes up to a minute: the numerical code is compiled once.")
+        self.compile_note.setProperty("muted", True)
+        self.compile_note.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         self.cancel_button = QPushButton("Cancel")
         self.cancel_button.clicked.connect(self.cancel_asked)
         page = QWidget()
         layout = QVBoxLayout(page)
         layout.setSpacing(16)
         layout.addStretch(1)
-        for widget in (self.progress_label, self.progress_bar, note, self.cancel_button):
+        for widget in (self.progress_label, self.progress_bar, self.compile_note, self.cancel_button):
             layout.addWidget(widget, alignment=Qt.AlignmentFlag.AlignHCenter)
         layout.addStretch(1)
         return page
@@ -131,7 +132,10 @@ class WelcomePage(QWidget):
 
     def show_busy(self, busy: tuple[str, float] | None) -> None:
         """Progress of what is under way; None shows the choices."""
-        self._pages.setCurrentIndex(0 if busy is None else 1)
+        page = 0 if busy is None else 1
+        if page == 1 and self._pages.currentIndex() == 0:
+            self.compile_note.setVisible(is_cold())
+        self._pages.setCurrentIndex(page)
         if busy is not None:
             self.progress_label.setText(busy[0])
             self.progress_bar.setValue(round(100 * busy[1]))

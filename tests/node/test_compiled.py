@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rhot_node.compiled import VARIABLE, is_complete, mark_complete, sources_hash
+from rhot_node.compiled import VARIABLE, is_cold, is_complete, mark_complete, sources_hash
 
 
 @pytest.fixture
@@ -67,3 +67,13 @@ def test_complete_belongs_to_one_folder(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.delenv(VARIABLE)
     assert not is_complete()
     mark_complete()
+
+
+def test_a_cache_is_cold_until_anything_was_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    assert is_cold()
+    (tmp_path / "detect_1").mkdir()
+    (tmp_path / "detect_1" / "kernel.py311.nbi").touch()
+    assert not is_cold()
+    monkeypatch.delenv(VARIABLE)
+    assert is_cold()

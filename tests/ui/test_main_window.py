@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QFileDialog
 
 from rhot_app.engine.status import Advice
 from rhot_app.project import save_rig
+from rhot_node.compiled import VARIABLE, mark_complete
 
 
 def test_the_first_page_offers_three_ways(bench):
@@ -51,6 +52,7 @@ def test_space_stops_and_starts(tracking):
     tracking.press(Qt.Key.Key_Space)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "IDLE")
     assert "Start" in tracking.window.actions_.start.text()
+    tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not tracking"] * 6)
     tracking.until(lambda: tracking.window.screen_parts.scene.start_button.isVisible())
     tracking.until(lambda: "space bar" in tracking.window.advice.texts[0])
     tracking.click(tracking.window.screen_parts.scene.start_button)
@@ -118,7 +120,7 @@ def test_a_vanished_engine_is_said_and_started_again(tracking):
     backend.engine.dead = True
     tracking.until(lambda: tracking.window.toolbar.badge.word == "NO ENGINE")
     tracking.until(lambda: "starting it again" in tracking.window.advice.texts[0])
-    tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not seen yet"] * 6)
+    tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not tracking"] * 6)
     assert not tracking.window.actions_.start.isEnabled()
     backend.gate.set()
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
@@ -148,13 +150,23 @@ def test_simulated_cameras_that_stopped_can_be_started_again(tracking):
     tracking.until(lambda: tracking.backend.calls.count("twin grasp") == 1)
 
 
-def test_opening_shows_progress_and_can_be_cancelled(bench):
+def test_only_the_first_start_of_all_is_said_to_take_long(bench, tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    bench.backend.gate.clear()
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.window.welcome.compile_note.isVisible())
+
+
+def test_opening_shows_progress_and_can_be_cancelled(bench, tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    mark_complete()
     bench.backend.gate.clear()
     bench.click(bench.window.welcome.twin_button)
     bench.until(lambda: bench.window.welcome.progress_bar.isVisible())
     bench.until(lambda: bench.window.welcome.progress_label.text() == "Starting the engine …")
     assert bench.window.welcome.progress_bar.value() == 40
     assert bench.window.toolbar.badge.word == "STARTING"
+    assert not bench.window.welcome.compile_note.isVisible()
     bench.click(bench.window.welcome.cancel_button)
     bench.until(lambda: "give up" in bench.backend.calls and bench.window.welcome.twin_button.isVisible())
     bench.run(0.2)
@@ -236,6 +248,7 @@ def test_a_hand_that_stands_still_for_a_second_is_taken_away(tracking):
     tracking.backend.engine.hidden = dict.fromkeys(tracking.backend.engine.rig.markers.ids, "both")
     tracking.until(lambda: not scene._actors.items[0].visible())
     assert tracking.window.toolbar.badge.word == "LOST"
+    tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not seen"] * 6)
 
 
 def test_the_window_stays_quick(tracking):

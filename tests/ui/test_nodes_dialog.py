@@ -43,8 +43,10 @@ def test_both_nodes_answer_and_a_rig_is_written(nodes, qtbot, themed, tmp_path):
     dialog = NodesDialog(DARK)
     qtbot.addWidget(dialog)
     dialog.show()
+    assert not dialog.ask_button.isEnabled(), "there is nobody to ask yet"
     for k, port in enumerate(nodes):
-        dialog.hosts[k].setText("127.0.0.1")
+        qtbot.keyClicks(dialog.hosts[k], "127.0.0.1")
+        assert dialog.ports[k].text() == "47801"
         dialog.ports[k].setValue(port)
     assert not dialog.save_button.isEnabled()
     qtbot.mouseClick(dialog.ask_button, Qt.MouseButton.LeftButton)

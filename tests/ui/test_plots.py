@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from PySide6.QtGui import QGuiApplication
 
 
@@ -16,6 +17,7 @@ def test_a_plot_pauses_resets_and_copies(tracking):
     lines = QGuiApplication.clipboard().text().splitlines()
     names = ("thumb", "index", "middle", "ring", "little", "wrist")
     assert lines[0] == ",".join(["time [s]", *(f"{name} [mm rms]" for name in names)])
+    tracking.until(lambda: any("Copied “Jitter per marker”" in text for text in tracking.window.advice.texts))
     assert lines == standing.splitlines() and float(lines[-1].split(",")[1]) > 0.1
     tracking.click(plot.reset_button)
     assert not plot.paused
@@ -31,6 +33,25 @@ def test_every_plot_has_names_units_and_values(tracking):
         assert item.getAxis("left").labelText == plot.unit and "[s]" in item.getAxis("bottom").labelText
     assert [entry.name for entry in parts.rate.legend.entries] == ["states", "left", "right", "lost /s"]
     assert parts.latency.legend.entries[-1].name == "detect"
+
+
+def test_a_spike_of_jitter_is_a_triangle_at_the_edge(tracking):
+    plot = tracking.window.screen_parts.jitter
+    seconds = np.linspace(-10.0, 0.0, 100)
+    rows = np.full((100, 6), 0.5)
+    rows[40:46, 2] = 9.0
+    plot.pause_button.setChecked(True)
+    plot._draw(seconds, rows, ())
+    top = plot.plot.viewRange()[1][1]
+    assert top < 1.5 and [(name, peak.value) for name, peak in plot.overflow.peaks] == [("middle", 9.0)]
+    mark = plot.overflow._item.points()[0]
+    assert mark.pos().y() <= top and mark.brush().color().name() == plot.legend.entries[2].colour
+
+
+def test_the_budget_is_named_beside_the_plot_and_not_over_its_lines(tracking):
+    plot = tracking.window.screen_parts.latency
+    assert plot.legend.entries[0].name == "budget" and not hasattr(plot._budget, "label")
+    tracking.until(lambda: plot.legend.values[0] == ("", "11.1"))
 
 
 def test_small_values_keep_their_unit(tracking):

@@ -10,11 +10,12 @@ from fake_engine import FakeEngine
 
 from rhot_app.tracking.state import LATENCY_STAGES, Condition, Knowledge
 from rhot_app.ui.models import glossary, words
+from rhot_app.ui.models.axis_range import peaks_above, round_top, usual_top
 from rhot_app.ui.models.label_layout import Box, place_labels, unique_prefixes
 from rhot_app.ui.models.latency import STACKED, LatencyWindow
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import SCHEMES, contrast, visible_on
-from rhot_app.ui.models.rates import LossMeter, rate_row
+from rhot_app.ui.models.rates import LossMeter, RateRows
 from rhot_app.ui.models.rows import bytes_text, clock_text, marker_rows, node_row
 from rhot_app.ui.models.series import Series, to_csv
 from rhot_node.wire.messages import MarkerFlag
@@ -76,8 +77,21 @@ def test_losses_are_per_second_and_never_negative(engine):
 
 
 def test_silence_is_a_gap_in_the_rates(engine):
+    rows = RateRows()
+    rows.row(engine.status(0.0))
+    assert rows.row(engine.status(2.0)).tolist() == [40.0, 40.0, 40.0]
     engine.running = False
-    assert np.isnan(rate_row(engine.status(1.0))).all()
+    assert np.isnan(rows.row(engine.status(3.0))).all()
+
+
+def test_what_piled_up_while_the_engine_started_is_no_rate(engine):
+    rows = RateRows()
+    rows.row(engine.status(0.0))
+    assert np.isfinite(rows.row(engine.status(1.3))).all()
+    burst = replace(engine.status(1.4), pid=4243, state_rate_hz=900.0)
+    assert np.isnan(rows.row(burst)).all()
+    assert np.isnan(rows.row(replace(engine.status(2.5), pid=4243))).all()
+    assert rows.row(replace(engine.status(2.7), pid=4243))[0] == 40.0
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=lambda s: s.name)
@@ -93,6 +107,20 @@ def test_text_and_states_stand_out(scheme):
 def test_a_dark_marker_is_made_visible():
     assert visible_on("#000000", SCHEMES["dark"].panel) != "#000000"
     assert visible_on("#ffffff", SCHEMES["dark"].panel) == "#ffffff"
+
+
+def test_a_spike_neither_flattens_the_plot_nor_is_hidden():
+    seconds = np.linspace(-30.0, 0.0, 300)
+    values = np.full(300, 0.5)
+    values[100:112] = [3.0, 4.0, *[6.0] * 5, *[5.0] * 5]
+    values[200] = 2.0
+    top = round_top(usual_top(values), 0.5)
+    assert 0.5 < top <= 1.0
+    assert [peak.value for peak in peaks_above(seconds, values, top)] == [6.0, 2.0]
+    assert peaks_above(seconds, values, 10.0) == []
+    steady = np.linspace(0.1, 1.0, 300)
+    assert usual_top(steady) == 1.0, "a range that is used all the time is shown whole"
+    assert np.isnan(usual_top(np.full(3, np.nan))) and round_top(float("nan"), 0.5) == 0.5
 
 
 def test_every_condition_has_its_own_word_and_shape():

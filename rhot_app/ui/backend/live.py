@@ -13,7 +13,7 @@ from rhot_app.engine.status import EngineStatus, Preview
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.jitter import JitterWindow
 from rhot_app.ui.models.latency import STACKED, LatencyWindow
-from rhot_app.ui.models.rates import LossMeter, rate_names, rate_row
+from rhot_app.ui.models.rates import LossMeter, RateRows, rate_names
 from rhot_app.ui.models.series import Series
 
 Array = NDArray[np.float64]
@@ -53,6 +53,7 @@ class Live:
         self._jitter_window = JitterWindow()
         self._latency_window = LatencyWindow()
         self._losses = LossMeter()
+        self._rates = RateRows()
         self.clear()
 
     def clear(self) -> None:
@@ -71,6 +72,7 @@ class Live:
         self._jitter_window.clear()
         self._latency_window.clear()
         self._losses.clear()
+        self._rates.clear()
 
     def step(self, client: Client) -> None:
         """Take in what arrived. Every state counts for the windows; only the newest is kept for drawing."""
@@ -101,7 +103,7 @@ class Live:
         names = (*rate_names(status), LOST)
         if names != self.rates.names:
             self.rates = Series(names)
-        self.rates.append(time.monotonic_ns(), np.append(rate_row(status), self._losses.per_second(status)))
+        self.rates.append(time.monotonic_ns(), np.append(self._rates.row(status), self._losses.per_second(status)))
 
     def sample(self, now_ns: int) -> None:
         """Add the windows' figures of this moment to the series of jitter and latency; a gap when nothing came."""

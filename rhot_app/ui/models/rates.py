@@ -9,6 +9,8 @@ from rhot_app.engine.status import EngineStatus
 
 Array = NDArray[np.float64]
 
+SETTLE_NS = 1_200_000_000
+
 
 class LossMeter:
     """Turns the ever growing counts of lost and dropped datagrams into losses per second."""
@@ -38,12 +40,30 @@ def count_lost(status: EngineStatus) -> int:
     return sum(node.lost + sum(node.dropped.values()) for node in status.nodes)
 
 
+class RateRows:
+    """Rates of a status as a row; unknown until a run has lasted as long as the engine's own window of one second.
+
+    Before that the engine counts what had piled up while it started as if it had come in that moment.
+    """
+
+    def __init__(self) -> None:
+        self._run: tuple[int, int] | None = None
+        self._began_ns = 0
+
+    def clear(self) -> None:
+        """Forget the run."""
+        self._run = None
+
+    def row(self, status: EngineStatus) -> Array:
+        """Rates (1 + nodes,) Hz; NaN while nothing arrives, so that a silence is a gap and not a line at zero."""
+        run = (status.pid, status.session)
+        if run != self._run:
+            self._run, self._began_ns = run, status.t_master_ns
+        values = [status.state_rate_hz, *(node.rate_hz for node in status.nodes)]
+        settled = status.t_master_ns - self._began_ns >= SETTLE_NS
+        return np.array([value if value > 0 and settled else np.nan for value in values])
+
+
 def rate_names(status: EngineStatus) -> tuple[str, ...]:
-    """Names of the columns of `rate_row`."""
+    """Names of the columns of `RateRows.row`."""
     return ("states", *(node.name for node in status.nodes))
-
-
-def rate_row(status: EngineStatus) -> Array:
-    """Rates (1 + nodes,) Hz; NaN while nothing arrives, so that a silence is a gap and not a line at zero."""
-    values = [status.state_rate_hz, *(node.rate_hz for node in status.nodes)]
-    return np.array([value if value > 0 else np.nan for value in values])

@@ -15,7 +15,8 @@ from rhot_app.ui.models.words import Look
 from rhot_app.ui.panels.empty_state import EmptyState
 from rhot_app.ui.shapes import ShapeMark
 
-_UNSEEN = Look("not seen yet", "square", "neutral", "Nothing has been received since the start.")
+_IDLE = Look("not tracking", "square", "neutral", "The nodes do not stream. Press Start.")
+_UNSEEN = Look("not seen", "ring", "neutral", "Nothing has been seen of it for a second.")
 
 
 class Swatch(QWidget):
@@ -89,17 +90,19 @@ class MarkersPanel(QWidget):
             self._grid.addWidget(mark, row, 3)
             self._lines.append((mark, word))
         self._shown = [None] * len(self._lines)
-        self.show_state(None)
+        self.show_state(None, running=False)
 
-    def show_state(self, state: HandState | None) -> None:
-        """What is known of each marker; None before the first state and after the last."""
+    def show_state(self, state: HandState | None, *, running: bool) -> None:
+        """What is known of each marker; None where there is no state: the nodes are `running` and see nothing, or they
+        are not."""
+        absent = _UNSEEN if running else _IDLE
         rows = marker_rows(state) if state is not None else []
         for k, (mark, word) in enumerate(self._lines):
             row = rows[k] if k < len(rows) else None
             if row is not None and row == self._shown[k]:
                 continue
             self._shown[k] = row
-            look = row.look if row is not None else _UNSEEN
+            look = row.look if row is not None else absent
             mark.set_shape(look.shape, self._scheme.tone(look.tone))
             word.setText(look.word)
             word.setToolTip(f"{look.meaning}\n{row.detail}" if row is not None else look.meaning)

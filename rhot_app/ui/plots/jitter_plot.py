@@ -11,6 +11,7 @@ from rhot_app.project import Rig
 from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.plots.legend import LegendEntry
+from rhot_app.ui.plots.overflow import Line
 from rhot_app.ui.plots.plot_panel import DASHES, PlotPanel, newest, number
 
 Array = NDArray[np.float64]
@@ -51,5 +52,4 @@ class JitterPlot(PlotPanel):
         for k, curve in enumerate(self._curves):
             curve.setData(seconds, rows[:, k])
         self.legend.set_values([(number(newest(seconds, rows, k), 2),) for k in range(len(self._curves))])
-        finite = rows[np.isfinite(rows)]
-        self._fit(float(np.percentile(finite, 99)) if len(finite) else float("nan"))
+        self._fit(seconds, [Line(entry.name, entry.colour, rows[:, k]) for k, entry in enumerate(self.legend.entries)])

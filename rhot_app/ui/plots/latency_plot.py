@@ -6,7 +6,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QWidget
 
 from rhot_app.ui.backend.live import LATENCY_COLUMNS
@@ -15,9 +15,20 @@ from rhot_app.ui.models.latency import BUDGET_S, STACKED
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme
 from rhot_app.ui.models.words import STAGES
 from rhot_app.ui.plots.legend import LegendEntry
+from rhot_app.ui.plots.overflow import Line
 from rhot_app.ui.plots.plot_panel import PlotPanel, newest, number
 
 Array = NDArray[np.float64]
+
+
+
+def _dotted(colour: str) -> QPen:
+    """Round dots: Qt's own dotted line looks dashed at this width."""
+    pen = pg.mkPen(colour, width=3)
+    pen.setCapStyle(Qt.PenCapStyle.RoundCap)
+    pen.setDashPattern([0.01, 2.5])
+    return pen
+
 
 class LatencyPlot(PlotPanel):
     """One band per stage from the bottom up in the order of the way."""
@@ -33,8 +44,7 @@ class LatencyPlot(PlotPanel):
         self._bands = [pg.FillBetweenItem(lower, upper) for lower, upper in zip(self._edges, self._edges[1:],
                                                                                 strict=False)]
         self._whole = (pg.PlotDataItem(connect="finite"), pg.PlotDataItem(connect="finite"))
-        self._budget = pg.InfiniteLine(1e3 * BUDGET_S, angle=0, label="11.1 ms budget",
-                                       labelOpts={"position": 0.02, "anchors": [(0, 1), (0, 1)]})
+        self._budget = pg.InfiniteLine(1e3 * BUDGET_S, angle=0)
         for item in (*self._edges, *self._bands, *self._whole, self._budget):
             self.plot.addItem(item)
         self.legend.setToolTip("\n".join([f"{STAGES[stage]}: {tip(stage)}" for stage in STACKED] + [tip("budget")]))
@@ -49,9 +59,9 @@ class LatencyPlot(PlotPanel):
             band.setBrush(fill)
         self._whole[0].setPen(pg.mkPen(self._scheme.text, width=2))
         self._whole[1].setPen(pg.mkPen(self._scheme.text, width=2, style=Qt.PenStyle.DashLine))
-        self._budget.setPen(pg.mkPen(self._scheme.accent, width=2, style=Qt.PenStyle.DotLine))
-        self._budget.label.setColor(self._scheme.accent)
+        self._budget.setPen(_dotted(self._scheme.accent))
         self.legend.set_entries([
+            LegendEntry("budget", self._scheme.accent, Qt.PenStyle.DotLine),
             LegendEntry("all", self._scheme.text),
             *(LegendEntry(STAGES[stage], colour, band=True)
               for stage, colour in reversed(list(zip(STACKED, STAGE_COLOURS, strict=False))))])
@@ -69,7 +79,8 @@ class LatencyPlot(PlotPanel):
         self._whole[0].setData(seconds, p50[:, -1])
         self._whole[1].setData(seconds, p99[:, -1])
         order = [stages, *reversed(range(stages))]
-        self.legend.set_values([(number(newest(seconds, p50, k), 2), number(newest(seconds, p99, k), 2))
-                                for k in order])
-        finite = p99[:, -1][np.isfinite(p99[:, -1])]
-        self._fit(float(np.percentile(finite, 98)) if len(finite) else float("nan"))
+        self.legend.set_values([("", number(1e3 * BUDGET_S, 1)),
+                                *((number(newest(seconds, p50, k), 2), number(newest(seconds, p99, k), 2))
+                                  for k in order)])
+        self._fit(seconds, [Line("p50 of all", self._scheme.text, p50[:, -1]),
+                            Line("p99 of all", self._scheme.text, p99[:, -1])])

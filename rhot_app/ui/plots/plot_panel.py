@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
+from rhot_app.ui.models.axis_range import round_top, usual_top
 from rhot_app.ui.models.glossary import tip
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.series import Series, to_csv
 from rhot_app.ui.plots.legend import Legend
+from rhot_app.ui.plots.overflow import Line, OverflowMarks
 
 Array = NDArray[np.float64]
 
@@ -24,8 +26,11 @@ DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine, Qt.P
 class PlotPanel(QWidget):
     """Base of the plots. A subclass draws in `_draw(seconds, rows)`; `refresh` gives it the window to show.
 
-    While paused the window stands still; the data go on and are there again when the pause ends.
+    While paused the window stands still; the data go on and are there again when the pause ends. `copied` confirms a
+    copy with a sentence.
     """
+
+    copied = Signal(str)
 
     term = ""
     title = ""
@@ -52,6 +57,7 @@ class PlotPanel(QWidget):
         self.legend = Legend(scheme, heads, widest_value)
         self._lay_out()
         self._style_plot()
+        self.overflow = OverflowMarks(self.plot, self.unit)
 
     def _button(self, text: str, meaning: str) -> QPushButton:
         button = QPushButton(text)
@@ -136,14 +142,13 @@ class PlotPanel(QWidget):
         """Draw `rows` (n, columns) over `seconds` (n,)."""
         raise TypeError(f"{type(self).__name__} does not draw")
 
-    def _fit(self, top: float) -> None:
-        """Let the vertical axis begin at zero and end a little above `top`, at one of a few round values."""
-        if not np.isfinite(top) or top <= 0:
-            top = self.least_span
-        steps = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
-        scale = 10.0 ** np.floor(np.log10(top))
-        high = max(scale * steps[np.searchsorted(steps, 1.05 * top / scale).clip(max=len(steps) - 1)], self.least_span)
-        self.plot.setYRange(0.0, float(high), padding=0.02)
+    def _fit(self, seconds: Array, lines: list[Line]) -> None:
+        """Let the vertical axis begin at zero and end at a round value that the usual values stay below; mark what does
+        not."""
+        values = np.concatenate([line.values for line in lines]) if lines else np.empty(0)
+        high = round_top(usual_top(values), self.least_span)
+        self.plot.setYRange(0.0, high, padding=0.02)
+        self.overflow.show(seconds, lines, high)
 
     def begin_anew(self) -> None:
         """Forget what was before this moment, and leave a pause."""
@@ -159,6 +164,9 @@ class PlotPanel(QWidget):
     def copy_csv(self) -> None:
         """Put `csv` on the clipboard."""
         QGuiApplication.clipboard().setText(self.csv())
+        count = len(self._window[0])
+        self.copied.emit(f"Copied “{self.title}” to the clipboard: {count} rows of comma-separated text."
+                         if count else f"“{self.title}” shows nothing yet, so only the headings were copied.")
 
 
 def newest(seconds: Array, rows: Array, column: int) -> float:

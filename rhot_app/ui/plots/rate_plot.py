@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QWidget
 from rhot_app.ui.backend.live import LOST
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme
 from rhot_app.ui.plots.legend import LegendEntry
+from rhot_app.ui.plots.overflow import Line
 from rhot_app.ui.plots.plot_panel import DASHES, PlotPanel, newest, number
 
 Array = NDArray[np.float64]
@@ -58,5 +59,4 @@ class RatePlot(PlotPanel):
         some = np.isfinite(lost) & (lost > 0)
         self._bars.setOpts(x=seconds[some], height=lost[some], width=0.1)
         self.legend.set_values([(number(newest(seconds, rows, k), 1),) for k in range(len(self._names))])
-        finite = rows[np.isfinite(rows)]
-        self._fit(float(finite.max()) if len(finite) else float("nan"))
+        self._fit(seconds, [Line(entry.name, entry.colour, rows[:, k]) for k, entry in enumerate(self.legend.entries)])
