@@ -39,12 +39,12 @@ def run(args: argparse.Namespace) -> int:
 
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
     rig = load_rig(args.rig)
-    with serving(rig, args.rig.absolute(), UdpNodes, args.directory) as (engine, server, directory):
+    with serving(rig, args.rig.absolute(), UdpNodes, args.directory) as serve:
         if args.log is not None:
-            engine.record(args.log.absolute())
+            serve.engine.record(args.log.absolute())
         if args.start:
-            engine.start()
+            serve.engine.start()
         if args.json:
-            print(json.dumps({"pid": os.getpid(), "directory": str(directory.path), "rig": rig.name}), flush=True)
-        server.run()
+            print(json.dumps({"pid": os.getpid(), "directory": str(serve.directory.path), "rig": rig.name}), flush=True)
+        serve.server.run()
     return 0

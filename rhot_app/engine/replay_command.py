@@ -6,9 +6,20 @@ import argparse
 import json
 import logging
 import sys
+import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rhot_app.engine.command import add_serving_arguments
+from rhot_app.errors import RecordingError
+
+if TYPE_CHECKING:
+    from rhot_app.engine.serve import Serving
+    from rhot_app.project import Rig
+    from rhot_app.sources.replay import LogReplay
+
+LAST_WORDS_S = 0.5
+"""Clients of a replay that is over get the last states, and the status that says so, within this time."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,11 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="times real time, or max for as fast as possible (default 1)")
     parser.add_argument("--json", action="store_true",
                         help="serve nothing: replay at once and print a summary as one JSON object")
+    parser.add_argument("--keep", action="store_true",
+                        help="go on serving after the log's end: an app can look at the last state, or replay again")
     add_serving_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Replay; with clients to serve, until SIGTERM, SIGINT or the command ``quit``."""
+    """Replay; with clients to serve, until the log's end, SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.replay_summary import summarise
     from rhot_app.engine.serve import serving
     from rhot_app.project import load_rig
@@ -40,13 +53,30 @@ def run(args: argparse.Namespace) -> int:
         return 0
     reader.close()
     rig_path = None if args.rig is None else args.rig.absolute()
-    with serving(rig, rig_path, lambda rig: LogReplay(args.path, rig, args.speed), args.directory) as (
-            engine, server, _):
-        engine.start()
-        print(f"replaying {args.path} for clients (the app, or EngineClient); it stays after the log's end. "
-              "Ctrl+C ends it. For a summary: --json", file=sys.stderr, flush=True)
-        server.run()
+    replays: list[LogReplay] = []  # another one whenever a client changes to other nodes
+
+    def replay(rig: Rig) -> LogReplay:
+        replays.append(LogReplay(args.path, rig, args.speed))
+        return replays[-1]
+
+    with serving(rig, rig_path, replay, args.directory) as serve:
+        print(f"replaying {args.path} for clients (the app, or EngineClient). Ctrl+C ends it. For a summary: --json",
+          file=sys.stderr, flush=True)
+        serve.engine.start()
+        serve.server.run(until=lambda: replays[-1].over)
+        if not serve.server.ending:
+            _conclude(replays[-1], serve, args.keep)
     return 0
+
+
+def _conclude(replay: LogReplay, serve: Serving, keep: bool) -> None:
+    """Say what came of the replay, and serve on; raises RecordingError when the log is broken in the middle."""
+    if replay.failure:
+        raise RecordingError(replay.failure)
+    print(f"the log is over: {serve.states.count} states in {replay.played_s:.1f} s."
+          + (" It is kept for clients, who can replay it again; Ctrl+C ends it." if keep else ""), flush=True)
+    last_s = time.monotonic() + LAST_WORDS_S
+    serve.server.run(until=lambda: not keep and time.monotonic() > last_s)
 
 
 def _speed(text: str) -> float | None:

@@ -9,6 +9,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import zmq
@@ -26,9 +27,19 @@ SWITCH_INTERVAL_S = 1e-4
 _COLLECT_S = 5.0
 
 
+@dataclass(frozen=True, slots=True)
+class Serving:
+    """An engine that serves clients."""
+
+    engine: Engine
+    server: Server
+    directory: EngineDirectory
+    states: StatePublisher
+
+
 @contextlib.contextmanager
 def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
-            directory: Path | None) -> Iterator[tuple[Engine, Server, EngineDirectory]]:
+            directory: Path | None) -> Iterator[Serving]:
     """An engine in its directory, warmed up, frames passing; the caller runs the server.
 
     Raises EngineError when another engine holds the directory, SourceError when a port is taken.
@@ -48,7 +59,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: server.end())
         prepare_process()
-        yield engine, server, place
+        yield Serving(engine, server, place, publish)
 
 
 def prepare_process() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -26,11 +27,13 @@ class StatePublisher:
     """The socket of the hand states; used by the pipeline's thread only. Never blocks: a slow client misses states."""
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], directory: EngineDirectory) -> None:
+        self.count = 0
         self._socket = _bind(context, zmq.PUB, directory.states)
 
     def __call__(self, payload: bytes) -> None:
         """Publish one state's bytes."""
         self._socket.send_multipart((TOPIC_STATE, payload), zmq.DONTWAIT, copy=True)
+        self.count += 1
 
     def close(self) -> None:
         """Close the socket."""
@@ -72,9 +75,9 @@ class Server:
             self._nodes.ask_for_faults(status)
             self._publish(TOPIC_STATUS, encode(status))
 
-    def run(self) -> None:
-        """Serve until `end`."""
-        while not self.ending:
+    def run(self, until: Callable[[], bool] = lambda: False) -> None:
+        """Serve until `end`, or until `until` is true."""
+        while not self.ending and not until():
             self.step()
 
     def close(self) -> None:

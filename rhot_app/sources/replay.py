@@ -82,6 +82,9 @@ class LogReplay:
 
     def __init__(self, path: Path, rig: Rig, speed: float | None = 1.0) -> None:
         """Open the log; raises RecordingError when it is none."""
+        self.over = False  # the log was played as far as it can be read
+        self.failure = ""  # why that is not its end
+        self.played_s = 0.0  # of the log's own time, from its first datagram
         self._deliver: Deliver = to_nobody
         self.receivers: tuple[NodeReceiver, ...] = ()
         LogReader(path).close()
@@ -115,7 +118,8 @@ class LogReplay:
     def start(self, session: int) -> None:
         """Replay from the beginning; the log brings its own sessions, so `session` is not looked at."""
         self.stop()
-        self._notice = ""
+        self._notice = self.failure = ""
+        self.over = False
         self._ending.clear()
         self._door.rewind()
         self._thread = threading.Thread(target=self._run, name="replay", daemon=True)
@@ -139,25 +143,31 @@ class LogReplay:
     def _run(self) -> None:
         try:
             with contextlib.closing(LogReader(self._path)) as reader:
-                self._play(reader)
+                if not self._play(reader):
+                    return
+            torn = reader.torn_bytes
+            self._notice = "The log is over; Start replays it again." if not torn else (
+                f"The log is over; its last {torn} bytes are torn (the program died while writing).")
         except RecordingError as exc:
-            self._notice = str(exc)
-            return
-        torn = reader.torn_bytes
-        self._notice = "The log is over; Start replays it again." if not torn else (
-            f"The log is over; its last {torn} bytes are torn (the program died while writing).")
+            self._notice = self.failure = str(exc)
+        self.over = True
 
-    def _play(self, records: Iterable[Record]) -> None:
+    def _play(self, records: Iterable[Record]) -> bool:
+        """Deliver all frames in their time; False when told to end before."""
         first_ns: int | None = None
         begun_ns = time.monotonic_ns()
         for record in records:
             if first_ns is None and record.kind is RecordKind.DATAGRAM:
                 first_ns, begun_ns = record.t_master_ns, time.monotonic_ns()
-            if self._wait(record.t_master_ns - first_ns if first_ns is not None else 0, begun_ns):
-                return
+            elapsed_ns = record.t_master_ns - first_ns if first_ns is not None else 0
+            if self._wait(elapsed_ns, begun_ns):
+                return False
+            if record.kind is RecordKind.DATAGRAM:
+                self.played_s = 1e-9 * elapsed_ns
             frame = self._door.feed(record)
             if frame is not None:
                 self._deliver([frame])
+        return True
 
     def _wait(self, elapsed_log_ns: int, begun_ns: int) -> bool:
         """Wait until the record is due; True when the replay shall end."""

@@ -85,6 +85,26 @@ def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
     summary = json.loads(rhot("replay", str(log_path), "--json").stdout)
     assert summary["states"] > 20
     assert summary["markers"]["wrist"]["measured_fraction"] > 0.9
+    ended = rhot("replay", str(log_path), "--speed", "max", "--directory", str(place))
+    assert ended.returncode == 0
+    assert f"the log is over: {summary['states']} states in" in ended.stdout
+    kept_replay_serves_on(log_path, place)
+
+
+def kept_replay_serves_on(log_path: Path, place: Path) -> None:
+    """After the log's end there still is an engine, and it can replay again."""
+    command = [sys.executable, "-m", "rhot_app", "replay", str(log_path), "--speed", "max", "--keep",
+               "--directory", str(place)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as kept:
+        assert kept.stdout is not None
+        assert "Ctrl+C ends it" in kept.stdout.readline()
+        with EngineClient(place) as client:
+            assert client.command("hello")["pid"] == kept.pid
+            client.poll(0.3)
+            client.command("start")
+            assert any(isinstance(message, HandState) for _ in range(50) for message in client.poll(0.1))
+        kept.send_signal(signal.SIGTERM)
+        assert kept.wait(10) == 0
 
 
 def test_background_engine_is_killed_found_dead_and_started_again(tmp_path: Path) -> None:
