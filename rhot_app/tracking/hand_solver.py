@@ -67,7 +67,7 @@ class HandSolver:
 
     def solve(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes) -> SolvedHand:
         """The hand whose wrist and finger markers are at `wrist` (3,) and `tips` (5, 3), m; NaN where unknown."""
-        wrist_seen = not np.isnan(wrist[0])
+        wrist_seen = bool(np.isfinite(wrist[0]))
         lost = self._wrist_s is None or t_s - self._wrist_s > FORGET_S
         # What the tips alone made of the palm meanwhile may be far off: begin anew with the wrist.
         if self.pose is not None and (t_s - self._solved_s > FORGET_S or (wrist_seen and lost)):
@@ -80,7 +80,7 @@ class HandSolver:
             if fit is None:
                 return no_hand(tips)
             palm, dt_s = fit.pose, 0.0
-        placed = wrist_seen or (not lost and np.count_nonzero(~np.isnan(tips[:, 0])) >= TIPS_WITHOUT_WRIST)
+        placed = wrist_seen or (not lost and int(np.count_nonzero(np.isfinite(tips[:, 0]))) >= TIPS_WITHOUT_WRIST)
         return self._follow(t_s, wrist, tips, wrist_knowledge, tip_knowledge, palm, dt_s, placed)
 
     def _follow(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes,

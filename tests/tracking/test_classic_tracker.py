@@ -5,8 +5,8 @@ import time
 import msgspec
 import numpy as np
 import pytest
+from grasping_hand import GRASP, MEASURED, REST, RIG, states_of
 from synthetic_rig import (
-    EPOCH_NS,
     FAST,
     WIDE,
     Sight,
@@ -24,19 +24,6 @@ from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import FilterSettings
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import LATENCY_STAGES, Knowledge
-
-RIG = make_rig()
-GRASP = hand_trajectory(RIG, "grasp", 5.0)
-REST = GRASP(np.array([0.0]))[0]
-MEASURED, INFERRED, UNKNOWN = Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.UNKNOWN
-
-
-def states_of(sight=Sight(), rig=RIG, preset=WIDE, trajectory=GRASP, seconds=4.0):  # noqa: B008 - frozen
-    return run(make_tracker(rig), observe(rig, preset, trajectory, seconds, sight))
-
-
-def seconds(state):
-    return (state.t_master_ns - EPOCH_NS) * 1e-9
 
 
 def test_a_grasping_hand_is_measured_to_a_fraction_of_a_millimetre():
