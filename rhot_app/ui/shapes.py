@@ -1,4 +1,4 @@
-"""The shapes that go with the words: disc, ring, half, square, cross, octagon, hatch; and the toolbar's signs."""
+"""The shapes that go with the words: disc, ring, half, square, cross, tick, octagon, hatch; and the toolbar's signs."""
 
 from __future__ import annotations
 
@@ -35,6 +35,10 @@ def paint_shape(painter: QPainter, shape: str, box: QRectF, colour: QColor) -> N
     elif shape == "cross":
         painter.drawLine(QLineF(inner.topLeft(), inner.bottomRight()))
         painter.drawLine(QLineF(inner.topRight(), inner.bottomLeft()))
+    elif shape == "tick":
+        painter.drawPolyline(QPolygonF([QPointF(inner.left(), inner.center().y()),
+                                        QPointF(inner.left() + 0.38 * inner.width(), inner.bottom() - 0.1 * size),
+                                        QPointF(inner.right(), inner.top() + 0.1 * size)]))
     elif shape == "hatch":
         painter.setPen(QPen(colour, max(width * 0.6, 1.0)))
         painter.setBrush(QBrush(colour, Qt.BrushStyle.BDiagPattern))

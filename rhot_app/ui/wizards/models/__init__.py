@@ -1,0 +1,1 @@
+"""What the wizards know and decide, without Qt."""

@@ -1,0 +1,196 @@
+"""The live picture of one camera, as large as fits, with what the step draws over it; and several side by side."""
+
+from __future__ import annotations
+
+import time
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPen, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
+
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.feed import LiveFeed, Picture
+from rhot_app.ui.wizards.models.drawing import Overlay
+from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.picture_painter import Place, fit, paint_overlay, paint_tag
+
+FLASH_S = 0.25
+"""How long the frame lights up when a picture was kept: long enough to be seen from two metres."""
+
+_FLASH_PX = 10
+
+
+class PictureView(QWidget):
+    """`picked` gives camera and rectangle (x, y, width, height) in px of the frame when a person has clicked or
+    dragged over the picture; a click is a rectangle without size. Only while `pickable`."""
+
+    picked = Signal(str, float, float, float, float)
+
+    def __init__(self, name: str, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.name = name
+        self.pickable = False
+        self._scheme = scheme
+        self._picture: Picture | None = None
+        self._image = QImage()
+        self._overlay: Overlay = ()
+        self._problem = ""
+        self._flash_until = 0.0
+        self._drag: tuple[QPointF, QPointF] | None = None
+        self.setMinimumSize(160, 120)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName(f"Live picture of camera {name}")
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """Four by three."""
+        return QSize(640, 480)
+
+    @property
+    def shown(self) -> Picture | None:
+        """The picture shown."""
+        return self._picture
+
+    @property
+    def overlay(self) -> Overlay:
+        """What is drawn over it."""
+        return self._overlay
+
+    def show_picture(self, picture: Picture | None, problem: str = "") -> None:
+        """Another picture; `problem` is shown instead of one, or over the last one."""
+        if picture is self._picture and problem == self._problem:
+            return
+        self._picture, self._problem = picture, problem
+        if picture is None:
+            self._image = QImage()
+        else:
+            height, width = picture.bgr.shape[:2]
+            self._image = QImage(picture.bgr.data, width, height, picture.bgr.strides[0], QImage.Format.Format_BGR888)
+        self.update()
+
+    def show_overlay(self, overlay: Overlay) -> None:
+        """Draw this over the picture from now on."""
+        if overlay is not self._overlay:
+            self._overlay = overlay
+            self.update()
+
+    def flash(self) -> None:
+        """Light the frame up: a picture was kept."""
+        self._flash_until = time.monotonic() + FLASH_S
+        self.update()
+
+    def tick(self) -> None:
+        """End the flash in time."""
+        if self._flash_until and time.monotonic() >= self._flash_until:
+            self._flash_until = 0.0
+            self.update()
+
+    def _place(self) -> Place:
+        width, height = (self._image.width(), self._image.height()) if not self._image.isNull() else (640, 480)
+        return fit(width, height, QRectF(self.rect()))
+
+    def paintEvent(self, event: object) -> None:  # noqa: N802
+        """Picture, overlay, name, flash, drag."""
+        painter = QPainter(self)
+        painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform)
+        place = self._place()
+        painter.fillRect(place.target, QColor(self._scheme.scene))
+        if not self._image.isNull():
+            painter.drawImage(place.target, self._image)
+            paint_overlay(painter, self._overlay, place, self._scheme)
+        paint_tag(painter, place.target.topLeft() + QPointF(6, 6), self.name, bold=True)
+        if self._image.isNull() or self._problem:
+            painter.setPen(QColor(self._scheme.text))
+            painter.drawText(place.target.adjusted(24, 24, -24, -24),
+                             Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap,
+                             self._problem or "waiting for the first picture")
+        self._paint_frames(painter, place)
+        painter.end()
+
+    def _paint_frames(self, painter: QPainter, place: Place) -> None:
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        if self._flash_until:
+            painter.setPen(QPen(QColor(self._scheme.good), _FLASH_PX))
+            half = _FLASH_PX / 2
+            painter.drawRect(place.target.adjusted(half, half, -half, -half))
+        if self._drag is not None:
+            painter.setPen(QPen(QColor(self._scheme.accent), 2, Qt.PenStyle.DashLine))
+            painter.drawRect(QRectF(*self._drag).normalized())
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """The first corner."""
+        if self.pickable and self._picture is not None and event.button() == Qt.MouseButton.LeftButton:
+            self._drag = (event.position(), event.position())
+            self.update()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """The other corner, so far."""
+        if self._drag is not None:
+            self._drag = (self._drag[0], event.position())
+            self.update()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """The other corner."""
+        if self._drag is None:
+            return
+        place = self._place()
+        (x0, y0), (x1, y1) = place.to_frame(self._drag[0]), place.to_frame(event.position())
+        self._drag = None
+        self.update()
+        self.picked.emit(self.name, min(x0, x1), min(y0, y1), abs(x1 - x0), abs(y1 - y0))
+
+
+class PictureWall(QWidget):
+    """The pictures of some cameras, beside or above each other, whichever makes them larger."""
+
+    picked = Signal(str, float, float, float, float)
+
+    def __init__(self, cameras: tuple[str, ...], scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.views = {name: PictureView(name, scheme) for name in cameras}
+        self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(8)
+        for view in self.views.values():
+            self._layout.addWidget(view, 1)
+            view.picked.connect(self.picked)
+
+    def show_cameras(self, cameras: tuple[str, ...] | None) -> None:
+        """Show only these; None shows all."""
+        for name, view in self.views.items():
+            view.setVisible(cameras is None or name in cameras)
+        self._arrange()
+
+    def refresh(self, feed: LiveFeed) -> None:
+        """Newest pictures."""
+        for name, view in self.views.items():
+            if view.isVisible():
+                view.show_picture(feed.newest(name), feed.problem(name))
+                view.tick()
+
+    def show_view(self, view: StepView) -> None:
+        """What the step draws."""
+        for name, widget in self.views.items():
+            widget.show_overlay(view.overlays.get(name, ()))
+
+    def flash(self) -> None:
+        """A picture was kept."""
+        for view in self.views.values():
+            view.flash()
+
+    def set_pickable(self, on: bool) -> None:
+        """Whether a person may click and drag in the pictures."""
+        for view in self.views.values():
+            view.pickable = on
+            view.setCursor(Qt.CursorShape.CrossCursor if on else Qt.CursorShape.ArrowCursor)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Another arrangement may be larger now."""
+        super().resizeEvent(event)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        count = max(sum(not view.isHidden() for view in self.views.values()), 1)
+        stacked = min(self.width(), 4 / 3 * self.height() / count)
+        beside = min(self.width() / count, 4 / 3 * self.height())
+        self._layout.setDirection(QBoxLayout.Direction.LeftToRight if beside >= stacked
+                                  else QBoxLayout.Direction.TopToBottom)

@@ -1,0 +1,133 @@
+"""A small wizard with every kind of step, for the tests of the window itself."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import slow_work
+from PySide6.QtWidgets import QSpinBox
+
+from rhot_app.calibration.verdict import Finding, Grade, judge
+from rhot_app.ui.wizards.accept_page import AcceptPage
+from rhot_app.ui.wizards.models.accept import AcceptStep
+from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Tag
+from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
+from rhot_app.ui.wizards.models.step import Bar, Step, StepView, Task
+from rhot_app.ui.wizards.page import Page
+from rhot_app.ui.wizards.plan import Kit, Plan
+
+
+class FormStep(Step):
+    """A number to enter."""
+
+    title = "The board"
+
+    def __init__(self):
+        self.number = 0
+
+    def view(self):
+        return StepView("Say how many squares the board has.", done=self.number > 0,
+                        hint="" if self.number else "Enter the number of squares.")
+
+
+class FormPage(Page):
+    """One field."""
+
+    def __init__(self, step):
+        super().__init__(step)
+        self.box = QSpinBox()
+        self.box.valueChanged.connect(self._enter)
+        self.column.addWidget(self.box)
+        self.column.addStretch(1)
+
+    def _enter(self, value):
+        self.step.number = value
+        self.changed.emit()
+
+
+class CollectStep(Step):
+    """Three pictures to capture."""
+
+    title = "Take pictures"
+    watches = captures = True
+
+    def __init__(self):
+        self.seen = None
+        self.captured = []
+        self.enough = 3
+
+    def see(self, pictures):
+        return {name: float(picture.bgr[240].max(axis=1).argmax()) for name, picture in pictures.items()}
+
+    def take(self, seen):
+        self.seen = seen
+
+    def capture(self):
+        if self.seen is None:
+            return False
+        self.captured.append(self.seen)
+        return True
+
+    def undo(self):
+        if self.captured:
+            self.captured.pop()
+            return True
+        return False
+
+    @property
+    def keeps(self):
+        return bool(self.captured)
+
+    def view(self):
+        count = len(self.captured)
+        overlays = {}
+        for name, x in (self.seen or {}).items():
+            overlays[name] = (Cells(np.eye(3)), Dots(np.array([[x, 240.0]])), Tag(x, 200.0, "edge"),
+                              Line(np.array([[x, 100.0], [x + 60, 100.0], [x, 160.0]]), closed=True, shaded=True))
+        bars = (Bar("pictures", count / self.enough, "captured so far"), Bar("tilt", 0.4), Bar("size", 1.0))
+        return StepView("Hold the board still and press Space.", done=count >= self.enough, bars=bars,
+                        overlays=overlays, kept=count)
+
+
+class SolveStep(Step):
+    """Counts in another process."""
+
+    title = "Solve"
+
+    def __init__(self, steps=3):
+        self.steps = steps
+        self.result = None
+        self.problem = ""
+
+    def task(self):
+        return Task("Counting …", slow_work.count, (self.steps, 0.05)) if self.result is None else None
+
+    def take_result(self, result):
+        self.result = result
+
+    def take_failure(self, sentence):
+        self.problem = sentence
+
+    def verdict(self):
+        return judge("rms 0.31 px over 13 pictures", [
+            Finding("tilt", Grade.FAIR, "The board was tilted by 12° at most.", "The focal length needs more.",
+                    "Take three more pictures with the board tilted by 30°.")])
+
+    def view(self):
+        if self.result is None:
+            return StepView("Wait a moment.", hint=self.problem)
+        return StepView("Look at the verdict.", done=True, verdict=self.verdict())
+
+
+def make_plan(kit: Kit, steps: int = 3) -> Plan:
+    """The wizard's pages."""
+    solve = SolveStep(steps)
+
+    def propose():
+        after = msgspec.structs.replace(kit.rig, name="calibrated")
+        return Proposal("lens calibration", solve.verdict(), (Row("focal length", "530.0 px", "535.9 ± 0.4 px"),
+                                                              Row("picture", "640 × 480", "640 × 480")),
+                        (RigChange(kit.rig, after, kit.rig_path, "lens calibration"),))
+
+    form, collect = FormPage(FormStep()), Page(CollectStep())
+    return Plan("Sample", (form, collect, Page(solve), AcceptPage(AcceptStep(propose), kit.scheme)))

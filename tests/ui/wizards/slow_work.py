@@ -1,0 +1,36 @@
+"""Work for the solver's process: module functions, because they are pickled by name."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from rhot_app.errors import CalibrationError
+
+
+def count(steps: int, pause_s: float, *, progress: Callable[[str, float], None]) -> int:
+    """Count, slowly."""
+    for k in range(steps):
+        progress("counting", (k + 1) / steps)
+        time.sleep(pause_s)
+    return steps
+
+
+def hold_the_interpreter(seconds: float, *, progress: Callable[[str, float], None]) -> str:
+    """Compute in pure Python, as solvers do between calls of numpy."""
+    end, total = time.monotonic() + seconds, 0
+    while time.monotonic() < end:
+        total += sum(k * k for k in range(2000))
+    return "held"
+
+
+def refuse(*, progress: Callable[[str, float], None]) -> None:
+    """Fail on purpose."""
+    raise CalibrationError("There are too few pictures; take at least five.")
+
+
+def die(*, progress: Callable[[str, float], None]) -> None:
+    """End without a word."""
+    import os
+
+    os._exit(3)

@@ -1,0 +1,189 @@
+"""What works behind a wizard's window: live pictures, looks at them, long work in another process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import slow_work
+from fake_engine import synthetic_rig
+from wizard_rig import FakeRigAsker
+
+from rhot_app.errors import CalibrationError
+from rhot_app.ui.wizards.feed import LiveFeed
+from rhot_app.ui.wizards.looker import Looker
+from rhot_app.ui.wizards.models.step import Step
+from rhot_app.ui.wizards.solver import Solver, StoppedError
+
+
+def until(condition, timeout_s=5.0):
+    """Wait for something that threads do."""
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end and not condition():
+        time.sleep(0.005)
+    assert condition()
+
+
+@pytest.fixture
+def asker():
+    return FakeRigAsker(synthetic_rig())
+
+
+@pytest.fixture
+def feed(asker):
+    feed = LiveFeed({"left": 1, "right": 2}, asker.connect, rate_hz=50.0).start()
+    yield feed
+    feed.stop()
+
+
+@pytest.fixture
+def solver(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(Path(slow_work.__file__).parent))
+    solver = Solver()
+    yield solver
+    solver.stop()
+
+
+class Counting(Step):
+    """Counts what it sees."""
+
+    watches = True
+
+    def see(self, pictures):
+        time.sleep(0.02)
+        return {name: picture.number for name, picture in pictures.items()}
+
+
+def test_the_feed_keeps_newest_pictures_of_both_cameras(feed):
+    until(lambda: feed.newest("left") is not None and feed.newest("right") is not None)
+    first = feed.newest("left")
+    until(lambda: feed.newest("left").number > first.number)
+    assert first.bgr.shape == (480, 640, 3)
+    assert int(first.bgr[0, 0, 0]) == 80 and int(feed.newest("right").bgr[0, 0, 0]) == 100
+    together = feed.together(("left", "right"))
+    assert abs(together["left"].received_ns - together["right"].received_ns) < 100_000_000
+
+
+def test_the_feed_says_why_there_is_no_picture_and_goes_on_afterwards(feed, asker):
+    asker.refuse = "node left does not answer."
+    until(lambda: feed.problem("left") == "node left does not answer.")
+    asker.refuse = ""
+    until(lambda: feed.problem("left") == "")
+    assert feed.newest("left") is not None
+
+
+def test_a_paused_feed_asks_for_nothing(feed, asker):
+    until(lambda: feed.newest("left") is not None)
+    feed.pause(True)
+    time.sleep(0.15)
+    asked = len(asker.commands)
+    time.sleep(0.15)
+    assert len(asker.commands) == asked
+    feed.pause(False)
+    until(lambda: len(asker.commands) > asked)
+
+
+def test_a_picture_that_was_overtaken_is_left_out(asker):
+    feed = LiveFeed({"left": 1}, asker.connect)
+    feed.step("left", asker)
+    newest = feed.newest("left")
+    asker._number = newest.number - 2
+    feed.step("left", asker)
+    assert feed.newest("left") is newest
+
+
+def test_a_stopped_feed_closes_its_connections(asker):
+    feed = LiveFeed({"left": 1}, asker.connect, rate_hz=50.0).start()
+    until(lambda: feed.newest("left") is not None)
+    feed.stop()
+    assert asker.closed == 2
+
+
+def test_the_looker_gives_each_finding_once_and_only_to_its_step(feed):
+    looker, step, other = Looker(feed).start(), Counting(), Counting()
+    looker.watch(step)
+    found = []
+
+    def take():
+        seen = looker.found(step)
+        if seen is not None:
+            found.append(tuple(seen.items()))
+        return len(found) >= 3
+
+    until(take)
+    looker.watch(other)
+    assert looker.found(step) is None
+    looker.stop()
+    assert len(set(found)) == len(found), "the same pictures were looked at twice"
+
+
+def test_a_look_that_fails_does_not_end_the_live_view(feed):
+    class Clumsy(Counting):
+        looks = 0
+
+        def see(self, pictures):
+            self.looks += 1
+            raise ValueError("a strange picture")
+
+    looker, step = Looker(feed).start(), Clumsy()
+    looker.watch(step)
+    until(lambda: step.looks >= 2)
+    looker.watch(Counting())
+    assert looker._thread.is_alive()
+    looker.stop()
+
+
+def test_work_reports_progress_and_gives_its_result(solver):
+    reports = []
+    assert solver.run(slow_work.count, (4, 0.06), lambda text, fraction: reports.append((text, fraction))) == 4
+    assert reports[-1] == ("counting", 1.0) and len(reports) >= 3
+    assert solver.run(slow_work.count, (1, 0.0), lambda text, fraction: None) == 1, "the process serves again"
+
+
+def test_errors_of_work_are_sentences(solver):
+    with pytest.raises(CalibrationError, match="too few pictures"):
+        solver.run(slow_work.refuse, (), lambda text, fraction: None)
+    with pytest.raises(CalibrationError, match="ended unexpectedly"):
+        solver.run(slow_work.die, (), lambda text, fraction: None)
+    assert solver.run(slow_work.count, (1, 0.0), lambda text, fraction: None) == 1
+
+
+def test_work_is_stopped_at_once_however_busy_it_is(solver):
+    solver.prepare("slow_work")
+    errors = []
+
+    def run():
+        try:
+            solver.run(slow_work.hold_the_interpreter, (30.0,), lambda text, fraction: None)
+        except StoppedError as exc:
+            errors.append(exc)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    time.sleep(0.3)
+    began = time.monotonic()
+    solver.stop()
+    thread.join(3.0)
+    assert errors and time.monotonic() - began < 2.0
+
+
+def test_work_does_not_delay_this_process(solver):
+    solver.prepare("slow_work")
+    late = []
+    thread = threading.Thread(target=solver.run, args=(slow_work.hold_the_interpreter, (0.6,), print))
+    thread.start()
+    while thread.is_alive():
+        began = time.perf_counter()
+        time.sleep(0.005)
+        late.append(time.perf_counter() - began - 0.005)
+    assert np.median(late) < 0.004
+
+
+def test_the_solving_process_imports_no_qt():
+    code = "import rhot_app.ui.wizards.solver_process, sys; sys.exit(any('PySide6' in m for m in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

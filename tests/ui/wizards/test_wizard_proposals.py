@@ -1,0 +1,127 @@
+"""What a wizard proposes and how it is put into force, taken back and remembered; remaining time in words."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import msgspec
+import pytest
+from fake_engine import synthetic_rig
+from wizard_rig import FakeRigAsker
+
+from rhot_app import rig_history
+from rhot_app.calibration.verdict import Finding, Grade, judge
+from rhot_app.errors import EngineError, RigError
+from rhot_app.project import load_rig, save_rig
+from rhot_app.ui.wizards.models.accept import AcceptStep
+from rhot_app.ui.wizards.models.done import age_text, in_force
+from rhot_app.ui.wizards.models.proposal import NodeChange, Proposal, RigChange, Row
+from rhot_app.ui.wizards.models.remaining import Remaining
+
+
+@pytest.fixture
+def asker():
+    return FakeRigAsker(synthetic_rig())
+
+
+def test_remaining_time_in_words():
+    remaining = Remaining(100.0)
+    assert remaining.text(100.1) == ""
+    remaining.report(0.25, 110.0)
+    assert remaining.text(110.0) == "about 30 s left"
+    assert remaining.text(120.0) == "about 20 s left"
+    remaining.report(0.3, 220.0)
+    assert remaining.text(220.0) == "about 5 min left"
+    remaining.report(0.2, 230.0)
+    assert remaining.fraction == 0.3
+
+
+def rig_file(folder):
+    path = folder / "desk.json"
+    save_rig(path, synthetic_rig("desk"))
+    return path
+
+
+def change_of(path, name):
+    before = load_rig(path)
+    return RigChange(before, msgspec.structs.replace(before, name=name), path, "lens calibration")
+
+
+def test_a_rig_change_goes_to_engine_and_file_and_back(asker, tmp_path):
+    path = rig_file(tmp_path)
+    change = change_of(path, "new")
+    change.use(asker.command)
+    assert asker.rig.name == "new" and load_rig(path).name == "new"
+    assert [v.replaced_by for v in rig_history.versions(path)] == ["lens calibration"]
+    change.restore(asker.command)
+    assert asker.rig.name == "desk" and load_rig(path).name == "desk"
+    assert len(rig_history.versions(path)) == 2, "the new one can be brought back as well"
+
+
+def test_a_rig_that_cannot_be_written_is_not_left_in_the_engine(asker, tmp_path):
+    path = rig_file(tmp_path)
+    change = change_of(path, "new")
+    gone = RigChange(change.before, change.after, tmp_path / "missing" / "desk.json", "lens calibration")
+    with pytest.raises(RigError):
+        gone.use(asker.command)
+    assert asker.rig.name == "desk"
+
+
+def test_a_proposal_is_put_into_force_whole_or_not_at_all(asker, tmp_path):
+    path = rig_file(tmp_path)
+
+    class Refusing:
+        def use(self, command):
+            raise EngineError("node left: new settings are not possible.")
+
+        def restore(self, command):
+            raise AssertionError("was never used")
+
+    proposal = Proposal("lens calibration", judge("rms 0.3 px", []), (), (change_of(path, "new"), Refusing()))
+    with pytest.raises(EngineError):
+        proposal.use(asker.command)
+    assert load_rig(path).name == "desk" and asker.rig.name == "desk"
+    assert proposal.rig.name == "new" and proposal.rig_before.name == "desk"
+
+
+def test_a_node_change_goes_to_the_node_and_back(asker):
+    change = NodeChange(2, {"camera": {"gain": None}}, {"camera": {"gain": 2.5}})
+    change.use(asker.command)
+    assert asker.settings[2].camera.gain == 2.5 and asker.settings[1].camera.gain is None
+    change.restore(asker.command)
+    assert asker.settings[2].camera.gain is None
+
+
+def test_the_last_step_refuses_a_poor_result_and_comes_back(asker):
+    poor = judge("rms 9 px", [Finding("rms", Grade.POOR, "rms 9 px", "The board moved.", "Hold it still.")])
+    step = AcceptStep(lambda: Proposal("lens calibration", poor, (Row("rms", "0.3 px", "9 px"),)))
+    step.enter()
+    assert not step.usable and "must not be used" in step.view().sentence
+    step = AcceptStep(lambda: Proposal("lens calibration", judge("rms 0.3 px", []), ()))
+    step.enter()
+    assert step.usable and step.keeps and not step.view().done
+    step.begin()
+    step.finish("used")
+    assert step.view().done and step.restorable and not step.keeps
+    step.finish("restored")
+    assert step.usable and not step.keeps
+
+
+def test_what_is_in_force_follows_restores(tmp_path):
+    path = rig_file(tmp_path)
+    assert in_force(path) == {}
+    one = msgspec.structs.replace(load_rig(path), name="one")
+    rig_history.accept(path, one, "lens calibration")
+    rig_history.accept(path, msgspec.structs.replace(one, name="two"), "stereo calibration")
+    assert set(in_force(path)) == {"lens calibration", "stereo calibration"}
+    before_stereo = rig_history.versions(path)[0]
+    rig_history.restore(path, before_stereo)
+    assert set(in_force(path)) == {"lens calibration"}
+    rig_history.restore(path, rig_history.versions(path)[0])
+    assert set(in_force(path)) == {"lens calibration", "stereo calibration"}
+
+
+def test_age_in_words():
+    now = datetime(2026, 5, 10, 12, 0, tzinfo=UTC)
+    texts = [age_text(now - timedelta(days=days), now) for days in (0, 1, 5, 100)]
+    assert texts == ["today", "yesterday", "5 days ago", "3 months ago"]

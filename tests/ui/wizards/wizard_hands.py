@@ -1,0 +1,48 @@
+"""A person's hands and patience in front of a wizard."""
+
+from __future__ import annotations
+
+import time
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+
+class Hands:
+    """Clicks and keys on one `WizardWindow`."""
+
+    def __init__(self, window):
+        self.window = window
+        window.show()
+        window.activateWindow()
+        assert QTest.qWaitForWindowActive(window)
+
+    def until(self, condition, timeout_s=8.0):
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end and not condition():
+            QTest.qWait(10)
+        assert condition()
+
+    def run(self, seconds):
+        QTest.qWait(round(1000 * seconds))
+
+    def click(self, widget):
+        assert widget.isVisible() and widget.isEnabled()
+        QTest.mouseClick(widget, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+                         QPoint(widget.width() // 2, widget.height() // 2))
+
+    def key(self, key, modifier=Qt.KeyboardModifier.NoModifier):
+        QTest.keyClick(self.window, key, modifier)
+
+    def next(self):
+        """Click Next once it can be clicked."""
+        self.until(lambda: self.window.frame.next_button.isEnabled())
+        self.click(self.window.frame.next_button)
+
+    @property
+    def sentence(self):
+        return self.window.frame.sentence.text()
+
+    @property
+    def title(self):
+        return self.window.step.title

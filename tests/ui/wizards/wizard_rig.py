@@ -1,0 +1,80 @@
+"""A rig without processes for the wizards' tests: an asker that gives pictures and keeps rig and settings."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+
+from rhot_app.errors import EngineError
+from rhot_app.project import Rig, parse_rig
+from rhot_node.config import NodeSettings, changed_settings
+
+Draw = Callable[[int, float], np.ndarray]
+
+
+def grey_picture(node_id: int, t_s: float) -> np.ndarray:
+    """A picture in which something moves."""
+    picture = np.full((480, 640, 3), 60 + 20 * node_id, np.uint8)
+    cv2.circle(picture, (round(320 + 200 * np.sin(t_s)), 240), 40, (60, 160, 220), -1)
+    return picture
+
+
+class FakeRigAsker:
+    """What the engine's client answers to `still`, `rig`, `set_rig` and `node`; `draw` makes the pictures."""
+
+    def __init__(self, rig: Rig, draw: Draw = grey_picture) -> None:
+        self.rig = rig
+        self.draw = draw
+        self.refuse = ""
+        self.delay_s = 0.0
+        self.commands: list[str] = []
+        self.settings = {node.node_id: NodeSettings(node.node_id, node.name, rig.markers) for node in rig.nodes}
+        self.saved: list[int] = []
+        self.closed = 0
+        self._number = 0
+        self._lock = threading.Lock()
+
+    def connect(self) -> FakeRigAsker:
+        """One asker for everybody."""
+        return self
+
+    def close(self) -> None:
+        self.closed += 1
+
+    def command(self, name: str, *, timeout_s: float = 3.0, **arguments: Any) -> dict[str, Any]:
+        """As the engine would answer."""
+        if self.refuse:
+            raise EngineError(self.refuse)
+        with self._lock:
+            self.commands.append(name)
+            self._number += 1
+            number = self._number
+        if name == "still":
+            return self._still(arguments["node_id"], number)
+        if name == "set_rig":
+            self.rig = parse_rig(msgspec.json.encode(arguments["document"]), "the new rig")
+        if name == "rig":
+            return {"document": msgspec.to_builtins(self.rig), "path": ""}
+        if name == "node":
+            return {"answer": self._node(arguments["node_id"], arguments["request"])}
+        return {}
+
+    def _still(self, node_id: int, number: int) -> dict[str, Any]:
+        time.sleep(self.delay_s)
+        now_s = time.monotonic()
+        _, png = cv2.imencode(".png", self.draw(node_id, now_s), [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        return {"png": png.tobytes(), "answer": {"number": number, "t_node_ns": round(1e9 * now_s)}}
+
+    def _node(self, node_id: int, request: dict[str, Any]) -> dict[str, Any]:
+        if request["request"] == "set_settings":
+            self.settings[node_id] = changed_settings(self.settings[node_id], request["settings"])
+            if request.get("save", True):
+                self.saved.append(node_id)
+            return {"restart": []}
+        return {"settings": msgspec.to_builtins(self.settings[node_id])}
