@@ -17,14 +17,15 @@ from scene import Scene
 from rhot_app.engine.client import EngineClient
 
 
-def refused(bench: Bench, process: subprocess.Popen[bytes], name: str, *words: str) -> None:
-    """Assert that a process ends with code 2 and one sentence that has these words."""
+def refused(bench: Bench, process: subprocess.Popen[bytes], name: str, *words: str) -> bool:
+    """Whether a process ended with code 2 and one sentence that has these words; asserts each on its own."""
     assert ends(process, START_S), f"{name} did not end"
     said = bench.log(name)
     assert process.returncode == 2, said
     assert "Traceback" not in said
     for word in words:
         assert word in said
+    return True
 
 
 @pytest.mark.timeout(TEST_S)
@@ -32,7 +33,7 @@ def test_a_taken_data_port_stops_the_engine(bench: Bench) -> None:
     port = bench.rig.nodes[1].data_port
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
         holder.bind(("0.0.0.0", port))
-        refused(bench, bench.start_engine(), "engine", str(port), "right")
+        assert refused(bench, bench.start_engine(), "engine", str(port), "right")
 
 
 @pytest.mark.timeout(TEST_S)
@@ -46,7 +47,7 @@ def test_a_taken_port_stops_a_node(bench: Bench, which: str) -> None:
         holder.bind(("127.0.0.1", port))
         if kind == socket.SOCK_STREAM:
             holder.listen()
-        refused(bench, bench.start_node(0, f"yuv:{bench.folder}/left.yuv"), "left", str(port))
+        assert refused(bench, bench.start_node(0, f"yuv:{bench.folder}/left.yuv"), "left", str(port))
 
 
 @pytest.mark.timeout(TEST_S)
@@ -56,7 +57,7 @@ def test_a_second_engine_in_the_same_directory_is_refused(bench: Bench) -> None:
         wait_until(client, lambda: client.status is not None, START_S, "the engine's status")
         second = bench.start(["rhot_app", "engine", "--rig", str(bench.rig_path), "--directory", str(bench.sockets)],
                              "second")
-        refused(bench, second, "second", str(first.pid))
+        assert refused(bench, second, "second", str(first.pid))
         assert client.command("hello")["pid"] == first.pid
 
 

@@ -32,5 +32,9 @@ def test_without_permission_nothing_changes(monkeypatch):
     def refuse(*_: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
+    def policy_after_hurrying() -> int:
+        realtime.hurry_this_thread()
+        return os.sched_getscheduler(0)
+
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    in_a_thread(realtime.hurry_this_thread)
+    assert in_a_thread(policy_after_hurrying) == os.sched_getscheduler(0)

@@ -90,6 +90,7 @@ def test_restarted_node_streams_again_within_two_seconds(rig: Rig, source: UdpNo
 def test_node_that_lost_its_start_gets_another(source: UdpNodes, nodes: list[SyntheticNode]) -> None:
     source.start(new_session())  # before anybody has answered
     eventually(lambda: all(link.door.accepted > 5 for link in source.links))
+    assert all(node.state is NodeState.STREAMING for node in nodes)
 
 
 def test_other_masters_session_is_left_alone(rig: Rig, source: UdpNodes, nodes: list[SyntheticNode]) -> None:
@@ -109,6 +110,7 @@ def test_fault_is_seen(rig: Rig, source: UdpNodes) -> None:
     node = SyntheticNode(rig, 0, state=NodeState.FAULT)
     node.start()
     eventually(lambda: source.links[0].state is NodeState.FAULT)
+    assert not source.links[0].silent(time.monotonic_ns())
     node.close()
 
 
