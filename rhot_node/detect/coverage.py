@@ -32,6 +32,7 @@ SUM_COLUMNS = 16  # of the summed-area table, see `_sum_areas`
 def unmix(y, u, v, region, level, kind, colour, sums, coverage, gain):
     """Write `coverage` and its noise `gain` (d coverage / d grey level, 0 where it is fixed) over `region`.
 
+    Returns the paint's mean colour (Y, U, V), of its interior, or of its edge when it has none.
     Scratch: `colour`, (..., 3) of the chroma planes' size, mean luma and chroma of the region's pixels; `sums`, one
     larger both ways and SUM_COLUMNS deep, their summed-area table.
     """
@@ -66,6 +67,7 @@ def unmix(y, u, v, region, level, kind, colour, sums, coverage, gain):
                 value += weight[channel] * (colour[row, column, channel] - near[MEAN + channel])
             coverage[row, column] = min(max(value, -CLIP), 1.0 + CLIP)
             gain[row, column] = slope
+    return paint[0, 0], paint[1, 0], paint[2, 0]
 
 
 @njit(cache=True)

@@ -14,6 +14,8 @@ from rhot_node.detect import measure as m
 from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
+from rhot_node.detect.light import DEAD_ZONE, Light
+from rhot_node.detect.light_guess import guess_light
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
 from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, Track, lost_observation
 from rhot_node.markers import MarkerSet
@@ -26,13 +28,22 @@ CANDIDATES = 4  # blobs per marker that are measured until one proves to be pain
 NOISE_START = 1.5  # grey levels of chroma noise, until the first frames have told
 NOISE_MIN = 0.5  # quantisation alone leaves 0.3
 NOISE_GAIN = 0.1
+RECOGNISED = 2  # markers in view that make the light known
+GUESS_EVERY = 20  # frames without them until the light is guessed anew
+STEADY = 0.7  # of the light is that of the last frame
+PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
+DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
+LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
 
 
 class FastDetector:
     """Finds every marker of a set in one YUV420 image after the other; see `rhot_node.detect.detector.Detector`."""
 
     def __init__(self, markers: MarkerSet) -> None:
+        self._set = markers
         self._markers = markers.markers
+        self._light = Light(markers)
+        self._until_guess = 0
         self._directions = directions(markers)
         self._sector = sector_table(markers)
         self._gate = ColourGate(markers)
@@ -41,20 +52,62 @@ class FastDetector:
         self._scratch = m.Scratch(0, 0)
         self._tracks: list[Track] = []
         self._noise_variance = NOISE_START**2
+        self._paint = np.zeros((len(self._markers), 3))
+        self._paint_pixels = np.zeros(len(self._markers))
         self.reset()
 
     def reset(self) -> None:
-        """Forget all tracks: the next frame is searched as a whole."""
-        self._tracks = [Track(marker.shape) for marker in self._markers]
+        """Forget all tracks and the light: the next frame is searched as a whole."""
+        self._forget_tracks()
+        self._light.warmth = 0.0
+        self._until_guess = 0
+
+    def paint_colours(self) -> NDArray[np.float64]:
+        """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was found last."""
+        return self._paint.copy()
+
+    @property
+    def warmth(self) -> float:
+        """How much warmer the light is than the one the colours were learnt in; see `rhot_node.detect.light`."""
+        return self._light.warmth
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """One observation per marker, in the order of the marker set; lost markers are stated as lost."""
         self._fit_scratch(image)
+        if self._until_guess > 0:
+            seen = self._find(image)
+            self._read_light(seen, STEADY)
+        else:
+            seen = self._find_in_unknown_light(image)
+        recognised = sum(mark.found for mark in seen) >= min(RECOGNISED, len(seen))
+        self._until_guess = GUESS_EVERY if recognised else self._until_guess - 1
+        return seen
+
+    def _find_in_unknown_light(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """Guess the light, find the markers, read the light from them, and find them again in that."""
+        self._until_guess = GUESS_EVERY
+        guess_light(image, self._light, self._gate, self._set)
+        for _ in range(LIGHT_PASSES):
+            seen = self._find(image)
+            if self._read_light(seen, 0.0) < DEAD_ZONE:
+                break
+            self._forget_tracks()
+        return seen
+
+    def _read_light(self, seen: tuple[MarkerObservation, ...], steady: float) -> float:
+        """Take the light from the markers that are plainly seen; returns by how much its warmth changed."""
+        plain = [mark.index for mark in seen if mark.found and not mark.flags & DOUBTFUL
+                 and self._paint_pixels[mark.index] >= PAINT_PIXELS_MIN]
+        return self._light.read(plain, self._paint[plain], steady)
+
+    def _find(self, camera_image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """Every marker, in the picture as it would look in the light of the calibration."""
+        image = self._light.balanced(camera_image)
         found: dict[int, MarkerObservation] = {}
         lost = []
         for index, track in enumerate(self._tracks):
             if track.alive and self._measure(image, index, track.request(self._request)):
-                found[index] = track.observe(index, self._row.tolist(), self._noise, MarkerFlag(0))
+                found[index] = self._observe(index, MarkerFlag(0))
             else:
                 lost.append(index)
         if lost:
@@ -62,8 +115,12 @@ class FastDetector:
         return tuple(found[index] for index in range(len(self._tracks)))
 
     def all_blobs(self, image: YuvImage) -> list[list[MarkerObservation]]:
-        """Every blob of every marker's colour, largest first, without regard to tracks; a list per marker."""
+        """Every blob of every marker's colour, largest first, without regard to tracks; a list per marker.
+
+        In the light of the last frame that was searched for markers.
+        """
         self._fit_scratch(image)
+        image = self._light.balanced(image)
         everything: list[list[MarkerObservation]] = []
         blobs = self._gate.blobs(image, range(len(self._markers))).copy()
         for index, marker in enumerate(self._markers):
@@ -73,6 +130,9 @@ class FastDetector:
                     own.append(Track(marker.shape).observe(index, self._row.tolist(), self._noise, MarkerFlag.ACQUIRED))
             everything.append(sorted(own, key=lambda seen: -seen.diameter))
         return everything
+
+    def _forget_tracks(self) -> None:
+        self._tracks = [Track(marker.shape) for marker in self._markers]
 
     @property
     def _noise(self) -> float:
@@ -94,6 +154,13 @@ class FastDetector:
             self._noise_variance += gain * (row[m.NOISE_SUM] / row[m.NOISE_COUNT] - self._noise_variance)
         return True
 
+    def _observe(self, index: int, flags: MarkerFlag) -> MarkerObservation:
+        """Take what was measured into the marker's track, and note the colour of its paint."""
+        row = self._row
+        self._paint_pixels[index] = row[m.PAINT_PIXELS]
+        self._paint[index] = self._light.unbalanced(row[m.PAINT_Y:m.PAINT_CR + 1])
+        return self._tracks[index].observe(index, row.tolist(), self._noise, flags)
+
     def _acquire(self, image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
         """Search the whole frame for the lost markers and state each as found or lost."""
         blobs = self._gate.blobs(image, lost).copy()
@@ -103,7 +170,7 @@ class FastDetector:
             for blob in ranked[:CANDIDATES]:
                 if self._measure(image, index, self._blob_request(index, blob)):
                     self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
-                    found[index] = track.observe(index, self._row.tolist(), self._noise, flags)
+                    found[index] = self._observe(index, flags)
                     break
             else:
                 track.lose()

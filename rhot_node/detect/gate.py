@@ -1,7 +1,7 @@
 """The gate of the full search: which pixels of a picture it takes for which marker's paint.
 
-`FastDetector` searches with it, and whoever shows or judges the colours asks the same object: what is drawn as the mask is
-what the detector computes.
+`FastDetector` searches with it, and whoever shows or judges the colours asks the same object: what is drawn as the mask
+is what the detector computes.
 """
 
 from __future__ import annotations

@@ -29,8 +29,10 @@ from rhot_node.detect.window import (
 PX, PY, HALF_X, HALF_Y, SIGMA, AREA_REF, LEVEL_REF, IS_BAND = range(8)
 REQUEST_COLUMNS = 8
 # Columns of a result, after those of rhot_node.detect.position.
+# The paint: how many pixels are all paint, and its mean luma and chroma (minus 128).
 LEVEL, AT_BORDER, FRAGMENTS, COST, RIVAL_COST, NOISE_SUM, NOISE_COUNT = range(RESULT_COLUMNS, RESULT_COLUMNS + 7)
-MEASURE_COLUMNS = RESULT_COLUMNS + 7
+PAINT_PIXELS, PAINT_Y, PAINT_CB, PAINT_CR = range(RESULT_COLUMNS + 7, RESULT_COLUMNS + 11)
+MEASURE_COLUMNS = RESULT_COLUMNS + 11
 
 ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
 LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed one is used for another attempt
@@ -112,7 +114,8 @@ def _place(y, u, v, window, count, level, request, scratch, result):
     area, interior = classify(region, own, mask, kind, stack)
     if interior == 0 and area >= SEAM:
         return False
-    unmix(y, u, v, region, level, kind, colour, sums, coverage, gain)
+    luma, cb, cr = unmix(y, u, v, region, level, kind, colour, sums, coverage, gain)
+    result[PAINT_PIXELS], result[PAINT_Y], result[PAINT_CB], result[PAINT_CR] = interior, luma, cb - 128.0, cr - 128.0
     if not centroid(region, coverage, gain, result):
         return False
     at_border = x0 == 0 or y0 == 0 or x1 == u.shape[1] - 1 or y1 == u.shape[0] - 1

@@ -1,0 +1,57 @@
+"""In which light is a picture taken, when nothing is known of it? The light in which it shows the most markers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.light import WARMTH_MOST, Light
+from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, X_MAX, X_MIN, Y_MAX, Y_MIN
+from rhot_node.markers import MarkerSet
+
+GUESSES = np.arange(-6, 7) * (WARMTH_MOST / 6.5)
+HUE_SIGMA_DEG = 6.0  # what a guess half a step beside the light leaves
+COMPACT = 0.5  # of the bounding box: a marker fills as much
+MARKERS_LEAST = 3  # that must be recognised for another light to be believed
+ADVANTAGE = 1.0  # markers more than in the last known light
+ALL_THERE = 0.75  # of the greatest score: no other light can be much better
+
+
+def guess_light(image: YuvImage, light: Light, gate: ColourGate, markers: MarkerSet) -> bool:
+    """Set the light in which clearly more markers are recognised than in the present one; says whether it did.
+
+    Two colours may be explained by many a light: with fewer than MARKERS_LEAST nothing is guessed.
+    """
+    if len(markers.markers) < MARKERS_LEAST:
+        return False
+    present = light.warmth
+    scores = _scores(light.balanced(image), gate, markers)
+    if scores.sum() >= ALL_THERE * len(markers.markers):
+        return False
+    best, best_score = present, float(scores.sum()) + ADVANTAGE
+    for guess in GUESSES:
+        light.warmth = float(guess)
+        scores = _scores(light.balanced(image), gate, markers)
+        if scores.sum() > best_score and np.count_nonzero(scores > 0.3) >= MARKERS_LEAST:
+            best, best_score = light.warmth, float(scores.sum())
+    light.warmth = best
+    return best != present
+
+
+def _scores(image: YuvImage, gate: ColourGate, markers: MarkerSet) -> NDArray[np.float64]:
+    """(M,) 0..1: how well each marker's best blob has its hue, as far as it is compact."""
+    blobs = gate.blobs(image, range(len(markers.markers)))
+    box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)
+    compact = np.minimum(blobs[:, AREA] / (COMPACT * box), 1.0)
+    hues = np.arctan2(blobs[:, SUM_V], blobs[:, SUM_U])
+    scores = np.zeros(len(markers.markers))
+    for index, marker in enumerate(markers.markers):
+        own = blobs[:, LABEL] == index + 1
+        if own.any():
+            away = np.degrees(np.remainder(hues[own] - marker.chroma.hue_rad + math.pi, 2.0 * math.pi) - math.pi)
+            scores[index] = np.max(compact[own] * np.exp(-0.5 * (away / HUE_SIGMA_DEG) ** 2))
+    return scores
