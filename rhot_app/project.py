@@ -91,6 +91,21 @@ class FilterSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     position_markers: dict[str, OneEuroSettings] = {}
 
 
+class DepthSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How distance is found: `stereo` from calibrated cameras; `disparity` from the disparity of two uncalibrated ones,
+    parallel and equal, by RHOT eq. 6.12 or, with `k` (metres) and `z`, by the power law D = k |x|^z of eq. 7.4."""
+
+    mode: Literal["stereo", "disparity"] = "stereo"
+    baseline_m: Positive = 0.075
+    view_angle_deg: Annotated[float, Meta(gt=1, lt=170)] = 62.2  # horizontal
+    k: Positive | None = None
+    z: Annotated[float, Meta(ge=-2, lt=0)] | None = None
+
+    def __post_init__(self) -> None:
+        if (self.k is None) != (self.z is None):
+            raise ValueError("k and z belong together; give both or neither")
+
+
 class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole rig."""
 
@@ -99,6 +114,7 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     markers: MarkerSet
     hand: HandAnatomy
     filters: FilterSettings = FilterSettings()
+    depth: DepthSettings = DepthSettings()
     broadcast: Broadcast = Broadcast()
     format: Literal["rhot-rig"] = FORMAT
     version: Literal[1] = VERSION
@@ -111,6 +127,8 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             doubled = [value for value in values if values.count(value) > 1]
             if doubled:
                 raise ValueError(f"two nodes have the same {what} {doubled[0]!r}; each node needs its own")
+        if self.depth.mode == "disparity" and len(self.nodes) != 2:
+            raise ValueError(f"depth.mode is \"disparity\", which needs two cameras; the rig has {len(self.nodes)}")
         known = set(self.markers.ids)
         for field in ("pixel_markers", "position_markers"):
             unknown = sorted(set(getattr(self.filters, field)) - known)

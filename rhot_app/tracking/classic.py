@@ -89,7 +89,7 @@ class ClassicTracker:
         rig, shapes = self._rig, self._shapes()
         markers = Sheet(len(rig.cameras), len(rig.marker_ids))
         stages.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
-                          rig.cameras, rig.focal, shapes, self._memory, markers.used, markers.doubtful,
+                          rig.cameras, rig.focal, shapes, rig.law, self._memory, markers.used, markers.doubtful,
                           markers.believed, markers.restarted, markers.raw, markers.covariances, markers.errors)
         clock.lap("triangulate")
         if not self._filtering:
@@ -101,7 +101,7 @@ class ClassicTracker:
                              position.state, pixel.gap_s, pixels)
         clock.lap("filter")
         stages.locate_filtered(pixels, paired.covariances, markers.used, rig.intrinsics, rig.cameras, rig.focal,
-                               shapes, markers.positions)
+                               shapes, rig.law, markers.positions)
         clock.lap("triangulate")
         stages.filter_positions(t_s, markers.positions, position.parameters, position.state, position.gap_s,
                                 markers.believed)

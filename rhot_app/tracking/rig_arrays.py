@@ -12,6 +12,7 @@ from rhot_app.geometry.silhouette import ball
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
 from rhot_app.project import OneEuroSettings, Rig
+from rhot_app.tracking.estimate import disparity_law
 from rhot_node.markers import Marker
 
 Array = NDArray[np.float64]
@@ -26,7 +27,8 @@ class RigArrays:
     `cameras` (C, 3, 4) camera_from_world m; `intrinsics` (C, 9) as `CameraModel`; `focal` (C, 2) px.
     `shapes` (M, 3, 3) m^2: the markers' bodies as far as known without the hand's pose, zero for flat ones. `tips`
     (5,): marker index of each finger's tip, -1 without one; `wrist`: the same for the wrist. `band_half_axes`
-    (3,) m along the palm's x, y, z; None when the wrist wears no band.
+    (3,) m along the palm's x, y, z; None when the wrist wears no band. `law` (7,): how distance follows from
+    disparity (`estimate.disparity_law`), empty when markers are triangulated.
     """
 
     camera_names: tuple[str, ...]
@@ -38,6 +40,7 @@ class RigArrays:
     tips: NDArray[np.int64]
     wrist: int
     band_half_axes: Array | None
+    law: Array
 
 
 def compile_rig(rig: Rig) -> RigArrays:
@@ -56,6 +59,7 @@ def compile_rig(rig: Rig) -> RigArrays:
         tips=np.array([roles.index(role) if role in roles else -1 for role in TIP_ROLES], dtype=np.int64),
         wrist=wrist,
         band_half_axes=_band(markers[wrist], rig.hand) if wrist >= 0 and markers[wrist].shape == "band" else None,
+        law=disparity_law(rig),
     )
 
 

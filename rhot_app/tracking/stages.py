@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rhot_app.filters import one_euro
 from rhot_app.tracking import locate, trust
+from rhot_app.tracking.estimate import locate_by_disparity
 from rhot_app.tracking.state import Knowledge
 
 Array = NDArray[np.float64]
@@ -48,17 +49,28 @@ def turn_band(world_from_palm: Array, half_axes: Array, shape: Array) -> None:
 
 @njit(cache=True)
 def locate_raw(t_s: float, flags: NDArray[np.int64], live: Mask, pixels: Array, covariances: Array, intrinsics: Array,
-               cameras: Array, focal: Array, shapes: Array, memory: Array, used: Mask, doubtful: Mask, believed: Mask,
-               restarted: Mask, raw: Array, raw_covariances: Array, errors: Array) -> None:
-    """Unfiltered positions decide what to believe. Arrays as in `locate` and `trust`."""
+               cameras: Array, focal: Array, shapes: Array, law: Array, memory: Array, used: Mask, doubtful: Mask,
+               believed: Mask, restarted: Mask, raw: Array, raw_covariances: Array, errors: Array) -> None:
+    """Unfiltered positions decide what to believe. Arrays as in `locate`, `estimate` and `trust`."""
     locate.choose_views(flags, live, used, doubtful)
-    locate.locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, raw, raw_covariances, errors)
+    _locate(pixels, covariances, used, intrinsics, cameras, focal, shapes, law, raw, raw_covariances, errors)
     trust.judge(t_s, raw, raw_covariances, memory, believed, restarted)
     for m in range(raw.shape[0]):
         doubtful[m] |= errors[m] > locate.DOUBT_PX
         if not believed[m]:
             raw[m] = math.nan
             used[:, m] = False
+
+
+@njit(cache=True)
+def _locate(pixels: Array, covariances: Array, used: Mask, intrinsics: Array, cameras: Array, focal: Array,
+            shapes: Array, law: Array, positions: Array, position_covariances: Array, errors: Array) -> None:
+    """By triangulation, or by disparity where the rig has a law for it."""
+    if law.shape[0] > 0:
+        locate_by_disparity(pixels, covariances, used, law, positions, position_covariances, errors)
+    else:
+        locate.locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, positions,
+                          position_covariances, errors)
 
 
 @njit(cache=True)
@@ -83,11 +95,11 @@ def filter_pixels(t_s: float, used: Mask, restarted: Mask, pixels: Array, parame
 
 @njit(cache=True)
 def locate_filtered(pixels: Array, covariances: Array, used: Mask, intrinsics: Array, cameras: Array, focal: Array,
-                    shapes: Array, positions: Array) -> None:
+                    shapes: Array, law: Array, positions: Array) -> None:
     """Fill `positions` (M, 3) m from filtered pixels; covariances and errors stay those of the unfiltered ones."""
     markers = positions.shape[0]
-    locate.locate_all(pixels, covariances, used.copy(), intrinsics, cameras, focal, shapes, positions,
-                      np.empty((markers, 3, 3)), np.empty(markers))
+    _locate(pixels, covariances, used.copy(), intrinsics, cameras, focal, shapes, law, positions,
+            np.empty((markers, 3, 3)), np.empty(markers))
 
 
 @njit(cache=True)
