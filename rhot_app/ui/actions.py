@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QObject, QSize, Qt
+from PySide6.QtCore import QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
 
@@ -101,6 +101,7 @@ class MainToolBar(QToolBar):
         button.setMenu(menu)
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        menu.aboutToHide.connect(lambda: QTimer.singleShot(0, lambda: _calm_down(button)))
         self.addWidget(button)
         return button
 
@@ -120,3 +121,9 @@ class MainToolBar(QToolBar):
         actions.record.setText("Stop recording" if recording else "Record")
         actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
         self.badge.set_scheme(scheme)
+
+
+def _calm_down(button: QToolButton) -> None:
+    """A closed menu leaves its button lit while the mouse rests on it, as if it were open; the next visit lights it."""
+    button.setAttribute(Qt.WidgetAttribute.WA_UnderMouse, False)
+    button.update()

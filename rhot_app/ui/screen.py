@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QSplitter
 
 from rhot_app.project import Rig
+from rhot_app.tracking.state import Condition
 from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
@@ -53,6 +54,7 @@ class Screen:
         self._next_panels = self._next_plots = 0.0
         self._state_seen_at = 0.0
         self._counted = 0
+        self._framed_session = -1
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours everywhere."""
@@ -72,7 +74,7 @@ class Screen:
             plot.begin_anew()
         self.nodes.show_status(None)
         self.hand.show_state(None)
-        self._drawn_state = self._drawn_preview = -1
+        self._drawn_state = self._drawn_preview = self._framed_session = -1
         self._state_seen_at = 0.0
 
     def refresh(self, live: Live, now_s: float) -> None:
@@ -102,9 +104,17 @@ class Screen:
                 self.pacer.begin(now_s)
                 self._drawn_state = live.state_count
                 self.scene.show_state(live.state)
+                self._frame_once(live)
         elif self._state_seen_at > 0.0 and now_s - self._state_seen_at > STALE_S:
             self.scene.show_state(None)
             self._state_seen_at = 0.0
+
+    def _frame_once(self, live: Live) -> None:
+        """Go near the hand the first time that all of it is tracked after a start."""
+        session = live.status.session if live.status is not None else 0
+        if session != self._framed_session and live.state is not None and live.state.condition is Condition.TRACKING:
+            self._framed_session = session
+            self.scene.frame_first()
 
     def _refresh_panels(self, live: Live) -> None:
         fresh = live.state if self._state_seen_at > 0.0 else None

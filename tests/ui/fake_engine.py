@@ -86,6 +86,7 @@ class FakeEngine:
         self.rig_path = ""
         self.commands: list[tuple[str, dict[str, Any]]] = []
         self.sequence = 0
+        self.session = 1
         self._model = build_model(self.rig.hand)
         self._random = np.random.default_rng(7)
 
@@ -155,9 +156,9 @@ class FakeEngine:
             message="" if self.node_words[node.name] != "silent" else "Nothing heard from 127.0.0.1 for 2 s.")
             for node in self.rig.nodes)
         return EngineStatus(
-            t_master_ns=round(t_s * 1e9), pid=4242, session=1, running=self.running, condition=self.condition().value,
-            rig_name=self.rig.name, rig_path=self.rig_path, state_rate_hz=self.rate_hz if self.running else 0.0,
-            nodes=nodes, advice=self.advice,
+            t_master_ns=round(t_s * 1e9), pid=4242, session=self.session, running=self.running,
+            condition=self.condition().value, rig_name=self.rig.name, rig_path=self.rig_path,
+            state_rate_hz=self.rate_hz if self.running else 0.0, nodes=nodes, advice=self.advice,
             latency={stage: LatencySummary(value, 1.4 * value)
                      for stage, value in zip(LATENCY_STAGES, _STAGE_S, strict=True)},
             log_path=self.log_path, log_bytes=120_000 if self.log_path else 0)

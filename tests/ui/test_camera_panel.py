@@ -63,6 +63,24 @@ def test_what_a_camera_does_not_see_is_not_marked(panel, engine):
     assert "ring" in panel.views["left"].marked and "ring" not in panel.views["right"].marked
 
 
+def test_a_small_picture_names_its_markers_while_the_mouse_is_over_it(panel, engine, qtbot):
+    live = Live()
+    live._take_state(engine.state(1.0))
+    live.previews["left"] = engine.preview(0, 1.0)
+    view = panel.views["left"]
+    panel.refresh(live)
+    QTest.qWait(20)
+    assert view.width() > 400 and view.named
+    panel.resize(420, 220)
+    QTest.qWait(20)
+    QTest.mouseMove(panel.views["right"], panel.views["right"].rect().center())
+    qtbot.waitUntil(lambda: not view.named)
+    bare = view.grab().toImage()
+    QTest.mouseMove(view, view.rect().center())
+    qtbot.waitUntil(lambda: view.named)
+    assert view.grab().toImage() != bare and view.marked[0] == "thumb"
+
+
 def test_pictures_stand_beside_each_other_where_that_is_larger(panel):
     panel.resize(600, 240)
     QTest.qWait(20)

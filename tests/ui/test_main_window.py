@@ -7,7 +7,9 @@ from pathlib import Path
 
 from fake_backend import FakeBackend
 from fake_engine import FakeEngine, synthetic_rig
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
+from PySide6.QtGui import QCursor
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
 
 from rhot_app.engine.status import Advice
@@ -95,11 +97,30 @@ def test_a_hidden_camera_panel_asks_for_no_pictures(tracking):
 
 def test_f_frames_the_hand_and_home_resets(tracking):
     scene = tracking.window.screen_parts.scene
+    tracking.press(Qt.Key.Key_Home)
     far = scene.cameraParams()["distance"]
     tracking.press(Qt.Key.Key_F)
     assert scene.cameraParams()["distance"] < far
     tracking.press(Qt.Key.Key_Home)
     assert scene.cameraParams()["distance"] == far
+
+
+def test_the_hand_is_framed_when_tracking_begins_unless_the_view_was_moved(tracking):
+    scene, engine = tracking.window.screen_parts.scene, tracking.backend.engine
+    tracking.press(Qt.Key.Key_Home)
+    far = scene.cameraParams()["distance"]
+    tracking.run(0.5)
+    assert scene.cameraParams()["distance"] == far, "the view stays where the person put it"
+    engine.session += 1
+    tracking.until(lambda: scene.cameraParams()["distance"] < 0.7 * far)
+    QTest.wheelEvent(scene.windowHandle() or tracking.window.windowHandle(),
+                     QPointF(scene.mapTo(tracking.window, scene.rect().center())), QPoint(0, -360))
+    framed, moved = scene._untouched_view, scene.cameraParams()
+    assert moved["distance"] > framed["distance"]
+    engine.session += 1
+    tracking.run(0.8)
+    assert scene.cameraParams() == moved
+    tracking.press(Qt.Key.Key_Home)
 
 
 def test_advice_comes_and_goes(tracking):
@@ -211,7 +232,7 @@ def test_attaching_shows_the_running_state_at_once(make_bench):
 def test_closing_the_rig_ends_everything_and_returns_to_the_first_page(tracking):
     tracking.window.actions_.close_rig.trigger()
     tracking.until(lambda: "close" in tracking.backend.calls and tracking.window.welcome.twin_button.isVisible())
-    assert tracking.window.toolbar.badge.word == "NO RIG"
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "NO RIG")
 
 
 def test_layout_and_look_are_remembered_and_can_be_reset(make_bench):
@@ -230,6 +251,23 @@ def test_layout_and_look_are_remembered_and_can_be_reset(make_bench):
     again.window.actions_.reset.trigger()
     assert again.window.docks.docks[3].isVisible() and again.window.actions_.dark.isChecked()
     assert again.window.actions_.names.isChecked()
+
+
+def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
+    button = tracking.window.toolbar.rig_button
+    idle = button.grab().toImage()
+    lit = []
+
+    def escape():
+        lit.append(button.grab().toImage() != idle)
+        tracking.press(Qt.Key.Key_Escape, button.menu())
+
+    QCursor.setPos(button.mapToGlobal(button.rect().center()))
+    QTimer.singleShot(200, escape)
+    tracking.click(button)
+    tracking.run(0.1)
+    assert lit == [True] and button.grab().toImage() == idle
+    QCursor.setPos(tracking.window.mapToGlobal(tracking.window.rect().center()))
 
 
 def test_the_calibrate_menu_shows_what_the_rig_says(tracking):

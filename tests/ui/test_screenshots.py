@@ -57,6 +57,7 @@ def shown(tracking):
         tracking.window.appearance.set_scheme("dark")
     tracking.window.screen_parts.scene.reset_view()
     tracking.window.docks.arrange()
+    tracking.backend.engine.session += 1
     tracking.run(0.4)
     return tracking
 
@@ -117,7 +118,7 @@ def test_scene_alone(shown):
 
 
 def test_dialogs(qtbot, bench):
-    for name, dialog in (("find-nodes", NodesDialog(DARK)), ("rig-cameras", RigDialog(FakeEngine().rig, "cameras")),
+    for name, dialog in (("connect-nodes", NodesDialog(DARK)), ("rig-cameras", RigDialog(FakeEngine().rig, "cameras")),
                          ("rig-markers", RigDialog(FakeEngine().rig, "markers"))):
         qtbot.addWidget(dialog)
         dialog.show()

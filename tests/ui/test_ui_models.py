@@ -11,7 +11,7 @@ from fake_engine import FakeEngine
 from rhot_app.tracking.state import LATENCY_STAGES, Condition, Knowledge
 from rhot_app.ui.models import glossary, words
 from rhot_app.ui.models.axis_range import peaks_above, round_top, usual_top
-from rhot_app.ui.models.label_layout import Box, place_labels, unique_prefixes
+from rhot_app.ui.models.label_layout import Box, place_at_sides, place_labels
 from rhot_app.ui.models.latency import STACKED, LatencyWindow
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import SCHEMES, contrast, visible_on
@@ -172,9 +172,16 @@ def test_labels_keep_clear_of_each_other():
     assert Box(0, 0, 10, 10).overlaps(Box(9, 9, 5, 5)) and not Box(0, 0, 10, 10).overlaps(Box(10, 0, 5, 5))
 
 
-def test_initials_are_the_shortest_that_tell_apart():
-    assert unique_prefixes(("thumb", "index", "middle")) == ["t", "i", "m"]
-    assert unique_prefixes(("tip_a", "tip_b")) == ["tip_a", "tip_b"]
+def test_labels_at_the_sides_keep_order_and_clear_of_each_other():
+    anchors = [(90.0, 70.0), (95.0, 70.0), (100.0, 71.0), (105.0, 69.0), (98.0, 120.0), (120.0, 75.0)]
+    boxes = place_at_sides(anchors, [(50.0, 18.0)] * 6, (200.0, 150.0), 4.0)
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    assert all(box.inside(200.0, 150.0) for box in boxes)
+    for x in (4.0, 146.0):
+        column = [k for k, box in enumerate(boxes) if box.x == x]
+        assert len(column) == 3
+        assert sorted(column, key=lambda k: boxes[k].y) == sorted(column, key=lambda k: anchors[k][1])
+    assert boxes[0].nearest((90.0, 70.0))[0] == boxes[0].x + 50.0
 
 
 def test_drawing_takes_no_more_than_its_share():

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 Point = tuple[float, float]
 
+_BETWEEN_PX = 2.0
+
 
 @dataclass(frozen=True, slots=True)
 class Box:
@@ -20,6 +22,10 @@ class Box:
         """Whether the two share any area."""
         return (self.x < other.x + other.width and other.x < self.x + self.width
                 and self.y < other.y + other.height and other.y < self.y + self.height)
+
+    def nearest(self, point: Point) -> Point:
+        """The point of the rectangle that is nearest to `point`."""
+        return min(max(point[0], self.x), self.x + self.width), min(max(point[1], self.y), self.y + self.height)
 
     def covers(self, point: Point, reach: float) -> bool:
         """Whether a mark at `point` that reaches so far to all sides touches it."""
@@ -58,7 +64,34 @@ def _around(x: float, y: float, width: float, height: float, gap: float, rise: f
     return [*boxes, Box(x - 0.5 * width, y - gap - height, width, height), Box(x - 0.5 * width, y + gap, width, height)]
 
 
-def unique_prefixes(names: tuple[str, ...]) -> list[str]:
-    """The shortest beginning of each name that no other name has: "t", "i", "m" … for pictures too small for names."""
-    return [next((name[:n] for n in range(1, len(name)) if sum(other.startswith(name[:n]) for other in names) == 1),
-                 name) for name in names]
+def place_at_sides(anchors: list[Point], sizes: list[Point], picture: Point, margin: float) -> list[Box]:
+    """A box for each label in a column at the left or right edge, for pictures too small to have room between anchors.
+
+    Each column takes the anchors of its half, in their order from top to bottom, so that the lines to them do not
+    cross. Labels of one column never overlap as long as the picture is tall enough for them one above the other.
+    """
+    boxes = [Box(0.0, 0.0, 0.0, 0.0)] * len(anchors)
+    by_x = sorted(range(len(anchors)), key=lambda k: anchors[k][0])
+    half = (len(by_x) + 1) // 2
+    for column, right in ((by_x[:half], False), (by_x[half:], True)):
+        column.sort(key=lambda k: anchors[k][1])
+        heights = [sizes[k][1] for k in column]
+        wanted = [anchors[k][1] - 0.5 * height for k, height in zip(column, heights, strict=True)]
+        for k, y in zip(column, _stack(wanted, heights, margin, picture[1] - margin), strict=True):
+            width, height = sizes[k]
+            boxes[k] = Box(picture[0] - margin - width if right else margin, y, width, height)
+    return boxes
+
+
+def _stack(wanted: list[float], heights: list[float], low: float, high: float) -> list[float]:
+    """Upper ends near those `wanted` (in rising order), one below the other, first pushed down and then up."""
+    tops: list[float] = []
+    floor = low
+    for y, height in zip(wanted, heights, strict=True):
+        tops.append(max(y, floor))
+        floor = tops[-1] + height + _BETWEEN_PX
+    ceiling = high
+    for k in reversed(range(len(tops))):
+        tops[k] = min(tops[k], ceiling - heights[k])
+        ceiling = tops[k] - _BETWEEN_PX
+    return tops

@@ -79,6 +79,7 @@ class AdviceBar(QWidget):
         """Toolbars do not ask how tall wrapped text gets at their width, so the bar says it."""
         layout = self.layout()
         if layout is not None and self.width() > 100:
+            layout.invalidate()  # it would count lines that have just been hidden
             self.setFixedHeight(max(layout.heightForWidth(self.width()), _LEAST_PX))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QResizeEvent
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, QSizeF, Qt
+from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QImage, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
 from rhot_app.ui.backend.live import Live
-from rhot_app.ui.models.label_layout import place_labels, unique_prefixes
+from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.panels.empty_state import EmptyState
@@ -21,8 +21,8 @@ from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
 
-_RING_PX = 7.0
-_ROOM_FOR_NAMES_PX = 240.0
+_RING_PX = (4.0, 7.0)  # radius in small and in large pictures
+_ROOM_FOR_NAMES_PX = 320.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,6 @@ class Mark:
 
     place: QPointF
     name: str
-    initial: str
     colour: str
     whole: bool
 
@@ -46,11 +45,13 @@ class CameraView(QWidget):
         self._image = QImage()
         self._frame = (4, 3)
         self._marks: list[Mark] = []
+        self._pointed_at = False
         self.setMinimumSize(120, 90)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName(f"Picture of camera {name}")
         self.setToolTip(f"Camera {name}: what it saw a moment ago, and the markers found in that picture.\n"
-                        "A full ring is a marker seen whole, a broken ring one that is half hidden or doubtful.")
+                        "A full ring is a marker seen whole, a broken ring one that is half hidden or doubtful.\n"
+                        "Names stand in large pictures, and in small ones while the mouse is over them.")
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Four by three."""
@@ -67,9 +68,8 @@ class CameraView(QWidget):
     def show_marks(self, pixels: Array, flags: NDArray[np.uint16], names: tuple[str, ...], colours: list[str]) -> None:
         """Markers at `pixels` (M, 2) px of the full frame; NaN ones are left out."""
         doubtful = int(MarkerFlag.PARTIAL | MarkerFlag.AMBIGUOUS)
-        self._marks = [Mark(QPointF(float(x), float(y)), short_name(name), initial, colour, not int(flag) & doubtful)
-                       for (x, y), flag, name, initial, colour
-                       in zip(pixels, flags, names, unique_prefixes(names), colours, strict=True)
+        self._marks = [Mark(QPointF(float(x), float(y)), short_name(name), colour, not int(flag) & doubtful)
+                       for (x, y), flag, name, colour in zip(pixels, flags, names, colours, strict=True)
                        if np.isfinite(x) and np.isfinite(y)]
         self.update()
 
@@ -84,42 +84,73 @@ class CameraView(QWidget):
         """Names of the markers drawn."""
         return [mark.name for mark in self._marks]
 
-    def paintEvent(self, event: object) -> None:  # noqa: N802
-        """Picture, marks, name."""
-        painter = QPainter(self)
-        painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform)
+    @property
+    def named(self) -> bool:
+        """Whether the markers' names are shown: where there is room for them, or somebody points at the picture."""
+        return self._pointed_at or self._target().width() >= _ROOM_FOR_NAMES_PX
+
+    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
+        """Somebody wants to know more."""
+        self._pointed_at = True
+        self.update()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Nobody does any more."""
+        self._pointed_at = False
+        self.update()
+
+    def _target(self) -> QRectF:
+        """Where the picture stands in the widget."""
         width, height = self._frame
         scale = min(self.width() / width, self.height() / height)
         target = QRectF(0, 0, width * scale, height * scale)
         target.moveCenter(QPointF(self.width() / 2, self.height() / 2))
+        return target
+
+    def paintEvent(self, event: object) -> None:  # noqa: N802
+        """Picture, marks, name."""
+        painter = QPainter(self)
+        painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform)
+        target = self._target()
         painter.fillRect(target, QColor(self._scheme.scene))
         if not self._image.isNull():
             painter.drawImage(target, self._image)
         painter.setClipRect(target)
-        self._paint_marks(painter, target, scale)
-        self._paint_tag(painter, target.topLeft() + QPointF(6, 6), self.name, bold=True)
+        painter.translate(target.topLeft())
+        scale = target.width() / self._frame[0]
+        places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self._marks]
+        self._paint_rings(painter, places, target.width())
+        if self.named:
+            self._paint_names(painter, places, target.size())
+        else:
+            self._paint_tag(painter, QPointF(6, 6), self.name, bold=True)
+        painter.translate(-target.topLeft())
         if self._image.isNull():
             painter.setPen(QColor(self._scheme.muted))
             painter.drawText(target, Qt.AlignmentFlag.AlignCenter, "no picture yet")
         painter.end()
 
-    def _paint_marks(self, painter: QPainter, target: QRectF, scale: float) -> None:
-        places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self._marks]
-        painter.translate(target.topLeft())
+    def _paint_rings(self, painter: QPainter, places: list[QPointF], width: float) -> None:
+        radius = _RING_PX[0] + (_RING_PX[1] - _RING_PX[0]) * min(1.0, width / _ROOM_FOR_NAMES_PX)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         for at, mark in zip(places, self._marks, strict=True):
             style = Qt.PenStyle.SolidLine if mark.whole else Qt.PenStyle.DotLine
-            for colour, width in (("#000000", 4.0), (mark.colour, 2.0)):
-                painter.setPen(QPen(QColor(colour), width, style))
-                painter.drawEllipse(at, _RING_PX, _RING_PX)
-        texts = [mark.name if target.width() >= _ROOM_FOR_NAMES_PX else mark.initial for mark in self._marks]
+            for colour, line_width in (("#000000", 4.0), (mark.colour, 2.0)):
+                painter.setPen(QPen(QColor(colour), line_width, style))
+                painter.drawEllipse(at, radius, radius)
+
+    def _paint_names(self, painter: QPainter, places: list[QPointF], picture: QSizeF) -> None:
+        """Names at the sides, each with a line to its marker."""
         metrics = QFontMetricsF(painter.font())
-        sizes = [(metrics.horizontalAdvance(text) + 8, metrics.height() + 2) for text in texts]
-        boxes = place_labels([(at.x(), at.y()) for at in places], sizes, (target.width(), target.height()),
-                             _RING_PX + 3)
-        for text, box in zip(texts, boxes, strict=True):
-            self._paint_tag(painter, QPointF(box.x, box.y), text)
-        painter.translate(-target.topLeft())
+        sizes = [(metrics.horizontalAdvance(mark.name) + 8, metrics.height() + 2) for mark in self._marks]
+        anchors = [(at.x(), at.y()) for at in places]
+        boxes = place_at_sides(anchors, sizes, (picture.width(), picture.height()), 4.0)
+        for colour, width in (("#000000", 3.0), ("#ffffff", 1.0)):
+            painter.setPen(QPen(QColor(colour), width))
+            for anchor, box in zip(anchors, boxes, strict=True):
+                painter.drawLine(QPointF(*anchor), QPointF(*box.nearest(anchor)))
+        for mark, box in zip(self._marks, boxes, strict=True):
+            self._paint_tag(painter, QPointF(box.x, box.y), mark.name)
 
     def _paint_tag(self, painter: QPainter, corner: QPointF, text: str, *, bold: bool = False) -> None:
         font = painter.font()

@@ -70,7 +70,7 @@ class NodesPanel(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._scheme = scheme
         self._cards: list[NodeCard] = []
-        self.empty = EmptyState("The engine has not reported on its nodes yet.")
+        self.empty = EmptyState("No word from the engine about its nodes.")
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(8, 4, 8, 8)
         self._layout.setSpacing(6)

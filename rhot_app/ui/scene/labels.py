@@ -66,9 +66,7 @@ class LabelPainter:
         boxes = place_labels(anchors, sizes, (float(size[0]), float(size[1])), _GAP_PX)
         painter.setPen(QColor(style.colour))
         for (x, y), box in zip(anchors, boxes, strict=True):
-            near_x = min(max(x, box.x), box.x + box.width)
-            near_y = min(max(y, box.y), box.y + box.height)
-            painter.drawLine(QLineF(x, y, near_x, near_y))
+            painter.drawLine(QLineF(x, y, *box.nearest((x, y))))
         for box, picture in zip(boxes, pictures, strict=True):
             painter.drawPixmap(QPointF(box.x, box.y), picture)
 

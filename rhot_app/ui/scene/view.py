@@ -28,6 +28,7 @@ _HOME_CENTRE_M = (0.06, 0.38, -0.04)
 _HOME_AZIMUTH_DEG = -62.0
 _HOME_ELEVATION_DEG = 20.0
 _FRAMED_DISTANCE_M = 0.42
+_FIRST_DISTANCE_M = 0.56  # with room around the hand for what it will do next
 
 
 class SceneView(GLViewWidget):
@@ -102,21 +103,32 @@ class SceneView(GLViewWidget):
         self._place_button()
 
     def reset_view(self) -> None:
-        """Back to the view from above and behind the cameras."""
+        """Back to the view from beside and above, which shows the cameras too."""
         self.setCameraParams(fov=_FIELD_OF_VIEW_DEG, center=QVector3D(*_HOME_CENTRE_M), distance=_HOME_DISTANCE_M,
                              azimuth=_HOME_AZIMUTH_DEG, elevation=_HOME_ELEVATION_DEG)
+        self._untouched_view = self.cameraParams()
         self.update()
+
+    def frame_first(self) -> None:
+        """Go near the hand, unless somebody has moved the view since it was reset."""
+        if self.cameraParams() == self._untouched_view and self._show_hand_from(_FIRST_DISTANCE_M):
+            self._untouched_view = self.cameraParams()
 
     def frame_hand(self) -> None:
         """Bring the hand into the middle, near enough to see every finger; without a hand, reset the view."""
+        if not self._show_hand_from(_FRAMED_DISTANCE_M):
+            self.reset_view()
+
+    def _show_hand_from(self, distance_m: float) -> bool:
+        """Bring the hand into the middle; False when there is none."""
         joints = self._state.joint_positions if self._state is not None else np.full((1, 3), np.nan)
         joints = joints[np.isfinite(joints).all(axis=1)]
         if not len(joints):
-            self.reset_view()
-            return
+            return False
         middle = to_display(0.5 * (joints.min(axis=0) + joints.max(axis=0)))
-        self.setCameraParams(center=QVector3D(*(float(v) for v in middle)), distance=_FRAMED_DISTANCE_M)
+        self.setCameraParams(center=QVector3D(*(float(v) for v in middle)), distance=distance_m)
         self.update()
+        return True
 
     def keyPressEvent(self, ev: QKeyEvent) -> None:  # noqa: N802
         """The arrow keys turn the view; every other key goes to the window's shortcuts."""
