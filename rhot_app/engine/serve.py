@@ -6,7 +6,6 @@ import contextlib
 import gc
 import os
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,10 +18,8 @@ from rhot_app.engine.directory import EngineDirectory, EngineLock, open_director
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.server import Server, StatePublisher
 from rhot_app.project import Rig
+from rhot_app.sources.realtime import share_interpreter
 from rhot_app.tracking.make import make_tracker
-
-SWITCH_INTERVAL_S = 1e-4
-"""A receiver that wakes up waits no longer than this for the interpreter (Python's default is 5 ms)."""
 
 _COLLECT_S = 5.0
 
@@ -64,7 +61,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
 
 def prepare_process() -> None:
     """Keep the interpreter out of a sample's way."""
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    share_interpreter()
     with contextlib.suppress(OSError):
         os.nice(-5)
     gc.collect()

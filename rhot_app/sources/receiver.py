@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from rhot_app.errors import SourceError
 from rhot_app.sources.door import NodeDoor, Verified
-from rhot_app.sources.realtime import hurry_this_thread
+from rhot_app.sources.realtime import claim_interpreter, hurry_this_thread, share_interpreter
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 
@@ -97,6 +97,7 @@ class NodeReceiver:
         with contextlib.suppress(BlockingIOError):
             while count < BURST:
                 data, ancillary, _, _ = self._socket.recvmsg(DATAGRAM_MAX, ANCILLARY_SIZE, flags)
+                claim_interpreter()
                 t_receive_ns, now_ns = self._kernel_time.receive_time_ns(ancillary)
                 count, flags = count + 1, socket.MSG_DONTWAIT
                 if self.tap is not None:
@@ -126,3 +127,4 @@ class NodeReceiver:
         hurry_this_thread()
         while not self._ending.is_set():
             self.step()
+            share_interpreter()

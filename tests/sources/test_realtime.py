@@ -1,6 +1,7 @@
 """Real-time scheduling is taken where it is permitted, for one thread alone, and never missed."""
 
 import os
+import sys
 import threading
 
 import pytest
@@ -38,3 +39,14 @@ def test_without_permission_nothing_changes(monkeypatch):
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     assert in_a_thread(policy_after_hurrying) == os.sched_getscheduler(0)
+
+
+def test_the_interpreter_is_kept_only_while_a_datagram_is_worked_on() -> None:
+    before = sys.getswitchinterval()
+    try:
+        claim_interpreter()
+        assert sys.getswitchinterval() >= 1e-3
+        share_interpreter()
+        assert sys.getswitchinterval() <= 2 * PATIENCE_S
+    finally:
+        sys.setswitchinterval(before)
