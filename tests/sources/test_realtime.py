@@ -44,9 +44,9 @@ def test_without_permission_nothing_changes(monkeypatch):
 def test_the_interpreter_is_kept_only_while_a_datagram_is_worked_on() -> None:
     before = sys.getswitchinterval()
     try:
-        claim_interpreter()
+        realtime.claim_interpreter()
         assert sys.getswitchinterval() >= 1e-3
-        share_interpreter()
-        assert sys.getswitchinterval() <= 2 * PATIENCE_S
+        realtime.share_interpreter()
+        assert sys.getswitchinterval() <= 2 * realtime.PATIENCE_S
     finally:
         sys.setswitchinterval(before)
