@@ -32,8 +32,9 @@ class EngineClient:
     One thread only. `state` and `status` are the newest of each kind that `poll` has seen.
     """
 
-    def __init__(self, directory: Path | None = None, *, states: bool = True) -> None:
-        """Connect; no message is exchanged yet. `states` False leaves the stream of hand states out."""
+    def __init__(self, directory: Path | None = None, *, states: bool = True, events: bool = True) -> None:
+        """Connect; no message is exchanged yet. `states` False leaves the stream of hand states out, `events` False
+        status and previews: for a client that only gives commands, and polls nothing."""
         self.directory = EngineDirectory((directory or default_directory()).absolute())
         self.state: HandState | None = None
         self.status: EngineStatus | None = None
@@ -44,10 +45,12 @@ class EngineClient:
         self._stream.setsockopt(zmq.LINGER, 0)
         self._stream.setsockopt(zmq.RECONNECT_IVL, 50)
         self._stream.setsockopt(zmq.RECONNECT_IVL_MAX, 200)
-        for topic in (TOPIC_STATUS, TOPIC_PREVIEW, *((TOPIC_STATE,) if states else ())):
-            self._stream.setsockopt(zmq.SUBSCRIBE, topic)
-        self._stream.connect(self.directory.events)
+        if events:
+            self._stream.setsockopt(zmq.SUBSCRIBE, TOPIC_STATUS)
+            self._stream.setsockopt(zmq.SUBSCRIBE, TOPIC_PREVIEW)
+            self._stream.connect(self.directory.events)
         if states:
+            self._stream.setsockopt(zmq.SUBSCRIBE, TOPIC_STATE)
             self._stream.connect(self.directory.states)
 
     def poll(self, timeout_s: float = 0.0) -> list[Published]:

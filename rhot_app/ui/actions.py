@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton,
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
 from rhot_app.ui.shapes import shape_icon
+from rhot_app.ui.wizards.catalogue import WIZARDS
 
 
 class Actions(QObject):
@@ -26,6 +27,9 @@ class Actions(QObject):
                                    "kept beside it.")
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
         self.quit = self._make("Quit", "Ctrl+Q", "End what the app started and close it.")
+        self.wizards = [self._make(f"{wizard.title} …", "", wizard.meaning) for wizard in WIZARDS]
+        self.earlier = self._make("Bring back an earlier calibration …", "", "Every calibration keeps what it "
+                                  "replaced; choose one by date and reason.")
         self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
         self.markers = self._make("Markers …", "", "The marker set that the rig file says.")
         self.hand = self._make("Hand …", "", "The hand's bones that the rig file says.")
@@ -74,7 +78,8 @@ class MainToolBar(QToolBar):
         self.addSeparator()
         a = actions
         self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.save_rig, a.close_rig, None, a.quit])
-        self.calibrate_button = self._add_menu("Calibrate", [a.cameras, a.markers, a.hand, None, a.files])
+        self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.cameras, a.markers,
+                                                             a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, None,
                                                    a.dark, a.light, None, a.reset])
         self.addAction(actions.guide)

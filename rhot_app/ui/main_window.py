@@ -33,6 +33,8 @@ from rhot_app.ui.settings import Settings
 from rhot_app.ui.theme import scheme_named
 from rhot_app.ui.voice import look_of, notices_of
 from rhot_app.ui.welcome import WelcomePage
+from rhot_app.ui.wizards.catalogue import WIZARDS
+from rhot_app.ui.wizards.launcher import Launcher
 
 TICK_MS = 16
 _SIZE = (1280, 800)
@@ -50,6 +52,7 @@ class MainWindow(QMainWindow):
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, self.tell)
         self.rig_watch = RigWatch(controller)
+        self.wizards = Launcher(controller.backend.asker, lambda: self.appearance.scheme, self)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
         scheme = scheme_named(settings.scheme)
@@ -109,6 +112,7 @@ class MainWindow(QMainWindow):
         a.quit.triggered.connect(self.close)
         for action, page in ((a.cameras, "cameras"), (a.markers, "markers"), (a.hand, "hand")):
             action.triggered.connect(lambda checked=False, page=page: self.show_rig_file(page))
+        self._connect_wizards()
         a.files.triggered.connect(lambda: self.open_guide("calibration"))
         a.frame.triggered.connect(self.screen_parts.scene.frame_hand)
         a.home.triggered.connect(self.screen_parts.scene.reset_view)
@@ -130,6 +134,19 @@ class MainWindow(QMainWindow):
         c.failed.connect(self._show_failure)
         self.appearance.scheme_changed.connect(self._recolour_buttons)
         self.docks.docks[2].visibilityChanged.connect(c.set_preview)
+
+    def _connect_wizards(self) -> None:
+        for action, wizard in zip(self.actions_.wizards, WIZARDS, strict=True):
+            action.triggered.connect(lambda checked=False, wizard=wizard: self.wizards.open(wizard))
+        self.actions_.earlier.triggered.connect(self.wizards.open_versions)
+        self.toolbar.calibrate_button.menu().aboutToShow.connect(self._show_ages)
+        self.wizards.rig_used.connect(self.rig_watch.look_soon)
+        self.wizards.failed.connect(self._show_failure)
+
+    def _show_ages(self) -> None:
+        """When each calibration was made, each time the menu opens."""
+        opened = self.controller.opened
+        self.wizards.show_ages(self.actions_.wizards, opened.rig_path if opened is not None else "")
 
     def _restore(self) -> None:
         """Layout and switches as they were left."""
@@ -268,7 +285,7 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home, a.names, a.clouds]
+        return [*a.wizards, a.earlier, a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home, a.names, a.clouds]
 
     def _show_busy(self) -> None:
         if self.controller.opened is None:
@@ -284,4 +301,5 @@ class MainWindow(QMainWindow):
         self.settings.set_layout(self.saveGeometry(), self.docks.state())
         self.settings.sync()
         self.dialogs.close()
+        self.wizards.close()
         event.accept()

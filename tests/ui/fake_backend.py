@@ -36,6 +36,9 @@ class FakeBackend:
     def client(self) -> FakeClient:
         return FakeClient(self.engine)
 
+    def asker(self) -> FakeClient:
+        return FakeClient(self.engine)
+
     def found(self) -> bool:
         return self.already_running
 

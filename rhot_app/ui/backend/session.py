@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import msgspec
 
@@ -70,8 +70,24 @@ class TwinPace:
     preset_hz: float
 
 
+class Asker(Protocol):
+    """Gives commands to the engine; one per thread."""
+
+    def command(self, name: str, *, timeout_s: float = 3.0, **arguments: Any) -> dict[str, Any]:
+        """Ask the engine; raises EngineError."""
+        ...
+
+    def close(self) -> None:
+        """Disconnect."""
+        ...
+
+
 class Backend(Protocol):
     """What the window needs of the processes; `Session` is the real one."""
+
+    def asker(self) -> Asker:
+        """A client that only gives commands; for workers, each its own."""
+        ...
 
     def found(self) -> bool:
         """Whether an engine runs already that the window should attach to."""
@@ -125,6 +141,10 @@ class Session:
     def client(self) -> EngineClient:
         """A client for this directory; it outlives restarts of the engine."""
         return EngineClient(self._place.path)
+
+    def asker(self) -> EngineClient:
+        """A client for this directory that only gives commands."""
+        return EngineClient(self._place.path, states=False, events=False)
 
     def found(self) -> bool:
         """Whether an engine runs here."""

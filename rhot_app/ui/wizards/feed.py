@@ -11,13 +11,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import EngineError, RhotError
+from rhot_app.ui.backend.session import Asker
 
 Image = NDArray[np.uint8]
 
@@ -29,18 +29,6 @@ _RETRY_S = 0.3
 _KEPT = 6
 _RATE_WINDOW_S = 2.0
 _OVERTAKEN_NS = 1_000_000_000
-
-
-class Asker(Protocol):
-    """Gives commands to the engine; one per thread."""
-
-    def command(self, name: str, **arguments: Any) -> dict[str, Any]:
-        """Ask the engine; raises EngineError."""
-        ...
-
-    def close(self) -> None:
-        """Disconnect."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from rhot_app.project import Rig
+from rhot_app.ui.backend.session import Asker
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.feed import Asker
 from rhot_app.ui.wizards.page import Page
 
 

@@ -51,7 +51,7 @@ class WizardWindow(QDialog):
         self._kept = 0
         self._job: Job | None = None
         self._guide: GuideViewer | None = None
-        self._closed = False
+        self._ending: Job | None = None
         self._connect_everything()
         self._go_to(0)
         self.feed.start()
@@ -229,12 +229,12 @@ class WizardWindow(QDialog):
     def reject(self) -> None:
         """Escape and Close: ask only when something would be lost."""
         if not self.busy and (not self.would_lose or self._may_lose()):
-            self._finish()
+            self.end()
             super().reject()
 
     def accept(self) -> None:
         """Close after use."""
-        self._finish()
+        self.end()
         super().accept()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
@@ -249,19 +249,19 @@ class WizardWindow(QDialog):
             QMessageBox.StandardButton.Discard | QMessageBox.StandardButton.Cancel, QMessageBox.StandardButton.Cancel)
         return answer == QMessageBox.StandardButton.Discard
 
-    def _finish(self) -> None:
-        """End threads and processes, in a worker, because a question to a node may be under way."""
-        if self._closed:
-            return
-        self._closed = True
+    def end(self) -> Job:
+        """End threads and processes, in a worker, because a question to a node may be under way; the worker's job."""
+        if self._ending is not None:
+            return self._ending
         self._timer.stop()
         self.work.close()
         put_back, feed, looker = self.plan.put_back, self.feed, self.looker
 
-        def end() -> None:
+        def stop() -> None:
             looker.stop()
             feed.stop()
             if put_back is not None:
                 put_back()
 
-        self.ending = Job(lambda progress: end(), lambda _: None, lambda sentence: None).start()
+        self._ending = Job(lambda progress: stop(), lambda _: None, lambda sentence: None).start()
+        return self._ending

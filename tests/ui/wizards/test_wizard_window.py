@@ -42,8 +42,7 @@ def open_wizard(themed, asker, tmp_path, monkeypatch):
 
     yield open_
     for window in opened:
-        window._finish()
-        window.ending.wait(5.0)
+        window.end().wait(5.0)
         window.deleteLater()
 
 

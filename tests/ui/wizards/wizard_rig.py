@@ -35,6 +35,7 @@ class FakeRigAsker:
         self.delay_s = 0.0
         self.commands: list[str] = []
         self.settings = {node.node_id: NodeSettings(node.node_id, node.name, rig.markers) for node in rig.nodes}
+        self.path = ""
         self.saved: list[int] = []
         self.closed = 0
         self._number = 0
@@ -60,7 +61,7 @@ class FakeRigAsker:
         if name == "set_rig":
             self.rig = parse_rig(msgspec.json.encode(arguments["document"]), "the new rig")
         if name == "rig":
-            return {"document": msgspec.to_builtins(self.rig), "path": ""}
+            return {"document": msgspec.to_builtins(self.rig), "path": self.path}
         if name == "node":
             return {"answer": self._node(arguments["node_id"], arguments["request"])}
         return {}

@@ -1,0 +1,33 @@
+"""All wizards in the order in which a new rig needs them. Cheap to import: a wizard's own module comes as it opens."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rhot_app.ui.wizards.plan import Kit, Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Wizard:
+    """One wizard. `module` in this package has ``make_plan(kit)``; `reason` is what it writes into a rig's history, so
+    that the menu can tell when it was used last."""
+
+    module: str
+    title: str
+    meaning: str
+    reason: str
+
+    def load(self) -> None:
+        """Import what it needs; takes a moment the first time, so call it in a worker."""
+        importlib.import_module(f"{__package__}.{self.module}")
+
+    def make_plan(self, kit: Kit) -> Plan:
+        """Its pages for the rig at hand."""
+        plan: Plan = importlib.import_module(f"{__package__}.{self.module}").make_plan(kit)
+        return plan
+
+
+WIZARDS: tuple[Wizard, ...] = ()

@@ -1,0 +1,132 @@
+"""Opens wizards from the Calibrate menu: one at a time, over the main window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QWidget
+
+from rhot_app.errors import EngineError
+from rhot_app.project import Rig, parse_rig
+from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.job import Job
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.shapes import shape_icon
+from rhot_app.ui.wizards.catalogue import WIZARDS, Wizard
+from rhot_app.ui.wizards.models.done import age_text, in_force
+from rhot_app.ui.wizards.plan import Kit
+from rhot_app.ui.wizards.versions_dialog import VersionsDialog
+from rhot_app.ui.wizards.window import WizardWindow
+
+_END_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class RigNow:
+    """The engine's rig and its file, and the settings of the nodes that answered."""
+
+    rig: Rig
+    path: Path | None
+    node_settings: dict[int, dict[str, Any]]
+
+
+class Launcher(QObject):
+    """`rig_used` after a wizard or a restore has changed the rig; `failed` with a sentence when none could open."""
+
+    rig_used = Signal()
+    failed = Signal(str)
+
+    def __init__(self, connect: Callable[[], Asker], scheme: Callable[[], Scheme], window: QWidget) -> None:
+        super().__init__(window)
+        self._connect = connect
+        self._scheme = scheme
+        self._window = window
+        self._job: Job | None = None
+        self.wizard: WizardWindow | None = None
+        self.versions: VersionsDialog | None = None
+
+    def show_ages(self, actions: list[QAction], path: str) -> None:
+        """A tick and the age of what is in force, for each wizard's action in the order of `WIZARDS`."""
+        when = in_force(Path(path)) if path else {}
+        scheme, ratio = self._scheme(), self._window.devicePixelRatioF()
+        for action, wizard in zip(actions, WIZARDS, strict=True):
+            done = when.get(wizard.reason)
+            shape, tone = ("tick", scheme.good) if done is not None else ("ring", scheme.neutral)
+            action.setIcon(shape_icon(shape, tone, ratio))
+            action.setText(f"{wizard.title} …\t{age_text(done) if done is not None else 'not yet'}")
+
+    def open(self, wizard: Wizard) -> None:
+        """Ask engine and nodes how things stand, then show the wizard."""
+        if self._job is None and self.wizard is None:
+            self._job = Job(lambda progress: self._look(wizard), lambda now: self._show(wizard, now), self._not_opened,
+                            None, self).start()
+
+    def open_versions(self) -> None:
+        """Show what can be brought back."""
+        if self._job is None:
+            self._job = Job(lambda progress: self._look(None), self._show_versions, self._not_opened, None,
+                            self).start()
+
+    def close(self) -> None:
+        """The app is closing: no question, nothing left running."""
+        if self.wizard is not None:
+            self.wizard.end().wait(_END_S)
+
+    def _look(self, wizard: Wizard | None) -> RigNow:
+        if wizard is not None:
+            wizard.load()
+        asker = self._connect()
+        try:
+            answer = asker.command("rig")
+            path = str(answer.get("path", ""))
+            rig = parse_rig(msgspec.json.encode(answer["document"]), path or "the engine's rig")
+            settings = _node_settings(asker, rig) if wizard is not None else {}
+        finally:
+            asker.close()
+        return RigNow(rig, Path(path) if path else None, settings)
+
+    def _show(self, wizard: Wizard, now: RigNow) -> None:
+        self._job = None
+        kit = Kit(now.rig, now.path, self._connect, self._scheme(), now.node_settings)
+        self.wizard = WizardWindow(wizard.make_plan(kit), kit, self._window)
+        self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
+        self.wizard.finished.connect(self._forget)
+        self.wizard.open()
+
+    def _forget(self) -> None:
+        if self.wizard is not None:
+            self.wizard.deleteLater()
+            self.wizard = None
+
+    def _show_versions(self, now: RigNow) -> None:
+        self._job = None
+        if now.path is None:
+            self.failed.emit("This rig came from no file, so there are no earlier versions of it. Save it first.")
+            return
+        self.versions = VersionsDialog(now.path, now.rig, self._connect, self._scheme(), self._window)
+        self.versions.rig_used.connect(lambda rig: self.rig_used.emit())
+        self.versions.finished.connect(self.versions.deleteLater)
+        self.versions.open()
+
+    def _not_opened(self, sentence: str) -> None:
+        self._job = None
+        self.failed.emit(sentence)
+
+
+def _node_settings(asker: Asker, rig: Rig) -> dict[int, dict[str, Any]]:
+    """Settings by node id; a node that does not answer is left out, its picture will say why."""
+    found: dict[int, dict[str, Any]] = {}
+    for node in rig.nodes:
+        if not node.text_datagrams:
+            try:
+                answer = asker.command("node", node_id=node.node_id, request={"request": "settings"})
+                found[node.node_id] = dict(answer["answer"]["settings"])
+            except (EngineError, KeyError):
+                continue
+    return found

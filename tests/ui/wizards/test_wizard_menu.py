@@ -1,0 +1,131 @@
+"""The Calibrate menu: wizards open over the window, tell when they were used, and earlier versions come back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+import sample_wizard
+from fake_backend import FakeBackend
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from wizard_hands import Hands
+from wizard_rig import FakeRigAsker
+
+from rhot_app import rig_history
+from rhot_app.project import load_rig, save_rig
+from rhot_app.ui import actions, main_window
+from rhot_app.ui.backend.session import Opened
+from rhot_app.ui.wizards import launcher
+from rhot_app.ui.wizards.catalogue import Wizard
+from rhot_app.ui.wizards.models.rig_rows import rig_rows
+
+
+class SampleWizard(Wizard):
+    """The tests' own wizard, which stands in no module of the app."""
+
+    def load(self):
+        """Nothing to import."""
+
+    def make_plan(self, kit):
+        return sample_wizard.make_plan(kit)
+
+
+SAMPLE = (SampleWizard("sample", "Sample", "A small wizard.", "lens calibration"),)
+
+
+class RigBackend(FakeBackend):
+    """A fake engine whose rig has a file, and which answers the wizards' questions."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
+        self.rig_asker = FakeRigAsker(self.engine.rig)
+        self.rig_asker.path = str(path)
+        self.engine.rig_path = str(path)
+        save_rig(path, self.engine.rig)
+
+    def asker(self):
+        return self.rig_asker
+
+    def _opened(self, path, *, simulated):
+        return Opened(self.engine.rig, str(self.path), self.engine.running, self.ours, simulated)
+
+
+@pytest.fixture
+def bench(make_bench, tmp_path, monkeypatch):
+    """The main window on a rig with a file, and the sample wizard in its menu."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(sample_wizard.__file__).parent))
+    for module in (actions, main_window, launcher):
+        monkeypatch.setattr(module, "WIZARDS", SAMPLE)
+    bench = make_bench(RigBackend(tmp_path / "desk.json"))
+    bench.track()
+    return bench
+
+
+def test_a_wizard_opens_over_the_window_and_its_age_stands_in_the_menu(bench):
+    window = bench.window
+    action = window.actions_.wizards[0]
+    window._show_ages()
+    assert action.text() == "Sample …\tnot yet"
+    action.trigger()
+    bench.until(lambda: window.wizards.wizard is not None)
+    wizard = Hands(window.wizards.wizard)
+    wizard.window.page.box.setValue(9)
+    wizard.next()
+    for _ in range(3):
+        wizard.until(lambda: wizard.window.step.seen is not None)
+        wizard.key(Qt.Key.Key_Space)
+    for _ in range(3):
+        wizard.next()
+    wizard.until(lambda: wizard.window.frame.next_button.text() == "Close")
+    wizard.next()
+    bench.until(lambda: window.wizards.wizard is None)
+    window._show_ages()
+    assert action.text() == "Sample …\ttoday"
+    assert load_rig(bench.backend.path).name == "calibrated"
+
+
+def test_a_wizard_that_cannot_open_says_why(bench):
+    bench.backend.rig_asker.refuse = "The engine does not answer."
+    bench.window.actions_.wizards[0].trigger()
+    bench.until(lambda: "The engine does not answer." in bench.window.advice.texts)
+    assert bench.window.wizards.wizard is None
+
+
+def test_closing_the_app_ends_an_open_wizard_without_a_question(bench):
+    bench.window.actions_.wizards[0].trigger()
+    bench.until(lambda: bench.window.wizards.wizard is not None)
+    wizard = bench.window.wizards.wizard
+    bench.window.close()
+    assert not any(thread.is_alive() for thread in wizard.feed._threads)
+
+
+def test_an_earlier_version_is_brought_back_and_that_is_undone(bench):
+    path, asker = bench.backend.path, bench.backend.rig_asker
+    moved = msgspec.structs.replace(asker.rig, name="newer", nodes=(
+        asker.rig.nodes[0], msgspec.structs.replace(asker.rig.nodes[1], time_offset_s=0.002)))
+    asker.rig = moved
+    rig_history.accept(path, moved, "time calibration")
+    bench.window.actions_.earlier.trigger()
+    bench.until(lambda: bench.window.wizards.versions is not None)
+    dialog = bench.window.wizards.versions
+    assert "before time calibration" in dialog.list.item(0).text()
+    assert [dialog.table.item(0, c).text() for c in range(3)] == ["right: time offset", "2.00 ms", "0.00 ms"]
+    bench.click(dialog.back_button)
+    bench.until(lambda: "back in force" in dialog.sentence.text())
+    assert asker.rig.name == "test bench" == load_rig(path).name and dialog.list.count() == 2
+    bench.click(dialog.back_button)
+    bench.until(lambda: load_rig(path).name == "newer")
+    assert asker.rig.name == "newer"
+    QTest.keyClick(dialog, Qt.Key.Key_Escape)
+
+
+def test_two_rigs_are_compared_in_figures_for_people(bench):
+    rig = bench.backend.rig_asker.rig
+    lens = msgspec.structs.replace(rig.nodes[0].intrinsics, fx=540.04)
+    other = msgspec.structs.replace(rig, nodes=(msgspec.structs.replace(rig.nodes[0], intrinsics=lens), rig.nodes[1]))
+    assert rig_rows(rig, rig) == ()
+    assert [(row.what, row.before, row.after) for row in rig_rows(rig, other)] == [
+        ("left: focal length", "530.0, 530.0 px", "540.0, 530.0 px")]
