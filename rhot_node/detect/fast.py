@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
-from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.gate import ColourGate, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
 from rhot_node.detect.light import DEAD_ZONE, Light
@@ -177,7 +177,7 @@ class FastDetector:
                 found[index] = lost_observation(index)
 
     def _rank(self, index: int, blobs: Blobs) -> tuple[Blobs, MarkerFlag]:
-        """The blobs from the likeliest on: by motion and size while the marker is remembered, else by `_merits`."""
+        """The blobs from the likeliest on: by motion and size while the marker is remembered, else by merit."""
         track = self._tracks[index]
         if track.remembered:
             costs = np.array([track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
@@ -185,21 +185,10 @@ class FastDetector:
             order = np.argsort(costs)
             doubtful = len(blobs) > 1 and costs[order[1]] < costs[order[0]] + RIVAL_MARGIN
         else:
-            merits = self._merits(index, blobs)
-            order = np.argsort(-merits)
-            doubtful = len(blobs) > 1 and merits[order[1]] > AS_PLAUSIBLE * merits[order[0]]
+            worth = merits(blobs, self._markers[index].chroma, self._scratch.mask.shape)
+            order = np.argsort(-worth)
+            doubtful = len(blobs) > 1 and worth[order[1]] > AS_PLAUSIBLE * worth[order[0]]
         return blobs[order], MarkerFlag.ACQUIRED | MarkerFlag.AMBIGUOUS if doubtful else MarkerFlag.ACQUIRED
-
-    def _merits(self, index: int, blobs: Blobs) -> NDArray[np.float64]:
-        """(N,) area, as far as compact, of the marker's own hue, and not cut by the frame's border."""
-        chroma = self._markers[index].chroma
-        box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)
-        away = np.angle(np.exp(1j * (np.arctan2(blobs[:, SUM_V], blobs[:, SUM_U]) - chroma.hue_rad)))
-        match = np.exp(-(away / math.radians(chroma.hue_tolerance_deg)) ** 2)
-        height, width = self._scratch.mask.shape
-        cut = ((blobs[:, X_MIN] == 0) | (blobs[:, Y_MIN] == 0)
-               | (blobs[:, X_MAX] == width - 1) | (blobs[:, Y_MAX] == height - 1))
-        return np.asarray(blobs[:, AREA] ** 2 / box * match * np.where(cut, 0.5, 1.0))
 
     def _blob_request(self, index: int, blob: Blobs) -> NDArray[np.float64]:
         request = self._request

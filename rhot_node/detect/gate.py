@@ -6,14 +6,16 @@ is what the detector computes.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import Table, acquisition_table
-from rhot_node.detect.search import Searcher, label_at
-from rhot_node.markers import MarkerSet
+from rhot_node.detect.search import AREA, SUM_U, SUM_V, X_MAX, X_MIN, Y_MAX, Y_MIN, Searcher, label_at
+from rhot_node.markers import ChromaModel, MarkerSet
 
 AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
 
@@ -46,6 +48,20 @@ class ColourGate:
         wanted = np.zeros(len(self.luma_limits) + 1, dtype=np.bool_)
         wanted[np.asarray(indices, dtype=np.intp) + 1] = True
         return self._searcher.find(image.y, image.u, image.v, wanted, AREA_MIN)
+
+
+def merits(blobs: NDArray[np.float64], chroma: ChromaModel, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """(N,) how likely each blob is the marker: its area, as far as compact, of the marker's hue, not cut by the border.
+
+    `shape`: (H/2, W/2) of the chroma planes. A search without any memory takes the blob with the most.
+    """
+    box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)
+    away = np.angle(np.exp(1j * (np.arctan2(blobs[:, SUM_V], blobs[:, SUM_U]) - chroma.hue_rad)))
+    match = np.exp(-(away / math.radians(chroma.hue_tolerance_deg)) ** 2)
+    height, width = shape
+    cut = ((blobs[:, X_MIN] == 0) | (blobs[:, Y_MIN] == 0)
+           | (blobs[:, X_MAX] == width - 1) | (blobs[:, Y_MAX] == height - 1))
+    return np.asarray(blobs[:, AREA] ** 2 / box * match * np.where(cut, 0.5, 1.0))
 
 
 @njit(cache=True)
