@@ -19,8 +19,9 @@ from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
 from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import EngineError
-from rhot_app.project import Rig, save_rig
+from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
+from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
 from rhot_app.sources.source import ObservationSource, same_network
 from rhot_app.tracking.tracker import Tracker
@@ -122,15 +123,15 @@ class Engine:
                 self.start()
 
     def save_rig(self, path: Path | None) -> Path:
-        """Write the rig to `path`, by default where it came from; returns the path."""
+        """Write the rig to `path`, by default where it came from; what stood there is kept (`rig_history`).
+
+        Returns the path. Raises EngineError without one, RigError when it cannot be written.
+        """
         with self._lock:
             target = path or self.rig_path
             if target is None:
                 raise EngineError("this rig came from no file; give a path to save it to.")
-            try:
-                save_rig(target, self.rig)
-            except OSError as exc:
-                raise EngineError(f"{target}: cannot be written ({exc.strerror}).") from exc
+            accept(target, self.rig, "saving the engine's rig")
             self.rig_path = target
             return target
 

@@ -12,9 +12,10 @@ from fake_tracker import FakeTracker
 from rhot_app.engine import codec
 from rhot_app.engine.core import Engine
 from rhot_app.engine.replay_summary import replay_states, summarise
-from rhot_app.errors import EngineError, RecordingError, RhotError
-from rhot_app.project import OneEuroSettings, Rig
+from rhot_app.errors import EngineError, RecordingError, RhotError, RigError
+from rhot_app.project import OneEuroSettings, Rig, load_rig
 from rhot_app.recording.raw_log import LogReader
+from rhot_app.rig_history import versions
 from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.replay import LogDoor, LogReplay
 from rhot_app.sources.udp_nodes import UdpNodes
@@ -224,5 +225,14 @@ def test_rig_is_saved_where_asked(tmp_path: Path, bench: Bench) -> None:
         bench.engine.save_rig(None)
     assert bench.engine.save_rig(tmp_path / "rig.json") == tmp_path / "rig.json"
     assert bench.engine.save_rig(None) == tmp_path / "rig.json"
-    with pytest.raises(EngineError, match="cannot be written"):
+    with pytest.raises(RigError, match="cannot be written"):
         bench.engine.save_rig(tmp_path / "no" / "rig.json")
+
+
+def test_saving_a_rig_keeps_what_stood_there(tmp_path: Path, bench: Bench) -> None:
+    before = bench.engine.rig
+    path = bench.engine.save_rig(tmp_path / "rig.json")
+    bench.engine.set_rig(msgspec.structs.replace(before, name="moved"))
+    bench.engine.save_rig(None)
+    kept = versions(path)
+    assert load_rig(path).name == "moved" and [load_rig(version.path) for version in kept] == [before]
