@@ -45,9 +45,11 @@ class SettingsRequest(_Request, frozen=True, tag="settings"):
 
 
 class SetSettingsRequest(_Request, frozen=True, tag="set_settings"):
-    """Change some settings: objects are merged field by field, everything else is replaced."""
+    """Change some settings: objects are merged field by field, everything else is replaced. `save` False tries them out:
+    they are in force until the node ends or other ones are set, and the file stays as it is."""
 
     settings: dict[str, Any]
+    save: bool = True
 
 
 class StillRequest(_Request, frozen=True, tag="still"):
@@ -76,21 +78,27 @@ _decoder = msgspec.json.Decoder(Request)
 
 
 class SettingsStore:
-    """The settings in force and their file; changes are saved before they count."""
+    """The settings in force and their file; changes are saved before they count, unless they are only tried out."""
 
     def __init__(self, path: Path, settings: NodeSettings) -> None:
         self.path = path
         self.current = settings
-        self._at_start = settings
+        self._at_start = self._saved = settings
         self._lock = threading.Lock()
 
-    def change(self, changes: dict[str, Any]) -> list[str]:
-        """Validate, save, then take up `changes`; returns what needs a restart. Raises SettingsError, OSError."""
+    def change(self, changes: dict[str, Any], *, save: bool = True) -> list[str]:
+        """Validate, save, then take up `changes`; returns what needs a restart. Raises SettingsError, OSError.
+
+        What is saved are the changes and what was saved before, not what is only being tried out.
+        """
         with self._lock:
             settings = changed_settings(self.current, changes)
-            save_settings(self.path, settings)
+            if save:
+                saved = changed_settings(self._saved, changes)
+                save_settings(self.path, saved)
+                self._saved = saved
             self.current = settings
-        log.info("settings changed and saved to %s", self.path)
+        log.info("settings changed%s", f" and saved to {self.path}" if save else " to try them out")
         return needs_restart(self._at_start, settings)
 
 
@@ -132,7 +140,7 @@ class Responder:
             case SettingsRequest():
                 return {"ok": True, "settings": self._store.current}, b""
             case SetSettingsRequest():
-                return {"ok": True, "restart": self._store.change(request.settings)}, b""
+                return {"ok": True, "restart": self._store.change(request.settings, save=request.save)}, b""
             case StillRequest():
                 return self._take_still()
             case StartRequest():

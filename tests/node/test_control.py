@@ -90,6 +90,15 @@ def test_settings_are_saved_and_say_what_needs_a_restart(served: Served) -> None
     assert answer["restart"] == ["udp_port"], "what waits for a restart still waits"
 
 
+def test_settings_are_tried_out_without_being_saved(served: Served) -> None:
+    before = served.store.path.read_bytes()
+    served.ask(request="set_settings", settings={"camera": {"gain": 3.5, "contrast": 2}}, save=False)
+    assert served.store.current.camera.gain == 3.5 and served.store.path.read_bytes() == before
+    served.ask(request="set_settings", settings={"camera": {"gain": 4.0}})
+    saved = load_settings(served.store.path).camera
+    assert saved.gain == 4.0 and saved.contrast is None and served.store.current.camera.contrast == 2
+
+
 def test_wrong_settings_change_nothing(served: Served) -> None:
     before = served.store.path.read_bytes()
     answer = served.ask(request="set_settings", settings={"camera": {"gain": -1}})
