@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.simulator.render import ray_table
+from rhot_app.simulator.rays import ray_table
 
 Array = NDArray[np.float64]
 

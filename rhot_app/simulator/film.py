@@ -24,10 +24,12 @@ from rhot_app.hand.model import build_model
 from rhot_app.project import save_rig
 from rhot_app.simulator.background import background_image
 from rhot_app.simulator.body import HandBody, build_body
+from rhot_app.simulator.moments import Shutter
 from rhot_app.simulator.motion import Motion, load_motion
 from rhot_app.simulator.nodes import NodePorts
-from rhot_app.simulator.render import FrameRenderer, Optics, Shutter
+from rhot_app.simulator.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.scene import Scene, TwinSettings, build_rig, make_scene, node_settings
+from rhot_app.simulator.solids_painter import SolidsPainter
 from rhot_app.simulator.truth import FrameTruth, save_truth, true_hand
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.config import save_settings
@@ -89,11 +91,15 @@ def make_shot(scene: Scene, motion: str, seconds: float, hidden: frozenset[str] 
 
 def make_renderer(shot: Shot, index: int) -> FrameRenderer:
     """The renderer of one camera of the shot."""
-    settings, camera = shot.scene.settings, shot.scene.camera(index)
-    background = background_image(settings.background, camera, settings.distance_m, shot.scene.seed)
-    optics = Optics(settings.psf_sigma_px, settings.noise_mid_grey, settings.noise_read, settings.shading)
-    shutter = Shutter(1e-9 * shot.scene.exposure_ns, 1e-9 * shot.scene.row_time_ns)
-    return FrameRenderer(shot.body(), camera, background, optics, shutter, 1000 * shot.scene.seed + index)
+    scene = shot.scene
+    settings, camera = scene.settings, scene.camera(index)
+    seed = 1000 * scene.seed + index
+    background = background_image(settings.background, camera, settings.distance_m, scene.seed)
+    painter = SolidsPainter(shot.body(), camera, background, settings.shading, seed)
+    optics = Optics(settings.psf_sigma_px, settings.noise_mid_grey, settings.noise_read)
+    shutter = Shutter(1e-9 * scene.exposure_ns, 1e-9 * scene.row_time_ns)
+    exposure = Exposure(shutter, shutter.exposure_s, settings.lamp, settings.controls)
+    return FrameRenderer(painter, background, optics, exposure, seed)
 
 
 def film(shot: Shot, folder: Path, progress: Progress | None = None) -> None:

@@ -18,6 +18,8 @@ from rhot_app.errors import RigError, SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.simulator.controls import Controls
+from rhot_app.simulator.lamp import Lamp
 from rhot_app.simulator.nodes import NodePorts
 from rhot_node.config import CameraSettings, ClockSettings, NodeSettings
 from rhot_node.files import read_document, resource_path
@@ -60,6 +62,8 @@ class TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     clock_drift_ppm: Annotated[float, Meta(ge=0, le=1000)]
     hand: str
     markers: str
+    lamp: Lamp = Lamp()
+    controls: Controls = Controls()
     format: Literal["rhot-twin"] = FORMAT
     version: Literal[1] = VERSION
 

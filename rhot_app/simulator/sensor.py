@@ -1,7 +1,8 @@
-"""The image sensor: point spread of the lens, colour conversion to planar YUV420, shot and read noise, 8 bits.
+"""The image sensor: point spread of the lens, settings, conversion to planar YUV420, shot and read noise, 8 bits.
 
-Grey levels 0..255. Each colour channel of a pixel has noise of variance read^2 + shot * level; its share in Y and,
-after the mean over 2 x 2 pixels, in U and V is what independent channels would give.
+Grey levels 0..255. Each colour channel of a pixel has noise of variance read + shot * level; its share in Y and, after
+the mean over 2 x 2 pixels, in U and V is what independent channels would give. What is brighter than the sensor can
+tell is cut off before the white balance.
 """
 
 from __future__ import annotations
@@ -12,34 +13,39 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.simulator.controls import Development
+
 Image = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
+Box = tuple[int, int, int, int]
 
 _TABLE_BITS = 20
 _REACH = 3  # px, half width of the point spread kernel
-_MID_GREY = 128.0
 
 
 class Sensor:
     """Turns radiance (3, H, W) into packed I420 bytes. The background is exposed once; frames change only a box."""
 
-    def __init__(self, background: Image, psf_sigma_px: float, noise_mid_grey: float, noise_read: float,
-                 seed: int) -> None:
-        """`noise_mid_grey`: sigma of a channel at level 128, `noise_read`: at level 0, grey levels."""
+    def __init__(self, background: Image, psf_sigma_px: float, development: Development, seed: int) -> None:
+        """`background` (3, H, W): what every frame shows outside its box."""
         _, height, width = background.shape
         self._kernel = psf_kernel(psf_sigma_px)
-        self._read = noise_read**2
-        self._shot = max(noise_mid_grey**2 - noise_read**2, 0.0) / _MID_GREY
         self._noise = np.random.default_rng([seed, 77]).standard_normal(1 << _TABLE_BITS, dtype=np.float32)
         self._random = np.random.default_rng([seed, 78])
         self._blurred = np.empty_like(background)
         self._work = np.empty_like(background)
         self._means = [np.empty(shape, np.float32) for shape in _plane_shapes(width, height)]
         self._sigmas = [np.empty(shape, np.float32) for shape in _plane_shapes(width, height)]
+        self.adjust(background, development)
+
+    def adjust(self, background: Image, development: Development) -> None:
+        """From now on another background, other settings."""
+        _, height, width = background.shape
+        self._development = development
         self._develop(background, (0, 0, width, height))
         self._empty = [plane.copy() for plane in (*self._means, *self._sigmas)]
 
-    def expose(self, image: Image, box: tuple[int, int, int, int], out: Bytes) -> None:
+    def expose(self, image: Image, box: Box, out: Bytes) -> None:
         """Write the packed I420 frame (H * 3 / 2 * W,) of `image`, which differs from the background only in `box`."""
         grown = self._grow(box)
         if grown[0] < grown[2]:
@@ -53,19 +59,21 @@ class Sensor:
         if grown[0] < grown[2]:
             self._restore(grown)
 
-    def _develop(self, image: Image, box: tuple[int, int, int, int]) -> None:
+    def _develop(self, image: Image, box: Box) -> None:
         x0, y0, x1, y1 = box
         blur(image, self._kernel, x0, y0, x1, y1, self._work, self._blurred)
-        to_planes(self._blurred, self._read, self._shot, x0, y0, x1, y1, *self._means, *self._sigmas)
+        how = self._development
+        to_planes(self._blurred, how.white, how.full, how.mix, how.offset, how.read, how.shot, x0, y0, x1, y1,
+                  *self._means, *self._sigmas)
 
-    def _restore(self, box: tuple[int, int, int, int]) -> None:
+    def _restore(self, box: Box) -> None:
         x0, y0, x1, y1 = box
         for k, (plane, empty) in enumerate(zip((*self._means, *self._sigmas), self._empty, strict=True)):
             step = 1 if k % 3 == 0 else 2
             area = np.s_[y0 // step:y1 // step, x0 // step:x1 // step]
             plane[area] = empty[area]
 
-    def _grow(self, box: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
+    def _grow(self, box: Box) -> Box:
         """The box that the point spread reaches, on even pixels inside the image."""
         height, width = self._means[0].shape
         x0, y0, x1, y1 = box
@@ -130,28 +138,36 @@ def _blur_border(source: Image, kernel: Image, x0: int, x1: int, result: Image) 
 
 
 @njit(cache=True, fastmath=True)
-def to_planes(rgb: Image, read: float, shot: float, x0: int, y0: int, x1: int, y1: int, luma: Image, cb: Image,
-              cr: Image, sigma_luma: Image, sigma_cb: Image, sigma_cr: Image) -> None:
-    """Full-range BT.601 means and standard deviations of Y, U, V inside an even box."""
+def to_planes(rgb: Image, white: Image, full: Image, mix: Image, offset: Image, read: float, shot: float, x0: int,
+              y0: int, x1: int, y1: int, luma: Image, cb: Image, cr: Image, sigma_luma: Image, sigma_cb: Image,
+              sigma_cr: Image) -> None:
+    """Means and standard deviations of Y, U, V inside an even box; the first seven say how (see `Development`)."""
     f = np.float32
-    base, slope = f(read), f(shot)
+    wr, wg, wb, fr, fg, fb = white[0], white[1], white[2], full[0], full[1], full[2]
+    # Variance of a channel, white balance included: base + slope * level.
+    base_r, base_g, base_b = f(read) * wr * wr, f(read) * wg * wg, f(read) * wb * wb
+    slope_r, slope_g, slope_b = f(shot) * wr, f(shot) * wg, f(shot) * wb
+    yr, yg, yb, y_off = mix[0, 0], mix[0, 1], mix[0, 2], offset[0]
+    ur, ug, ub, u_off = mix[1, 0], mix[1, 1], mix[1, 2], offset[1]
+    vr, vg, vb, v_off = mix[2, 0], mix[2, 1], mix[2, 2], offset[2]
     for y in range(y0, y1):
         for x in range(x0, x1):
-            r, g, b = rgb[0, y, x], rgb[1, y, x], rgb[2, y, x]
-            luma[y, x] = f(0.299) * r + f(0.587) * g + f(0.114) * b
-            sigma_luma[y, x] = math.sqrt(f(0.089401) * (base + slope * r) + f(0.344569) * (base + slope * g)
-                                         + f(0.012996) * (base + slope * b))
+            r, g, b = min(wr * rgb[0, y, x], fr), min(wg * rgb[1, y, x], fg), min(wb * rgb[2, y, x], fb)
+            luma[y, x] = yr * r + yg * g + yb * b + y_off
+            sigma_luma[y, x] = math.sqrt(yr * yr * (base_r + slope_r * r) + yg * yg * (base_g + slope_g * g)
+                                         + yb * yb * (base_b + slope_b * b))
+    quarter = f(0.25)
     for y in range(y0 // 2, y1 // 2):
         for x in range(x0 // 2, x1 // 2):
             j, i = 2 * y, 2 * x
-            r = f(0.25) * (rgb[0, j, i] + rgb[0, j, i + 1] + rgb[0, j + 1, i] + rgb[0, j + 1, i + 1])
-            g = f(0.25) * (rgb[1, j, i] + rgb[1, j, i + 1] + rgb[1, j + 1, i] + rgb[1, j + 1, i + 1])
-            b = f(0.25) * (rgb[2, j, i] + rgb[2, j, i + 1] + rgb[2, j + 1, i] + rgb[2, j + 1, i + 1])
-            cb[y, x] = f(128.0) - f(0.168736) * r - f(0.331264) * g + f(0.5) * b
-            cr[y, x] = f(128.0) + f(0.5) * r - f(0.418688) * g - f(0.081312) * b
-            vr, vg, vb = base + slope * r, base + slope * g, base + slope * b
-            sigma_cb[y, x] = f(0.5) * math.sqrt(f(0.028472) * vr + f(0.109736) * vg + f(0.25) * vb)
-            sigma_cr[y, x] = f(0.5) * math.sqrt(f(0.25) * vr + f(0.175300) * vg + f(0.006612) * vb)
+            r = min(quarter * wr * (rgb[0, j, i] + rgb[0, j, i + 1] + rgb[0, j + 1, i] + rgb[0, j + 1, i + 1]), fr)
+            g = min(quarter * wg * (rgb[1, j, i] + rgb[1, j, i + 1] + rgb[1, j + 1, i] + rgb[1, j + 1, i + 1]), fg)
+            b = min(quarter * wb * (rgb[2, j, i] + rgb[2, j, i + 1] + rgb[2, j + 1, i] + rgb[2, j + 1, i + 1]), fb)
+            cb[y, x] = ur * r + ug * g + ub * b + u_off
+            cr[y, x] = vr * r + vg * g + vb * b + v_off
+            nr, ng, nb = base_r + slope_r * r, base_g + slope_g * g, base_b + slope_b * b
+            sigma_cb[y, x] = f(0.5) * math.sqrt(ur * ur * nr + ug * ug * ng + ub * ub * nb)
+            sigma_cr[y, x] = f(0.5) * math.sqrt(vr * vr * nr + vg * vg * ng + vb * vb * nb)
 
 
 @njit(cache=True, fastmath=True)

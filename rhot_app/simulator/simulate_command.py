@@ -6,7 +6,7 @@ import argparse
 import json
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rhot_app.simulator.scene import Scene
@@ -24,6 +24,12 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
                         help="distance of the hand from the cameras in metres (default 0.6)")
     parser.add_argument("--background", default=None, choices=("cloth", "clutter"),
                         help="what stands behind the hand (default cloth)")
+    parser.add_argument("--lamp", type=float, default=None, metavar="F",
+                        help="brightness of the lamp, a factor on its light (default 1)")
+    parser.add_argument("--kelvin", type=float, default=None, metavar="K",
+                        help="colour temperature of the lamp; 6500, the default, is neutral, 3000 a warm bulb")
+    parser.add_argument("--mains", type=float, default=None, metavar="HZ",
+                        help="let the lamp flicker with mains of 50 or 60 Hz (default: steady)")
 
 
 def scene_of(args: argparse.Namespace) -> Scene:
@@ -34,11 +40,18 @@ def scene_of(args: argparse.Namespace) -> Scene:
     from rhot_app.simulator.scene import TwinSettings, make_scene, twin_defaults
 
     chosen = {"preset": args.preset, "distance_m": args.distance, "background": args.background}
-    merged = msgspec.to_builtins(twin_defaults()) | {key: value for key, value in chosen.items() if value is not None}
+    lamp = {"brightness": args.lamp, "kelvin": args.kelvin, "mains_hz": args.mains}
+    merged = _with(msgspec.to_builtins(twin_defaults()), chosen)
+    merged["lamp"] = _with(merged["lamp"], lamp)
     try:
         return make_scene(msgspec.convert(merged, TwinSettings), args.seed)
     except msgspec.ValidationError as exc:
         raise SimulatorError(f"the scene cannot be: {exc}") from exc
+
+
+def _with(fields: dict[str, Any], chosen: dict[str, Any]) -> dict[str, Any]:
+    """The fields, changed where something was chosen."""
+    return fields | {key: value for key, value in chosen.items() if value is not None}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,8 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scene_arguments(parser)
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="length of the recording (default 10)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR",
-                        help="new folder for the frames (DIR/left, DIR/right), truth.npz, shot.json, and, to play it to two "
-                             "nodes on this machine, their settings (left.json, right.json) and rig.json")
+                        help="new folder for the frames (DIR/left, DIR/right), truth.npz and shot.json; to play it to "
+                             "two nodes on this machine, their settings (left.json, right.json) and rig.json")
     parser.add_argument("--hide", action="append", default=[], metavar="ID",
                         help="leave a marker unpainted; repeatable")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")

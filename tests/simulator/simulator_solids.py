@@ -11,15 +11,20 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.dh import ROOT
 from rhot_app.hand.model import build_model
 from rhot_app.simulator.body import CAPSULE, PALM_GROUP, SKIN, HandBody
-from rhot_app.simulator.render import FrameRenderer, Optics, Shutter
+from rhot_app.simulator.controls import Controls
+from rhot_app.simulator.lamp import Lamp
+from rhot_app.simulator.moments import Shutter
+from rhot_app.simulator.render import Exposure, FrameRenderer, Optics
+from rhot_app.simulator.solids_painter import SolidsPainter
 from rhot_node.files import resource_path
 
 Array = NDArray[np.float64]
 
 FOCAL = 530.5
 CAMERA = CameraModel(640, 480, np.array([FOCAL, FOCAL, 319.5, 239.5, -0.05, 0.0, 0.0, 0.0, 0.0]), np.eye(4), np.eye(4))
+NEUTRAL, STEADY = Controls(), Lamp()
 STILL = Shutter(0.004, 48e-6)
-CLEAN = Optics(psf_sigma_px=0.7, noise_mid_grey=3.0, noise_read=1.5, shading=0.0)
+OPTICS = Optics(psf_sigma_px=0.7, noise_mid_grey=3.0, noise_read=1.5)
 
 
 class Gliding:
@@ -48,9 +53,13 @@ def balls(radii: list[float], places: list[tuple[float, float, float]], painted:
         marker_point=np.zeros(sum(painted), dtype=np.int64))
 
 
-def renderer(body: HandBody, shutter: Shutter = STILL, seed: int = 1) -> FrameRenderer:
-    """A renderer of `body` before black."""
-    return FrameRenderer(body, CAMERA, np.zeros((3, CAMERA.height, CAMERA.width), np.float32), CLEAN, shutter, seed)
+def renderer(body: HandBody, shutter: Shutter = STILL, seed: int = 1, background: NDArray[np.float32] | None = None,
+             shading: float = 0.0, lamp: Lamp = STEADY) -> FrameRenderer:
+    """A renderer of `body` before black, or another background (3, H, W)."""
+    if background is None:
+        background = np.zeros((3, CAMERA.height, CAMERA.width), np.float32)
+    painter = SolidsPainter(body, CAMERA, background, shading, seed)
+    return FrameRenderer(painter, background, OPTICS, Exposure(shutter, shutter.exposure_s, lamp, NEUTRAL), seed)
 
 
 def ball_image(centre: Array, radius: float) -> tuple[Array, float]:

@@ -15,14 +15,15 @@ from rhot_app.hand.shape import segments
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.simulator.background import background_image
 from rhot_app.simulator.body import CAPSULE, SKIN, build_body
+from rhot_app.simulator.moments import Shutter
 from rhot_app.simulator.motion import FACING
-from rhot_app.simulator.render import FrameRenderer, Optics, Shutter, ray_table
+from rhot_app.simulator.rays import ray_table
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 
 MODEL = build_model(load_hand(resource_path("hands", "right.json")))
 MARKERS = load_markers(resource_path("markers", "rhot6.json"))
-OPTICS = Optics(0.7, 3.0, 1.5, 0.25)
+SHADING = 0.25
 
 
 class StillHand:
@@ -111,7 +112,7 @@ def test_visible_fraction_counts_what_others_hide_and_what_the_border_cuts() -> 
 def test_open_hand_shows_every_marker_whole_in_its_colour() -> None:
     body = build_body(MODEL, MARKERS)
     background = background_image("cloth", CAMERA, 0.6, 1)
-    camera = FrameRenderer(body, CAMERA, background, OPTICS, STILL, 1)
+    camera = renderer(body, background=background, shading=SHADING)
     hand = StillHand((0.0375, 0.085, 0.6))
     image, box, visible = camera.radiance(hand, 0.0, 0)
     assert visible.min() > 0.98
@@ -144,7 +145,7 @@ def test_a_finger_before_another_hides_its_marker() -> None:
     angles[[6, 7, 8]] = np.radians([75.0, 85.0, 60.0])  # index curled: its tip lies before the palm
     body = build_body(MODEL, MARKERS)
     background = np.zeros((3, 480, 640), np.float32)
-    camera = FrameRenderer(body, CAMERA, background, OPTICS, STILL, 1)
+    camera = renderer(body, background=background, shading=SHADING)
     _, _, from_palm = camera.radiance(StillHand((0.0, 0.085, 0.6), angles), 0.0, 0)
     behind = StillHand((0.0, 0.085, 0.6), angles)
     behind._transform[:3, :2] *= 1.0
@@ -158,7 +159,7 @@ def test_a_finger_before_another_hides_its_marker() -> None:
 def test_hidden_markers_are_bare_skin() -> None:
     body = build_body(MODEL, MARKERS, frozenset({"thumb"}))
     assert 0 not in body.marker and body.marker_count == 6
-    camera = FrameRenderer(body, CAMERA, np.zeros((3, 480, 640), np.float32), OPTICS, STILL, 1)
+    camera = renderer(body, shading=SHADING)
     _, visible = camera.render(StillHand((0.0, 0.085, 0.6)), 0.0, 0)
     assert visible[0] == 0.0 and visible[1:].min() > 0.9
     with pytest.raises(RigError, match="toe"):
@@ -168,7 +169,7 @@ def test_hidden_markers_are_bare_skin() -> None:
 def test_frames_repeat_by_seed_and_differ_by_number() -> None:
     body, background = build_body(MODEL, MARKERS), background_image("clutter", CAMERA, 0.6, 1)
     hand = StillHand((0.0, 0.085, 0.6))
-    first, again = (FrameRenderer(body, CAMERA, background, OPTICS, STILL, 4) for _ in range(2))
+    first, again = (renderer(body, seed=4, background=background) for _ in range(2))
     one = first.render(hand, 0.0, 0)[0].copy()
     np.testing.assert_array_equal(one, again.render(hand, 0.0, 0)[0])
     assert (one != first.render(hand, 0.0, 1)[0]).mean() > 0.5

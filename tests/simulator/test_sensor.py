@@ -6,17 +6,19 @@ import cv2
 import numpy as np
 import pytest
 
+from rhot_app.simulator.controls import Controls, development
 from rhot_app.simulator.sensor import Sensor, psf_kernel
 from rhot_node.detect.image import YuvImage, from_i420
 
 WIDTH, HEIGHT = 96, 64
+NEUTRAL = Controls()
 
 
 def expose(image: np.ndarray, *, background: np.ndarray | None = None, psf: float = 0.7, noise: float = 0.0,
-           box: tuple[int, int, int, int] | None = None, seed: int = 1) -> YuvImage:
+           box: tuple[int, int, int, int] | None = None, seed: int = 1, controls: Controls = NEUTRAL) -> YuvImage:
     """One exposure of `image` (3, H, W) over a black background."""
     background = np.zeros_like(image) if background is None else background
-    sensor = Sensor(background, psf, noise, 0.5 * noise, seed)
+    sensor = Sensor(background, psf, development(controls, noise, 0.5 * noise), seed)
     out = np.empty(WIDTH * HEIGHT * 3 // 2, np.uint8)
     sensor.expose(image, (0, 0, WIDTH, HEIGHT) if box is None else box, out)
     return from_i420(out, WIDTH, HEIGHT)
@@ -45,7 +47,7 @@ def test_point_spread_is_a_gaussian_of_the_wanted_width_also_at_the_border() -> 
 
 def test_only_the_box_is_developed_and_the_next_frame_starts_clean() -> None:
     background = np.full((3, HEIGHT, WIDTH), 60.0, np.float32)
-    sensor = Sensor(background, 0.7, 0.0, 0.0, 1)
+    sensor = Sensor(background, 0.7, development(NEUTRAL, 0.0, 0.0), 1)
     image = background.copy()
     image[:, 20:30, 40:50] = 200.0
     out = np.empty(WIDTH * HEIGHT * 3 // 2, np.uint8)
@@ -72,3 +74,34 @@ def test_noise_is_that_of_three_independent_channels(level: float) -> None:
     luma = np.array([frame.y for frame in frames], dtype=np.float64) - level
     assert abs((luma[:, :, 1:] * luma[:, :, :-1]).mean()) < 0.1 * sigma**2
     assert abs((luma[1:] * luma[:-1]).mean()) < 0.1 * sigma**2
+
+
+def grey_picture(rgb: tuple[float, float, float], controls: Controls) -> tuple[float, float, float]:
+    """Mean Y, Cb, Cr of an even picture without noise."""
+    picture = expose(np.tile(np.array(rgb, np.float32)[:, None, None], (1, HEIGHT, WIDTH)), controls=controls)
+    return float(picture.y.mean()), float(picture.u.mean()), float(picture.v.mean())
+
+
+def test_settings_act_as_a_camera_s() -> None:
+    colour = (120.0, 90.0, 60.0)
+    luma, cb, cr = grey_picture(colour, NEUTRAL)
+    assert grey_picture(colour, Controls(saturation=0.0)) == pytest.approx((luma, 128.0, 128.0), abs=1.0)
+    assert grey_picture(colour, Controls(saturation=2.0))[1:] == pytest.approx((2 * cb - 128, 2 * cr - 128), abs=1.6)
+    assert grey_picture(colour, Controls(brightness=0.25)) == pytest.approx((luma + 32.0, cb, cr), abs=1.0)
+    assert grey_picture(colour, Controls(contrast=1.5))[0] == pytest.approx(128.0 + 1.5 * (luma - 128.0), abs=1.0)
+    # 2^(1/2.2) = 1.37 on red alone
+    assert grey_picture(colour, Controls(red_gain=2.0))[0] == pytest.approx(luma + 0.299 * 0.37 * 120.0, abs=1.0)
+
+
+def test_white_balance_cannot_bring_back_what_is_burnt_out() -> None:
+    burnt = grey_picture((400.0, 300.0, 255.0), NEUTRAL)
+    assert burnt == pytest.approx((255.0, 128.0, 128.0), abs=1.0)
+    _, cb, _ = grey_picture((400.0, 300.0, 255.0), Controls(blue_gain=0.5))
+    assert cb == pytest.approx(128.0 - 0.5 * 255.0 * (1.0 - 0.5 ** (1 / 2.2)), abs=1.0)
+
+
+def test_gain_pays_with_noise() -> None:
+    grey = np.full((3, HEIGHT, WIDTH), 128.0, np.float32)
+    quiet, loud = (expose(grey, noise=3.0, controls=Controls(gain=gain)).y.astype(float).std() for gain in (1.0, 4.0))
+    shot, read = 3.0**2 - 1.5**2, 1.5**2
+    assert loud / quiet == pytest.approx(np.sqrt((4.0 * shot + 16.0 * read) / (shot + read)), rel=0.06)

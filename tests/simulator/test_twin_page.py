@@ -7,11 +7,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from rhot_app.simulator import film, motion_file, scene
+from rhot_app.simulator import controls, film, lamp, motion_file, scene
 
 PAGE = (Path(__file__).parents[2] / "docs" / "twin.md").read_text()
 FORMATS: list[tuple[str, int, tuple[type[msgspec.Struct], ...]]] = [
-    (scene.FORMAT, scene.VERSION, (scene.TwinSettings, scene.Preset)),
+    (scene.FORMAT, scene.VERSION, (scene.TwinSettings, scene.Preset, lamp.Lamp, controls.Controls)),
     (motion_file.FORMAT, motion_file.VERSION, (motion_file.MotionFile, motion_file.Key, motion_file.Sway)),
     (film.FORMAT, film.VERSION, (film.ShotFile,)),
 ]
@@ -33,3 +33,5 @@ def test_page_names_every_default_as_it_is() -> None:
         assert row.split("|")[2].strip() == value
         actual = getattr(defaults, field)
         assert value.strip("`") == (actual if isinstance(actual, str) else f"{actual:g}")
+    for name, kind in (("lamp", lamp.Lamp), ("controls", controls.Controls)):
+        assert getattr(defaults, name) == kind(), "neutral unless somebody asks"

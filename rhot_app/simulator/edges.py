@@ -1,0 +1,49 @@
+"""Which pixels of a traced image must be sampled again: those near a change of what their centres show (numba)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+SKIN_ID, PAINT_ID = 1, 20
+"""What a pixel shows: 0 background, then skin of the hand and of the forearm (its far end sweeps far), then markers."""
+
+STILL_PX = 0.02  # what moves less while exposed is taken to stand still
+
+
+@njit(cache=True)
+def reach_by_id(meta: Indices, sweep: Array) -> Indices:
+    """(128, 2) px around a change of id, by id, that the exposure may sweep."""
+    reach = np.zeros((128, 2), np.int64)
+    for n in range(len(meta)):
+        code = SKIN_ID + meta[n, 0] if meta[n, 2] < 0 else PAINT_ID + meta[n, 2]
+        for axis in range(2):
+            pixels = math.ceil(0.5 * sweep[n, axis]) if sweep[n, axis] > STILL_PX else 0
+            reach[code, axis] = max(reach[code, axis], pixels)
+    return reach
+
+
+@njit(cache=True)
+def mark_edges(ids: NDArray[np.int8], edges: NDArray[np.uint8], rows: Indices, top: int, bottom: int,
+                reach: Indices) -> None:
+    height, width = ids.shape
+    for y in range(max(top - 1, 0), bottom):
+        below = min(y + 1, height - 1)
+        left, right = min(rows[y, 0], rows[below, 0]), max(rows[y, 1], rows[below, 1])
+        for x in range(max(left - 1, 0), right):
+            here, beside, under = ids[y, x], ids[y, min(x + 1, width - 1)], ids[below, x]
+            if here == beside and here == under:
+                continue
+            wide = max(reach[here, 0], reach[beside, 0], reach[under, 0])
+            high = max(reach[here, 1], reach[beside, 1], reach[under, 1])
+            to_x = x + wide + 2 if here != beside else x + wide + 1
+            to_y = y + high + 2 if here != under else y + high + 1
+            for j in range(max(y - high, 0), min(to_y, height)):
+                for i in range(max(x - wide, 0), min(to_x, width)):
+                    edges[j, i] = 1

@@ -1,0 +1,42 @@
+"""What a painter is: it puts something that moves over the background of one camera, at the times of a frame."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.simulator.moments import FrameTime
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+Box = tuple[int, int, int, int]
+"""Pixels x0 <= x < x1, y0 <= y < y1; (0, 0, 0, 0) when there are none."""
+
+
+class PoseSource(Protocol):
+    """Anything that says where the thing shown is at a time."""
+
+    def sample(self, times_s: Array) -> tuple[Array, Array]:
+        """world_from_palm (T, 4, 4) m, or of whatever is shown, and a hand's angles (T, 21) rad at times (T,) s of the
+        scene."""
+        ...
+
+
+class Painter(Protocol):
+    """Paints one kind of thing before one camera. Holds work space: one thread only."""
+
+    @property
+    def image(self) -> Image:
+        """(3, H, W) light before lens and sensor, as grey levels: what was painted last, the background elsewhere."""
+        ...
+
+    def relight(self, background: Image, level: Array) -> None:
+        """Another light: the `background` (3, H, W) as it is lit now, and factors (3,) on the grey levels of everything
+        else. The image becomes the background."""
+        ...
+
+    def paint(self, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
+        """Paint frame `number`; returns what may differ from the background, and the markers' visible parts (M,)."""
+        ...
