@@ -45,8 +45,8 @@ class SettingsRequest(_Request, frozen=True, tag="settings"):
 
 
 class SetSettingsRequest(_Request, frozen=True, tag="set_settings"):
-    """Change some settings: objects are merged field by field, everything else is replaced. `save` False tries them out:
-    they are in force until the node ends or other ones are set, and the file stays as it is."""
+    """Change some settings: objects are merged field by field, everything else is replaced. `save` False tries them
+    out: they are in force until the node ends or other ones are set, and the file stays as it is."""
 
     settings: dict[str, Any]
     save: bool = True
