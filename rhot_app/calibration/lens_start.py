@@ -1,0 +1,49 @@
+"""What is known about a camera's lens before cameras are put together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.bundle_layout import LensFreedom
+
+Array = NDArray[np.float64]
+
+K3 = 8  # its place among the lens parameters
+
+
+@dataclass(frozen=True, slots=True)
+class LensStart:
+    """One camera's lens: `lens` (9,) fx, fy, cx, cy, k1, k2, p1, p2, k3 for pictures of `size` (width, height).
+
+    `std` (9,) the standard deviations, when known. `origin`: "given" by a file or the rig, or found from the same
+    "views" that now put the cameras together.
+    """
+
+    lens: Array
+    size: tuple[int, int]
+    std: Array | None = None
+    origin: Literal["given", "views"] = "given"
+
+    def freedom(self, *, refine: bool) -> LensFreedom:
+        """How the bundle adjustment may change it.
+
+        Found from the same views: freely, for these corners say it all. Given: not at all, or with `refine` within its
+        standard deviations. A k3 of zero stays zero: the model was chosen without it.
+        """
+        if self.origin == "given" and not refine:
+            return LensFreedom.fixed()
+        free = np.ones(9, bool)
+        free[K3] = self.lens[K3] != 0.0
+        prior = None if self.std is None or self.origin == "views" else np.where(free, self.std, np.inf)
+        return LensFreedom.free(list(free), self.lens, prior)
+
+    def mirrored(self) -> LensStart:
+        """The lens of the same camera when its pictures are flipped left to right."""
+        flipped = self.lens.copy()
+        flipped[2] = self.size[0] - 1 - flipped[2]
+        flipped[7] = -flipped[7]
+        return replace(self, lens=flipped)

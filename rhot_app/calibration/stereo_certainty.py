@@ -1,0 +1,151 @@
+"""How certain a solved rig is: standard deviations of its parameters, and what they do to a point in space.
+
+From the covariance of the bundle adjustment: the inverse of its normal equations at the corners' own spread. That is
+exact for independent Gaussian corner errors. Errors that corners share - a bent board, a lens that the model does not
+describe - are not in it. Given lenses that are not refined add their own standard deviations, when these are known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.bundle import Bundle
+from rhot_app.calibration.bundle_layout import Layout, LensFreedom
+from rhot_app.calibration.bundle_model import LENS, POSE, BundleState, Observations, linearise, residuals
+from rhot_app.calibration.lens_start import LensStart
+from rhot_app.calibration.stereo_points import locate
+from rhot_app.geometry.transforms import exp_so3, log_so3
+
+Array = NDArray[np.float64]
+
+_STEP = 1e-2  # standard deviations: small enough to be linear, large enough for differences
+_TURN = 1e-6  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class Certainty:
+    """Covariance over all cameras: `factor` (C * 15, K), whose product with its transpose is the covariance of each
+    camera's lens (9) and pose (6: rotation and translation of camera_from_world), camera by camera."""
+
+    factor: Array
+
+    def lens_std(self, camera: int) -> Array:
+        """(9,) standard deviations of a lens."""
+        return np.asarray(np.linalg.norm(self._rows(camera)[:LENS], axis=1))
+
+    def pose_covariance(self, camera: int) -> Array:
+        """(6, 6) of camera_from_world: rotation turned from the left, rad, and translation, m."""
+        rows = self._rows(camera)[LENS:]
+        return np.asarray(rows @ rows.T)
+
+    def rotation_vector_std(self, camera: int, rotation: Array) -> Array:
+        """(3,) rad, standard deviations of the rotation vector of `rotation` (3, 3), the camera's."""
+        base = log_so3(rotation)
+        slope = np.column_stack([(log_so3(exp_so3(_TURN * axis) @ rotation) - base) / _TURN for axis in np.eye(3)])
+        return np.asarray(np.sqrt(np.diag(slope @ self.pose_covariance(camera)[:3, :3] @ slope.T)))
+
+    def _rows(self, camera: int) -> Array:
+        start = camera * (LENS + POSE)
+        return self.factor[start:start + LENS + POSE]
+
+
+def certainty(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -> Certainty:
+    """The certainty of a bundle whose lenses began as `lenses`."""
+    layout = bundle.layout
+    count = layout.board_at
+    values, vectors = np.linalg.eigh(bundle.covariance[:count, :count])
+    own = vectors * np.sqrt(np.maximum(values, 0.0))
+    considered, given = _of_given_lenses(bundle, seen, lenses)
+    columns = np.hstack([own, considered[:count]])
+    rows = []
+    for camera, freedom in enumerate(layout.lenses):
+        of_given = np.hstack([np.zeros((LENS, own.shape[1])), given[camera * LENS:(camera + 1) * LENS]])
+        rows.append(freedom.basis @ columns[layout.lens(camera)] + of_given)
+        rows.append(columns[layout.camera(camera)] if camera else np.zeros((POSE, columns.shape[1])))
+    return Certainty(np.vstack(rows))
+
+
+def _of_given_lenses(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -> tuple[Array, Array]:
+    """What the uncertainty of lenses that were kept does to the unknowns (size, K), and itself (9C, K).
+
+    Consider analysis (Bierman 1977): the unknowns follow a change of a kept parameter as the normal equations say.
+    """
+    std = np.zeros(LENS * len(lenses))
+    for camera, lens in enumerate(lenses):
+        if bundle.layout.lenses[camera].basis.shape[1] == 0 and lens.std is not None:
+            std[camera * LENS:(camera + 1) * LENS] = lens.std
+    kept = np.flatnonzero(std)
+    given = np.zeros((len(std), len(kept)))
+    given[kept, np.arange(len(kept))] = std[kept]
+    if not len(kept):
+        return np.zeros((bundle.layout.size, 0)), given
+    line = linearise(bundle.state, seen)
+    every = Layout([LensFreedom.free([True] * LENS, lens.lens) for lens in lenses], len(bundle.state.world_from_board),
+                   seen)
+    by_lens = every.jacobian(line)[:, :every.camera_at]
+    scaled = bundle.layout.jacobian(line).T @ (by_lens @ given) / max(bundle.noise_px, 1e-12) ** 2
+    return -bundle.covariance @ scaled, given
+
+
+def expected_error(state: BundleState, sure: Certainty, distance_m: float, noise_px: float) -> tuple[float, float]:
+    """Rms error in m of points about `distance_m` in front of the cameras: (by the calibration, by `noise_px` of a
+    marker's position in each picture).
+
+    The points stand on a 3 x 3 grid across the middle of the first camera's picture, and count where two cameras see
+    them; NaN when they see none. Every parameter is moved by what it is uncertain, and the same pixels triangulated.
+    """
+    points = _in_front(state, distance_m)
+    pixels = _pixels(points, state)
+    base = locate(pixels, state)
+    good = np.isfinite(base).all(axis=1)
+    if not np.any(good):
+        return float("nan"), float("nan")
+    by_rig = np.zeros(np.count_nonzero(good))
+    for column in sure.factor.T:
+        moved = locate(pixels, _moved(state, column * _STEP))
+        by_rig += np.sum(np.square((moved - base)[good] / _STEP), axis=1)
+    by_noise = np.zeros_like(by_rig)
+    for camera in range(len(pixels)):
+        for axis in range(2):
+            shifted = pixels.copy()
+            shifted[camera, :, axis] += 0.01
+            by_noise += np.sum(np.square((locate(shifted, state) - base)[good] * noise_px / 0.01), axis=1)
+    return float(np.sqrt(np.mean(by_rig))), float(np.sqrt(np.mean(by_noise)))
+
+
+def _in_front(state: BundleState, distance: float) -> Array:
+    """(9, 3) m world points about the rig's middle line, at `distance` from the middle of the cameras."""
+    world_from_camera = np.linalg.inv(state.camera_from_world)
+    axes = world_from_camera[:, :3, 2].sum(axis=0)
+    forward = axes / np.linalg.norm(axes)
+    middle = world_from_camera[:, :3, 3].mean(axis=0) + distance * forward
+    right = np.cross(world_from_camera[0, :3, 1], forward)
+    across = 0.15 * distance * right / np.linalg.norm(right)
+    down = np.cross(forward, across)
+    return np.array([middle + i * across + j * down for i in (-1, 0, 1) for j in (-1, 0, 1)])
+
+
+def _pixels(points: Array, state: BundleState) -> Array:
+    """(C, N, 2) px of world points, NaN behind a camera or outside the picture that its principal point suggests."""
+    count, cameras = len(points), len(state.lenses)
+    seen = Observations(np.repeat(np.arange(cameras), count), np.zeros(cameras * count, np.intp),
+                        np.tile(points, (cameras, 1)), np.zeros((cameras * count, 2)))
+    still = BundleState(state.lenses, state.camera_from_world, np.eye(4)[None])
+    pixels = -residuals(still, seen).reshape(cameras, count, 2)
+    outside = (pixels < 0.0) | (pixels > 2.0 * state.lenses[:, None, 2:4])
+    pixels[outside.any(axis=2)] = np.nan
+    return pixels
+
+
+def _moved(state: BundleState, change: Array) -> BundleState:
+    """`state` with each camera's lens and pose changed by `change` (C * 15,)."""
+    parts = change.reshape(len(state.lenses), LENS + POSE)
+    poses = state.camera_from_world.copy()
+    for pose, part in zip(poses, parts, strict=True):
+        pose[:3, :3] = exp_so3(part[LENS:LENS + 3]) @ pose[:3, :3]
+        pose[:3, 3] += part[LENS + 3:]
+    return BundleState(state.lenses + parts[:, :LENS], poses, state.world_from_board)
