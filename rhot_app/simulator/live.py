@@ -1,7 +1,8 @@
 """The live twin: a process that renders both cameras as fast as the machine allows, for two real node daemons.
 
 ``python -m rhot_app.simulator.live --directory DIR --rig OUT.json``. It writes a rig file with the daemons' real ports,
-prints one JSON line when all is ready, starts a daemon again that has died, and ends on SIGTERM with both.
+prints one JSON line when all is ready, and others about its pace later on (docs/twin.md), starts a daemon again that
+has died, and ends on SIGTERM with both.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from rhot_app.project import save_rig
 from rhot_app.simulator.film import Shot, make_renderer, make_shot
 from rhot_app.simulator.frame_socket import FrameSocket
 from rhot_app.simulator.nodes import READY_TIMEOUT_S, NodePorts, TwinNode
+from rhot_app.simulator.pace import Pace
 from rhot_app.simulator.scene import Scene, build_rig, node_settings
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 from rhot_node.capture.pace import available_delay_ns, sleep_until
@@ -131,11 +133,14 @@ def run(scene: Scene, motion: str, directory: Path, rig_path: Path) -> None:
         cameras = LiveCameras(shot, sockets)
         supervisor = stack.enter_context(contextlib.closing(Supervisor(scene, directory)))
         deadline = time.monotonic() + READY_TIMEOUT_S
-        ready = False
+        ready, pace = False, Pace(scene.preset.fps)
         while True:
             cameras.step()
             if ready:
                 supervisor.step()
+                event = pace.note(time.monotonic())
+                if event is not None:
+                    print(json.dumps(event), flush=True)
             elif (ports := supervisor.ports(deadline)) is not None:
                 save_rig(rig_path, build_rig(scene, tuple(ports)))
                 print(json.dumps({"event": "ready", "rig": str(rig_path), "pid": os.getpid()}), flush=True)
