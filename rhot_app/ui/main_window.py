@@ -52,7 +52,7 @@ class MainWindow(QMainWindow):
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, self.tell)
         self.rig_watch = RigWatch(controller)
-        self.wizards = Launcher(controller.backend.asker, lambda: self.appearance.scheme, self)
+        self.wizards = Launcher(controller.backend.asker, lambda: self.appearance.scheme, settings, self)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
         scheme = scheme_named(settings.scheme)

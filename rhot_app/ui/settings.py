@@ -65,6 +65,14 @@ class Settings:
         """Remember a switch of the View menu."""
         self._store.setValue(f"view/{name}", "yes" if value else "no")
 
+    def remembered(self, name: str) -> str:
+        """What a wizard remembers by this name, "" for nothing."""
+        return self._text(f"wizards/{name}", "")
+
+    def remember(self, name: str, text: str) -> None:
+        """Have a wizard's entry there the next time."""
+        self._store.setValue(f"wizards/{name}", text)
+
     def layout(self) -> tuple[QByteArray, QByteArray] | None:
         """Window geometry and dock layout; None when nothing is remembered."""
         geometry, state = self._store.value("window/geometry"), self._store.value("window/state")

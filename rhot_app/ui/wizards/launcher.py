@@ -19,6 +19,7 @@ from rhot_app.ui.job import Job
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.shapes import shape_icon
 from rhot_app.ui.wizards.catalogue import WIZARDS, Wizard
+from rhot_app.ui.wizards.memory import Memory
 from rhot_app.ui.wizards.models.done import age_text, in_force
 from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.versions_dialog import VersionsDialog
@@ -42,8 +43,10 @@ class Launcher(QObject):
     rig_used = Signal()
     failed = Signal(str)
 
-    def __init__(self, connect: Callable[[], Asker], scheme: Callable[[], Scheme], window: QWidget) -> None:
+    def __init__(self, connect: Callable[[], Asker], scheme: Callable[[], Scheme], memory: Memory,
+                 window: QWidget) -> None:
         super().__init__(window)
+        self._memory = memory
         self._connect = connect
         self._scheme = scheme
         self._window = window
@@ -93,7 +96,7 @@ class Launcher(QObject):
 
     def _show(self, wizard: Wizard, now: RigNow) -> None:
         self._job = None
-        kit = Kit(now.rig, now.path, self._connect, self._scheme(), now.node_settings)
+        kit = Kit(now.rig, now.path, self._connect, self._scheme(), self._memory, now.node_settings)
         self.wizard = WizardWindow(wizard.make_plan(kit), kit, self._window)
         self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
         self.wizard.finished.connect(self._forget)

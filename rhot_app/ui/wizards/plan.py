@@ -10,18 +10,21 @@ from typing import Any
 from rhot_app.project import Rig
 from rhot_app.ui.backend.session import Asker
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.memory import Memory
 from rhot_app.ui.wizards.page import Page
 
 
 @dataclass(frozen=True, slots=True)
 class Kit:
-    """What every wizard is given: the rig in force, its file (None: it came from none), a way to ask the engine and the
-    colours of the screen. Node settings by node id are as the nodes gave them when the wizard was opened."""
+    """What every wizard is given: the rig in force, its file (None: it came from none), a way to ask the engine, the
+    colours of the screen, and what was entered before. Node settings by node id are as the nodes gave them when the
+    wizard was opened."""
 
     rig: Rig
     rig_path: Path | None
     connect: Callable[[], Asker]
     scheme: Scheme
+    memory: Memory
     node_settings: dict[int, dict[str, Any]] = field(default_factory=dict)
 
 

@@ -11,7 +11,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox
 from wizard_hands import Hands
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeMemory, FakeRigAsker
 
 from rhot_app import rig_history
 from rhot_app.project import load_rig, save_rig
@@ -34,7 +34,7 @@ def open_wizard(themed, asker, tmp_path, monkeypatch):
     def open_(steps=3):
         path = tmp_path / "desk.json"
         save_rig(path, asker.rig)
-        kit = Kit(asker.rig, path, asker.connect, DARK)
+        kit = Kit(asker.rig, path, asker.connect, DARK, FakeMemory())
         hands = Hands(WizardWindow(sample_wizard.make_plan(kit, steps), kit))
         hands.path = path
         opened.append(hands.window)

@@ -25,6 +25,16 @@ def grey_picture(node_id: int, t_s: float) -> np.ndarray:
     return picture
 
 
+class FakeMemory(dict[str, str]):
+    """Remembers until the test is over."""
+
+    def remembered(self, name: str) -> str:
+        return self.get(name, "")
+
+    def remember(self, name: str, text: str) -> None:
+        self[name] = text
+
+
 class FakeRigAsker:
     """What the engine's client answers to `still`, `rig`, `set_rig` and `node`; `draw` makes the pictures."""
 

@@ -1,0 +1,59 @@
+"""A chessboard before the cameras of a rig, drawn by its homography: quick enough for a live picture."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from rhot_app.calibration.board import Chessboard
+from rhot_app.geometry.transforms import exp_so3, inverse, rigid, rotation_from_quaternion
+from rhot_app.project import Rig
+
+_PX_PER_SQUARE = 40
+_SQUARES_BESIDE = 1.5  # white paper around the board
+
+
+def board_texture(board: Chessboard) -> np.ndarray:
+    """(H, W) uint8, the whole sheet seen from above."""
+    margin = round(_SQUARES_BESIDE * _PX_PER_SQUARE)
+    rows, cols = board.rows + 1, board.cols + 1
+    squares = (np.add.outer(np.arange(rows), np.arange(cols)) % 2 * 180 + 30).astype(np.uint8)
+    sheet = np.kron(squares, np.ones((_PX_PER_SQUARE, _PX_PER_SQUARE), np.uint8))
+    return np.pad(sheet, margin, constant_values=215)
+
+
+class BoardScene:
+    """Pictures of one board in front of `rig`; `world_from_board` is set by the test, None takes the board away."""
+
+    def __init__(self, rig: Rig, board: Chessboard) -> None:
+        self.rig = rig
+        self.board = board
+        self.world_from_board: np.ndarray | None = None
+        self.noise = np.random.default_rng(3).integers(-3, 4, (480, 640, 3), dtype=np.int16)
+        self._texture = board_texture(board)
+
+    def place(self, rotation: tuple[float, float, float], centre_m: tuple[float, float, float]) -> None:
+        """Turn the board by the rotation vector (rad), its middle at `centre_m` in the rig's frame."""
+        middle = self.board.object_points().mean(axis=0)
+        turn = exp_so3(np.array(rotation))
+        self.world_from_board = rigid(turn, np.array(centre_m) - turn @ middle)
+
+    def homography(self, node_id: int) -> np.ndarray:
+        """(3, 3) px of a camera from px of the texture."""
+        node = next(node for node in self.rig.nodes if node.node_id == node_id)
+        lens = node.intrinsics
+        world_from_camera = rigid(rotation_from_quaternion(node.pose.rotation_wxyz), node.pose.translation_m)
+        camera_from_board = inverse(world_from_camera) @ self.world_from_board
+        matrix = np.array([[lens.fx, 0, lens.cx], [0, lens.fy, lens.cy], [0, 0, 1]])
+        scale, first = self.board.square_m / _PX_PER_SQUARE, (_SQUARES_BESIDE + 1) * _PX_PER_SQUARE - 0.5
+        board_from_texture = np.array([[scale, 0, -scale * first], [0, scale, -scale * first], [0, 0, 1]])
+        return matrix @ camera_from_board[:3, [0, 1, 3]] @ board_from_texture
+
+    def draw(self, node_id: int, t_s: float) -> np.ndarray:
+        """What the camera sees."""
+        picture = np.full((480, 640, 3), 110, np.uint8)
+        if self.world_from_board is not None:
+            grey = cv2.warpPerspective(self._texture, self.homography(node_id), (640, 480), flags=cv2.INTER_AREA,
+                                       borderMode=cv2.BORDER_CONSTANT, borderValue=110)
+            picture = cv2.cvtColor(cv2.GaussianBlur(grey, (0, 0), 0.7), cv2.COLOR_GRAY2BGR)
+        return np.clip(picture + self.noise, 0, 255).astype(np.uint8)
