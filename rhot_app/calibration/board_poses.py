@@ -6,7 +6,7 @@ Two cameras together, or the other shots, tell which of them is right (Schweigho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board import Board
 from rhot_app.calibration.corners import BoardView
 from rhot_app.geometry.camera import undistort_points
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.geometry.transforms import apply, exp_so3, rigid
 
 Array = NDArray[np.float64]
 
@@ -26,10 +26,10 @@ _MOST_DEGRADED = 4.0  # a second pose whose error is this many times the first o
 class PosedView:
     """One board view with the poses that explain it.
 
-    `view` as found; `points` (N, 3) m on the board and `rays` (N, 2) their undistorted normalised coordinates;
-    `focal_px` turns normalised distances into pixels. `camera_from_board` (K, 4, 4) m, best first, with `rms_px` (K,).
-    `half_turn` (4, 4) takes the board to itself, counted from its other end; None where the colours tell the ends
-    apart.
+    `view` with the corners that the lens can see; `points` (N, 3) m on the board and `rays` (N, 2) their undistorted
+    normalised coordinates; `focal_px` turns normalised distances into pixels. `camera_from_board` (K, 4, 4) m, best
+    first, with `rms_px` (K,). `half_turn` (4, 4) takes the board to itself, counted from its other end; None where the
+    colours tell the ends apart.
     """
 
     view: BoardView
@@ -59,7 +59,7 @@ class PosedView:
         return np.concatenate([self.camera_from_board, self.camera_from_board @ self.half_turn])
 
     def _off(self, camera_from_board: Array) -> float:
-        local = self.points @ camera_from_board[:3, :3].T + camera_from_board[:3, 3]
+        local = apply(camera_from_board, self.points)
         if not np.all(local[:, 2] > 0.0):
             return float("inf")
         off = local[:, :2] / local[:, 2:] - self.rays
@@ -75,7 +75,8 @@ def pose_view(view: BoardView, board: Board, lens: Array) -> PosedView | None:
     seen = np.isfinite(rays).all(axis=1)
     if np.count_nonzero(seen) < 4:
         return None
-    points, rays = view.object_points(board)[seen], np.ascontiguousarray(rays[seen])
+    view, rays = replace(view, pixels=view.pixels[seen], ids=view.ids[seen]), np.ascontiguousarray(rays[seen])
+    points = view.object_points(board)
     focal = float(np.sqrt(lens[0] * lens[1]))
     poses, errors = _planar_poses(points, rays)
     if not len(poses):
@@ -91,7 +92,7 @@ def _planar_poses(points: Array, rays: Array) -> tuple[Array, Array]:
     for turn, shift in zip(turns[:count], shifts[:count], strict=True):
         turn, shift = cv2.solvePnPRefineLM(points, rays, identity, None, turn.copy(), shift.copy())
         pose = rigid(exp_so3(turn.ravel()), shift.ravel())
-        local = points @ pose[:3, :3].T + pose[:3, 3]
+        local = apply(pose, points)
         if np.all(local[:, 2] > 0.0):
             poses.append(pose)
             errors.append(float(np.sqrt(np.mean(np.sum((local[:, :2] / local[:, 2:] - rays) ** 2, axis=1)))))

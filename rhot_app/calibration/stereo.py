@@ -33,8 +33,8 @@ def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool =
 
     `lenses` one per camera; `refine` lets given ones change within their standard deviations. `remembered` lenses of an
     earlier calibration of the same cameras: nothing is computed from them, but they know mirrored and swapped
-    pictures. `dropped` pictures that were already left out when the files were read. Raises CalibrationError when there is nothing to calibrate from:
-    too few shared shots, a lens for another picture size.
+    pictures. `dropped` pictures that were already left out when the files were read. Raises CalibrationError when
+    there is nothing to calibrate from: too few shared shots, a lens for another picture size.
     """
     _check_sizes(views, lenses)
     known = known or KnownLengths()
