@@ -79,6 +79,11 @@ class Chessboard(Lattice):
         return (self.cols + self.rows) % 2 == 1
 
     @property
+    def free_space(self) -> float:
+        """Which part of a square's side is empty around a corner, but for the four squares that meet there."""
+        return 1.0
+
+    @property
     def size_text(self) -> str:
         """The size as it is written on command lines, "9x6"."""
         return f"{self.cols}x{self.rows}"
@@ -129,6 +134,11 @@ class CharucoBoard(Lattice):
     def one_way_up(self) -> bool:
         """True: every marker tells its own place."""
         return True
+
+    @property
+    def free_space(self) -> float:
+        """Which part of a square's side is empty around a corner: a marker's corner is the next thing there."""
+        return min(1.0, float(np.sqrt(2.0)) * (1.0 - self.marker_m / self.square_m))
 
     @property
     def size_text(self) -> str:

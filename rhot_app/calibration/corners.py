@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board import Board, Chessboard
 from rhot_app.calibration.charuco_search import find_charuco
 from rhot_app.calibration.chessboard_search import find_chessboard
-from rhot_app.calibration.edges import edge_width_px
-from rhot_app.calibration.subpixel import neighbour_px, refine
+from rhot_app.calibration.subpixel import refine, side_px
 
 Array = NDArray[np.float64]
 Gray = NDArray[np.uint8]
@@ -25,8 +24,9 @@ class BoardView:
     """The corners of one board in one picture.
 
     `pixels` (N, 2) raw px and `ids` (N,) of the corners found, sorted by id (see `board`); `width`, `height` px of the
-    picture; `square_px` the shortest side of a square in the picture; `edge_px` how wide the edges between black and
-    white are (2 is sharp, 4 and more is blurred); `source` the file or camera it came from, for messages.
+    picture; `square_px` the shortest side of a square in the picture; `blur_px` the SD of the blur across the edges,
+    in the blurrier direction (1 is sharp, 2 and more is not), NaN when unknown; `source` the file or camera it came
+    from, for messages.
     """
 
     pixels: Array
@@ -34,7 +34,7 @@ class BoardView:
     width: int
     height: int
     square_px: float
-    edge_px: float
+    blur_px: float
     source: str = ""
 
     @property
@@ -75,7 +75,8 @@ def detect(image: NDArray[np.uint8], board: Board, *, thorough: bool = True, sou
         rough = find_charuco(gray, board)
     if rough is None:
         return None
-    return _view(gray, refine(gray, rough), source)
+    grid, blur = refine(gray, rough, free=board.free_space)
+    return _view(grid, blur, gray.shape, source)
 
 
 def to_grid(pixels: Array, ids: NDArray[np.int64], board: Board) -> Array:
@@ -85,13 +86,12 @@ def to_grid(pixels: Array, ids: NDArray[np.int64], board: Board) -> Array:
     return grid.reshape(board.rows, board.cols, 2)
 
 
-def _view(gray: Gray, grid: Array, source: str) -> BoardView | None:
-    height, width = gray.shape
+def _view(grid: Array, blur: float, shape: tuple[int, ...], source: str) -> BoardView | None:
+    height, width = shape
     flat = grid.reshape(-1, 2)
     inside = (flat >= 0.0).all(axis=1) & (flat[:, 0] <= width - 1) & (flat[:, 1] <= height - 1)
     ids = np.flatnonzero(inside)
-    sides = neighbour_px(grid).reshape(-1)[ids]
-    sides = sides[np.isfinite(sides)]
+    sides = side_px(grid)
     if len(ids) < FEWEST_CORNERS or not len(sides):
         return None
-    return BoardView(flat[ids], ids, width, height, float(sides.min()), edge_width_px(gray, grid), source)
+    return BoardView(flat[ids], ids, width, height, float(sides.min()), blur, source)
