@@ -21,6 +21,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot simulate": ("--motion", "--seconds", "--out"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json"),
     "rhot calibrate depth": ("--table", "--rig", "--out", "--baseline-mm", "--view-angle-deg", "--json"),
+    "rhot check": ("RIG", "--json"),
+    "rhot history": ("RIG", "--restore", "--json"),
     "rhot-node": ("--settings", "--camera", "detect"),
     "rhot-node detect": ("--markers", "--detector", "--all", "--json"),
 }

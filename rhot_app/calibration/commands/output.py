@@ -15,21 +15,26 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
 
 
+def tell(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json: bool) -> None:
+    """Print a result and its verdict: one JSON object, or sentences and `lines` for people."""
+    if as_json:
+        print(json.dumps({**fields, **verdict.to_json()}))
+        return
+    print(verdict.sentence)
+    for finding in verdict.findings:
+        print(f"  [{finding.grade.value}] {finding.sentence}")
+    print(*lines, sep="\n")
+
+
 def show(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json: bool, written: str = "") -> int:
     """Print a calibration's result and return the exit code: 0, or 2 when the verdict forbids its use.
 
     `fields` are the JSON's, the verdict's own are added; `lines` the figures for people; `written` the file that was
     written, empty for none.
     """
-    if as_json:
-        print(json.dumps({**fields, **verdict.to_json(), "written": written or None}))
-    else:
-        print(verdict.sentence)
-        for finding in verdict.findings:
-            print(f"  [{finding.grade.value}] {finding.sentence}")
-        print(*lines, sep="\n")
-        if written:
-            print(f"Written: {written}")
+    tell({**fields, "written": written or None}, lines, verdict, as_json=as_json)
+    if written and not as_json:
+        print(f"Written: {written}")
     if verdict.acceptable:
         return 0
     worst = verdict.findings[0].sentence

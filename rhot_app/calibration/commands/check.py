@@ -1,0 +1,56 @@
+"""``rhot check``: what can be wrong with a rig file and shows without a picture."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rhot_app.calibration.commands.output import add_json_argument, tell
+
+if TYPE_CHECKING:
+    from rhot_app.calibration.rig_checks import RigReport
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot check``."""
+    parser.add_argument("rig", type=Path, metavar="RIG", help="the rig file")
+    add_json_argument(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check and report; exit code 2 when the rig cannot be tracked with."""
+    from rhot_app.calibration.rig_checks import check_rig
+    from rhot_app.project import load_rig
+
+    report = check_rig(load_rig(args.rig))
+    tell(_fields(report), _lines(report), report.verdict, as_json=args.json)
+    return 0 if report.verdict.acceptable else 2
+
+
+def _fields(report: RigReport) -> dict[str, Any]:
+    from rhot_app.calibration.rig_camera_checks import WORKING_DISTANCES_M
+
+    return {
+        "cameras": [{"name": lens.name, "view_deg": [round(math.degrees(angle), 2) for angle in lens.view_rad],
+                     "usable_percent": round(100 * lens.usable, 1)} for lens in report.lenses],
+        "pairs": [{"first": pair.first, "second": pair.second, "baseline_mm": round(pair.baseline_m * 1e3, 3),
+                   "toe_in_deg": round(math.degrees(pair.toe_in_rad), 3),
+                   "overlap_percent": {f"{z:g}": round(100 * share, 1) for z, share
+                                       in zip(WORKING_DISTANCES_M, pair.overlap, strict=True)}}
+                  for pair in report.pairs],
+    }
+
+
+def _lines(report: RigReport) -> list[str]:
+    from rhot_app.calibration.rig_camera_checks import WORKING_DISTANCES_M
+
+    lines = [f"{lens.name}: sees {math.degrees(lens.view_rad[0]):.1f} x {math.degrees(lens.view_rad[1]):.1f} degrees"
+             for lens in report.lenses]
+    for pair in report.pairs:
+        shares = ", ".join(f"{100 * share:.0f} % at {z:g} m"
+                           for z, share in zip(WORKING_DISTANCES_M, pair.overlap, strict=True))
+        lines.append(f"{pair.first} - {pair.second}: {pair.baseline_m * 1e3:.1f} mm apart, axes "
+                     f"{math.degrees(pair.toe_in_rad):.1f} degrees, seen by both: {shares}")
+    return lines

@@ -1,0 +1,65 @@
+"""``rhot history``: the earlier versions of a rig file, and bringing one back."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rhot_app.calibration.commands.output import add_json_argument
+
+if TYPE_CHECKING:
+    from rhot_app.rig_history import Version
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot history``."""
+    parser.add_argument("rig", type=Path, metavar="RIG", help="the rig file")
+    parser.add_argument("--restore", type=int, metavar="N",
+                        help="bring version N of the list back; what is there now becomes a version itself")
+    add_json_argument(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """List the versions, newest first, or restore one."""
+    from rhot_app import rig_history
+    from rhot_app.errors import RigError
+
+    versions = rig_history.versions(args.rig)
+    if not versions and not args.rig.exists():
+        raise RigError(f"{args.rig}: no such file, and no earlier version of it.")
+    if args.restore is None:
+        _show(args, versions)
+        return 0
+    if not 1 <= args.restore <= len(versions):
+        raise RigError(f"{args.rig} has no version {args.restore}: {_count(versions)}.")
+    chosen = versions[args.restore - 1]
+    rig_history.restore(args.rig, chosen)
+    if args.json:
+        print(json.dumps({"restored": _entry(args.restore, chosen), "written": str(args.rig)}))
+    else:
+        print(f"{args.rig} is again as it was before the {chosen.replaced_by} of {_when(chosen)}.")
+    return 0
+
+
+def _show(args: argparse.Namespace, versions: list[Version]) -> None:
+    if args.json:
+        print(json.dumps({"versions": [_entry(number, version) for number, version in enumerate(versions, 1)]}))
+        return
+    print(f"{args.rig}: {_count(versions)}.")
+    for number, version in enumerate(versions, 1):
+        print(f"  {number}  until {_when(version)}, before: {version.replaced_by}")
+
+
+def _entry(number: int, version: Version) -> dict[str, object]:
+    return {"number": number, "replaced_at": version.replaced_at.isoformat(), "replaced_by": version.replaced_by,
+            "path": str(version.path)}
+
+
+def _count(versions: list[Version]) -> str:
+    return {0: "no earlier versions", 1: "one earlier version"}.get(len(versions), f"{len(versions)} earlier versions")
+
+
+def _when(version: Version) -> str:
+    return version.replaced_at.astimezone().strftime("%Y-%m-%d %H:%M:%S")

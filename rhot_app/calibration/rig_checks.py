@@ -1,0 +1,53 @@
+"""Everything that can be wrong with a rig file and shows without a picture, for ``rhot check`` and before writing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rhot_app.calibration.rig_camera_checks import (
+    LensFigures,
+    PairGeometry,
+    all_pairs,
+    lens_figures,
+    lens_findings,
+    pair_findings,
+)
+from rhot_app.calibration.rig_setup_checks import filter_findings, hand_findings, link_findings, marker_findings
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
+from rhot_app.project import Rig
+
+
+@dataclass(frozen=True, slots=True)
+class RigReport:
+    """What a rig file amounts to; lenses and pairs are empty where distance comes from disparity alone."""
+
+    lenses: tuple[LensFigures, ...]
+    pairs: tuple[PairGeometry, ...]
+    verdict: Verdict
+
+
+def check_rig(rig: Rig) -> RigReport:
+    """Check a whole rig."""
+    calibrated = rig.depth.mode == "stereo"
+    lenses = tuple(lens_figures(node) for node in rig.nodes) if calibrated else ()
+    pairs = tuple(all_pairs(rig)) if calibrated else ()
+    findings = [*camera_findings(rig, lenses, pairs), *marker_findings(rig), *hand_findings(rig), *filter_findings(rig),
+                *link_findings(rig)]
+    if len(rig.nodes) < 2:
+        findings.append(Finding("one_camera", Grade.FAIR, "The rig has one camera.", "Depth needs two.",
+                                "Add a second node."))
+    return RigReport(lenses, pairs, judge(_summary(rig, findings), findings))
+
+
+def camera_findings(rig: Rig, lenses: tuple[LensFigures, ...], pairs: tuple[PairGeometry, ...]) -> list[Finding]:
+    """The findings about lenses and places of the cameras only."""
+    by_lens = [finding for node, figures in zip(rig.nodes, lenses, strict=False)
+               for finding in lens_findings(node, figures)]
+    return [*by_lens, *pair_findings(rig, list(pairs))]
+
+
+def _summary(rig: Rig, findings: list[Finding]) -> str:
+    wrong = sum(finding.grade is not Grade.GOOD for finding in findings)
+    cameras = "1 camera" if len(rig.nodes) == 1 else f"{len(rig.nodes)} cameras"
+    things = {0: "nothing is wrong", 1: "one thing to look at"}.get(wrong, f"{wrong} things to look at")
+    return f"{rig.name}, {cameras}: {things}."

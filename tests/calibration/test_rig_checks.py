@@ -1,0 +1,129 @@
+"""What is wrong with a rig file is said without a picture; what is right is not blamed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from rhot_app.__main__ import main
+from rhot_app.calibration.rig_checks import check_rig
+from rhot_app.calibration.verdict import Grade
+from rhot_app.project import CameraPose, Intrinsics, OneEuroSettings, Rig, RigNode, load_rig, save_rig
+from rhot_node.files import resource_path
+
+LENS = Intrinsics(640, 480, 533.0, 533.5, 341.0, 235.0, (-0.28, 0.09, 0.001, 0.0, 0.0))
+
+
+def change(struct: object, **fields: object) -> object:
+    return msgspec.structs.replace(struct, **fields)  # type: ignore[type-var]
+
+
+@pytest.fixture
+def rig() -> Rig:
+    """A rig as a calibration leaves it."""
+    template = load_rig(resource_path("rigs", "two_pis.json"))
+    return with_nodes(template, lambda node: change(node, intrinsics=LENS))
+
+
+def with_nodes(rig: Rig, edit: Callable[[RigNode], object], only: str = "") -> Rig:
+    nodes = tuple(edit(node) if only in ("", node.name) else node for node in rig.nodes)
+    return change(rig, nodes=nodes)  # type: ignore[return-value]
+
+
+def with_lens(rig: Rig, **fields: object) -> Rig:
+    return with_nodes(rig, lambda node: change(node, intrinsics=change(node.intrinsics, **fields)), "left")
+
+
+def with_right_at(rig: Rig, *place: float, turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)) -> Rig:
+    return with_nodes(rig, lambda node: change(node, pose=CameraPose(turn, place)), "right")  # type: ignore[arg-type]
+
+
+def test_a_calibrated_rig_is_good(rig: Rig) -> None:
+    report = check_rig(rig)
+    assert report.verdict.grade is Grade.GOOD
+    assert not report.verdict.findings
+    (pair,) = report.pairs
+    assert pair.baseline_m == pytest.approx(0.075)
+    assert 0.75 < pair.overlap[0] < pair.overlap[2] < 1.0
+
+
+def test_a_rig_that_nobody_calibrated_is_not_called_good() -> None:
+    report = check_rig(load_rig(resource_path("rigs", "two_pis.json")))
+    assert report.verdict.codes == {"nominal"}
+    assert report.verdict.grade is Grade.FAIR
+
+
+LENSES: list[tuple[str, Grade, dict[str, object]]] = [
+    ("field_of_view", Grade.POOR, {"fx": 3.6, "fy": 3.6}),  # millimetres
+    ("field_of_view", Grade.FAIR, {"fx": 1600.0, "fy": 1600.0}),
+    ("principal_point", Grade.POOR, {"cx": 900.0}),
+    ("principal_point", Grade.FAIR, {"cy": 350.0}),
+    ("aspect", Grade.FAIR, {"fy": 400.0}),
+    ("distortion", Grade.POOR, {"distortion": (-0.9, 0.0, 0.0, 0.0, 0.0)}),
+]
+
+
+@pytest.mark.parametrize(("code", "grade", "fields"), LENSES)
+def test_a_lens_that_cannot_be_is_named(rig: Rig, code: str, grade: Grade, fields: dict[str, object]) -> None:
+    found = {finding.code: finding for finding in check_rig(with_lens(rig, **fields)).verdict.findings}
+    assert found[code].grade is grade
+    assert "left" in found[code].figure.lower()
+
+
+def test_cameras_that_cannot_work_together_are_named(rig: Rig) -> None:
+    assert "coincident" in check_rig(with_right_at(rig, 0.001, 0.0, 0.0)).verdict.codes
+    assert "apart" in check_rig(with_right_at(rig, 75.0, 0.0, 0.0)).verdict.codes
+    assert "swapped" in check_rig(with_right_at(rig, -0.075, 0.0, 0.0)).verdict.codes
+    away = check_rig(with_right_at(rig, 0.075, 0.0, 0.0, turn=(0.0, 0.0, 1.0, 0.0))).verdict
+    assert "overlap" in away.codes
+    assert not away.acceptable
+
+
+def test_cameras_of_other_names_may_stand_in_any_order(rig: Rig) -> None:
+    moved = with_right_at(rig, -0.075, 0.0, 0.0)
+    renamed = with_nodes(moved, lambda node: change(node, name=f"pi {node.node_id}"))
+    assert check_rig(renamed).verdict.grade is Grade.GOOD
+
+
+def test_cameras_on_opposite_sides_of_the_hand_may_track(rig: Rig) -> None:
+    opposite = check_rig(with_right_at(rig, 0.0, 0.0, 1.2, turn=(0.0, 0.0, 1.0, 0.0)))
+    assert opposite.pairs[0].overlap[1] > 0.85
+    assert "overlap" not in opposite.verdict.codes
+
+
+def test_markers_hand_filters_and_ports_are_looked_at(rig: Rig) -> None:
+    index = rig.markers.markers[1]
+    twin = change(rig.markers.markers[2], chroma=index.chroma)
+    markers = change(rig.markers, markers=(*rig.markers.markers[:2], twin, *rig.markers.markers[3:]))
+    assert "colours" in check_rig(change(rig, markers=markers)).verdict.codes  # type: ignore[arg-type]
+    thumb = change(rig.hand.fingers["thumb"], bones_mm=(4.6, 3.2, 2.7), marker_mm=1.0)  # centimetres
+    hand = check_rig(change(rig, hand=change(rig.hand, fingers={**rig.hand.fingers, "thumb": thumb})))  # type: ignore[arg-type]
+    assert not hand.verdict.acceptable
+    assert "hand" in hand.verdict.codes
+    slow = change(rig.filters, position=OneEuroSettings(min_cutoff_hz=0.01, beta=0.0))
+    assert "filter" in check_rig(change(rig, filters=slow)).verdict.codes  # type: ignore[arg-type]
+    together = with_nodes(rig, lambda node: change(node, address="10.0.0.1"))
+    assert not check_rig(together).verdict.acceptable
+    late = with_nodes(rig, lambda node: change(node, time_offset_s=0.4), "left")
+    assert "time" in check_rig(late).verdict.codes
+
+
+def test_a_rig_that_measures_disparity_needs_no_lenses(rig: Rig) -> None:
+    blind = with_lens(change(rig, depth=change(rig.depth, mode="disparity")), fx=3.6)  # type: ignore[arg-type]
+    assert check_rig(blind).verdict.grade is Grade.GOOD
+
+
+def test_the_command_says_it_and_ends_with_code_2(rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "rig.json"
+    save_rig(path, rig)
+    assert main(["check", str(path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["grade"] == "good"
+    assert told["pairs"][0]["baseline_mm"] == 75.0
+    save_rig(path, with_right_at(rig, -0.075, 0.0, 0.0))
+    assert main(["check", str(path)]) == 2
+    assert "calibrated from mirrored pictures" in capsys.readouterr().out
