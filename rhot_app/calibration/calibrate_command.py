@@ -7,6 +7,7 @@ import importlib
 from types import ModuleType
 
 KINDS: dict[str, str] = {
+    "colours": "the markers' colours, from boxes on their paint in pictures",
     "depth": "distance from disparity, without a board, from a table of measured distances",
 }
 """Name of each calibration, as of its module in `commands`, and what it is for."""

@@ -12,6 +12,7 @@ from rhot_node.errors import SettingsError
 from rhot_node.markers import ChromaModel
 
 Box = tuple[int, int, int, int]
+Colours = NDArray[np.float32]
 
 SAMPLES_MIN = 12  # chroma pixels
 MAGNITUDE_LEAST = 12.0  # grey levels of mean chroma; less is grey
@@ -20,23 +21,39 @@ SPREADS = 3.0  # robust standard deviations on both sides of the mean that the h
 LIGHT_LEFT = 0.5  # of the weakest sample: shadow on the paint leaves about this much of its chroma
 
 
+def box_mask(image: YuvImage, boxes: list[Box]) -> NDArray[np.bool_]:
+    """(H/2, W/2) chroma pixels that lie wholly in `boxes`, each (x0, y0, x1, y1) luma px, the upper ends exclusive."""
+    mask = np.zeros(image.u.shape, dtype=np.bool_)
+    for x0, y0, x1, y1 in boxes:
+        mask[(max(y0, 0) + 1) // 2:max(y1, 0) // 2, (max(x0, 0) + 1) // 2:max(x1, 0) // 2] = True
+    return mask
+
+
+def colours_of(image: YuvImage, mask: NDArray[np.bool_]) -> Colours:
+    """(N, 3) mean luma, Cb and Cr (minus 128) of the chroma pixels where `mask` (H/2, W/2) is True."""
+    rows, columns = np.nonzero(mask)
+    luma = sum(image.y[2 * rows + j, 2 * columns + i].astype(np.float32) for j in (0, 1) for i in (0, 1))
+    return np.stack([0.25 * np.asarray(luma), image.u[rows, columns] - np.float32(128.0),
+                     image.v[rows, columns] - np.float32(128.0)], axis=1)
+
+
 def learn_chroma(image: YuvImage, boxes: list[Box]) -> ChromaModel:
     """Colour model of the paint inside `boxes`, each (x0, y0, x1, y1) luma px, the upper ends exclusive.
 
     Mean and spread are robust (median, median absolute deviation): a glint or a corner of something else in a box
     does no harm as long as most of it is paint. Raises SettingsError when the boxes hold too few pixels or no colour.
     """
-    mask = np.zeros(image.u.shape, dtype=np.bool_)
-    for x0, y0, x1, y1 in boxes:
-        mask[(max(y0, 0) + 1) // 2:max(y1, 0) // 2, (max(x0, 0) + 1) // 2:max(x1, 0) // 2] = True
-    return learn_chroma_from_pixels(image, mask)
+    return learn_chroma_from_pixels(image, box_mask(image, boxes))
 
 
 def learn_chroma_from_pixels(image: YuvImage, mask: NDArray[np.bool_]) -> ChromaModel:
     """As `learn_chroma`, from the chroma pixels where `mask` (H/2, W/2) is True."""
-    cb = image.u[mask].astype(np.float64) - 128.0
-    cr = image.v[mask].astype(np.float64) - 128.0
-    luma = image.y[::2, ::2][mask].astype(np.float64)
+    return learn_chroma_from_colours(colours_of(image, mask))
+
+
+def learn_chroma_from_colours(colours: Colours) -> ChromaModel:
+    """As `learn_chroma`, from (N, 3) luma, Cb and Cr (minus 128)."""
+    luma, cb, cr = colours.astype(np.float64).T
     if cb.size < SAMPLES_MIN:
         raise SettingsError(f"the samples hold {cb.size} colour pixels inside the image; at least {SAMPLES_MIN} are "
                             "needed. Draw the box larger, or go nearer.")

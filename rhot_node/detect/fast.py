@@ -16,6 +16,7 @@ from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
 from rhot_node.detect.light import DEAD_ZONE, Light
 from rhot_node.detect.light_guess import guess_light
+from rhot_node.detect.outline import INTERIOR, OUTSIDE
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
 from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, Track, lost_observation
 from rhot_node.markers import MarkerSet
@@ -65,6 +66,16 @@ class FastDetector:
     def paint_colours(self) -> NDArray[np.float64]:
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was found last."""
         return self._paint.copy()
+
+    def paint_mask(self, image: YuvImage, seen: MarkerObservation) -> NDArray[np.bool_]:
+        """(H/2, W/2) the chroma pixels inside a marker that `detect` has just placed in this very `image`.
+
+        Its edge, where paint and surroundings share pixels, is left out; small markers have no inside.
+        """
+        self._scratch.kind[:] = OUTSIDE
+        if seen.found:
+            self._measure(self._light.balanced(image), seen.index, self._tracks[seen.index].recall(self._request))
+        return np.asarray(self._scratch.kind == INTERIOR)
 
     @property
     def warmth(self) -> float:

@@ -71,6 +71,12 @@ class Track:
         out[m.IS_BAND] = self.shape == "band"
         return out
 
+    def recall(self, out: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The request for the very frame that was observed last."""
+        self.request(out)
+        out[m.PX], out[m.PY] = self.x + self.sag_x, self.y + self.sag_y
+        return out
+
     def candidate_cost(self, x: float, y: float, area: float) -> float:
         """How badly a blob of a full search fits the last sight, in squared standard deviations."""
         gap = self.missed + 1

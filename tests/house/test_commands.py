@@ -20,6 +20,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot replay": ("LOG", "--rig"),
     "rhot simulate": ("--motion", "--seconds", "--out"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json"),
+    "rhot calibrate colours": ("--image", "--sample", "--markers", "--skin", "--out", "--json"),
     "rhot calibrate depth": ("--table", "--rig", "--out", "--baseline-mm", "--view-angle-deg", "--json"),
     "rhot check": ("RIG", "--json"),
     "rhot history": ("RIG", "--restore", "--json"),

@@ -1,0 +1,72 @@
+"""Rehearse tracking by other lamps: the calibration's own pictures, relit, shown to the real detector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from rhot_app.calibration.colour_light import LAMPS, SAME, Lamp, relit_image
+from rhot_app.calibration.colour_samples import View
+from rhot_app.calibration.paint_region import PaintRegion
+from rhot_app.progress import Progress, silent
+from rhot_node.detect.fast import FastDetector
+from rhot_node.markers import MarkerSet
+from rhot_node.wire.messages import MarkerObservation
+
+VIEWS_MOST = 4
+LAMPS_TRIED = (SAME, *(lamp for lamp in LAMPS if lamp.brightness != 1.0))
+GROWN, SHRUNK = 2.2, 0.3  # of the marker's area: something else belongs to it, most of it is gone
+
+Outcome = Literal["lost", "elsewhere", "joined"]
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A marker that the detector did not find where it is: lost, found elsewhere, or joined by its surroundings.
+
+    `tracked`: whether that happened in its tracking window, a frame after it had been found.
+    """
+
+    marker: str
+    picture: int
+    lamp: Lamp
+    outcome: Outcome
+    tracked: bool
+
+
+def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
+             progress: Progress = silent) -> tuple[Failure, ...]:
+    """Show the pictures by all lamps as unrelated stills and once again as the next frame; tell what fails.
+
+    Only markers that are known in a picture are judged there. `names`: of the markers, in the order of the set.
+    """
+    detector = FastDetector(markers)
+    failures = []
+    chosen = list(enumerate(views))[:VIEWS_MOST]
+    for number, (picture, view) in enumerate(chosen):
+        for step, lamp in enumerate(LAMPS_TRIED):
+            progress("trying other lamps", (number + step / len(LAMPS_TRIED)) / len(chosen))
+            image = view.image if lamp == SAME else relit_image(view.image, lamp)
+            detector.reset()
+            for tracked in (False, True):
+                seen = detector.detect(image)
+                for name, mark in zip(names, seen, strict=True):
+                    if name in view.paint:
+                        outcome = _outcome(mark, view.paint[name])
+                        if outcome is not None:
+                            failures.append(Failure(name, picture, lamp, outcome, tracked))
+    return tuple(failures)
+
+
+def _outcome(seen: MarkerObservation, region: PaintRegion) -> Outcome | None:
+    if not seen.found:
+        return "lost"
+    height, width = region.whole.shape
+    column, row = min(max(int(seen.x) // 2, 0), width - 1), min(max(int(seen.y) // 2, 0), height - 1)
+    ratio = 0.7854 * (0.5 * seen.diameter) ** 2 / region.area
+    if not region.whole[row, column]:
+        return "joined" if ratio > GROWN else "elsewhere"
+    if ratio > GROWN:
+        return "joined"
+    return "lost" if ratio < SHRUNK else None

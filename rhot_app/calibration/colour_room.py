@@ -1,0 +1,128 @@
+"""What else in the room has the markers' colours: its hues, and what each marker's gate lets through."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.colour_samples import View
+from rhot_app.calibration.paint_region import Mask
+from rhot_node.detect.colour import Colours, colours_of
+from rhot_node.detect.gate import ColourGate, merits
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.search import AREA, SUM_X, SUM_Y
+from rhot_node.markers import MarkerSet
+
+HUE_STEP_DEG = 5
+HUE_BINS = 360 // HUE_STEP_DEG
+ROOM_MAGNITUDE = 14.0  # grey levels of chroma; less is a shade of grey
+ROOM_PIXELS = 20000  # of all pictures that models are tried on
+GREY = 128
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """The thing outside the marker that its gate would rather take than any other.
+
+    `picture`: index of the view. `x`, `y`: its centre, luma px. `area_px`: its size, `passing_px`: all that passes,
+    luma px^2. `merit`: as the detector's search ranks it, as a fraction of the marker's own in that picture: above 1 it
+    is taken for the marker.
+    """
+
+    marker: str
+    picture: int
+    x: float
+    y: float
+    area_px: float
+    passing_px: float
+    merit: float
+
+
+@dataclass(frozen=True, slots=True)
+class RoomReport:
+    """`hue_px` (72,): chroma pixels per picture outside all markers by hue, from -180 degrees on in steps of 5.
+
+    `rivals`: per marker the worst of all pictures that show it, None when nothing passes.
+    """
+
+    hue_px: NDArray[np.float64]
+    rivals: tuple[Rival | None, ...]
+
+
+def survey_room(markers: MarkerSet, names: Sequence[str], views: Sequence[View]) -> RoomReport:
+    """Search the pictures outside the markers. `names`: of the markers, in the order of the set."""
+    gate = ColourGate(markers)
+    histogram = np.zeros(HUE_BINS)
+    rivals: list[Rival | None] = [None] * len(names)
+    for picture, view in enumerate(views):
+        room = outside(view)
+        histogram += hue_histogram(view.image, room) / len(views)
+        for index, name in enumerate(names):
+            if name in view.paint:
+                rival = _rival(gate, markers, index, name, view, picture, room)
+                known = rivals[index]
+                if rival is not None and (known is None or rival.merit > known.merit):
+                    rivals[index] = rival
+    return RoomReport(histogram, tuple(rivals))
+
+
+def hue_histogram(image: YuvImage, where: Mask) -> NDArray[np.float64]:
+    """(72,) chroma pixels of the picture by hue, of those in `where` (H/2, W/2) that are coloured at all."""
+    bins = _HUE_BINS[image.u, image.v][where]
+    return np.bincount(bins, minlength=HUE_BINS + 1)[:HUE_BINS].astype(np.float64)
+
+
+def outside(view: View) -> Mask:
+    """(H/2, W/2) everything but the markers known in the picture."""
+    room = np.ones(view.image.u.shape, dtype=np.bool_)
+    for region in view.paint.values():
+        room &= ~region.whole
+    return room
+
+
+def room_colours(views: Sequence[View], name: str) -> tuple[Colours, float]:
+    """(N, 3) coloured things outside the markers, of the pictures that show `name`; chroma pixels a row stands for.
+
+    Pixels are counted per picture: three pictures of one room do not make it three times as large.
+    """
+    shown = [view for view in views if name in view.paint]
+    found = [colours_of(view.image, outside(view) & (_HUE_BINS[view.image.u, view.image.v] < HUE_BINS))
+             for view in shown]
+    colours = np.concatenate(found) if found else np.zeros((0, 3), np.float32)
+    step = max(1, len(colours) // ROOM_PIXELS)
+    return colours[::step], step / max(len(shown), 1)
+
+
+def _rival(gate: ColourGate, markers: MarkerSet, index: int, name: str, view: View, picture: int,
+           room: Mask) -> Rival | None:
+    chroma = markers.markers[index].chroma
+    blobs = gate.blobs(_only(view.image, room), [index]).copy()
+    if not len(blobs):
+        return None
+    own = gate.blobs(_only(view.image, view.paint[name].whole), [index])
+    shape = view.image.u.shape
+    best_own = float(np.max(merits(own, chroma, shape), initial=0.0)) or view.paint[name].area
+    worth = merits(blobs, chroma, shape)
+    best = blobs[int(np.argmax(worth))]
+    return Rival(name, picture, x=2.0 * float(best[SUM_X] / best[AREA]) + 0.5,
+                 y=2.0 * float(best[SUM_Y] / best[AREA]) + 0.5, area_px=4.0 * float(best[AREA]),
+                 passing_px=4.0 * float(blobs[:, AREA].sum()), merit=float(worth.max()) / best_own)
+
+
+def _only(image: YuvImage, where: Mask) -> YuvImage:
+    """The picture with everything but `where` grey."""
+    return YuvImage(image.y, np.where(where, image.u, GREY).astype(np.uint8),
+                    np.where(where, image.v, GREY).astype(np.uint8))
+
+
+def _hue_bins() -> NDArray[np.uint8]:
+    """(256, 256) of [U, V]: bin of the hue, HUE_BINS where it is grey."""
+    cb, cr = np.meshgrid(np.arange(256) - 128.0, np.arange(256) - 128.0, indexing="ij")
+    bins = np.floor((np.degrees(np.arctan2(cr, cb)) + 180.0) / HUE_STEP_DEG) % HUE_BINS
+    return np.where(np.hypot(cb, cr) >= ROOM_MAGNITUDE, bins, HUE_BINS).astype(np.uint8)
+
+
+_HUE_BINS = _hue_bins()

@@ -1,0 +1,192 @@
+"""Collect samples of the markers' paint: from a click or a box at first, then by following the moving markers.
+
+One picture shows a paint in one place, at one angle to the lamp. What is learnt from many covers shading and position,
+and one finger over the marker or a glint in one frame counts for little.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.paint_region import PaintRegion, Point, region_at, region_in, region_of
+from rhot_app.errors import CalibrationError
+from rhot_node.detect.colour import SAMPLES_MIN, Box, Colours, colours_of, learn_chroma_from_colours
+from rhot_node.detect.fast import DOUBTFUL, FastDetector
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.light import RGB_FROM_YCC
+from rhot_node.errors import SettingsError
+from rhot_node.markers import Marker, MarkerSet
+
+PIXELS_A_FRAME = 300  # of one marker: every frame weighs about the same
+FRAMES_MOST = 60  # of one marker; enough places and angles
+FRAMES_ENOUGH = 10
+VIEWS_MOST = 12  # pictures kept to search the room in
+MOVED = 0.5  # diameters from every place seen so far: another place
+TURNED = 1.12  # ratio of areas or of levels to what was seen there: another angle or light
+
+
+@dataclass(frozen=True, slots=True)
+class PaintSamples:
+    """Pixels of one marker's paint.
+
+    `colours` (N, 3): Y, Cb, Cr, chroma minus 128. `frame` (N,): which picture each is from. `area`: how large the
+    marker is in the pictures, median, chroma px.
+    """
+
+    name: str
+    colours: Colours
+    frame: NDArray[np.int32]
+    area: float
+
+    @property
+    def frames(self) -> int:
+        """How many pictures they are from."""
+        return len(np.unique(self.frame))
+
+    @property
+    def rgb(self) -> tuple[int, int, int]:
+        """The paint's median colour, 0..255."""
+        red, green, blue = np.clip(np.rint(RGB_FROM_YCC @ np.median(self.colours, axis=0)), 0, 255).astype(int)
+        return int(red), int(green), int(blue)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A picture and the markers that are known in it, by name."""
+
+    image: YuvImage
+    paint: dict[str, PaintRegion] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """One picture's share of a marker's samples."""
+
+    picture: int
+    colours: Colours
+    x: float
+    y: float
+    area: float
+    level: float
+
+
+class ColourSamples:
+    """Gathers samples for any number of markers, picture by picture. Pictures given to it must not change later.
+
+    `add` names a marker in a picture; `follow` finds the named ones in further pictures by the real detector and takes
+    what adds something: another place, another angle, another light.
+    """
+
+    def __init__(self) -> None:
+        self._sights: dict[str, list[_Sight]] = {}
+        self._views: list[View] = []
+        self._pictures = 0
+        self._last: YuvImage | None = None
+        self._detector: FastDetector | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Markers that have samples, in the order in which they were named."""
+        return tuple(self._sights)
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """Pictures that were kept to search the room in."""
+        return tuple(self._views)
+
+    @property
+    def samples(self) -> tuple[PaintSamples, ...]:
+        """What has been gathered, one per marker."""
+        return tuple(PaintSamples(
+            name=name, colours=np.concatenate([sight.colours for sight in sights]),
+            frame=np.concatenate([np.full(len(sight.colours), sight.picture, np.int32) for sight in sights]),
+            area=float(np.median([sight.area for sight in sights]))) for name, sights in self._sights.items())
+
+    def variety(self, name: str) -> float:
+        """0..1: how much of a marker has been seen; 1 from FRAMES_ENOUGH pictures on that each showed something new."""
+        return min(1.0, len(self._sights.get(name, [])) / FRAMES_ENOUGH)
+
+    def add(self, name: str, image: YuvImage, where: Box | Point) -> PaintRegion:
+        """Samples of the marker `name` at a click (x, y) or in a box (x0, y0, x1, y1), luma px, upper ends exclusive.
+
+        Returns what is taken for its paint, to be shown. Raises CalibrationError when there is no colour, or so much of
+        it that it cannot be a marker.
+        """
+        try:
+            region = region_at(image, where) if len(where) == 2 else region_in(image, where)
+            learn_chroma_from_colours(colours_of(image, region.sample))
+        except (SettingsError, CalibrationError) as exc:
+            raise CalibrationError(f"{name}: {exc}") from exc
+        self._keep(image, {name: region})
+        self._detector = None
+        return region
+
+    def follow(self, image: YuvImage) -> dict[str, PaintRegion]:
+        """Find the named markers in a picture of a stream and take samples where they show something new.
+
+        Returns the markers of which samples were taken. Half-hidden and doubtful ones are left out.
+        """
+        if not self._sights:
+            return {}
+        detector = self._follower()
+        taken = {}
+        for name, seen in zip(self.names, detector.detect(image), strict=True):
+            if seen.found and not seen.flags & DOUBTFUL and len(self._sights[name]) < FRAMES_MOST:
+                inside = detector.paint_mask(image, seen)
+                if np.count_nonzero(inside) >= SAMPLES_MIN and self._adds(name, _sight(0, image, region_of(inside))):
+                    taken[name] = region_of(inside)
+        if taken:
+            self._keep(image, taken)
+        return taken
+
+    def keep_view(self, image: YuvImage) -> None:
+        """Keep a picture to search the room in, whether or not it shows a marker that anybody named."""
+        if len(self._views) < VIEWS_MOST and all(view.image is not image for view in self._views):
+            self._views.append(View(image))
+
+    def forget(self, name: str) -> None:
+        """Drop a marker's samples."""
+        self._sights.pop(name, None)
+        for view in self._views:
+            view.paint.pop(name, None)
+        self._detector = None
+
+    def _follower(self) -> FastDetector:
+        """The real detector, with what is known so far; learnt anew only when somebody names a marker."""
+        if self._detector is None:
+            self._detector = FastDetector(MarkerSet(markers=tuple(
+                Marker(id=f"m{k}", chroma=learn_chroma_from_colours(paint.colours), display_rgb=paint.rgb)
+                for k, paint in enumerate(self.samples))))
+        return self._detector
+
+    def _adds(self, name: str, new: _Sight) -> bool:
+        diameter = math.sqrt(4.0 / math.pi * new.area)
+        for old in self._sights[name]:
+            near = math.hypot(new.x - old.x, new.y - old.y) < MOVED * diameter
+            if near and max(new.area / old.area, old.area / new.area) < TURNED \
+                    and max(new.level / old.level, old.level / new.level) < TURNED:
+                return False
+        return True
+
+    def _keep(self, image: YuvImage, regions: dict[str, PaintRegion]) -> None:
+        if image is not self._last:
+            self._pictures += 1
+            self._last = image
+        for name, region in regions.items():
+            self._sights.setdefault(name, []).append(_sight(self._pictures, image, region))
+        self.keep_view(image)
+        for view in self._views:
+            if view.image is image:
+                view.paint.update(regions)
+
+
+def _sight(picture: int, image: YuvImage, region: PaintRegion) -> _Sight:
+    colours = colours_of(image, region.sample)
+    rows, columns = np.nonzero(region.sample)
+    level = float(np.hypot(*np.median(colours[:, 1:], axis=0)))
+    return _Sight(picture, colours[::max(1, len(colours) // PIXELS_A_FRAME)], float(columns.mean()),
+                  float(rows.mean()), region.area, level)

@@ -1,0 +1,184 @@
+"""``rhot calibrate colours``: colour models from boxes on the paint in pictures."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.errors import CalibrationError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from rhot_app.calibration.colours import ColourReport
+    from rhot_node.detect.image import YuvImage
+
+EPILOG = """Boxes are x,y,w,h in pixels of the picture, (0, 0) at its top-left corner: nothing but paint inside, and as
+much of it as is plainly visible. Every other name makes another marker; NAME@2 takes the second --image, and adds to
+the samples of NAME. Pictures that show more of the room tell more of what else has the colours.
+
+Without --markers every name makes a marker: thumb, index, middle, ring, little and wrist are worn on the hand, others
+are free points. With --markers the named markers of that file get new colours, and nothing else changes.
+
+With --json: "markers" (per marker "chroma", "range", "coverage_percent", "samples", "pictures", "area_px"),
+"separability" ("rows", "columns", "percent", "sentences"), "room" ("hue_px", "rivals"), "failures", "free_paints",
+"verdict", "grade", "warnings", "findings", "written"."""
+
+_SAMPLE = re.compile(r"(?P<name>[^=@]+)(?:@(?P<picture>\d+))?=(?P<box>[^=]+)")
+_NAME = re.compile(r"[A-Za-z0-9_.-]{1,32}")
+
+
+@dataclass(frozen=True, slots=True)
+class BoxArgument:
+    """NAME[@PICTURE]=x,y,w,h: a name, the picture's number from 0, and the box's upper-left corner and size, px."""
+
+    text: str
+    name: str
+    picture: int
+    box: tuple[int, int, int, int]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Define the command's options."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument("--image", type=Path, action="append", required=True, metavar="PATH",
+                        help="a picture as the camera gives it; several are numbered 1, 2, ...")
+    parser.add_argument("--sample", action="append", required=True, metavar="NAME=x,y,w,h",
+                        help="a box on the paint of marker NAME (NAME@2=...: in the second picture)")
+    parser.add_argument("--markers", type=Path, metavar="BASE", help="marker file whose markers are learnt anew")
+    parser.add_argument("--skin", action="append", default=[], metavar="x,y,w,h",
+                        help="a box on bare skin (@2=x,y,w,h: in the second picture)")
+    parser.add_argument("--out", type=Path, required=True, metavar="MARKERS", help="marker file to write")
+    add_json_argument(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Learn, judge, print and write. Raises CalibrationError or SettingsError before anything is printed."""
+    from rhot_app.calibration.colour_samples import ColourSamples
+    from rhot_app.calibration.colours import solve_colours
+    from rhot_app.progress import ProgressLine
+    from rhot_node.markers import load_markers, save_markers
+
+    if not args.out.parent.is_dir():
+        raise CalibrationError(f"--out {args.out}: the folder {args.out.parent} does not exist; create it first.")
+    base = load_markers(args.markers) if args.markers else None
+    images = [_read(path) for path in args.image]
+    collector = ColourSamples()
+    for sample in _samples(args.sample):
+        collector.add(sample.name, _image(sample, images, args.image), _corners(sample))
+    for image in images:
+        collector.keep_view(image)
+    skin = _skin([parse_box(f"skin{text}" if text.startswith("@") else f"skin={text}", "--skin") for text in args.skin],
+                 images, args.image)
+    line = ProgressLine("colours", sys.stderr)
+    report = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
+    line.finish()
+    written = ""
+    if report.verdict.acceptable:
+        try:
+            save_markers(args.out, report.markers)
+        except OSError as exc:
+            raise CalibrationError(f"--out {args.out}: cannot be written ({exc.strerror}).") from exc
+        written = str(args.out)
+    fields = {**report.to_json(), "images": [str(path) for path in args.image]}
+    return show(fields, _lines(report), report.verdict, as_json=args.json, written=written)
+
+
+def parse_box(text: str, option: str) -> BoxArgument:
+    """Read NAME[@PICTURE]=x,y,w,h. Raises CalibrationError that shows how it must look."""
+    match = _SAMPLE.fullmatch(text.strip())
+    form, example = ("NAME=x,y,w,h", "thumb=310,204,12,10") if option == "--sample" else ("x,y,w,h", "310,204,12,10")
+    wanted = f"{option} {text!r} is not {form} with whole pixels, such as {example}."
+    if match is None:
+        raise CalibrationError(wanted)
+    try:
+        x, y, width, height = (int(part) for part in match["box"].split(","))
+    except ValueError:
+        raise CalibrationError(wanted) from None
+    name = match["name"].strip()
+    if not _NAME.fullmatch(name):
+        raise CalibrationError(f"{option} {text!r}: a marker's name has 1 to 32 letters, digits, '-', '_' or '.'.")
+    if width < 1 or height < 1:
+        raise CalibrationError(f"{option} {text!r}: a box of {width} x {height} px holds nothing.")
+    picture = int(match["picture"] or 1) - 1
+    return BoxArgument(text, name, picture, (x, y, width, height))
+
+
+def _samples(texts: list[str]) -> list[BoxArgument]:
+    """All samples; raises CalibrationError when one name has two boxes in a picture: one of them is another marker."""
+    samples = [parse_box(text, "--sample") for text in texts]
+    places = [(sample.name, sample.picture) for sample in samples]
+    for name, picture in places:
+        if places.count((name, picture)) > 1:
+            raise CalibrationError(f"--sample: {name!r} has more than one box in picture {picture + 1}. Every marker "
+                                   "has a name of its own, and one box in each picture.")
+    return samples
+
+
+def _read(path: Path) -> YuvImage:
+    import cv2
+    import numpy as np
+
+    from rhot_node.detect.image import from_bgr
+
+    if not path.is_file():
+        raise CalibrationError(f"--image {path}: there is no such file.")
+    bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if bgr is None:
+        raise CalibrationError(f"--image {path}: not an image that can be decoded (PNG, JPEG, BMP, TIFF).")
+    if min(bgr.shape[:2]) < 16:
+        raise CalibrationError(f"--image {path}: {bgr.shape[1]} x {bgr.shape[0]} px is too small to show a marker.")
+    return from_bgr(np.asarray(bgr, dtype=np.uint8))
+
+
+def _image(box: BoxArgument, images: list[YuvImage], paths: list[Path]) -> YuvImage:
+    """The picture that a box lies in; raises CalibrationError unless it does, wholly."""
+    if not 0 <= box.picture < len(images):
+        raise CalibrationError(f"{box.text!r} asks for picture {box.picture + 1}, and there "
+                               f"{'is' if len(images) == 1 else 'are'} {len(images)}; give another --image.")
+    image = images[box.picture]
+    (width, height), (x, y, wide, high) = image.size, box.box
+    if x < 0 or y < 0 or x + wide > width or y + high > height:
+        raise CalibrationError(f"{box.text!r} reaches outside {paths[box.picture]}, which has {width} x {height} px.")
+    return image
+
+
+def _corners(box: BoxArgument) -> tuple[int, int, int, int]:
+    x, y, width, height = box.box
+    return x, y, x + width, y + height
+
+
+def _skin(boxes: list[BoxArgument], images: list[YuvImage], paths: list[Path]) -> np.ndarray:
+    import numpy as np
+
+    from rhot_app.calibration.colours import NO_COLOURS
+    from rhot_node.detect.colour import box_mask, colours_of
+
+    found = [NO_COLOURS]
+    for box in boxes:
+        image = _image(box, images, paths)
+        found.append(colours_of(image, box_mask(image, [_corners(box)])))
+    return np.concatenate(found)
+
+
+def _lines(report: ColourReport) -> list[str]:
+    """The tables for people: every marker's model, and the separability matrix in percent."""
+    lines = [f"{'marker':<12} {'Cb':>6} {'Cr':>6} {'hue +-':>7} {'chroma >=':>9} {'luma':>8} {'covered %':>9} "
+             f"{'pictures':>8}"]
+    chosen = {marker.id: marker.chroma for marker in report.markers.markers}
+    for one, covered in zip(report.samples, report.separability.coverage, strict=True):
+        chroma = chosen[one.name]
+        lines.append(f"{one.name:<12} {chroma.cb:6.1f} {chroma.cr:6.1f} {chroma.hue_tolerance_deg:7.1f} "
+                     f"{chroma.magnitude_min:9.1f} {chroma.luma_min:4d}-{chroma.luma_max:<3d} {100 * covered:9.1f} "
+                     f"{one.frames:8d}")
+    columns = (*report.names, *report.separability.others)
+    lines += ["", "taken for     " + " ".join(f"{name[:9]:>9}" for name in columns) + "   (% of the column)"]
+    for name, row in zip(report.names, report.separability.matrix, strict=True):
+        lines.append(f"{name:<13} " + " ".join(f"{100 * share:9.1f}" for share in row))
+    return lines

@@ -1,0 +1,122 @@
+"""The region of a marker in a picture, from a click on it or from a box over it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.errors import CalibrationError
+from rhot_node.detect.colour import MAGNITUDE_LEAST, SAMPLES_MIN, Box, box_mask, colours_of
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.outline import RING
+
+Mask = NDArray[np.bool_]
+Point = tuple[float, float]
+
+HUE_REACH_DEG = 16.0  # of the same paint in other shade, noise included
+LEVEL_REACH = (0.42, 2.0)  # of the sample's chroma: shade, and the edge where half the pixel is paint
+SOLID = 0.7  # of its convex hull that a marker fills, half hidden ones included
+REGION_MOST = 0.2  # of the picture; more is the room, or an arm, and no marker
+
+
+@dataclass(frozen=True, slots=True)
+class PaintRegion:
+    """Chroma pixels (H/2, W/2) of one marker: `sample`, those that are surely paint; `whole`, all it may touch.
+
+    `runs_on`: its colour has no end where the marker must have one; `whole` is then no more than the sample.
+    """
+
+    sample: Mask
+    whole: Mask
+    runs_on: bool = False
+
+    @property
+    def area(self) -> float:
+        """Size of the whole marker, its soft edge halved, chroma px."""
+        return 0.5 * (float(np.count_nonzero(self.whole)) + float(np.count_nonzero(_shrunk(self.whole, 2 * RING))))
+
+
+def region_at(image: YuvImage, point: Point) -> PaintRegion:
+    """The paint round a click (x, y) luma px: what is connected with it and of its colour.
+
+    Raises CalibrationError when the click is outside, on grey, or on something too large or too small for a marker.
+    """
+    width, height = image.size
+    x, y = point
+    if not (0 <= x < width and 0 <= y < height):
+        raise CalibrationError(f"the point {x:g}, {y:g} lies outside the picture of {width} x {height} px.")
+    column, row = min(int(x) // 2, width // 2 - 1), min(int(y) // 2, height // 2 - 1)
+    around = np.zeros(image.u.shape, dtype=np.bool_)
+    around[max(row - 1, 0):row + 2, max(column - 1, 0):column + 2] = True
+    flooded = _flood(image, around)
+    if flooded is None:
+        raise CalibrationError("there is no colour under the click: grey, black and white cannot be told from the "
+                               "room. Click the middle of the paint.")
+    share = np.count_nonzero(flooded) / flooded.size
+    if share > REGION_MOST:
+        raise CalibrationError(f"the colour under the click runs over {100 * share:.0f} % of the picture: that is the "
+                               "room or the skin, not a marker. Click the middle of the paint, or draw a box over it.")
+    inner = _shrunk(flooded, 1)
+    sample = inner if np.count_nonzero(inner) >= SAMPLES_MIN else flooded
+    if np.count_nonzero(sample) < SAMPLES_MIN:
+        raise CalibrationError(f"only {np.count_nonzero(sample)} colour pixels belong to the paint under the click; "
+                               f"{SAMPLES_MIN} are needed. Go nearer, or draw a box over the marker.")
+    return PaintRegion(sample, _grown(flooded, RING))
+
+
+def region_in(image: YuvImage, box: Box) -> PaintRegion:
+    """The paint in a box (x0, y0, x1, y1) luma px, upper ends exclusive, and the marker that it belongs to.
+
+    Raises CalibrationError when the box lies outside the picture.
+    """
+    sample = box_mask(image, [box])
+    if not sample.any():
+        width, height = image.size
+        raise CalibrationError(f"the box {box} holds no colour pixel of the picture of {width} x {height} px.")
+    flooded = _flood(image, sample)
+    if flooded is None:
+        return PaintRegion(sample, _grown(sample, RING))
+    runs_on = not _may_be_a_marker(flooded, int(np.count_nonzero(sample)))
+    return PaintRegion(sample, _grown(sample if runs_on else flooded | sample, RING), runs_on)
+
+
+def _may_be_a_marker(flooded: Mask, sampled: int) -> bool:
+    """Not much of the picture, and of one piece: a finger's paint has no fingers itself."""
+    if np.count_nonzero(flooded) > max(REGION_MOST * flooded.size, 1.5 * sampled):
+        return False
+    contours, _ = cv2.findContours(_grown(flooded, 1).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    largest = max(contours, key=cv2.contourArea)
+    return cv2.contourArea(largest) >= SOLID * cv2.contourArea(cv2.convexHull(largest))
+
+
+def region_of(sample: Mask) -> PaintRegion:
+    """The region of a marker that the detector placed, from its inner pixels."""
+    return PaintRegion(sample, _grown(sample, RING + 1))
+
+
+def _flood(image: YuvImage, seed: Mask) -> Mask | None:
+    """What is connected with `seed` and of its colour; None when that is grey."""
+    _, cb, cr = (float(c) for c in np.median(colours_of(image, seed), axis=0))
+    level = math.hypot(cb, cr)
+    if level < MAGNITUDE_LEAST:
+        return None
+    u, v = image.u.astype(np.float32) - 128.0, image.v.astype(np.float32) - 128.0
+    along, across = (u * cb + v * cr) / level, (v * cb - u * cr) / level
+    alike = ((np.abs(across) <= math.tan(math.radians(HUE_REACH_DEG)) * along)
+             & (along >= LEVEL_REACH[0] * level) & (along <= LEVEL_REACH[1] * level))
+    _, numbers = cv2.connectedComponents(alike.astype(np.uint8), connectivity=8)
+    own = np.unique(numbers[seed & alike])
+    return np.asarray(np.isin(numbers, own[own > 0]))
+
+
+def _grown(mask: Mask, by: int) -> Mask:
+    return cv2.dilate(mask.astype(np.uint8), np.ones((2 * by + 1, 2 * by + 1), np.uint8)).astype(np.bool_)
+
+
+def _shrunk(mask: Mask, by: int) -> Mask:
+    return cv2.erode(mask.astype(np.uint8), np.ones((2 * by + 1, 2 * by + 1), np.uint8),
+                     borderValue=0).astype(np.bool_)
