@@ -19,7 +19,7 @@ from msgspec import Meta
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, changed_settings, needs_restart, save_settings
 from rhot_node.errors import NodeError
-from rhot_node.pictures import PictureBox, encode_still
+from rhot_node.pictures import PictureBox, StillFormat, encode_still
 from rhot_node.session import Sessions
 
 log = logging.getLogger(__name__)
@@ -53,7 +53,9 @@ class SetSettingsRequest(_Request, frozen=True, tag="set_settings"):
 
 
 class StillRequest(_Request, frozen=True, tag="still"):
-    """One frame as PNG, full size, in a second message part."""
+    """One frame, full size, in a second message part: PNG without loss, or JPEG where many are wanted."""
+
+    format: StillFormat = "png"
 
 
 class StartRequest(_Request, frozen=True, tag="start"):
@@ -142,18 +144,18 @@ class Responder:
             case SetSettingsRequest():
                 return {"ok": True, "restart": self._store.change(request.settings, save=request.save)}, b""
             case StillRequest():
-                return self._take_still()
+                return self._take_still(request.format)
             case StartRequest():
                 return self._start(request), b""
             case StopRequest():
                 return {"ok": True, "stopped": self._sessions.stop(request.session)}, b""
 
-    def _take_still(self) -> tuple[dict[str, Any], bytes]:
+    def _take_still(self, kind: StillFormat) -> tuple[dict[str, Any], bytes]:
         picture = self._pictures.next_still(STILL_S)
         if picture is None:
             raise NodeError(f"no frame came within {STILL_S:.0f} s; ask for the state to see what the camera does.")
-        still = encode_still(picture)
-        return {"ok": True, "format": "png", "width": still.width, "height": still.height,
+        still = encode_still(picture, kind)
+        return {"ok": True, "format": kind, "width": still.width, "height": still.height,
                 "number": picture.number, "t_node_ns": picture.t_node_ns}, still.data
 
     def _start(self, request: StartRequest) -> dict[str, Any]:

@@ -23,7 +23,6 @@ TIMEOUT_S = 2.7
 """A still may take two seconds on a node whose camera has just stopped; a client waits for three."""
 
 _FAULT_PERIOD_S = 1.0
-_ATTACHMENT_NAMES = {"still": "png", "node": "data"}
 
 log = logging.getLogger(__name__)
 
@@ -94,7 +93,7 @@ class NodeControl:
         if peer is None:
             known = ", ".join(f"{peer.node.node_id} ({peer.node.name})" for peer in self._peers.values())
             raise EngineError(f"there is no node {node_id!r} with a control channel; there is {known or 'none'}.")
-        request = {"request": "still"} if command == "still" else arguments.get("request")
+        request = _still_request(arguments) if command == "still" else arguments.get("request")
         if not isinstance(request, dict):
             raise EngineError('node needs a "request": an object as docs/node.md describes.')
         self._put(peer, client, command, request)
@@ -204,8 +203,15 @@ def _translate(name: str, command: str, parts: list[bytes]) -> tuple[Answer, byt
     if not reply.pop("ok", False):
         return refusal(EngineError(f"node {name}: {reply.get('error', 'it refused without a reason')}")), None
     if len(parts) > 1:
-        return {"ok": True, "answer": reply, "attachment": _ATTACHMENT_NAMES[command]}, parts[1]
+        name_of_part = str(reply.get("format", "png")) if command == "still" else "data"
+        return {"ok": True, "answer": reply, "attachment": name_of_part}, parts[1]
     return {"ok": True, "answer": reply}, None
+
+
+def _still_request(arguments: Arguments) -> dict[str, Any]:
+    """The format goes along when it is named; a node knows what it can do."""
+    kind = arguments.get("format")
+    return {"request": "still"} if kind is None else {"request": "still", "format": kind}
 
 
 def _read_preview(name: str, parts: list[bytes]) -> Preview | None:

@@ -55,7 +55,8 @@ class ControlPeer:
     @staticmethod
     def answer(request: dict[str, object]) -> list[bytes]:
         if request["request"] == "still":
-            return [b'{"ok": true, "width": 640}', b"\x89PNG"]
+            kind = request.get("format", "png")
+            return [f'{{"ok": true, "width": 640, "format": "{kind}"}}'.encode(), b"\x89PNG"]
         if request["request"] == "state":
             return [b'{"ok": true, "state": "fault", "message": "the camera is gone: plug it in."}']
         return [b'{"ok": false, "error": "no such request."}']
@@ -189,10 +190,11 @@ def test_broken_bytes_are_refused_and_the_engine_lives(client: EngineClient, dat
 def test_requests_go_to_the_node_and_back(client: EngineClient, peer: ControlPeer) -> None:
     still = client.command("still", node_id=1)
     assert still["png"] == b"\x89PNG" and still["answer"]["width"] == 640
+    assert client.command("still", node_id=1, format="jpeg")["jpeg"]
     assert client.command("node", node_id=1, request={"request": "state"})["answer"]["state"] == "fault"
     with pytest.raises(EngineError, match="node left: no such request"):
         client.command("node", node_id=1, request={"request": "sing"})
-    assert [request["request"] for request in peer.heard] == ["still", "state", "sing"]
+    assert [request["request"] for request in peer.heard] == ["still", "still", "state", "sing"]
 
 
 def test_a_slow_node_delays_nobody_else(client: EngineClient, peer: ControlPeer, tmp_path: Path) -> None:

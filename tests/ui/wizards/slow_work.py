@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 
@@ -24,6 +25,11 @@ def hold_the_interpreter(seconds: float, *, progress: Callable[[str, float], Non
     return "held"
 
 
+def who(*, progress: Callable[[str, float], None]) -> tuple[int, int, str]:
+    """Process id, niceness, threads of numerical libraries."""
+    return os.getpid(), os.nice(0), os.environ["OPENBLAS_NUM_THREADS"]
+
+
 def refuse(*, progress: Callable[[str, float], None]) -> None:
     """Fail on purpose."""
     raise CalibrationError("There are too few pictures; take at least five.")
@@ -31,6 +37,4 @@ def refuse(*, progress: Callable[[str, float], None]) -> None:
 
 def die(*, progress: Callable[[str, float], None]) -> None:
     """End without a word."""
-    import os
-
     os._exit(3)

@@ -79,8 +79,8 @@ class FakeRigAsker:
     def _still(self, node_id: int, number: int) -> dict[str, Any]:
         time.sleep(self.delay_s)
         now_s = time.monotonic()
-        _, png = cv2.imencode(".png", self.draw(node_id, now_s), [cv2.IMWRITE_PNG_COMPRESSION, 1])
-        return {"png": png.tobytes(), "answer": {"number": number, "t_node_ns": round(1e9 * now_s)}}
+        _, jpeg = cv2.imencode(".jpg", self.draw(node_id, now_s), [cv2.IMWRITE_JPEG_QUALITY, 98])
+        return {"jpeg": jpeg.tobytes(), "answer": {"number": number, "t_node_ns": round(1e9 * now_s)}}
 
     def _node(self, node_id: int, request: dict[str, Any]) -> dict[str, Any]:
         if request["request"] == "set_settings":
