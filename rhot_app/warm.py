@@ -14,8 +14,8 @@ from multiprocessing import get_context
 
 from rhot_app.engine.warm_up import warm_up as rehearse_tracker
 from rhot_app.project import Rig, load_rig
-from rhot_app.simulator.film import make_renderer, make_shot
 from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.simulator.shot import make_renderer, make_shot
 from rhot_app.tracking.make import make_tracker
 from rhot_node.compiled import mark_complete
 from rhot_node.detect.fast import FastDetector
@@ -37,7 +37,7 @@ def warm_tracker(rig: Rig) -> None:
 def warm_twin(_rig: Rig) -> None:
     """Compile what the digital twin draws with."""
     shot = make_shot(make_scene(twin_defaults(), seed=1), "rest", seconds=1.0)
-    make_renderer(shot, 0).render(shot.motion, t_row0_s=0.0, number=0)
+    make_renderer(shot, 0).render(shot.act.source, t_row0_s=0.0, number=0)
 
 
 STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker, "twin": warm_twin}

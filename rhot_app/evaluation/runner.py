@@ -8,8 +8,9 @@ from typing import Any, Literal
 from rhot_app.evaluation.report import figures_of
 from rhot_app.evaluation.trial import run_trial
 from rhot_app.progress import ProgressLine
-from rhot_app.simulator.film import film, make_shot, read_shot
+from rhot_app.simulator.film import film
 from rhot_app.simulator.scene import Scene
+from rhot_app.simulator.shot import make_shot, read_shot
 
 Detector = Literal["fast", "reference"]
 
@@ -18,7 +19,7 @@ def evaluate(scene: Scene, motion: str, seconds: float, work: Path, *, loss: flo
              detector: Detector = "fast") -> dict[str, Any]:
     """Figures of a motion filmed in `scene`; `work` is an empty folder. Raises RhotError."""
     shot = make_shot(scene, motion, seconds)
-    line = ProgressLine(f"rendering {seconds:g} s of {shot.motion.name}")
+    line = ProgressLine(f"rendering {seconds:g} s of {shot.act.name}")
     film(shot, work / "frames", line)
     line.finish()
     return evaluate_frames(work / "frames", work, loss=loss, detector=detector)

@@ -79,6 +79,10 @@ class HandBody:
         """(T, M, 3) m from `points`."""
         return np.asarray(points[:, self.marker_point])
 
+    def marker_positions(self, world_from_palm: Array, angles: Array) -> Array:
+        """(T, M, 3) m, the markers' centres for poses (T, 4, 4) and (T, 21)."""
+        return self.marker_centres(self.points(world_from_palm, angles))
+
     def place(self, world_from_palm: Array, angles: Array) -> Array:
         """(T, N, 12) parameters of the solids in the world for poses (T, 4, 4) and (T, 21)."""
         frames = self._forward(world_from_palm, angles)[0][:, self.row]

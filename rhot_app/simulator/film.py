@@ -1,4 +1,4 @@
-"""Film a scene to disk: both cameras' frames as raw YUV recordings, one process per camera, and the truth.
+"""Film a shot to disk: both cameras' frames as raw YUV recordings, one process per camera, and the truth.
 
 Beside them lie a rig file and each node's settings with ports of their own, so that the shot can be played to real
 daemons on one machine (docs/twin.md).
@@ -10,38 +10,18 @@ import contextlib
 import multiprocessing
 import shutil
 import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Final, Literal
 
-import msgspec
 import numpy as np
 
 from rhot_app.errors import SimulatorError
-from rhot_app.hand.model import build_model
-from rhot_app.project import save_rig
-from rhot_app.simulator.background import background_image
-from rhot_app.simulator.body import HandBody, build_body
-from rhot_app.simulator.moments import Shutter
-from rhot_app.simulator.motion import Motion, load_motion
-from rhot_app.simulator.nodes import NodePorts
-from rhot_app.simulator.render import Exposure, FrameRenderer, Optics
-from rhot_app.simulator.scene import Scene, TwinSettings, build_rig, make_scene, node_settings
-from rhot_app.simulator.solids_painter import SolidsPainter
-from rhot_app.simulator.truth import FrameTruth, save_truth, true_hand
+from rhot_app.simulator.shot import Shot, make_renderer, save_shot
+from rhot_app.simulator.truth import FrameTruth, save_truth, true_act
 from rhot_node.capture.yuv import YuvWriter
-from rhot_node.config import save_settings
-from rhot_node.files import read_document, write_document
 
 TRUTH_NAME = "truth.npz"
-RIG_NAME = "rig.json"
-SHOT_NAME = "shot.json"
-FIRST_PORT = 47810  # of the first node of a shot; ten more for each further one, beside those of real nodes
-
-FORMAT: Final = "rhot-shot"
-VERSION: Final = 1
 
 Progress = Callable[[int, int], None]
 """Called with (frames done, frames in all)."""
@@ -49,89 +29,33 @@ Progress = Callable[[int, int], None]
 _REPORT_FRAMES = 8
 
 
-class ShotFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """``shot.json``: what a folder of frames shows."""
-
-    motion: str
-    seconds: float
-    seed: int
-    hidden: list[str]
-    settings: TwinSettings
-    format: Literal["rhot-shot"] = FORMAT
-    version: Literal[1] = VERSION
-
-
-def read_shot(folder: Path) -> tuple[ShotFile, Scene]:
-    """What was filmed into `folder`, and its scene. Raises SimulatorError when it holds no complete shot."""
-    shot = read_document(folder / SHOT_NAME, ShotFile, format_name=FORMAT, version=VERSION, error=SimulatorError)
-    return shot, make_scene(shot.settings, shot.seed)
-
-
-@dataclass(frozen=True)
-class Shot:
-    """What is filmed: a scene, a motion in it, for how long, and which markers (ids) are left unpainted."""
-
-    scene: Scene
-    motion: Motion
-    seconds: float
-    hidden: frozenset[str] = frozenset()
-
-    def body(self) -> HandBody:
-        """The hand that wears the scene's markers."""
-        return build_body(build_model(self.scene.hand), self.scene.markers, self.hidden)
-
-
-def make_shot(scene: Scene, motion: str, seconds: float, hidden: frozenset[str] = frozenset()) -> Shot:
-    """A shot of the motion with this name or file. Raises SimulatorError, RigError."""
-    if not seconds > 0.0:
-        raise SimulatorError(f"a recording of {seconds:g} s cannot be; give more than 0 s.")
-    model = build_model(scene.hand)
-    return Shot(scene, load_motion(motion, model, scene.centre, scene.seed), seconds, hidden)
-
-
-def make_renderer(shot: Shot, index: int) -> FrameRenderer:
-    """The renderer of one camera of the shot."""
-    scene = shot.scene
-    settings, camera = scene.settings, scene.camera(index)
-    seed = 1000 * scene.seed + index
-    background = background_image(settings.background, camera, settings.distance_m, scene.seed)
-    painter = SolidsPainter(shot.body(), camera, background, settings.shading, seed)
-    optics = Optics(settings.psf_sigma_px, settings.noise_mid_grey, settings.noise_read)
-    shutter = Shutter(1e-9 * scene.exposure_ns, 1e-9 * scene.row_time_ns)
-    exposure = Exposure(shutter, shutter.exposure_s, settings.lamp, settings.controls)
-    return FrameRenderer(painter, background, optics, exposure, seed)
-
-
 def film(shot: Shot, folder: Path, progress: Progress | None = None) -> None:
-    """Render the shot into the new `folder`: one recording per camera, ``truth.npz``, ``rig.json``, ``shot.json``.
+    """Render the shot into the new `folder`: one recording per camera, ``truth.npz``, ``rig.json``, ``shot.json``, and
+    the nodes' settings in ``NAME.json``, their ports those of the rig file.
 
-    The nodes' settings are in ``NAME.json``, their ports those of the rig file. The folder appears only when all is
-    complete; an interrupt or error leaves nothing behind. Raises SimulatorError.
+    The folder appears only when all is complete; an interrupt or error leaves nothing behind. Raises SimulatorError.
     """
+    with new_folder(folder) as work:
+        cameras = _film_cameras(shot, work, progress)
+        save_truth(work / TRUTH_NAME, true_act(shot.act, shot.seconds, cameras))
+        save_shot(shot, work)
+
+
+@contextlib.contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """A hidden folder that becomes `folder` when the block ends, or vanishes when it fails. Raises SimulatorError when
+    `folder` exists or has no place."""
     if folder.exists():
         raise SimulatorError(f"{folder} exists already; choose another folder or remove it.")
     if not folder.parent.is_dir():
         raise SimulatorError(f"{folder.parent} is not a folder; create it first.")
     work = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
     try:
-        cameras = _film_cameras(shot, work, progress)
-        save_truth(work / TRUTH_NAME, true_hand(shot.motion, shot.body(), shot.seconds, cameras))
-        _save_nodes(shot.scene, work)
-        write_document(work / SHOT_NAME, ShotFile(shot.motion.name, shot.seconds, shot.scene.seed,
-                                                  sorted(shot.hidden), shot.scene.settings))
+        yield work
         work.chmod(0o755)
         work.replace(folder)
     finally:
         shutil.rmtree(work, ignore_errors=True)
-
-
-def _save_nodes(scene: Scene, folder: Path) -> None:
-    """The rig file and the settings of its nodes."""
-    firsts = [FIRST_PORT + 10 * index for index in range(len(scene.names))]
-    ports = tuple(NodePorts(first, first + 1, first + 2) for first in firsts)
-    for index, name in enumerate(scene.names):
-        save_settings(folder / f"{name}.json", node_settings(scene, index, ports=ports[index]))
-    save_rig(folder / RIG_NAME, build_rig(scene, ports))
 
 
 def _film_cameras(shot: Shot, folder: Path, progress: Progress | None) -> tuple[FrameTruth, ...]:
@@ -195,7 +119,7 @@ def _write_frames(shot: Shot, index: int, folder: Path, pipe: Connection) -> Fra
     with YuvWriter(folder / scene.names[index], preset.width, preset.height, scene.exposure_ns,
                    scene.row_time_ns) as writer:
         for number, t_ns in enumerate(times):
-            frame, fractions = renderer.render(shot.motion, 1e-9 * t_ns, number)
+            frame, fractions = renderer.render(shot.act.source, 1e-9 * t_ns, number)
             writer.append(t_ns, frame)
             visible.append(fractions.copy())
             if number % _REPORT_FRAMES == 0:

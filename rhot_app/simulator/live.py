@@ -19,11 +19,11 @@ from pathlib import Path
 
 from rhot_app.errors import RhotError
 from rhot_app.project import save_rig
-from rhot_app.simulator.film import Shot, make_renderer, make_shot
 from rhot_app.simulator.frame_socket import FrameSocket
 from rhot_app.simulator.nodes import READY_TIMEOUT_S, NodePorts, TwinNode
 from rhot_app.simulator.pace import Pace
 from rhot_app.simulator.scene import Scene, build_rig, node_settings
+from rhot_app.simulator.shot import Shot, make_renderer, make_shot
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 from rhot_node.capture.pace import available_delay_ns, sleep_until
 from rhot_node.capture.stream import StreamHeader
@@ -48,7 +48,7 @@ class LiveCameras:
         scene = shot.scene
         self._delay_ns = available_delay_ns(scene.exposure_ns, scene.row_time_ns, scene.preset.height)
         for renderer in self._renderers:
-            renderer.render(shot.motion, 0.0, 0)  # compiles on the first start of all; no node waits for it yet
+            renderer.render(shot.act.source, 0.0, 0)  # compiles on the first start of all; no node waits for it yet
         self._origin_ns = time.monotonic_ns()
         self._tick_ns = self._origin_ns
         self._number = 0
@@ -68,7 +68,8 @@ class LiveCameras:
         for index in order:
             t_ns = self._tick_ns + round(1e9 * scene.phases_s[index])
             began = time.thread_time()
-            frame, _ = self._renderers[index].render(self._shot.motion, 1e-9 * (t_ns - self._origin_ns), self._number)
+            t_s = 1e-9 * (t_ns - self._origin_ns)
+            frame, _ = self._renderers[index].render(self._shot.act.source, t_s, self._number)
             cost += time.thread_time() - began
             sleep_until(t_ns + self._delay_ns)
             self._sockets[index].send(StreamHeader(preset.width, preset.height, self._number, t_ns, scene.exposure_ns,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rhot_app.simulator.moments import FrameTime
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Image = NDArray[np.float32]
 Box = tuple[int, int, int, int]
 """Pixels x0 <= x < x1, y0 <= y < y1; (0, 0, 0, 0) when there are none."""
@@ -19,8 +20,35 @@ class PoseSource(Protocol):
     """Anything that says where the thing shown is at a time."""
 
     def sample(self, times_s: Array) -> tuple[Array, Array]:
-        """world_from_palm (T, 4, 4) m, or of whatever is shown, and a hand's angles (T, 21) rad at times (T,) s of the
-        scene."""
+        """world_from_palm (T, 4, 4) m, or of whatever is shown, and a hand's angles (T, 21) rad (others: (T, 0)) at
+        times (T,) s of the scene."""
+        ...
+
+
+class Solids(Protocol):
+    """Capsules and cylinders that some pose places in the world, painted ones first; fields as of `body.HandBody`."""
+
+    @property
+    def kind(self) -> Indices: ...
+    @property
+    def group(self) -> Indices: ...
+    @property
+    def marker(self) -> Indices: ...
+    @property
+    def size(self) -> Array: ...
+    @property
+    def rgb(self) -> Array: ...
+    @property
+    def margin(self) -> Array: ...
+    @property
+    def marker_count(self) -> int: ...
+
+    def place(self, transforms: Array, angles: Array) -> Array:
+        """(T, N, 12) parameters of the solids for poses (T, 4, 4) and angles (T, A)."""
+        ...
+
+    def marker_positions(self, transforms: Array, angles: Array) -> Array:
+        """(T, M, 3) m, the centres of the set's markers; NaN for those that are not there."""
         ...
 
 

@@ -8,8 +8,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rhot_app.simulator.show_arguments import add_show_arguments, show_of
+
 if TYPE_CHECKING:
     from rhot_app.simulator.scene import Scene
+
+MOST_PICTURES = 999
 
 
 def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,10 +61,14 @@ def _with(fields: dict[str, Any], chosen: dict[str, Any]) -> dict[str, Any]:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot simulate``."""
     add_scene_arguments(parser)
+    add_show_arguments(parser)
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="length of the recording (default 10)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR",
                         help="new folder for the frames (DIR/left, DIR/right), truth.npz and shot.json; to play it to "
                              "two nodes on this machine, their settings (left.json, right.json) and rig.json")
+    parser.add_argument("--pictures", type=int, default=None, metavar="N",
+                        help="N pictures per camera (DIR/left/000.png ...) instead of a recording: of a board, one at "
+                             "each place where it is held still")
     parser.add_argument("--hide", action="append", default=[], metavar="ID",
                         help="leave a marker unpainted; repeatable")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
@@ -68,20 +76,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Render; Ctrl-C leaves nothing half-written."""
+    from rhot_app.errors import SimulatorError
     from rhot_app.progress import ProgressLine
-    from rhot_app.simulator.film import film, make_shot
+    from rhot_app.simulator.film import film
+    from rhot_app.simulator.pictures import take_pictures
+    from rhot_app.simulator.shot import make_shot
 
+    if args.pictures is not None and not 1 <= args.pictures <= MOST_PICTURES:
+        raise SimulatorError(f"--pictures is a number from 1 to {MOST_PICTURES}, not {args.pictures}.")
     began = time.monotonic()
-    shot = make_shot(scene_of(args), args.motion, args.seconds, frozenset(args.hide))
-    line = ProgressLine(f"rendering {args.seconds:g} s of {shot.motion.name}")
-    film(shot, args.out.absolute(), line)
+    shot = make_shot(scene_of(args), show_of(args), args.seconds, frozenset(args.hide))
+    line = ProgressLine(f"rendering {args.seconds:g} s of {shot.act.name}" if args.pictures is None
+                        else f"taking pictures of {shot.act.name}")
+    if args.pictures is None:
+        film(shot, args.out.absolute(), line)
+    else:
+        take_pictures(shot, args.out.absolute(), args.pictures, line)
     line.finish()
-    frames = {name: len(shot.scene.frame_times_ns(k, args.seconds)) for k, name in enumerate(shot.scene.names)}
+    frames = {name: args.pictures or len(shot.scene.frame_times_ns(k, args.seconds))
+              for k, name in enumerate(shot.scene.names)}
     if args.json:
-        print(json.dumps({"out": str(args.out.absolute()), "motion": shot.motion.name, "seconds": args.seconds,
+        print(json.dumps({"out": str(args.out.absolute()), "motion": shot.act.name, "seconds": args.seconds,
                           "seed": args.seed, "preset": shot.scene.settings.preset,
                           "distance_m": shot.scene.settings.distance_m, "frames": frames,
                           "elapsed_s": round(time.monotonic() - began, 3)}))
     else:
-        print(f"{args.out}: " + ", ".join(f"{count} frames of {name}" for name, count in frames.items()))
+        what = "frames" if args.pictures is None else "pictures"
+        print(f"{args.out}: " + ", ".join(f"{count} {what} of {name}" for name, count in frames.items()))
     return 0

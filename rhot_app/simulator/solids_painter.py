@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.simulator.body import CAPSULE, HandBody
+from rhot_app.simulator.body import CAPSULE
 from rhot_app.simulator.moments import NODES, FrameTime, power_series
-from rhot_app.simulator.painter import Box, Image, PoseSource
+from rhot_app.simulator.painter import Box, Image, PoseSource, Solids
 from rhot_app.simulator.rays import light_direction, ray_table
 from rhot_app.simulator.spans import area_outside, outline
 from rhot_app.simulator.trace import Moving, View, canvas, trace
@@ -22,7 +22,7 @@ class SolidsPainter:
     """A `Painter` of solids. A marker's visible part is that of its unhidden area, 0 when it is not in front of the
     camera at all."""
 
-    def __init__(self, body: HandBody, camera: CameraModel, background: Image, shading: float, seed: int) -> None:
+    def __init__(self, body: Solids, camera: CameraModel, background: Image, shading: float, seed: int) -> None:
         """`shading`: share of the brightness that depends on how a surface faces the lamp."""
         self._body, self._camera, self._shading, self._seed = body, camera, shading, seed
         self._meta = np.stack([body.kind, body.group, body.marker], axis=1)

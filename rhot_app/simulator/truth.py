@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import zipfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import SimulatorError
+from rhot_app.simulator.acts import Act
 from rhot_app.simulator.body import HandBody
-from rhot_app.simulator.motion import Motion
+from rhot_app.simulator.prop import Prop
 
 Array = NDArray[np.float64]
 
@@ -73,30 +77,71 @@ def _interpolate(times_s: Array, values: Array, at_s: Array) -> Array:
     return np.asarray((1.0 - part) * values[after - 1] + part * values[after])
 
 
-def true_hand(motion: Motion, body: HandBody, seconds: float, cameras: tuple[FrameTruth, ...]) -> Truth:
-    """Sample the hand that was rendered, from scene time 0 to `seconds`."""
+@dataclass(frozen=True, slots=True)
+class ThingTruth:
+    """Something rigid over scene time, rig frame, m. K samples; M markers in the set's order, NaN for those it does not
+    wear; 0 on paper.
+
+    `world_from_thing` (K, 4, 4): a board's frame is that of `rhot_app.calibration.board`. `markers` (K, M, 3).
+    """
+
+    times_s: Array
+    world_from_thing: Array
+    markers: Array
+    cameras: tuple[FrameTruth, ...]
+
+
+def true_act(act: Act, seconds: float, cameras: tuple[FrameTruth, ...]) -> Truth | ThingTruth:
+    """Sample what was rendered, from scene time 0 to `seconds`."""
     times = np.arange(0.0, seconds + 1.0 / SAMPLE_HZ, 1.0 / SAMPLE_HZ)
-    transforms, angles = motion.sample(times)
-    points = body.points(transforms, angles)
-    return Truth(times, body.marker_centres(points), points[:, :21], angles, transforms, cameras)
+    transforms, angles = act.source.sample(times)
+    if isinstance(act.thing, HandBody):
+        points = act.thing.points(transforms, angles)
+        return Truth(times, act.thing.marker_centres(points), points[:, :21], angles, transforms, cameras)
+    markers = np.zeros((len(times), 0, 3))
+    if isinstance(act.thing, Prop):
+        markers = act.thing.marker_positions(transforms, angles)
+    return ThingTruth(times, transforms, markers, cameras)
 
 
-def save_truth(path: Path, truth: Truth) -> None:
+def save_truth(path: Path, truth: Truth | ThingTruth) -> None:
     """Write a truth file (numpy .npz)."""
-    frames = {f"camera{k}_{name}": getattr(camera, name) for k, camera in enumerate(truth.cameras)
+    arrays = {f"camera{k}_{name}": getattr(camera, name) for k, camera in enumerate(truth.cameras)
               for name in ("times_s", "visible")}
-    np.savez_compressed(path, times_s=truth.times_s, markers=truth.markers, joints=truth.joints.astype(np.float32),
-                        angles=truth.angles, world_from_palm=truth.world_from_palm, **frames)
+    if isinstance(truth, Truth):
+        arrays |= {"joints": truth.joints.astype(np.float32), "angles": truth.angles,
+                   "world_from_palm": truth.world_from_palm}
+    else:
+        arrays["world_from_thing"] = truth.world_from_thing
+    np.savez_compressed(path, times_s=truth.times_s, markers=truth.markers, **arrays)
 
 
 def load_truth(path: Path) -> Truth:
-    """Read a truth file; raises SimulatorError when it is missing or foreign."""
+    """Read the truth about a hand; raises SimulatorError when the file is missing, foreign, or about something else."""
+    with _opened(path) as data:
+        if "world_from_thing" in data.files:
+            raise SimulatorError(f"{path}: no hand was filmed here, so there is none to compare with.")
+        return Truth(data["times_s"], data["markers"], data["joints"].astype(np.float64), data["angles"],
+                     data["world_from_palm"], _cameras(data))
+
+
+def load_thing_truth(path: Path) -> ThingTruth:
+    """Read the truth about a board, ruler or marker; raises SimulatorError when there is none."""
+    with _opened(path) as data:
+        return ThingTruth(data["times_s"], data["world_from_thing"], data["markers"], _cameras(data))
+
+
+def _cameras(data: Any) -> tuple[FrameTruth, ...]:
+    count = sum(name.endswith("_visible") for name in data.files)
+    return tuple(FrameTruth(data[f"camera{k}_times_s"], data[f"camera{k}_visible"]) for k in range(count))
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """An open truth file; whatever is wrong with it becomes a SimulatorError."""
     try:
         with np.load(path) as data:
-            count = sum(name.endswith("_visible") for name in data.files)
-            cameras = tuple(FrameTruth(data[f"camera{k}_times_s"], data[f"camera{k}_visible"]) for k in range(count))
-            return Truth(data["times_s"], data["markers"], data["joints"].astype(np.float64), data["angles"],
-                         data["world_from_palm"], cameras)
+            yield data
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as exc:
         raise SimulatorError(f"{path}: not a truth file of a simulated run ({exc}). "
                              "Render one with `rhot simulate --out FOLDER`.") from exc

@@ -18,7 +18,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot demo": ("--motion", "--seed"),
     "rhot engine": ("--rig", "--log"),
     "rhot replay": ("LOG", "--rig"),
-    "rhot simulate": ("--motion", "--seconds", "--out"),
+    "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--lamp", "--kelvin"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json"),
     "rhot calibrate colours": ("--image", "--sample", "--markers", "--skin", "--out", "--json"),
     "rhot calibrate depth": ("--table", "--rig", "--out", "--baseline-mm", "--view-angle-deg", "--json"),

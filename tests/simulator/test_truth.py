@@ -8,25 +8,30 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.film import make_shot
+from rhot_app.simulator.body import HandBody
 from rhot_app.simulator.scene import make_scene, twin_defaults
-from rhot_app.simulator.truth import FrameTruth, Truth, load_truth, save_truth, true_hand
+from rhot_app.simulator.shot import make_shot
+from rhot_app.simulator.truth import FrameTruth, Truth, load_truth, save_truth, true_act
 
 
 def some_truth() -> Truth:
     shot = make_shot(make_scene(twin_defaults(), 1), "fast", 0.5)
     cameras = (FrameTruth(np.array([0.0, 0.1, 0.2]), np.array([[1.0, 0.5], [0.2, 1.0], [1.0, 1.0]])),
                FrameTruth(np.array([0.05, 0.15]), np.array([[0.9, 0.9], [0.8, 0.8]])))
-    return true_hand(shot.motion, shot.body(), shot.seconds, cameras)
+    truth = true_act(shot.act, shot.seconds, cameras)
+    assert isinstance(truth, Truth)
+    return truth
 
 
 def test_between_samples_the_hand_is_where_the_motion_says() -> None:
     shot, truth = make_shot(make_scene(twin_defaults(), 1), "fast", 0.5), some_truth()
     times = np.random.default_rng(1).uniform(0.0, 0.5, 50)
-    points = shot.body().points(*shot.motion.sample(times))
+    body = shot.act.thing
+    assert isinstance(body, HandBody)
+    points = body.points(*shot.act.source.sample(times))
     np.testing.assert_allclose(truth.joints_at(times), points[:, :21], atol=2e-5)
-    np.testing.assert_allclose(truth.markers_at(times), shot.body().marker_centres(points), atol=2e-5)
-    np.testing.assert_allclose(truth.angles_at(times), shot.motion.sample(times)[1], atol=1e-4)
+    np.testing.assert_allclose(truth.markers_at(times), body.marker_centres(points), atol=2e-5)
+    np.testing.assert_allclose(truth.angles_at(times), shot.act.source.sample(times)[1], atol=1e-4)
 
 
 def test_wrist_marker_is_the_wrist_joint_and_tips_lie_on_their_fingers() -> None:

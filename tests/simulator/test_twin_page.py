@@ -7,13 +7,14 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from rhot_app.simulator import controls, film, lamp, motion_file, scene
+from rhot_app.simulator import controls, lamp, motion_file, pictures, scene, shot, shows
 
 PAGE = (Path(__file__).parents[2] / "docs" / "twin.md").read_text()
 FORMATS: list[tuple[str, int, tuple[type[msgspec.Struct], ...]]] = [
     (scene.FORMAT, scene.VERSION, (scene.TwinSettings, scene.Preset, lamp.Lamp, controls.Controls)),
     (motion_file.FORMAT, motion_file.VERSION, (motion_file.MotionFile, motion_file.Key, motion_file.Sway)),
-    (film.FORMAT, film.VERSION, (film.ShotFile,)),
+    (shot.FORMAT, shot.VERSION, (shot.ShotFile, shows.HandShow, shows.BoardShow, shows.RulerShow, shows.MarkerShow)),
+    (pictures.FORMAT, pictures.VERSION, (pictures.PicturesFile, pictures.Picture)),
 ]
 
 
