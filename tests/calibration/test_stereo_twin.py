@@ -130,7 +130,8 @@ def test_a_shot_with_a_bumped_board_is_left_out() -> None:
     shots = list(views.shots)
     left, right = shots[5].views
     assert right is not None
-    shots[5] = Shot(shots[5].name, (left, replace(right, pixels=right.pixels + np.array([0.0, 3.0]))))  # moved between exposures
+    bumped = replace(right, pixels=right.pixels + np.array([0.0, 3.0]))  # between the exposures
+    shots[5] = Shot(shots[5].name, (left, bumped))
     report = calibrate(replace(views, shots=tuple(shots)), twin.starts())
     assert [(each.name, each.code) for each in report.dropped] == [("06", "residual")]
     assert figures(report).noise_px == pytest.approx(0.1, rel=0.1)
@@ -155,10 +156,10 @@ def test_the_expected_error_is_what_triangulation_shows() -> None:
         twin = stereo_twin(0)
         found = figures(calibrate(twin.views(np.random.default_rng(seed), 0.3), twin.starts()))
         stated.append(found.error_m[0])
-        point = np.array([[0.05, 0.0, 0.6]])
+        point, other = np.array([[0.05, 0.0, 0.6]]), np.array([[0.05, 0.1, 0.6]])
         models = [CameraModel(*SIZE, lens, inverse(pose), pose)
                   for lens, pose in zip(twin.lenses, twin.camera_from_world, strict=True)]
-        ends = np.stack([np.vstack([model.project(point), model.project(point + 0.1 * np.eye(3)[1])]) for model in models])
+        ends = np.stack([np.vstack([model.project(point), model.project(other)]) for model in models])
         measured = read_ruler(RulerReading(0.1, ends), found.state)
         assert measured.ratio == pytest.approx(1.0, abs=0.01)
         offs.append(locate(ends, found.state)[0] - point[0])
