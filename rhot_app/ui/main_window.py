@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QMainWindow,
     QStackedWidget,
-    QToolBar,
 )
 
 from rhot_app.ui.actions import Actions, MainToolBar
@@ -25,7 +24,7 @@ from rhot_app.ui.docks import Docks
 from rhot_app.ui.guide import page_of
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.passing import PassingNotices
-from rhot_app.ui.panels.advice_bar import AdviceBar
+from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.recordings import SHOW_FOLDER, Recordings
 from rhot_app.ui.rig_watch import RigWatch
 from rhot_app.ui.screen import Screen
@@ -69,7 +68,7 @@ class MainWindow(QMainWindow):
         self._add_docks()
         self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.toolbar)
-        self._add_advice_bar()
+        self.addToolBar(Qt.ToolBarArea.BottomToolBarArea, toolbar_of(self.advice, self))
         self._connect_actions()
         self._restore()
         self._show_rig()
@@ -88,15 +87,6 @@ class MainWindow(QMainWindow):
         self.docks.add("Hand", parts.hand, "right")
         self.docks.add("Plots", parts.plots, "bottom", title=False)
 
-    def _add_advice_bar(self) -> None:
-        bar = QToolBar("Advice", self)
-        bar.setObjectName("advicebar")
-        bar.setMovable(False)
-        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        bar.addWidget(self.advice)
-        self.addToolBar(Qt.ToolBarArea.BottomToolBarArea, bar)
-        bar.toggleViewAction().setVisible(False)
-
     def _connect_actions(self) -> None:
         a, c = self.actions_, self.controller
         self.addActions(a.all())
@@ -107,7 +97,7 @@ class MainWindow(QMainWindow):
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)
         a.nodes.triggered.connect(self.connect_nodes)
-        a.save_rig.triggered.connect(self.save_rig)
+        a.save_rig.triggered.connect(lambda: self.rig_watch.save(self.tell))
         a.close_rig.triggered.connect(c.close_rig)
         a.quit.triggered.connect(self.close)
         for action, page in ((a.cameras, "cameras"), (a.markers, "markers"), (a.hand, "hand")):
@@ -189,15 +179,6 @@ class MainWindow(QMainWindow):
         path = self.dialogs.connect_nodes(self.appearance.scheme)
         if path is not None:
             self.open_rig(path)
-
-    def save_rig(self) -> None:
-        """Write the rig as the engine has it to its file."""
-        self.controller.save_rig(self._confirm_saved)
-
-    def _confirm_saved(self, path: str) -> None:
-        self.rig_watch.look_soon()
-        self.tell(Notice("info", f"The rig was saved to {path}. What stood there before is kept in "
-                                 f"{Path(path).name}.history."))
 
     def show_rig_file(self, page: str) -> None:
         """What the rig file says, to read."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, parse_rig
 from rhot_app.ui.backend.live import Client
 from rhot_app.ui.controller import Controller
+from rhot_app.ui.models.notice import Notice
 
 LOOK_S = 1.5
 
@@ -63,6 +65,14 @@ class RigWatch:
             opened = self._controller.opened
             self._controller.link.work(look_at_rig, lambda sight: self._take(sight, opened),
                                        lambda sentence: self._rest())
+
+    def save(self, tell: Callable[[Notice], None]) -> None:
+        """Have the engine write its rig to the file it came from, and `tell` where it was written."""
+        self._controller.save_rig(lambda path: self._confirm(Path(path), tell))
+
+    def _confirm(self, path: Path, tell: Callable[[Notice], None]) -> None:
+        self.look_soon()
+        tell(Notice("info", f"The rig was saved to {path}. What stood there before is kept in {path.name}.history."))
 
     def _rest(self) -> None:
         """An engine that does not answer is told of elsewhere."""

@@ -100,6 +100,7 @@ def style_sheet(s: Scheme) -> str:
     QLineEdit, QComboBox, QSpinBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
         padding: 4px 8px; min-height: 20px; }}
     QLineEdit:focus, QComboBox:focus, QSpinBox:focus {{ border-color: {s.accent}; }}
+    QSpinBox QLineEdit {{ border: none; padding: 0; min-height: 0; }}
     QProgressBar {{ border: 1px solid {s.border}; border-radius: 4px; background: {s.panel}; height: 8px; }}
     QProgressBar::chunk {{ background: {s.accent}; border-radius: 3px; }}
     """

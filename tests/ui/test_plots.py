@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from PySide6.QtGui import QGuiApplication
+
+from rhot_app.ui.backend.live import LATENCY_COLUMNS
 
 
 def test_a_plot_pauses_resets_and_copies(tracking):
@@ -52,6 +55,20 @@ def test_the_budget_is_named_beside_the_plot_and_not_over_its_lines(tracking):
     plot = tracking.window.screen_parts.latency
     assert plot.legend.entries[0].name == "budget" and not hasattr(plot._budget, "label")
     tracking.until(lambda: plot.legend.values[0] == ("", "11.1"))
+
+
+def test_a_gap_stays_a_gap_in_the_bands(tracking):
+    plot = tracking.window.screen_parts.latency
+    plot.pause_button.setChecked(True)
+    seconds = np.linspace(-10.0, 0.0, 101)
+    rows = np.full((101, len(LATENCY_COLUMNS)), 2.0)
+    rows[30:40] = rows[41:50] = np.nan
+    plot._draw(seconds, rows, LATENCY_COLUMNS)
+    for band in plot._bands:
+        widths = sorted(polygon.boundingRect().width() for polygon in band.path().toSubpathPolygons())
+        assert widths == pytest.approx([2.9, 5.0])
+        assert all(polygon.boundingRect().right() < -7.05 or polygon.boundingRect().left() > -5.05
+                   for polygon in band.path().toSubpathPolygons())
 
 
 def test_small_values_keep_their_unit(tracking):

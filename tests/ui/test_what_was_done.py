@@ -69,6 +69,16 @@ def test_slow_simulated_cameras_are_told_calmly(tracking):
     tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
 
 
+def test_the_bar_is_as_tall_as_its_sentences(bench):
+    advice = bench.window.advice
+    bench.until(lambda: advice.parentWidget().height() < 40)
+    bench.window.tell(Notice("error", "Something is wrong."))
+    bench.window.tell(Notice("info", "Something was done."))
+    bench.until(lambda: len(advice.texts) == 2 and advice.parentWidget().height() > 45)
+    bench.window.passing.clear()
+    bench.until(lambda: advice.parentWidget().height() < 40)
+
+
 def test_a_sentence_passes_by():
     passing, done, failed = PassingNotices(), Notice("info", "done"), Notice("error", "failed")
     passing.show(done, 100.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QToolBar, QVBoxLayout, QWidget
 
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.palette import Scheme
@@ -36,6 +36,7 @@ class AdviceBar(QWidget):
         layout.setSpacing(4)
         for _ in range(SHOWN):
             layout.addWidget(self._make_line())
+        self.setFixedHeight(_LEAST_PX)  # before the toolbar around it takes the height of all lines for its own
 
     def _make_line(self) -> QWidget:
         line, mark, label, button = QWidget(), ShapeMark(18), QLabel(), QPushButton()
@@ -95,3 +96,17 @@ class AdviceBar(QWidget):
     def _act(self, index: int) -> None:
         if self._shown is not None and index < len(self._shown):
             self.acted.emit(self._shown[index].key)
+
+
+def toolbar_of(advice: AdviceBar, parent: QWidget) -> QToolBar:
+    """A toolbar that holds nothing but `advice` and cannot be moved or hidden."""
+    bar = QToolBar("Advice", parent)
+    bar.setObjectName("advicebar")
+    bar.setMovable(False)
+    bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+    bar.addWidget(advice)
+    bar.toggleViewAction().setVisible(False)
+    margins = bar.layout()
+    assert margins is not None
+    margins.setContentsMargins(0, 1, 0, 0)  # it took those of a toolbar with buttons before it had its name
+    return bar

@@ -22,6 +22,12 @@ Array = NDArray[np.float64]
 
 
 
+def _in_a_row(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """`known` (n,) without single values between gaps: they have no width, and a fill would pair the wrong edges."""
+    padded = np.concatenate([[False], known, [False]])
+    return known & (padded[:-2] | padded[2:])
+
+
 def _dotted(colour: str) -> QPen:
     """Round dots: Qt's own dotted line looks dashed at this width."""
     pen = pg.mkPen(colour, width=3)
@@ -73,7 +79,7 @@ class LatencyPlot(PlotPanel):
         p50, p99 = rows[:, :stages + 1], rows[:, stages + 1:]
         medians = np.where(np.isfinite(p50[:, :stages]), p50[:, :stages], 0.0)
         heights = np.concatenate([np.zeros((len(seconds), 1)), np.cumsum(np.maximum(medians, 0.0), axis=1)], axis=1)
-        heights[~np.isfinite(p50[:, -1])] = np.nan
+        heights[~_in_a_row(np.isfinite(p50[:, -1]))] = np.nan
         for k, edge in enumerate(self._edges):
             edge.setData(seconds, heights[:, k])
         self._whole[0].setData(seconds, p50[:, -1])
