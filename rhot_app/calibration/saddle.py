@@ -104,7 +104,9 @@ def _fit(gray: Gray, about: Array, radius: float, along: float, down: float) -> 
             damping *= 10.0
         if math.hypot(step[0], step[1]) < _STILL_PX or damping > 1e8:
             break
-    if not math.hypot(p[0] - about[0], p[1] - about[1]) < 0.5 * radius:
+    near = math.hypot(p[0] - about[0], p[1] - about[1]) < 0.6 * radius
+    crossing = abs(math.sin(p[2] - p[3])) > 0.1  # edges that fell together cross nowhere
+    if not (near and crossing):
         p[:] = math.nan
     return p
 

@@ -1,13 +1,14 @@
 """Corners to a fraction of a pixel: how far to look around each one is decided by the squares next to it.
 
 A window that reaches into neighbouring squares pulls the corner away: 11 pixels around corners that are 22 apart cost
-0.2 px of rms and 3 px of focal length on real images. Here a careful pass of cornerSubPix finds the crossing, and a
-fit of the blurred edges (`saddle`) within the free space around it gives the last digits.
+0.2 px of rms and 3 px of focal length on real images. Here the blurred edges around every corner are fitted (`saddle`)
+within the free space there is.
 """
 
 from __future__ import annotations
 
-import cv2
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,10 +17,9 @@ from rhot_app.calibration.saddle import fit_saddles
 Array = NDArray[np.float64]
 
 REACH = 0.45  # of the free space: the disc's radius
-FIRST_REACH = 0.2  # of the first pass
 WIDEST_PX, NARROWEST_PX = 12.0, 2.5  # radii of the disc: more only costs time; less does not determine a crossing
-_FIRST_WIDEST, _FIRST_NARROWEST = 5, 2
-_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-2)
+_ASTRAY = 0.12  # of the free space: a corner farther than this from where its neighbours expect it is tried again
+_ASTRAY_PX = 0.5
 
 
 def refine(gray: NDArray[np.uint8], grid: Array, *, free: float = 1.0) -> tuple[Array, float]:
@@ -27,16 +27,37 @@ def refine(gray: NDArray[np.uint8], grid: Array, *, free: float = 1.0) -> tuple[
 
     `free` says which part of the way to the next grid line is empty around a corner: less than 1 where squares hold
     markers. Returns the grid and the blur of the edges (median SD in px, of the blurrier direction). A corner whose
-    edges cannot be fitted keeps its first, careful place.
+    edges cannot be fitted becomes NaN.
     """
-    first = _careful(gray, grid, free)
-    space, directions = clearance_px(first), _directions(first)
-    radii = np.clip(REACH * free * space, NARROWEST_PX, WIDEST_PX)
-    radii = np.where(np.isfinite(space), radii, 0.0)
-    fitted = fit_saddles(gray, first.reshape(-1, 2), directions.reshape(-1, 2), radii.reshape(-1))
+    space = clearance_px(grid)
+    radii = np.where(np.isfinite(space), np.clip(REACH * free * space, NARROWEST_PX, WIDEST_PX), 0.0)
+    directions = _directions(grid)
+    fitted = fit_saddles(gray, grid.reshape(-1, 2), directions.reshape(-1, 2), radii.reshape(-1))
     places = fitted[:, :2].reshape(grid.shape)
+    expected = _expected(places)
+    again = np.linalg.norm(places - expected, axis=-1) <= np.maximum(_ASTRAY * space, _ASTRAY_PX)
+    again = ~again & np.isfinite(expected).all(axis=-1) & (radii > 0.0)  # the comparison is False for NaN
+    if again.any():
+        retried = fit_saddles(gray, expected[again], directions[again], radii[again])
+        fitted[again.reshape(-1)] = retried
+        places[again] = retried[:, :2]
     blurs = fitted[np.isfinite(fitted).all(axis=1), 2:].max(axis=1)
-    return np.where(np.isfinite(places), places, first), float(np.median(blurs)) if len(blurs) else float("nan")
+    return places, float(np.median(blurs)) if len(blurs) else float("nan")
+
+
+def _expected(grid: Array) -> Array:
+    """(rows, cols, 2) px, where the corners within two steps along rows and columns expect each one (median)."""
+    wide = np.pad(grid, ((2, 2), (2, 2), (0, 0)), constant_values=np.nan)
+    rows, cols = grid.shape[:2]
+
+    def at(row: int, col: int) -> Array:
+        return wide[2 + row:2 + row + rows, 2 + col:2 + col + cols]
+
+    guesses = [(at(0, -1) + at(0, 1)) / 2, (at(-1, 0) + at(1, 0)) / 2]
+    guesses += [2 * at(row, col) - at(2 * row, 2 * col) for row, col in ((0, 1), (0, -1), (1, 0), (-1, 0))]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a corner without neighbours: NaN is the answer
+        return np.asarray(np.nanmedian(np.stack(guesses), axis=0))
 
 
 def side_px(grid: Array) -> Array:
@@ -75,19 +96,4 @@ def _directions(grid: Array) -> Array:
         there = np.isfinite(both).all(axis=-1, keepdims=True)
         mean = np.where(there, both, 0.0).sum(axis=0)
         found[..., which] = np.arctan2(mean[..., 1], mean[..., 0])
-    return found
-
-
-def _careful(gray: NDArray[np.uint8], grid: Array, free: float) -> Array:
-    """A pass with windows so narrow that no other corner can draw them."""
-    found = grid.copy()
-    space = clearance_px(grid)
-    present = np.isfinite(space)
-    half = np.zeros(space.shape, int)
-    half[present] = np.clip(np.rint(FIRST_REACH * free * space[present]), _FIRST_NARROWEST, _FIRST_WIDEST)
-    for side in np.unique(half[present]):
-        chosen = present & (half == side)
-        start = np.ascontiguousarray(grid[chosen], np.float32).reshape(-1, 1, 2)
-        cv2.cornerSubPix(gray, start, (int(side), int(side)), (-1, -1), _STOP)
-        found[chosen] = start.reshape(-1, 2)
     return found
