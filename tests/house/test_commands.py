@@ -21,6 +21,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--lamp", "--kelvin"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json"),
     "rhot calibrate colours": ("--image", "--sample", "--markers", "--skin", "--out", "--json"),
+    "rhot calibrate time": ("--log", "--rig", "--out", "--json"),
     "rhot calibrate depth": ("--table", "--rig", "--out", "--baseline-mm", "--view-angle-deg", "--json"),
     "rhot check": ("RIG", "--json"),
     "rhot history": ("RIG", "--restore", "--json"),
