@@ -49,14 +49,15 @@ def kelvin_of(warmth: float) -> float:
 
 def relit(colours: Colours, lamp: Lamp) -> Colours:
     """(N, 3) Y, Cb, Cr by another lamp; channels clip at 0 and 255, bytes are rounded."""
-    rgb = np.clip(colours @ RGB_FROM_YCC.T * lamp.gains, 0.0, 255.0)
-    return np.rint(rgb @ YCC_FROM_RGB.T).astype(np.float32)
+    to_rgb = (RGB_FROM_YCC.T * lamp.gains).astype(np.float32)
+    rgb = np.clip(colours.astype(np.float32) @ to_rgb, 0.0, 255.0)
+    return np.rint(rgb @ YCC_FROM_RGB.T.astype(np.float32))
 
 
 def balanced(colours: Colours, warmth: float) -> Colours:
     """(N, 3) Y, Cb, Cr as the detector corrects them when it takes the light to have this warmth."""
-    chroma = np.clip(np.rint(colours @ balance_matrix(warmth).T), -128.0, 127.0)
-    return np.column_stack([colours[:, 0], chroma]).astype(np.float32)
+    chroma = np.clip(np.rint(colours @ balance_matrix(warmth).T.astype(np.float32)), -128.0, 127.0)
+    return np.column_stack([colours[:, 0], chroma])
 
 
 def relit_image(image: YuvImage, lamp: Lamp) -> YuvImage:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.colour_light import LAMPS, balanced, relit
+from rhot_app.calibration.colour_room import RoomColours
 from rhot_app.calibration.colour_samples import PaintSamples
 from rhot_node.detect.colour import Colours
 from rhot_node.detect.light import RGB_FROM_YCC
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 
 COVERAGE = 0.99  # of a marker's samples that its model shall let through by any lamp
 TOLERANCE_DEG = (6.0, 25.0)
+WANTED_DEG = 10.0  # where nothing is in the way: tomorrow's noise and shade are not in the samples
 MARGIN_DEG = 2.0  # beyond the samples
 LIGHT_ERROR = 0.08  # of warmth: what the detector leaves of another lamp
 UNKNOWN_LIGHT = 0.3  # of warmth: the same where too few markers tell the lamp
@@ -39,12 +41,11 @@ TRIES = 8  # tolerances, and magnitudes, that are compared
 class Obstacles:
     """What must not be taken for paint.
 
-    `skin` (N, 3) Y, Cb, Cr: it adjoins markers. `rooms`, per marker: (N, 3) colours of what is not that marker in
-    pictures that show it, and how many chroma pixels each row stands for.
+    `skin` (N, 3) Y, Cb, Cr: it adjoins markers. `rooms`, per marker: what surrounds it in the pictures that show it.
     """
 
     skin: Colours
-    rooms: tuple[tuple[Colours, float], ...]
+    rooms: tuple[RoomColours, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +79,7 @@ def solve_models(samples: Sequence[PaintSamples], obstacles: Obstacles) -> tuple
     models = []
     for index, paint in enumerate(paints):
         most = min(paint.wanted, _neighbours_leave(index, paints))
-        room, weight = obstacles.rooms[index]
-        tolerance, magnitude = _gate(paint, most, obstacles.skin, room, weight)
+        tolerance, magnitude = _gate(paint, most, obstacles.skin, obstacles.rooms[index])
         dark, bright = paint.luma
         models.append(ChromaModel(
             cb=round(paint.mean[0], 1), cr=round(paint.mean[1], 1), hue_tolerance_deg=round(tolerance, 1),
@@ -120,7 +120,7 @@ def _paint(colours: Colours, area: float, error: float) -> _Paint:
     now, magnitude, level = _polar(kept, hue)
     weakest = float(np.percentile(magnitude, 5.0))
     core = float(np.percentile(np.abs(now), 100.0 * COVERAGE))
-    wanted = max(float(np.percentile(away, 100.0 * COVERAGE)) for away, _ in seen) + MARGIN_DEG
+    wanted = max(MARGIN_DEG + max(float(np.percentile(away, 100.0 * COVERAGE)) for away, _ in seen), WANTED_DEG)
     dark, bright = np.percentile(kept[:, 0], (2.0, 98.0))
     return _Paint(hue, core, wanted, seen, level, weakest, (float(mean[0]), float(mean[1])),
                   (float(dark), float(bright)), area)
@@ -142,23 +142,26 @@ def _neighbours_leave(index: int, paints: list[_Paint]) -> float:
     return room
 
 
-def _gate(paint: _Paint, most: float, skin: Colours, room: Colours, weight: float) -> tuple[float, float]:
+def _gate(paint: _Paint, most: float, skin: Colours, room: RoomColours) -> tuple[float, float]:
     """Hue tolerance and least magnitude that cost least; of equals the widest tolerance and the least magnitude."""
     low, high = TOLERANCE_DEG
     most = min(max(most, low), high)
     weakest = min(float(np.percentile(magnitude, 2.0)) for _, magnitude in paint.seen)
     least = max(min(SHADE * paint.weakest, weakest), MAGNITUDE_LEAST)
     skin_away, skin_magnitude, _ = _polar(skin, paint.hue)
-    room_away, room_magnitude, _ = _polar(room, paint.hue)
+    room_away, room_magnitude, _ = _polar(room.colours, paint.hue)
+    around = room.weight * len(room.colours)
     best, best_cost = (most, least), math.inf
     for tolerance in np.linspace(most, max(min(paint.core, most), low), TRIES):
         for magnitude in np.linspace(least, max(weakest, least), TRIES):
             lost = max(float(np.mean((a > tolerance) | (m < magnitude))) for a, m in paint.seen)
             window = min(magnitude, WINDOW_LEVEL * paint.level)
             touching = _share(skin_away, skin_magnitude, tolerance, window)
-            mistaken = weight * len(room) * _share(room_away, room_magnitude, tolerance, magnitude) / paint.area
+            behind = around / room.size * _share(room_away, room_magnitude, tolerance, window)
+            mistaken = around / paint.area * _share(room_away, room_magnitude, tolerance, magnitude)
             no_shade = max(magnitude / paint.weakest - SHADE, 0.0)
-            cost = lost + min(4.0 * touching, 1.0) + min(mistaken, 1.0) + 0.3 * no_shade + 0.1 * (1 - tolerance / most)
+            cost = (lost + min(4.0 * touching, 1.0) + min(4.0 * behind, 1.0) + min(mistaken, 1.0) + 0.3 * no_shade
+                    + 0.1 * (1.0 - tolerance / most))
             if cost < best_cost - 1e-9:
                 best, best_cost = (float(tolerance), float(magnitude)), cost
     return best

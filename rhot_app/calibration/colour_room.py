@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.colour_samples import View
-from rhot_app.calibration.paint_region import Mask
+from rhot_app.calibration.paint_region import Mask, only
 from rhot_node.detect.colour import Colours, colours_of
 from rhot_node.detect.gate import ColourGate, merits
 from rhot_node.detect.image import YuvImage
@@ -20,7 +20,6 @@ HUE_STEP_DEG = 5
 HUE_BINS = 360 // HUE_STEP_DEG
 ROOM_MAGNITUDE = 14.0  # grey levels of chroma; less is a shade of grey
 ROOM_PIXELS = 20000  # of all pictures that models are tried on
-GREY = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +49,16 @@ class RoomReport:
 
     hue_px: NDArray[np.float64]
     rivals: tuple[Rival | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RoomColours:
+    """Coloured things round a marker: `colours` (N, 3) Y, Cb, Cr, each of which stands for `weight` chroma pixels of a
+    picture, in a room of `size` chroma pixels, grey ones included."""
+
+    colours: Colours
+    weight: float
+    size: float
 
 
 def survey_room(markers: MarkerSet, names: Sequence[str], views: Sequence[View]) -> RoomReport:
@@ -83,26 +92,23 @@ def outside(view: View) -> Mask:
     return room
 
 
-def room_colours(views: Sequence[View], name: str) -> tuple[Colours, float]:
-    """(N, 3) coloured things outside the markers, of the pictures that show `name`; chroma pixels a row stands for.
-
-    Pixels are counted per picture: three pictures of one room do not make it three times as large.
-    """
-    shown = [view for view in views if name in view.paint]
-    found = [colours_of(view.image, outside(view) & (_HUE_BINS[view.image.u, view.image.v] < HUE_BINS))
-             for view in shown]
+def room_colours(views: Sequence[View], name: str) -> RoomColours:
+    """The coloured things outside the markers, in the pictures that show `name`."""
+    shown = [(view, outside(view)) for view in views if name in view.paint]
+    found = [colours_of(view.image, room & (_HUE_BINS[view.image.u, view.image.v] < HUE_BINS)) for view, room in shown]
     colours = np.concatenate(found) if found else np.zeros((0, 3), np.float32)
-    step = max(1, len(colours) // ROOM_PIXELS)
-    return colours[::step], step / max(len(shown), 1)
+    step, pictures = max(1, len(colours) // ROOM_PIXELS), max(len(shown), 1)
+    size = sum(float(np.count_nonzero(room)) for _, room in shown) / pictures
+    return RoomColours(colours[::step], step / pictures, max(size, 1.0))
 
 
 def _rival(gate: ColourGate, markers: MarkerSet, index: int, name: str, view: View, picture: int,
            room: Mask) -> Rival | None:
     chroma = markers.markers[index].chroma
-    blobs = gate.blobs(_only(view.image, room), [index]).copy()
+    blobs = gate.blobs(only(view.image, room), [index]).copy()
     if not len(blobs):
         return None
-    own = gate.blobs(_only(view.image, view.paint[name].whole), [index])
+    own = gate.blobs(only(view.image, view.paint[name].whole), [index])
     shape = view.image.u.shape
     best_own = float(np.max(merits(own, chroma, shape), initial=0.0)) or view.paint[name].area
     worth = merits(blobs, chroma, shape)
@@ -110,12 +116,6 @@ def _rival(gate: ColourGate, markers: MarkerSet, index: int, name: str, view: Vi
     return Rival(name, picture, x=2.0 * float(best[SUM_X] / best[AREA]) + 0.5,
                  y=2.0 * float(best[SUM_Y] / best[AREA]) + 0.5, area_px=4.0 * float(best[AREA]),
                  passing_px=4.0 * float(blobs[:, AREA].sum()), merit=float(worth.max()) / best_own)
-
-
-def _only(image: YuvImage, where: Mask) -> YuvImage:
-    """The picture with everything but `where` grey."""
-    return YuvImage(image.y, np.where(where, image.u, GREY).astype(np.uint8),
-                    np.where(where, image.v, GREY).astype(np.uint8))
 
 
 def _hue_bins() -> NDArray[np.uint8]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.paint_region import PaintRegion, Point, region_at, region_in, region_of
+from rhot_app.calibration.paint_region import PaintRegion, Point, only, region_at, region_in, region_of
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import SAMPLES_MIN, Box, Colours, colours_of, learn_chroma_from_colours
 from rhot_node.detect.fast import DOUBTFUL, FastDetector
@@ -27,6 +27,7 @@ FRAMES_ENOUGH = 10
 VIEWS_MOST = 12  # pictures kept to search the room in
 MOVED = 0.5  # diameters from every place seen so far: another place
 TURNED = 1.12  # ratio of areas or of levels to what was seen there: another angle or light
+GROWN = 2.0  # of the area since it was seen last: no marker comes so near at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,14 +157,21 @@ class ColourSamples:
         self._detector = None
 
     def _follower(self) -> FastDetector:
-        """The real detector, with what is known so far; learnt anew only when somebody names a marker."""
+        """The real detector, with what is known so far; learnt anew only when somebody names a marker.
+
+        It is shown the last named markers alone at first: what else has their colours is not what to follow.
+        """
         if self._detector is None:
             self._detector = FastDetector(MarkerSet(markers=tuple(
                 Marker(id=f"m{k}", chroma=learn_chroma_from_colours(paint.colours), display_rgb=paint.rgb)
                 for k, paint in enumerate(self.samples))))
+            named = next(view for view in reversed(self._views) if view.paint)
+            self._detector.detect(only(named.image, np.any([one.whole for one in named.paint.values()], axis=0)))
         return self._detector
 
     def _adds(self, name: str, new: _Sight) -> bool:
+        if not 1.0 / GROWN < new.area / self._sights[name][-1].area < GROWN:
+            return False  # something else of that colour
         diameter = math.sqrt(4.0 / math.pi * new.area)
         for old in self._sights[name]:
             near = math.hypot(new.x - old.x, new.y - old.y) < MOVED * diameter

@@ -95,7 +95,7 @@ def solve_colours(samples: Sequence[PaintSamples], views: Sequence[View], *, ski
     learnt = {one.name: _marker(one, model, base) for one, model in zip(ordered, models, strict=True)}
     sampled = MarkerSet(markers=tuple(learnt.values()))
     progress("comparing the colours", 0.1)
-    separability = judge_colours(sampled, ordered, skin, [colours for colours, _ in rooms])
+    separability = judge_colours(sampled, ordered, skin, [room.colours for room in rooms])
     room = survey_room(sampled, names, views)
     failures = rehearse(sampled, names, views, lambda text, share: progress(text, 0.3 + 0.7 * share))
     free = free_paints([np.degrees(model.hue_rad) for model in models], room.hue_px)

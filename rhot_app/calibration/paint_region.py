@@ -19,6 +19,9 @@ Point = tuple[float, float]
 
 HUE_REACH_DEG = 16.0  # of the same paint in other shade, noise included
 LEVEL_REACH = (0.42, 2.0)  # of the sample's chroma: shade, and the edge where half the pixel is paint
+SEED = 40  # chroma pixels; a smaller box only says where the paint is, which is taken from round it
+SEED_HUE_DEG, SEED_LEVEL = 8.0, (0.65, 1.5)  # ... as far as it is plainly the same
+GREY = 128  # chroma of grey, bytes
 SOLID = 0.7  # of its convex hull that a marker fills, half hidden ones included
 REGION_MOST = 0.2  # of the picture; more is the room, or an arm, and no marker
 
@@ -80,6 +83,10 @@ def region_in(image: YuvImage, box: Box) -> PaintRegion:
     flooded = _flood(image, sample)
     if flooded is None:
         return PaintRegion(sample, _grown(sample, RING))
+    if np.count_nonzero(sample) < SEED:
+        alike = _flood(image, sample, SEED_HUE_DEG, SEED_LEVEL)
+        if alike is not None and _may_be_a_marker(alike, SEED):
+            sample = sample | _shrunk(alike, 1)
     runs_on = not _may_be_a_marker(flooded, int(np.count_nonzero(sample)))
     return PaintRegion(sample, _grown(sample if runs_on else flooded | sample, RING), runs_on)
 
@@ -98,7 +105,14 @@ def region_of(sample: Mask) -> PaintRegion:
     return PaintRegion(sample, _grown(sample, RING + 1))
 
 
-def _flood(image: YuvImage, seed: Mask) -> Mask | None:
+def only(image: YuvImage, where: Mask) -> YuvImage:
+    """The picture with everything but `where` (H/2, W/2) grey."""
+    return YuvImage(image.y, np.where(where, image.u, GREY).astype(np.uint8),
+                    np.where(where, image.v, GREY).astype(np.uint8))
+
+
+def _flood(image: YuvImage, seed: Mask, hue_deg: float = HUE_REACH_DEG,
+           levels: tuple[float, float] = LEVEL_REACH) -> Mask | None:
     """What is connected with `seed` and of its colour; None when that is grey."""
     _, cb, cr = (float(c) for c in np.median(colours_of(image, seed), axis=0))
     level = math.hypot(cb, cr)
@@ -106,8 +120,8 @@ def _flood(image: YuvImage, seed: Mask) -> Mask | None:
         return None
     u, v = image.u.astype(np.float32) - 128.0, image.v.astype(np.float32) - 128.0
     along, across = (u * cb + v * cr) / level, (v * cb - u * cr) / level
-    alike = ((np.abs(across) <= math.tan(math.radians(HUE_REACH_DEG)) * along)
-             & (along >= LEVEL_REACH[0] * level) & (along <= LEVEL_REACH[1] * level))
+    alike = ((np.abs(across) <= math.tan(math.radians(hue_deg)) * along)
+             & (along >= levels[0] * level) & (along <= levels[1] * level))
     _, numbers = cv2.connectedComponents(alike.astype(np.uint8), connectivity=8)
     own = np.unique(numbers[seed & alike])
     return np.asarray(np.isin(numbers, own[own > 0]))
