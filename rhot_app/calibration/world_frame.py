@@ -108,14 +108,13 @@ def _stance(name: str, world_from_camera: Array) -> CameraStance:
 def _stance_findings(stances: Sequence[CameraStance]) -> list[Finding]:
     found = []
     for each in stances:
-        if each.height_m <= 0.0 or each.down_rad <= 0.0:
-            where = "below the table" if each.height_m <= 0.0 else "looking up from it"
-            found.append(Finding("gravity", Grade.POOR, f"{each.name.capitalize()} would stand {where} "
-                                 f"(height {each.height_m * 1e3:.0f} mm, looking down by "
-                                 f"{np.degrees(each.down_rad):.0f} degrees).",
-                                 "The board does not lie on the table with its printed side up.",
-                                 "Lay it flat on the table and take the picture again."))
-        elif abs(each.roll_rad) > _LEVEL_RAD:
+        if each.down_rad < 0.0:
+            found.append(Finding("gravity", Grade.FAIR, f"{each.name.capitalize()} looks up from the table by "
+                                 f"{-np.degrees(each.down_rad):.0f} degrees.",
+                                 "The board may stand, or lie on something that is not level.",
+                                 "If the camera does not look up, lay the board flat on the table and take the picture "
+                                 "again."))
+        if abs(each.roll_rad) > _LEVEL_RAD:
             found.append(Finding("roll", Grade.FAIR, f"{each.name.capitalize()} is rolled by "
                                  f"{np.degrees(each.roll_rad):.0f} degrees against the table.",
                                  "The board does not lie level, or the camera is mounted askew.",
