@@ -98,6 +98,7 @@ class NodesDialog(QDialog):
         host.setMinimumWidth(180)
         host.textChanged.connect(self._forget_answers)
         port.setRange(1, 65535)
+        port.setMinimumHeight(30)
         port.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
         port.setValue(CONTROL_PORT)
         port.setToolTip("Where the node takes orders. The default is right unless its settings file says otherwise.")

@@ -97,10 +97,9 @@ def style_sheet(s: Scheme) -> str:
     QHeaderView::section {{ background: {s.panel}; color: {s.muted}; border: none; padding: 4px 10px; }}
     QTableView::item {{ padding: 0 6px; }}
     QStatusBar {{ background: {s.panel}; border-top: 1px solid {s.border}; }}
-    QLineEdit, QComboBox, QSpinBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
+    QLineEdit, QComboBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
         padding: 4px 8px; min-height: 20px; }}
-    QLineEdit:focus, QComboBox:focus, QSpinBox:focus {{ border-color: {s.accent}; }}
-    QSpinBox QLineEdit {{ border: none; padding: 0; min-height: 0; }}
+    QLineEdit:focus, QComboBox:focus {{ border-color: {s.accent}; }}
     QProgressBar {{ border: 1px solid {s.border}; border-radius: 4px; background: {s.panel}; height: 8px; }}
     QProgressBar::chunk {{ background: {s.accent}; border-radius: 3px; }}
     """
