@@ -51,7 +51,8 @@ class MainWindow(QMainWindow):
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, self.tell)
         self.rig_watch = RigWatch(controller)
-        self.wizards = Launcher(controller.backend.asker, lambda: self.appearance.scheme, settings, self)
+        self.wizards = Launcher(controller.backend.asker, controller.backend.client,
+                                lambda: self.appearance.scheme, settings, self)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
         scheme = scheme_named(settings.scheme)

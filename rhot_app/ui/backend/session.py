@@ -18,6 +18,7 @@ from typing import Any, Protocol
 import msgspec
 
 from rhot_app.engine.client import EngineClient
+from rhot_app.engine.codec import Published
 from rhot_app.engine.directory import EngineDirectory, open_directory
 from rhot_app.engine.process import (
     end_started,
@@ -82,8 +83,24 @@ class Asker(Protocol):
         ...
 
 
+class Listener(Protocol):
+    """Hears what the engine publishes; one per thread."""
+
+    def poll(self) -> list[Published]:
+        """Everything that arrived since the last call; never waits."""
+        ...
+
+    def close(self) -> None:
+        """Disconnect."""
+        ...
+
+
 class Backend(Protocol):
     """What the window needs of the processes; `Session` is the real one."""
+
+    def client(self) -> Listener:
+        """A client that hears the hand's states."""
+        ...
 
     def asker(self) -> Asker:
         """A client that only gives commands; for workers, each its own."""

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, parse_rig
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.session import Asker, Listener
 from rhot_app.ui.job import Job
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.shapes import shape_icon
@@ -43,11 +43,12 @@ class Launcher(QObject):
     rig_used = Signal()
     failed = Signal(str)
 
-    def __init__(self, connect: Callable[[], Asker], scheme: Callable[[], Scheme], memory: Memory,
-                 window: QWidget) -> None:
+    def __init__(self, connect: Callable[[], Asker], listen: Callable[[], Listener], scheme: Callable[[], Scheme],
+                 memory: Memory, window: QWidget) -> None:
         super().__init__(window)
         self._memory = memory
         self._connect = connect
+        self._listen = listen
         self._scheme = scheme
         self._window = window
         self._job: Job | None = None
@@ -96,7 +97,8 @@ class Launcher(QObject):
 
     def _show(self, wizard: Wizard, now: RigNow) -> None:
         self._job = None
-        kit = Kit(now.rig, now.path, self._connect, self._scheme(), self._memory, now.node_settings)
+        kit = Kit(now.rig, now.path, self._connect, self._scheme(), self._memory, now.node_settings,
+                  self._listen)
         self.wizard = WizardWindow(wizard.make_plan(kit), kit, self._window)
         self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
         self.wizard.finished.connect(self._forget)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rhot_app.project import Rig
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.session import Asker, Listener
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.memory import Memory
 from rhot_app.ui.wizards.page import Page
@@ -18,7 +18,8 @@ from rhot_app.ui.wizards.page import Page
 class Kit:
     """What every wizard is given: the rig in force, its file (None: it came from none), a way to ask the engine, the
     colours of the screen, and what was entered before. Node settings by node id are as the nodes gave them when the
-    wizard was opened."""
+    wizard was opened. `listen` makes a client that hears the hand's states, for wizards that calibrate by a moving
+    hand."""
 
     rig: Rig
     rig_path: Path | None
@@ -26,6 +27,7 @@ class Kit:
     scheme: Scheme
     memory: Memory
     node_settings: dict[int, dict[str, Any]] = field(default_factory=dict)
+    listen: Callable[[], Listener] | None = None
 
 
 @dataclass(frozen=True, slots=True)

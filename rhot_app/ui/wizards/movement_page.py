@@ -1,0 +1,76 @@
+"""The page of a recorded movement: one large button; the engine is asked in a worker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtWidgets import QLabel, QPushButton
+
+from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.job import Job
+from rhot_app.ui.wizards.models.movement import MovementStep, Request
+from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.page import Page
+from rhot_app.ui.wizards.state_feed import StateFeed
+
+_LABELS = {"waiting": "Record", "beginning": "Record", "recording": "Stop", "ending": "Stop",
+           "recorded": "Record again"}
+
+
+class MovementPage(Page):
+    """Begins and ends the recording of a `MovementStep`."""
+
+    def __init__(self, step: MovementStep, connect: Callable[[], Asker], states: StateFeed) -> None:
+        super().__init__(step)
+        self._movement = step
+        self._connect = connect
+        self._states = states
+        self._job: Job | None = None
+        self.button = QPushButton()
+        self.button.setAutoDefault(False)
+        self.button.setToolTip("Space. Begins or ends the recording; it ends by itself when the time is over.")
+        self.button.clicked.connect(self._press)
+        note = QLabel("The engine records what the cameras send, into a file that goes when this window closes.")
+        note.setWordWrap(True)
+        note.setProperty("muted", True)
+        self.column.addWidget(self.button)
+        self.column.addWidget(note)
+        self.column.addStretch(1)
+
+    def entered(self) -> None:
+        """Hear the hand from now on."""
+        self._states.start()
+
+    def _press(self) -> None:
+        if self._movement.capture():
+            self.changed.emit()
+
+    def show_view(self, view: StepView) -> None:
+        """The button's word; ask the engine what the step wants."""
+        phase = self._movement.phase
+        self.button.setText(_LABELS[phase])
+        self.button.setEnabled(phase in ("waiting", "recording", "recorded"))
+        request = self._movement.request()
+        if request is not None:
+            self._job = Job(lambda progress: self._ask(request), lambda _: self._answered(request), self._refused, None,
+                            self).start()
+
+    def _ask(self, request: Request) -> None:
+        asker = self._connect()
+        try:
+            if request.kind == "end":
+                asker.command("record_stop")
+            else:
+                if not asker.command("hello").get("running", True):
+                    asker.command("start")
+                asker.command("record", path=str(request.path))
+        finally:
+            asker.close()
+
+    def _answered(self, request: Request) -> None:
+        self._movement.answered(request)
+        self.changed.emit()
+
+    def _refused(self, sentence: str) -> None:
+        self._movement.refused(sentence)
+        self.changed.emit()
