@@ -58,7 +58,9 @@ class Twin:
             return None
         if rng is not None:
             pixels = pixels + rng.normal(0.0, noise_px, pixels.shape)
-        return BoardView(pixels, np.arange(len(pixels)), *SIZE, 20.0, 2.0, f"{self.names[camera]}")
+        grid = pixels.reshape(self.board.rows, self.board.cols, 2)
+        side = min(float(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min()) for axis in (0, 1))
+        return BoardView(pixels, np.arange(len(pixels)), *SIZE, side, 2.0, self.names[camera])
 
 
 def stereo_twin(seed: int = 0, shots: int = 14, board: Board = BOARD) -> Twin:
