@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.geometry.transforms import best_rotation, fit_rigid, rigid
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, neutral_pose
@@ -71,7 +72,11 @@ def start_poses(model: HandModel, wrist: Array, tips: Array) -> list[HandPose]:
         angles = np.clip(angles, *model.limits.T)
         at_rest = forward(model, HandPose(np.eye(4), angles))
         shape = np.vstack([at_rest.joints[0], at_rest.marker_centres])
-        world = _laid_on(markers[seen], shape[seen], about_first=bool(seen[0]))
+        if seen[0]:  # the wrist is where the hand is: turn about it
+            turn = best_rotation((markers[seen] - wrist).T @ (shape[seen] - shape[0]))
+            world = rigid(turn, wrist - turn @ shape[0])
+        else:
+            world = fit_rigid(shape[seen], markers[seen])
         poses.append(HandPose(world, angles))
         # The same hand turned about its long axis: few tips, or tips in a row, do not show which side is the back.
         tip = markers[1:][seen[1:]].mean(axis=0)
@@ -80,16 +85,6 @@ def start_poses(model: HandModel, wrist: Array, tips: Array) -> list[HandPose]:
         turned[:3, :3] = (2.0 * np.outer(axis, axis) - np.eye(3)) @ world[:3, :3]
         poses.append(HandPose(turned, angles))
     return poses
-
-
-def _laid_on(markers: Array, shape: Array, *, about_first: bool) -> Array:
-    """world_from_palm (4, 4) that lays `shape` (N, 3) m on `markers` (N, 3) m, about the first or their middle."""
-    to, origin = (markers[0], shape[0]) if about_first else (markers.mean(axis=0), shape.mean(axis=0))
-    u, _, vt = np.linalg.svd((markers - to).T @ (shape - origin))
-    world = np.eye(4)
-    world[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    world[:3, 3] = to - world[:3, :3] @ origin
-    return world
 
 
 def _fit_from(model: HandModel, wrist: Array, tips: Array, start: HandPose, previous: HandPose | None, dt_s: float,

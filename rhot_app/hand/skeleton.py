@@ -39,6 +39,10 @@ ANGLE_SLICES: tuple[slice, ...] = (slice(0, 5), *(slice(5 + 4 * k, 9 + 4 * k) fo
 JOINT_SLICES: tuple[slice, ...] = tuple(slice(1 + 4 * k, 5 + 4 * k) for k in range(5))
 """Slice of `JOINTS` that belongs to each finger, in the order of `FINGERS`."""
 
+BONES: tuple[tuple[str, str, str], ...] = (("metacarpal", "proximal", "distal"),
+                                           *(("proximal", "medial", "distal"),) * 4)
+"""Names of each finger's three bones from its root to its tip, in the order of `FINGERS`."""
+
 TIP_ROLES: tuple[str, ...] = tuple(f"{finger}_tip" for finger in FINGERS)
 WRIST_ROLE = "wrist"
 
