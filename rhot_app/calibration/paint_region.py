@@ -39,8 +39,8 @@ class PaintRegion:
 
     @property
     def area(self) -> float:
-        """Size of the whole marker, its soft edge halved, chroma px."""
-        return 0.5 * (float(np.count_nonzero(self.whole)) + float(np.count_nonzero(_shrunk(self.whole, 2 * RING))))
+        """Size of the whole marker without the margin of `whole`, chroma px."""
+        return float(np.count_nonzero(_shrunk(self.whole, RING)))
 
 
 def region_at(image: YuvImage, point: Point) -> PaintRegion:
@@ -102,7 +102,7 @@ def _may_be_a_marker(flooded: Mask, sampled: int) -> bool:
 
 def region_of(sample: Mask) -> PaintRegion:
     """The region of a marker that the detector placed, from its inner pixels."""
-    return PaintRegion(sample, _grown(sample, RING + 1))
+    return PaintRegion(sample, _grown(_grown(sample, 1), RING))
 
 
 def only(image: YuvImage, where: Mask) -> YuvImage:

@@ -1,0 +1,173 @@
+"""Colour calibration: models that bear other lamps, and a verdict that says what will go wrong."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import pytest
+from colour_scenes import PAINTS, RADIUS, SKIN, WOOD, box, picture, place
+from marker_rendering import Rgb
+
+from rhot_app.calibration.colour_light import LAMPS
+from rhot_app.calibration.colour_room import hue_histogram
+from rhot_app.calibration.colour_samples import ColourSamples
+from rhot_app.calibration.colours import NO_COLOURS, ColourReport, solve_colours
+from rhot_app.calibration.verdict import Grade
+from rhot_app.errors import CalibrationError
+from rhot_node.detect.colour import box_mask, colours_of
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.light import gains_of
+from rhot_node.detect.reference import ReferenceDetector
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+
+RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
+
+
+def calibrate(image: YuvImage, names: tuple[str, ...] = tuple(PAINTS), skin: bool = False, **given) -> ColourReport:
+    collector = ColourSamples()
+    for name in names:
+        collector.add(name, image, box(name))
+    x, y = place(names[0])
+    finger = box_mask(image, [(round(x) - 5, round(y) + 30, round(x) + 5, round(y) + 60)])
+    return solve_colours(collector.samples, collector.views, skin=colours_of(image, finger) if skin else NO_COLOURS,
+                         **given)
+
+
+def misplaced(report: ColourReport, image: YuvImage, shift: tuple[float, float] = (0.0, 0.0)) -> list[str]:
+    wrong = []
+    for name, seen in zip(report.names, FastDetector(report.markers).detect(image), strict=True):
+        x, y = place(name, shift)
+        if not seen.found or math.hypot(seen.x - x, seen.y - y) > 0.3 * RADIUS:
+            wrong.append(name)
+    return wrong
+
+
+@pytest.fixture(scope="module")
+def six() -> ColourReport:
+    return calibrate(picture(), skin=True)
+
+
+def test_six_paints_are_learnt_named_and_told_apart(six: ColourReport) -> None:
+    assert six.verdict.acceptable
+    assert not {"overlap", "same-colour", "skin", "room", "fails", "lamp"} & six.verdict.codes
+    assert [marker.role for marker in six.markers.markers] == [
+        "thumb_tip", "index_tip", "middle_tip", "ring_tip", "little_tip", "wrist"]
+    assert six.markers.markers[5].shape == "band"
+    assert min(six.separability.coverage) >= 0.99
+    for marker, nominal in zip(six.markers.markers, RHOT6.markers, strict=True):
+        away = math.remainder(marker.chroma.hue_rad - nominal.chroma.hue_rad, 2 * math.pi)
+        assert abs(math.degrees(away)) < 3.0
+
+
+@pytest.mark.parametrize("lamp", [lamp for lamp in LAMPS if lamp.warmth in (-0.54, 0.54, 0.0)], ids=str)
+def test_no_marker_is_lost_by_another_lamp(six: ColourReport, lamp) -> None:
+    shift = (11.0, 23.0)
+    shown = picture(shift=shift, light=lamp.brightness ** (1 / 2.2), gains=tuple(gains_of(lamp.warmth)), seed=7)
+    assert misplaced(six, shown, shift) == []
+
+
+def test_the_thesis_detector_gets_bounds_of_its_own(six: ColourReport) -> None:
+    for name, seen in zip(six.names, ReferenceDetector(six.markers).detect(picture(seed=3)), strict=True):
+        assert math.hypot(seen.x - place(name)[0], seen.y - place(name)[1]) < 0.35 * RADIUS, name
+
+
+def test_one_paint_twice_is_not_usable() -> None:
+    report = calibrate(picture({"thumb": PAINTS["ring"], "index": PAINTS["ring"], "middle": PAINTS["middle"]}),
+                       ("thumb", "index", "middle"))
+    assert "same-colour" in report.verdict.codes
+    assert report.verdict.grade is Grade.POOR
+    worst = report.verdict.findings[0]
+    assert worst.figure.startswith("thumb and index overlap by")
+    assert "Use another paint" in worst.remedy
+    assert report.separability.pair("thumb", "index") > 0.35 > report.separability.pair("thumb", "middle")
+
+
+ORANGE: Rgb = (214, 140, 104)  # nearly skin
+
+
+def test_a_paint_like_skin_is_warned_of_with_the_figure_and_what_to_do() -> None:
+    report = calibrate(picture({**PAINTS, "thumb": ORANGE}, background=(60, 62, 66)), skin=True)
+    (finding,) = [one for one in report.verdict.findings if one.code == "skin"]
+    share = round(100 * report.separability.pair("thumb", "skin"))
+    assert finding.figure == f"thumb and skin overlap by {share} %."
+    assert "grey border" in finding.remedy
+    assert f"thumb and skin overlap by {share} %" in report.separability.sentences
+
+
+def test_a_thing_in_the_room_of_the_same_colour_is_named_with_its_place() -> None:
+    clutter = [(291.0, 30.0, 24.0, PAINTS["middle"])]
+    report = calibrate(picture(clutter=clutter, background=(60, 62, 66)))
+    (finding,) = [one for one in report.verdict.findings if one.code == "room"]
+    rival = report.room.rivals[report.names.index("middle")]
+    assert rival is not None and rival.merit > 1.0
+    assert math.hypot(rival.x - 291, rival.y - 30) < 3.0
+    assert rival.area_px == pytest.approx(math.pi * 24**2, rel=0.1)
+    assert "middle" in finding.figure
+    green = round((math.degrees(RHOT6.markers[2].chroma.hue_rad) + 180) / 5)
+    assert report.room.hue_px[green - 1:green + 1].sum() == pytest.approx(math.pi * 12**2, rel=0.15)
+
+
+def test_a_dull_thing_of_the_same_hue_is_kept_out_by_the_magnitude() -> None:
+    dull = (110, 135, 113)
+    report = calibrate(picture(clutter=[(291.0, 30.0, 24.0, dull)], background=(60, 62, 66)))
+    assert not {"room", "fails"} & report.verdict.codes
+    assert misplaced(report, picture(clutter=[(291.0, 30.0, 24.0, dull)], background=(60, 62, 66), seed=4)) == []
+
+
+def test_free_paints_are_far_from_all_that_are_worn(six: ColourReport) -> None:
+    three = calibrate(picture({name: PAINTS[name] for name in ("thumb", "middle", "index")}, background=(90, 92, 95)),
+                      ("thumb", "middle", "index"))
+    assert not {"magenta", "green", "yellow", "orange", "red"} & set(three.free)
+    assert {"cyan", "azure", "blue"} & set(three.free)
+    assert not {"magenta", "green", "yellow", "cyan", "blue", "pink"} & set(six.free)
+
+
+def test_base_markers_keep_what_is_not_a_colour() -> None:
+    report = calibrate(picture(), ("ring", "thumb"), base=RHOT6)
+    assert report.markers.ids == RHOT6.ids
+    assert report.names == ("thumb", "ring")
+    ring, nominal = report.markers.markers[3], RHOT6.markers[3]
+    assert (ring.radius_mm, ring.shape, ring.role) == (nominal.radius_mm, nominal.shape, nominal.role)
+    assert ring.chroma != nominal.chroma
+    assert report.markers.markers[1] == RHOT6.markers[1]
+    with pytest.raises(CalibrationError, match="no marker 'toe'"):
+        collector = ColourSamples()
+        collector.add("toe", picture(), box("ring"))
+        solve_colours(collector.samples, collector.views, base=RHOT6)
+
+
+def test_burnt_and_weak_paint_is_told_with_the_remedy() -> None:
+    burnt = calibrate(picture({**PAINTS, "index": (300, 280, 40)}, background=(60, 62, 66)))
+    assert "exposure" in next(one for one in burnt.verdict.findings if one.code == "burnt").remedy
+    weak = calibrate(picture({**PAINTS, "ring": (100, 132, 142)}, background=(60, 62, 66)))
+    assert any(one.code == "pale" and "ring" in one.figure for one in weak.verdict.findings)
+
+
+def test_nothing_is_solved_without_samples() -> None:
+    with pytest.raises(CalibrationError, match="no samples"):
+        solve_colours([], [])
+
+
+def test_mask_and_histogram_of_a_live_picture_take_little_of_a_tenth_of_a_second() -> None:
+    gate, image = ColourGate(RHOT6), picture()
+    large = YuvImage(*(np.tile(plane, (2, 2)) for plane in (image.y, image.u, image.v)))
+    times = []
+    for _ in range(12):
+        start = time.perf_counter()
+        labels = gate.labels(large)
+        hue_histogram(large, labels == 0)
+        [np.count_nonzero(labels == k + 1) for k in range(6)]
+        times.append(time.perf_counter() - start)
+    assert min(times) < 0.04, f"{1e3 * min(times):.1f} ms"
+
+
+def test_wood_and_skin_are_no_markers_colour(six: ColourReport) -> None:
+    gate = ColourGate(six.markers)
+    bare = picture({}, background=WOOD)
+    finger = picture({"thumb": SKIN}, background=WOOD)
+    assert np.count_nonzero(gate.labels(bare)) == np.count_nonzero(gate.labels(finger)) == 0
