@@ -11,6 +11,8 @@ from rhot_app.ui.panels.state_badge import StateBadge
 from rhot_app.ui.shapes import shape_icon
 from rhot_app.ui.wizards.catalogue import WIZARDS
 
+_CALM_MS = 100  # the system may report the mouse over the button once more when the menu above it has gone
+
 
 class Actions(QObject):
     """Every action of the window; what they do is connected by the window."""
@@ -106,7 +108,7 @@ class MainToolBar(QToolBar):
         button.setMenu(menu)
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        menu.aboutToHide.connect(lambda: QTimer.singleShot(0, lambda: _calm_down(button)))
+        menu.aboutToHide.connect(lambda: QTimer.singleShot(_CALM_MS, lambda: _calm_down(button)))
         self.addWidget(button)
         return button
 

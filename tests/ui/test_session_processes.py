@@ -112,6 +112,15 @@ def test_simulated_nodes_are_started_watched_and_ended(session, stand_in):
     wait_until(lambda: not session.twin_alive())
 
 
+def test_the_twin_may_catch_up(tmp_path):
+    output = tmp_path / "twin.out"
+    slow, in_time = (f'{{"event": "{word}", "achieved_hz": 20.0, "preset_hz": 40.0}}\n' for word in ("slow", "in_time"))
+    output.write_text(slow + in_time)
+    assert session_module._pace_in(output) is None
+    output.write_text(slow + in_time + slow)
+    assert session_module._pace_in(output) == TwinPace(20.0, 40.0)
+
+
 def test_a_twin_that_cannot_start_says_why(session, stand_in):
     with pytest.raises(SimulatorError, match=r"did not start.*no such motion"):
         session.open_twin(TwinChoice(motion="no_such_motion"), quiet)

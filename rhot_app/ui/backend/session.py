@@ -276,11 +276,13 @@ class Session:
 
 
 def _pace_in(output: Path) -> TwinPace | None:
-    """The newest whole line about the pace: ``{"event": "slow", "achieved_hz": …, "preset_hz": …}``."""
+    """The newest whole line about the pace: ``{"event": "slow", "achieved_hz": …, "preset_hz": …}``, or "in_time"."""
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
         whole_lines, _, _ = output.read_text().rpartition("\n")
         for line in reversed(whole_lines.splitlines()):
             event = json.loads(line)
+            if event.get("event") == "in_time":
+                return None
             if event.get("event") == "slow":
                 return TwinPace(float(event["achieved_hz"]), float(event["preset_hz"]))
     return None
