@@ -30,4 +30,8 @@ class Wizard:
         return plan
 
 
-WIZARDS: tuple[Wizard, ...] = ()
+WIZARDS: tuple[Wizard, ...] = (
+    Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),
+    Wizard("depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
+           "depth calibration"),
+)

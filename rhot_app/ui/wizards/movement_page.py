@@ -22,7 +22,7 @@ class MovementPage(Page):
 
     def __init__(self, step: MovementStep, connect: Callable[[], Asker], states: StateFeed) -> None:
         super().__init__(step)
-        self._movement = step
+        self.movement = step
         self._connect = connect
         self._states = states
         self._job: Job | None = None
@@ -42,15 +42,15 @@ class MovementPage(Page):
         self._states.start()
 
     def _press(self) -> None:
-        if self._movement.capture():
+        if self.movement.capture():
             self.changed.emit()
 
     def show_view(self, view: StepView) -> None:
         """The button's word; ask the engine what the step wants."""
-        phase = self._movement.phase
+        phase = self.movement.phase
         self.button.setText(_LABELS[phase])
         self.button.setEnabled(phase in ("waiting", "recording", "recorded"))
-        request = self._movement.request()
+        request = self.movement.request()
         if request is not None:
             self._job = Job(lambda progress: self._ask(request), lambda _: self._answered(request), self._refused, None,
                             self).start()
@@ -68,9 +68,9 @@ class MovementPage(Page):
             asker.close()
 
     def _answered(self, request: Request) -> None:
-        self._movement.answered(request)
+        self.movement.answered(request)
         self.changed.emit()
 
     def _refused(self, sentence: str) -> None:
-        self._movement.refused(sentence)
+        self.movement.refused(sentence)
         self.changed.emit()

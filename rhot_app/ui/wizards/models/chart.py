@@ -1,0 +1,41 @@
+"""What a chart of a result shows, without its widget."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.ui.wizards.models.step import Step
+
+Array = NDArray[np.float64]
+Style = Literal["line", "dashes", "dots", "faint dots", "band"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """One curve: `x` and `y` (N,). A band reaches from `y` to `high` (N,)."""
+
+    name: str
+    x: Array
+    y: Array
+    style: Style = "line"
+    high: Array | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chart:
+    """Curves over one pair of axes with their units."""
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+
+
+class ChartedStep(Step):
+    """A step with charts instead of pictures."""
+
+    charts: tuple[Chart, ...] = ()

@@ -1,0 +1,30 @@
+"""The time wizard: when each camera sees, from a waving hand."""
+
+from __future__ import annotations
+
+from rhot_app.ui.wizards.accept_page import AcceptPage
+from rhot_app.ui.wizards.chart_page import ChartPage
+from rhot_app.ui.wizards.models.accept import AcceptStep
+from rhot_app.ui.wizards.models.solve import SolveStep
+from rhot_app.ui.wizards.models.step import Task
+from rhot_app.ui.wizards.models.time_steps import SECONDS, WaveCoach, charts_of, propose, solve_log
+from rhot_app.ui.wizards.movement_kit import Movements
+from rhot_app.ui.wizards.plan import Kit, Plan
+
+
+def make_plan(kit: Kit) -> Plan:
+    """Wave, look at the fit, use it."""
+    movements = Movements(kit)
+    wave = movements.page("Wave", "Press Record, then wave your hand up and down before the cameras for 20 seconds.",
+                          SECONDS, WaveCoach)
+    movement = wave.movement
+
+    def task() -> Task | None:
+        log = movement.log
+        return None if log is None else Task("Comparing the cameras' times …", solve_log, (log, kit.rig))
+
+    solve = SolveStep(task, lambda report: report.verdict, charts_of)
+    accept = AcceptStep(lambda: propose(solve.report, kit.rig, kit.rig_path, kit.node_settings),
+                        "Record a movement first.")
+    return Plan("Time of the cameras", (wave, ChartPage(solve, kit.scheme), AcceptPage(accept, kit.scheme)),
+                solver="rhot_app.calibration.time_offset", put_back=movements.end)
