@@ -60,6 +60,7 @@ class RowTable(QTableWidget):
         self._scheme = scheme
         self.setHorizontalHeaderLabels(list(heads))
         self.verticalHeader().setVisible(False)
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -77,4 +78,3 @@ class RowTable(QTableWidget):
                 item.setFont(app_font(13.0, bold=c == 2 and row.changed))
                 item.setForeground(QColor(self._scheme.muted if c == 0 else self._scheme.text))
                 self.setItem(r, c, item)
-        self.resizeRowsToContents()

@@ -29,6 +29,7 @@ _RETRY_S = 0.3
 _KEPT = 6
 _RATE_WINDOW_S = 2.0
 _OVERTAKEN_NS = 1_000_000_000
+_STALE_NS = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,10 +96,12 @@ class LiveFeed:
     def together(self, cameras: tuple[str, ...]) -> dict[str, Picture]:
         """One recent picture of each camera, all received as nearly at the same time as can be had.
 
-        Cameras without a picture are left out.
+        Cameras without a picture of the last second are left out.
         """
+        oldest_ns = time.monotonic_ns() - _STALE_NS
         with self._lock:
-            recent = {name: list(self._pictures[name]) for name in cameras if self._pictures[name]}
+            recent = {name: list(self._pictures[name]) for name in cameras
+                      if self._pictures[name] and self._pictures[name][-1].received_ns > oldest_ns}
         if not recent:
             return {}
         anchor_ns = min(pictures[-1].received_ns for pictures in recent.values())

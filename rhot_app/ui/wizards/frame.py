@@ -130,5 +130,5 @@ class WizardFrame:
             self.close_button.setVisible(step.state != "used")
         else:
             self.next_button.setText("Next")
-            self.next_button.setEnabled(view.done and not working)
+            self.next_button.setEnabled(view.may_go_on and not working)
             self.close_button.setVisible(True)

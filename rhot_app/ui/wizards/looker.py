@@ -15,15 +15,15 @@ _IDLE_S = 0.01
 
 
 class Looker:
-    """Looks for one step at a time; `found` gives each finding once. A picture is looked at once; those that come while
-    the last ones are being looked at are left out, except the newest."""
+    """Looks for one step at a time; `found` gives each finding once. Every look has a new picture of every camera: who
+    judges whether something moved must not see the same picture twice."""
 
     def __init__(self, feed: LiveFeed) -> None:
         self._feed = feed
         self._lock = threading.Lock()
         self._step: Step | None = None
         self._found: tuple[Step, Any] | None = None
-        self._looked_at: tuple[tuple[str, int], ...] = ()
+        self._looked_at: dict[str, Picture] = {}
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="looker", daemon=True)
 
@@ -43,7 +43,7 @@ class Looker:
         with self._lock:
             self._step = step if step is not None and step.watches else None
             self._found = None
-            self._looked_at = ()
+            self._looked_at = {}
 
     def found(self, step: Step) -> Any:
         """What was found for `step` since the last call; None for nothing new."""
@@ -58,8 +58,7 @@ class Looker:
         if step is None:
             return False
         pictures = self._feed.together(step.cameras or self._feed.cameras)
-        names = _names(pictures)
-        if not pictures or names == last:
+        if not pictures or any(picture is last.get(name) for name, picture in pictures.items()):
             return False
         try:
             seen = step.see(pictures)
@@ -68,7 +67,7 @@ class Looker:
             seen = None
         with self._lock:
             if self._step is step:
-                self._looked_at = names
+                self._looked_at = pictures
                 self._found = (step, seen) if seen is not None else self._found
         return True
 
@@ -76,7 +75,3 @@ class Looker:
         while not self._ending.is_set():
             if not self.look():
                 self._ending.wait(_IDLE_S)
-
-
-def _names(pictures: dict[str, Picture]) -> tuple[tuple[str, int], ...]:
-    return tuple(sorted((name, picture.received_ns) for name, picture in pictures.items()))

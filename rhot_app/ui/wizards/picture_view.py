@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPen, QResizeEvent
@@ -160,11 +161,14 @@ class PictureWall(QWidget):
             view.setVisible(cameras is None or name in cameras)
         self._arrange()
 
-    def refresh(self, feed: LiveFeed) -> None:
-        """Newest pictures."""
+    def refresh(self, feed: LiveFeed, frozen: Mapping[str, Picture]) -> None:
+        """Newest pictures; those in `frozen` instead of them."""
         for name, view in self.views.items():
             if view.isVisible():
-                view.show_picture(feed.newest(name), feed.problem(name))
+                if name in frozen:
+                    view.show_picture(frozen[name])
+                else:
+                    view.show_picture(feed.newest(name), feed.problem(name))
                 view.tick()
 
     def show_view(self, view: StepView) -> None:

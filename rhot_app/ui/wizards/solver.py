@@ -12,7 +12,7 @@ import pickle
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from rhot_app.errors import CalibrationError
@@ -42,14 +42,15 @@ class Solver:
         with contextlib.suppress(OSError, ValueError):
             _write(process, module)
 
-    def run(self, function: Callable[..., Any], arguments: tuple[Any, ...], progress: Progress) -> Any:
-        """``function(*arguments, progress=...)``, computed over there; its progress is passed on.
+    def run(self, function: Callable[..., Any], arguments: tuple[Any, ...], progress: Progress,
+            options: Mapping[str, Any] | None = None) -> Any:
+        """``function(*arguments, progress=..., **options)``, computed over there; its progress is passed on.
 
         Raises CalibrationError with the sentence of whatever error the work ended in, StoppedError after `stop`.
         """
         process = self._started()
         try:
-            _write(process, (function, arguments))
+            _write(process, (function, arguments, dict(options or {})))
             while True:
                 assert process.stdout is not None
                 kind, *rest = pickle.load(process.stdout)

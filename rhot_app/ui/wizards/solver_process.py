@@ -1,6 +1,7 @@
 """The process in which long work of the wizards runs: ``python -m rhot_app.ui.wizards.solver_process``. No Qt.
 
-It reads pickled messages from standard input: a module's name to import in good time, or (function, arguments) to run.
+It reads pickled messages from standard input: a module's name to import in good time, or (function, arguments,
+options) to run.
 For work it writes pickled answers to standard output: ("progress", text, fraction), at last ("done", result) or
 ("failed", sentence). It ends with its input; whoever wants the work to stop ends the process.
 """
@@ -38,8 +39,8 @@ def serve(source: BinaryIO, sink: BinaryIO) -> None:
             _send(sink, _work(message, sink))
 
 
-def _work(message: tuple[Any, tuple[Any, ...]], sink: BinaryIO) -> tuple[str, Any]:
-    function, arguments = message
+def _work(message: tuple[Any, tuple[Any, ...], dict[str, Any]], sink: BinaryIO) -> tuple[str, Any]:
+    function, arguments, options = message
     reported_s = -1.0
 
     def progress(text: str, fraction: float) -> None:
@@ -50,7 +51,7 @@ def _work(message: tuple[Any, tuple[Any, ...]], sink: BinaryIO) -> tuple[str, An
             _send(sink, ("progress", text, fraction))
 
     try:
-        return "done", function(*arguments, progress=progress)
+        return "done", function(*arguments, progress=progress, **options)
     except (RhotError, NodeError, OSError) as exc:
         return "failed", str(exc)
     except Exception as exc:  # the sentence is for the screen; the trace goes where the app's own go

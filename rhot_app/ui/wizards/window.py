@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
@@ -11,7 +12,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog,
 from rhot_app.ui.guide import GuideViewer
 from rhot_app.ui.job import Job
 from rhot_app.ui.wizards.accept_page import AcceptPage
-from rhot_app.ui.wizards.feed import LiveFeed
+from rhot_app.ui.wizards.feed import LiveFeed, Picture
 from rhot_app.ui.wizards.frame import WizardFrame
 from rhot_app.ui.wizards.looker import Looker
 from rhot_app.ui.wizards.models.accept import AcceptStep, State
@@ -49,6 +50,7 @@ class WizardWindow(QDialog):
         self._dirty = True
         self._next_show = 0.0
         self._kept = 0
+        self._frozen: Mapping[str, Picture] = {}
         self._job: Job | None = None
         self._guide: GuideViewer | None = None
         self._ending: Job | None = None
@@ -104,7 +106,7 @@ class WizardWindow(QDialog):
                 self._apply(step, "used")
             elif step.state == "used":
                 self.accept()
-        elif step.view().done and not self.work.running:
+        elif step.view().may_go_on and not self.work.running:
             self._go_to(self.current + 1)
 
     def back(self) -> None:
@@ -164,7 +166,7 @@ class WizardWindow(QDialog):
 
     def tick(self) -> None:
         """Newest pictures; what was seen in them; what the step says to it."""
-        self.frame.wall.refresh(self.feed)
+        self.frame.wall.refresh(self.feed, self._frozen)
         seen = self.looker.found(self.step)
         if seen is not None:
             self.step.take(seen)
@@ -179,6 +181,7 @@ class WizardWindow(QDialog):
         self._dirty = False
         self.work.offer(self.step)
         view = self.step.view()
+        self._frozen = view.pictures
         self.plan.pages[self.current].show_view(view)
         self.frame.show_view(view, self.step, self.current, [page.step.view().done for page in self.plan.pages])
         if view.kept > self._kept:

@@ -89,7 +89,7 @@ class Work(QObject):
 
     def _compute(self, task: Task, progress: Progress) -> Any:
         try:
-            return self.solver.run(task.function, task.arguments, progress.report)
+            return self.solver.run(task.function, task.arguments, progress.report, task.options)
         except StoppedError as exc:
             if progress.cancelled:
                 raise CancelledError("Cancelled.") from exc

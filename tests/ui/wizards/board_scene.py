@@ -6,10 +6,12 @@ import cv2
 import numpy as np
 
 from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.corners import BoardView, detect
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid, rotation_from_quaternion
 from rhot_app.project import Rig
 
 _PX_PER_SQUARE = 40
+_NEAR_PX = 12.0  # perspective moves the mean of the corners off the middle's picture
 _SQUARES_BESIDE = 1.5  # white paper around the board
 
 
@@ -20,6 +22,12 @@ def board_texture(board: Chessboard) -> np.ndarray:
     squares = (np.add.outer(np.arange(rows), np.arange(cols)) % 2 * 180 + 30).astype(np.uint8)
     sheet = np.kron(squares, np.ones((_PX_PER_SQUARE, _PX_PER_SQUARE), np.uint8))
     return np.pad(sheet, margin, constant_values=215)
+
+
+def compile_search() -> None:
+    """The search for boards is compiled at its first use; tests that wait for it would wait too long."""
+    board = Chessboard(9, 6, 0.03)
+    detect(cv2.resize(board_texture(board), (320, 240), interpolation=cv2.INTER_AREA), board, thorough=False)
 
 
 class BoardScene:
@@ -48,6 +56,16 @@ class BoardScene:
         scale, first = self.board.square_m / _PX_PER_SQUARE, (_SQUARES_BESIDE + 1) * _PX_PER_SQUARE - 0.5
         board_from_texture = np.array([[scale, 0, -scale * first], [0, scale, -scale * first], [0, 0, 1]])
         return matrix @ camera_from_board[:3, [0, 1, 3]] @ board_from_texture
+
+    def seen_in(self, views: dict[str, BoardView | None]) -> bool:
+        """Whether every camera's view shows the board where it is now."""
+        return all(view is not None and self._near(node.node_id, view) for node in self.rig.nodes
+                   for view in [views.get(node.name)])
+
+    def _near(self, node_id: int, view: BoardView) -> bool:
+        middle = np.array(self._texture.shape[::-1]) / 2.0
+        spot = self.homography(node_id) @ [*middle, 1.0]
+        return bool(np.linalg.norm(view.pixels.mean(axis=0) - spot[:2] / spot[2]) < _NEAR_PX)
 
     def draw(self, node_id: int, t_s: float) -> np.ndarray:
         """What the camera sees."""

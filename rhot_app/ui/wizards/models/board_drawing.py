@@ -16,7 +16,7 @@ def board_marks(view: BoardView, board: Board, colour: str = "good") -> Overlay:
     rows = tuple(Line(row[np.isfinite(row[:, 0])], STAGE_COLOURS[k % len(STAGE_COLOURS)], width=1.5)
                  for k, row in enumerate(grid) if np.isfinite(row[:, 0]).sum() > 1)
     first = view.pixels[0]
-    return (*rows, Dots(view.pixels, colour, radius=3.0), Tag(float(first[0]) + 8, float(first[1]) - 20,
+    return (*rows, Dots(view.pixels, colour, radius=3.0), Tag(float(first[0]) - 28, float(first[1]) - 32,
                                                               str(int(view.ids[0]) + 1)))
 
 

@@ -34,7 +34,7 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Long work: ``function(*arguments, progress=...)`` runs in a process of its own, so all of it must pickle.
+    """Long work: ``function(*arguments, progress=..., **options)`` runs in a process of its own, so all must pickle.
 
     `function` stands in a module without Qt and takes a `rhot_app.progress.Progress`.
     """
@@ -42,12 +42,17 @@ class Task:
     title: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class StepView:
-    """Everything that is shown of a step at one moment. `overlays` are by camera; `hint` says why Next must wait;
-    `kept` counts what was captured, and the pictures light up when it grows."""
+    """Everything that is shown of a step at one moment.
+
+    `done` ticks it off and lets the person go on; `passable` lets them go on although more would be better. `hint` says
+    why Next must wait. `overlays` are by camera; `pictures` by camera are shown instead of the live ones. `kept` counts
+    what was captured: the pictures light up when it grows.
+    """
 
     sentence: str
     done: bool = False
@@ -55,7 +60,14 @@ class StepView:
     bars: tuple[Bar, ...] = ()
     verdict: Verdict | None = None
     overlays: Mapping[str, Overlay] = field(default_factory=dict)
+    pictures: Mapping[str, Picture] = field(default_factory=dict)
     kept: int = 0
+    passable: bool = False
+
+    @property
+    def may_go_on(self) -> bool:
+        """Whether Next means something."""
+        return self.done or self.passable
 
 
 class Step:
