@@ -54,7 +54,7 @@ class ChartView(QWidget):
             axis.setTickFont(app_font(_TEXT_PT))
             axis.setPen(scheme.border)
             axis.setTextPen(scheme.muted)
-        plot.addLegend(offset=(-10, 10), labelTextColor=scheme.text, brush=pg.mkBrush(scheme.panel))
+        plot.addLegend(offset=(-10, 1), labelTextColor=scheme.text, brush=pg.mkBrush(scheme.panel))
         tones = iter((scheme.accent, scheme.caution, scheme.good, scheme.bad, scheme.muted) * 4)
         for curve in chart.curves:
             self._add(plot, curve, QColor(next(tones)))

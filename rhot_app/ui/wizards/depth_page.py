@@ -21,7 +21,7 @@ from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.page import Page
 from rhot_app.ui.wizards.state_feed import StateFeed
 
-_HEADS = ("distance, cm", "disparity, px", "± px")
+_HEADS = ("cm", "px", "± px")
 
 
 class DistancePage(Page):
@@ -54,6 +54,7 @@ class DistancePage(Page):
         form.addRow("Disparity", self.seen)
         self.table = QTableWidget(0, len(_HEADS))
         self.table.setHorizontalHeaderLabels(list(_HEADS))
+        self.table.setToolTip("Distance, mean disparity and its spread within the second.")
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.table.verticalHeader().setVisible(False)
         self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)

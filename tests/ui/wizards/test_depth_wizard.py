@@ -54,6 +54,7 @@ def test_from_distances_to_a_rig_that_uses_them(hands, marker):
     for distance_cm in DISTANCES_CM:
         measure(hands, marker, distance_cm)
     assert page.table.rowCount() == len(DISTANCES_CM)
+    assert set(hands.window.step.view().overlays) == {"left", "right"}
     hands.next()
     assert hands.title == "The law" and hands.window.page.charts.plots
     hands.next()

@@ -15,6 +15,7 @@ from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.wizards.models.chart import Chart, ChartedStep, Curve
+from rhot_app.ui.wizards.models.drawing import Dots, Overlay, Tag
 from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Bar, Step, StepView
 
@@ -101,7 +102,17 @@ class DistanceStep(Step):
         """What to do next, and how many distances there are."""
         bars = (Bar("distances", min(len(self.rows) / ENOUGH, 1.0), f"{len(self.rows)} of {ENOUGH} or more"),
                 Bar("spread", self._spread(), "from near to far: the farthest three times the nearest"))
-        return StepView(self._sentence(), done=self.report is not None, hint=self.problem, bars=bars, kept=len(self.rows))
+        return StepView(self._sentence(), done=self.report is not None, hint=self.problem, bars=bars,
+                        overlays=self._overlays(), kept=len(self.rows))
+
+    def _overlays(self) -> dict[str, Overlay]:
+        """The chosen marker where each camera saw it last."""
+        states = self._recent(LOOK_S)
+        if not states:
+            return {}
+        name, places = self.rig.markers.ids[self.marker], states[-1].camera_pixels[:, self.marker]
+        return {camera: (Dots(place[None, :]), Tag(float(place[0]), float(place[1]), name))
+                for camera, place in zip(states[-1].camera_names, places, strict=True) if np.isfinite(place).all()}
 
     def _sentence(self) -> str:
         if not self.rows:
