@@ -115,6 +115,7 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hand: HandAnatomy
     filters: FilterSettings = FilterSettings()
     depth: DepthSettings = DepthSettings()
+    up: Literal["-y", "z"] = "-y"  # which axis of the rig frame points up: the left camera's, or a table's frame
     broadcast: Broadcast = Broadcast()
     format: Literal["rhot-rig"] = FORMAT
     version: Literal[1] = VERSION

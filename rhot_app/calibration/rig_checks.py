@@ -31,19 +31,24 @@ def check_rig(rig: Rig) -> RigReport:
     calibrated = rig.depth.mode == "stereo"
     lenses = tuple(lens_figures(node) for node in rig.nodes) if calibrated else ()
     pairs = tuple(all_pairs(rig)) if calibrated else ()
-    findings = [*camera_findings(rig, lenses, pairs), *marker_findings(rig), *hand_findings(rig), *filter_findings(rig),
-                *link_findings(rig)]
+    findings = [*_camera_findings(rig, lenses, pairs), *marker_findings(rig), *hand_findings(rig),
+                *filter_findings(rig), *link_findings(rig)]
     if len(rig.nodes) < 2:
         findings.append(Finding("one_camera", Grade.FAIR, "The rig has one camera.", "Depth needs two.",
                                 "Add a second node."))
     return RigReport(lenses, pairs, judge(_summary(rig, findings), findings))
 
 
-def camera_findings(rig: Rig, lenses: tuple[LensFigures, ...], pairs: tuple[PairGeometry, ...]) -> list[Finding]:
+def check_cameras(rig: Rig) -> list[Finding]:
     """The findings about lenses and places of the cameras only."""
+    return _camera_findings(rig, tuple(lens_figures(node) for node in rig.nodes), tuple(all_pairs(rig)))
+
+
+def _camera_findings(rig: Rig, lenses: tuple[LensFigures, ...], pairs: tuple[PairGeometry, ...]) -> list[Finding]:
+    """None where distance comes from disparity alone: no lens and no place is looked at."""
     by_lens = [finding for node, figures in zip(rig.nodes, lenses, strict=False)
                for finding in lens_findings(node, figures)]
-    return [*by_lens, *pair_findings(rig, list(pairs))]
+    return [*by_lens, *(pair_findings(rig, list(pairs)) if lenses else [])]
 
 
 def _summary(rig: Rig, findings: list[Finding]) -> str:

@@ -28,20 +28,22 @@ class KnownLengths:
 
 def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool = False,
               known: KnownLengths | None = None, remembered: Sequence[LensStart | None] = (),
-              dropped: Sequence[Dropped] = (), progress: Progress = silent) -> StereoReport:
+              dropped: Sequence[Dropped] = (), noticed: Sequence[Finding] = (),
+              progress: Progress = silent) -> StereoReport:
     """Put the cameras of `views` together.
 
     `lenses` one per camera; `refine` lets given ones change within their standard deviations. `remembered` lenses of an
     earlier calibration of the same cameras: nothing is computed from them, but they know mirrored and swapped
-    pictures. `dropped` pictures that were already left out when the files were read. Raises CalibrationError when
-    there is nothing to calibrate from: too few shared shots, a lens for another picture size.
+    pictures. `dropped` pictures that were already left out when the files were read, and what was `noticed`
+    in them. Raises CalibrationError when there is nothing to calibrate from: too few shared shots, a lens for another
+    picture size.
     """
     _check_sizes(views, lenses)
     known = known or KnownLengths()
     outcome = solve(views, lenses, refine=refine, progress=progress)
     if isinstance(outcome, Finding):
-        verdict = judge(f"{' and '.join(views.cameras)} cannot be put together.", [outcome])
-        return StereoReport(views.cameras, None, tuple(dropped), verdict)
+        summary = f"{' and '.join(views.cameras)} cannot be put together."
+        return StereoReport(views.cameras, None, tuple(dropped), summary, judge(summary, [*noticed, outcome]))
     progress("measuring what came out", 0.97)
     figures = figures_of(outcome, lenses, [shot.name for shot in views.shots])
     ruler = None if known.ruler is None else read_ruler(known.ruler, figures.state)
@@ -49,9 +51,10 @@ def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool =
     every = (*dropped, *outcome.dropped)
     evidence = lens_evidence(outcome, [own if own.origin == "given" else before for own, before
                                        in zip(lenses, remembered or [None] * len(lenses), strict=True)])
-    findings = _findings(figures, outcome, lenses, known, evidence, every)
-    progress("done", 1.0)
-    return StereoReport(views.cameras, figures, every, judge(_summary(figures), findings))
+    findings = [*noticed, *_findings(figures, outcome, lenses, known, evidence, every)]
+    progress("stereo calibration", 1.0)
+    summary = _summary(figures)
+    return StereoReport(views.cameras, figures, every, summary, judge(summary, findings))
 
 
 def _check_sizes(views: SharedViews, lenses: Sequence[LensStart]) -> None:

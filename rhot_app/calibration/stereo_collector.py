@@ -49,7 +49,8 @@ class Guidance:
     """What is still missing.
 
     `pairs` of cameras that need more shared shots; `covered` (C,) share of each camera's picture that shared shots
-    reach; `near_and_far`, `tilted`: whether the board was seen so; `advice` the next thing to do in words, empty when done.
+    reach; `near_and_far`, `tilted`: whether the board was seen so; `advice` the next thing to do in words, empty when
+    done.
     """
 
     pairs: tuple[PairNeed, ...]

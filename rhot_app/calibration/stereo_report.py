@@ -96,12 +96,16 @@ class StereoFigures:
 
 @dataclass(frozen=True, slots=True)
 class StereoReport:
-    """What came of a stereo calibration: the figures, None when the cameras could not be put together; the shots that
-    were dropped, with reasons; and the verdict."""
+    """What came of a stereo calibration.
+
+    `figures` are None when the cameras could not be put together; `dropped` shots with reasons; `summary` the sentence
+    with the main figures, for whoever adds findings of their own to the `verdict`.
+    """
 
     cameras: tuple[str, ...]
     figures: StereoFigures | None
     dropped: tuple[Dropped, ...]
+    summary: str
     verdict: Verdict
 
 

@@ -25,6 +25,10 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot calibrate depth": ("--table", "--rig", "--out", "--baseline-mm", "--view-angle-deg", "--json"),
     "rhot check": ("RIG", "--json"),
     "rhot history": ("RIG", "--restore", "--json"),
+    "rhot calibrate stereo": (
+        "--left", "--right", "--camera", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
+        "--left-intrinsics", "--right-intrinsics", "--intrinsics", "--refine-intrinsics", "--baseline-mm", "--ruler-mm",
+        "--ruler", "--table-image", "--rig-from", "--out", "--json"),
     "rhot-node": ("--settings", "--camera", "detect"),
     "rhot-node detect": ("--markers", "--detector", "--all", "--json"),
 }
