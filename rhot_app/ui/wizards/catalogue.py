@@ -31,6 +31,8 @@ class Wizard:
 
 
 WIZARDS: tuple[Wizard, ...] = (
+    Wizard("stereo", "Put the cameras together", "Where the cameras stand to each other and to the table, from a board "
+           "that they see at the same time.", "stereo calibration"),
     Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),
     Wizard("depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
            "depth calibration"),

@@ -1,0 +1,61 @@
+"""The fields of the second known length, and clicks on the ruler's ends."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
+
+from rhot_app.ui.wizards.models.known_step import KnownStep
+from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.page import Page
+
+
+class KnownPage(Page):
+    """Two lengths in mm; 0 says that it was not measured."""
+
+    def __init__(self, step: KnownStep) -> None:
+        super().__init__(step)
+        self._known = step
+        self.pickable = True
+        self.baseline = _length("The distance between the middles of the two lenses, measured by hand. 75 mm on the "
+                                "frame that the thesis describes.")
+        self.ruler = _length("The distance between two marks on a ruler, 200 mm for instance, that both cameras see.")
+        form = QFormLayout()
+        form.setSpacing(8)
+        form.addRow("Lens to lens", self.baseline)
+        form.addRow("Ruler", self.ruler)
+        self.hold = QPushButton("Hold the pictures")
+        self.hold.setToolTip("Space. Then click both ends of the ruler in each picture.")
+        self.hold.setAutoDefault(False)
+        self.hold.clicked.connect(self._hold)
+        self.column.addLayout(form)
+        self.column.addWidget(self.hold)
+        self.column.addStretch(1)
+        for box in (self.baseline, self.ruler):
+            box.valueChanged.connect(self._take)
+
+    def _take(self) -> None:
+        self._known.set_lengths(self.baseline.value(), self.ruler.value())
+        self.changed.emit()
+
+    def _hold(self) -> None:
+        self._known.capture()
+        self.changed.emit()
+
+    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+        """An end of the ruler; a drag is a click that slipped."""
+        self._known.pick(camera, x, y)
+
+    def show_view(self, view: StepView) -> None:
+        """The button says what it would do."""
+        self.hold.setEnabled(self.ruler.value() > 0.0)
+        self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
+
+
+def _length(meaning: str) -> QDoubleSpinBox:
+    box = QDoubleSpinBox()
+    box.setRange(0.0, 5000.0)
+    box.setDecimals(1)
+    box.setSuffix(" mm")
+    box.setSpecialValueText("not measured")
+    box.setToolTip(meaning)
+    return box
