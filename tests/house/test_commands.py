@@ -21,6 +21,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--lamp", "--kelvin"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json"),
     "rhot calibrate colours": ("--image", "--sample", "--markers", "--skin", "--out", "--json"),
+    "rhot calibrate filters": ("--log-still", "--log-fast", "--rig", "--out", "--per-marker", "--jitter-mm",
+                               "--lag-ms", "--json"),
     "rhot calibrate time": ("--log", "--rig", "--out", "--json"),
     "rhot calibrate depth": ("--table", "--rig", "--out", "--baseline-mm", "--view-angle-deg", "--json"),
     "rhot check": ("RIG", "--json"),

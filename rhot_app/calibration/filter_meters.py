@@ -1,0 +1,136 @@
+"""Jitter and lag of marker positions: of a whole recording, or of the last seconds while a hand moves.
+
+Jitter is the rms distance from a parabola through the half second about each sample, so that a hand that drifts or
+sways does not count as jitter. Lag is the delay by which the unfiltered curve has to be put back so that the filtered
+one lies on it best (least squares over all axes).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+JITTER_WINDOW_S = 0.5
+SPEED_WINDOW_S = 0.15
+
+SLOW_M_S = 0.15
+"""A lag is not told from noise while the marker's speed (95th percentile) is below."""
+
+_LEAST_NEIGHBOURS = 2  # on each side of a parabola
+_LONGEST_WINDOW = 1.5  # times its length, when samples are missing
+_LAG_ROUNDS = 4
+_LIVE_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerMotion:
+    """One marker's unfiltered way: `positions` and `velocities` (T, 3), NaN where unknown."""
+
+    positions: Array
+    velocities: Array
+
+    @property
+    def speed(self) -> float:
+        """95th percentile of the speed, m/s; 0 when nothing is known."""
+        speeds = np.linalg.norm(self.velocities, axis=1)
+        speeds = speeds[np.isfinite(speeds)]
+        return float(np.quantile(speeds, 0.95)) if len(speeds) else 0.0
+
+
+def motion_of(times_s: Array, positions: Array) -> MarkerMotion:
+    """The motion of unfiltered positions (T, 3); times may be irregular."""
+    return MarkerMotion(positions, velocities(times_s, positions, SPEED_WINDOW_S))
+
+
+def velocities(times_s: Array, positions: Array, window_s: float) -> Array:
+    """(T, 3) m/s by parabolas through `window_s` of positions (T, 3) m; NaN where some of them are missing."""
+    return _parabolas(times_s, positions, window_s)[1]
+
+
+def jitter(times_s: Array, values: Array) -> float:
+    """rms distance of `values` (T, D) from the parabolas through their half seconds; NaN with too few of them."""
+    middles, _, leverage = _parabolas(times_s, values, JITTER_WINDOW_S)
+    away = np.square(values - middles).sum(axis=1) / (1.0 - leverage)
+    return float(np.sqrt(np.nanmean(away))) if np.isfinite(away).any() else np.nan
+
+
+def lag(times_s: Array, filtered: Array, motion: MarkerMotion) -> tuple[float, float]:
+    """Delay of `filtered` (T, 3), s, and its rms distance from the unfiltered way, m; NaN for a marker too slow."""
+    known = np.isfinite(filtered).all(axis=1) & np.isfinite(motion.positions + motion.velocities).all(axis=1)
+    if np.count_nonzero(known) < 10 or motion.speed < SLOW_M_S:
+        return np.nan, np.nan
+    times, target = times_s[known], filtered[known]
+    positions, velocities = motion.positions[known], motion.velocities[known]
+    error = float(np.sqrt(np.mean(np.square(target - positions).sum(axis=1))))
+    delay = 0.0
+    for _ in range(_LAG_ROUNDS):
+        then, speed = (np.stack([np.interp(times - delay, times, column) for column in columns.T], axis=1)
+                       for columns in (positions, velocities))
+        delay -= float(np.sum((target - then) * speed) / np.sum(speed * speed))
+    return delay, error
+
+
+def _parabolas(times_s: Array, values: Array, window_s: float) -> tuple[Array, Array, Array]:
+    """Least squares about each sample of (T, D): value and slope there (T, D), and the sample's own say (T,); NaN
+    where the sample or too many of its neighbours are missing, and at both ends."""
+    middles, slopes = np.full((2, *values.shape), np.nan)
+    leverage = np.full(len(times_s), np.nan)
+    known = np.flatnonzero(np.isfinite(values).all(axis=1))
+    if len(known) < 2 * _LEAST_NEIGHBOURS + 1:
+        return middles, slopes, leverage
+    period_s = float(np.median(np.diff(times_s)))
+    half = max(_LEAST_NEIGHBOURS, round(0.5 * window_s / period_s))
+    around = known[np.arange(half, len(known) - half)[:, None] + np.arange(-half, half + 1)]
+    rows = around[:, half]
+    dt = (times_s[around] - times_s[rows, None]) / window_s
+    whole = np.ptp(dt, axis=1) < _LONGEST_WINDOW * max(1.0, 2 * half * period_s / window_s)
+    rows, around, dt = rows[whole], around[whole], dt[whole]
+    powers = np.stack([np.ones_like(dt), dt, dt * dt], axis=2)
+    normal = np.linalg.inv(powers.transpose(0, 2, 1) @ powers)
+    solved = normal @ (powers.transpose(0, 2, 1) @ values[around])
+    middles[rows], slopes[rows], leverage[rows] = solved[:, 0], solved[:, 1] / window_s, normal[:, 0, 0]
+    return middles, slopes, leverage
+
+
+@dataclass(frozen=True, slots=True)
+class MeterReading:
+    """The last two seconds, per marker (M,): jitter of the unfiltered and filtered positions, m; lag, s, NaN while the
+    marker hardly moves; speed (95th percentile), m/s."""
+
+    raw_jitter_m: Array
+    jitter_m: Array
+    lag_s: Array
+    speed_m_s: Array
+
+
+class FilterMeter:
+    """Jitter and lag now, from the unfiltered and filtered positions of every state. `add` costs a microsecond or two;
+    `read` is meant for a few times a second."""
+
+    def __init__(self, markers: int, capacity: int = 512) -> None:
+        self._times = np.full(capacity, np.nan)
+        self._raw, self._filtered = np.full((2, capacity, markers, 3), np.nan)
+        self._next = 0
+
+    def add(self, t_ns: int, raw: Array, filtered: Array) -> None:
+        """Take one state: its time and (M, 3) m, NaN where not located."""
+        self._times[self._next] = 1e-9 * t_ns
+        self._raw[self._next], self._filtered[self._next] = raw, filtered
+        self._next = (self._next + 1) % len(self._times)
+
+    def read(self) -> MeterReading:
+        """What the last two seconds show; NaN for a marker that was not seen enough."""
+        order = np.argsort(self._times)  # NaN last
+        order = order[self._times[order] >= np.nanmax(self._times, initial=-np.inf) - _LIVE_S]
+        times = self._times[order] - self._times[order[:1]]
+        rows = []
+        for marker in range(self._raw.shape[1]):
+            raw, filtered = self._raw[order, marker], self._filtered[order, marker]
+            motion = motion_of(times, raw)
+            filtered = np.where(np.isfinite(raw), filtered, np.nan)
+            rows.append((jitter(times, raw), jitter(times, filtered), lag(times, filtered, motion)[0], motion.speed))
+        return MeterReading(*np.array(rows, dtype=np.float64).reshape(-1, 4).T)
