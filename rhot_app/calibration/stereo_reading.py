@@ -47,7 +47,8 @@ def read_shared(files: Mapping[str, Sequence[Path]], board: Board, *, progress: 
     for camera in range(len(files)):
         _drop_other_sizes([row[camera] for row in rows])
     for row in rows:
-        dropped += [Dropped(each.path.name, each.trouble, each.code) for each in row if each.path and each.trouble]
+        dropped += [Dropped(_name(each.path, camera), each.trouble, each.code)
+                    for each, camera in zip(row, files, strict=True) if each.path and each.trouble]
     shots = tuple(Shot(shot.name, tuple(each.view for each in row))
                   for shot, row in zip(matched.shots, rows, strict=True))
     views = SharedViews(tuple(files), board, shots)
@@ -89,6 +90,11 @@ def _read(path: Path | None, board: Board) -> _Read:
         return _Read(path, None, f"the board ({board.text}) was not found", "no_board")
     beyond = look_beyond(gray, view, board) if isinstance(board, Chessboard) else None
     return _Read(path, view, beyond=beyond)
+
+
+def _name(path: Path, camera: str) -> str:
+    """What to call a picture: with its camera, unless its own name says it (left/007.png, left07.png)."""
+    return path.name if camera in path.name else f"{camera}/{path.name}"
 
 
 def _picture(path: Path) -> Gray | None:
