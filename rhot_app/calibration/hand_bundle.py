@@ -64,12 +64,11 @@ class HandBundle:
 class HandAdjustment:
     """The cost of a hand and its poses given sights (F, M, 3) m, NaN = missing, and its descent."""
 
-    def __init__(self, unknowns: HandUnknowns, seen: Array, limits: Array, weights: Weights) -> None:
-        """`limits` (21, 2) rad of the base hand."""
+    def __init__(self, unknowns: HandUnknowns, seen: Array, weights: Weights) -> None:
         self._unknowns = unknowns
         self._seen = seen
         self._weights = weights
-        self._limits = limits + np.array([-LIMIT_MARGIN, LIMIT_MARGIN])
+        self._limits = unknowns.limits + np.array([-LIMIT_MARGIN, LIMIT_MARGIN])
         self._natural = natural_pose()
         self._prior_information = np.linalg.inv(unknowns.prior.covariance)
         count = max(len(seen), 1)
@@ -161,7 +160,7 @@ class HandAdjustment:
             reduced = shape_matrix - flat.T @ solved[..., :-1].reshape(flat.shape)
             right = shape_right - flat.T @ solved[..., -1].ravel()
             reduced[np.diag_indices_from(reduced)] *= 1.0 + damping
-            shape_step: Array = np.linalg.solve(reduced, right)
+            shape_step = np.asarray(np.linalg.solve(reduced, right), dtype=np.float64)
         except np.linalg.LinAlgError as exc:
             raise CalibrationError("the markers do not hold the hand: too few are seen at the same time.") from exc
         return shape_step, np.asarray(solved[..., -1] - solved[..., :-1] @ shape_step)

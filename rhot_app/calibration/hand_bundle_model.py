@@ -11,15 +11,12 @@ from numpy.typing import NDArray
 from rhot_app.calibration.hand_shape import MARKERS, ROOTS, TURNS, HandUnknowns, left_jacobian
 from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.kinematics import TWIST, forward_arrays, jacobian_arrays, move
-from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES
 
 Array = NDArray[np.float64]
 
 POSE = TWIST + len(ANGLES)
 """Unknowns of one pose: twist in world axes, then the angles."""
-
-_EXACT = 12  # digits of mm: nothing is rounded while solving
 
 _SEGMENT_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """A bone's row has its hinge along z and the palm along y; a marker's place is along, towards the thumb, out of the
@@ -73,6 +70,13 @@ def linearise(unknowns: HandUnknowns, vector: Array, poses: Poses) -> Linearised
     return Linearised(points, per_pose, _per_shape(unknowns, vector, poses, frames, points))
 
 
+def in_segments(unknowns: HandUnknowns, vector: Array, poses: Poses, offsets: Array) -> Array:
+    """Offsets (F, M, 3) m in the world as (F, M, 3) along, across and above each marker's own segment."""
+    axes = linearise(unknowns, vector, poses).per_shape[..., MARKERS:]
+    own = np.stack([axes[:, m, :, 3 * m:3 * m + 3] for m in range(len(unknowns.places))], axis=1)
+    return np.asarray(np.einsum("fmij,fmi->fmj", own, offsets))
+
+
 def _per_shape(unknowns: HandUnknowns, vector: Array, poses: Poses, frames: Array, points: Array) -> Array:
     shape = unknowns.shape(vector)
     palm = poses.world[:, :3, :3]
@@ -104,7 +108,7 @@ def segment_axes(finger: int, segment: int) -> Array:
 def _table(unknowns: HandUnknowns, vector: Array) -> DhArrays:
     """The hand's table with its markers as points."""
     shape = unknowns.shape(vector)
-    model = build_model(unknowns.anatomy(vector, _EXACT))
+    model = unknowns.model(vector)
     rows, offsets = [], []
     for place, marker in zip(unknowns.places, shape.markers, strict=True):
         if place.on_palm:

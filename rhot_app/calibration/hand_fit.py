@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +15,6 @@ from rhot_app.calibration.marker_places import MarkerTracks
 from rhot_app.calibration.track_noise import SmoothTracks, smooth
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.model import build_model
 from rhot_app.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -32,6 +30,7 @@ agree; with a look per instant they contradict each other."""
 _START_NOISE_M = 3e-3
 _SIDE_INSTANTS = 60
 _ROUNDS = 4
+_NOISE_DOUBT = 1.2  # the variance of the noise is known to a fifth; only more than that is an error of another kind
 _DISTANCE_MEDIAN = 1.5382  # median distance of a 3-D Gaussian, in standard deviations per axis
 
 
@@ -59,7 +58,7 @@ def fit_hand(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = si
     if len(instants) < LEAST_INSTANTS:
         raise CalibrationError(f"only {len(instants)} instants show enough markers at once; at least {LEAST_INSTANTS} "
                                "are needed. Record a minute with all markers in sight.")
-    unknowns = HandUnknowns(msgspec.structs.replace(base, side="right"), tracks.places)
+    unknowns = HandUnknowns(base, tracks.places)
     seen = as_right(smoothed.positions[instants], base.side)
     progress("looking at the side of the hand", 0.0)
     some = seen[np.linspace(0, len(seen) - 1, min(_SIDE_INSTANTS, len(seen))).astype(int)]
@@ -77,29 +76,27 @@ def as_right(positions: Array, side: str) -> Array:
 def _begin(unknowns: HandUnknowns, seen: Array, steps: int) -> HandBundle:
     """Poses and a first shape from nothing: the hand is laid on the markers, the best instants show where the palm's
     markers sit, and these then hold the palm at all instants."""
-    limits = build_model(unknowns.anatomy(unknowns.prior.mean)).limits
     poses, off = lay_on(unknowns, unknowns.prior.mean, seen)
     best = np.argsort(off)[:max(20, len(seen) // 20)]
-    few = HandAdjustment(unknowns, seen[best], limits, Weights(_START_NOISE_M, len(best), len(best)))
+    few = HandAdjustment(unknowns, seen[best], Weights(_START_NOISE_M, len(best), len(best)))
     begun = few.run(unknowns.prior.mean, poses.of(best), steps)
     poses = lay_palm_on(unknowns, begun.vector, seen, poses)
-    every = HandAdjustment(unknowns, seen, limits, Weights(_START_NOISE_M, len(seen), len(seen), free_shape=False))
+    every = HandAdjustment(unknowns, seen, Weights(_START_NOISE_M, len(seen), len(seen), free_shape=False))
     return every.run(begun.vector, poses, steps)
 
 
 def _believe(unknowns: HandUnknowns, seen: Array, start: HandBundle, smoothed: SmoothTracks,
              progress: Progress) -> tuple[HandBundle, float]:
     """Adjust, see how large the errors are, weigh accordingly, and again. Returns the error beyond noise, m."""
-    limits = build_model(unknowns.anatomy(unknowns.prior.mean)).limits
     bundle, weights, beyond = start, Weights(_START_NOISE_M, 30.0), 0.0
     for turn in range(_ROUNDS):
         def share(text: str, fraction: float, turn: int = turn) -> None:
             progress(text, 0.1 + 0.9 * (turn + fraction) / _ROUNDS)
 
-        bundle = HandAdjustment(unknowns, seen, limits, weights).run(bundle.vector, bundle.poses, 100, progress=share)
+        bundle = HandAdjustment(unknowns, seen, weights).run(bundle.vector, bundle.poses, 100, progress=share)
         error = max(_error(bundle.residuals, unknowns.size), 1e-5)
         noise = min(smoothed.noise_m, error)
-        beyond = float(np.sqrt(error ** 2 - noise ** 2))
+        beyond = float(np.sqrt(max(error ** 2 - _NOISE_DOUBT * noise ** 2, 0.0)))
         # Noise averages out over the instants; what is beyond it does not.
         weights = Weights(error, error ** 2 / (noise ** 2 / len(seen) + beyond ** 2 / INDEPENDENT_ERRORS + 1e-18))
     return bundle, beyond

@@ -20,7 +20,7 @@ from rhot_app.calibration.hand_prior import Prior
 from rhot_app.calibration.marker_places import DISTAL, MarkerPlace
 from rhot_app.geometry.transforms import skew
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.model import build_model
+from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import FINGERS, JOINTS, WRIST_ROLE
 
 Array = NDArray[np.float64]
@@ -31,6 +31,7 @@ ROOTS, TURNS, MARKERS = 15, 30, 45
 
 _ACROSS_SD_M, _PAINT_SD_M, _WRIST_SD_M = 3e-3, 0.7e-3, 2e-3
 _PALM_SD_M = (30e-3, 30e-3, 10e-3)
+_EXACT = 12  # digits of mm
 _INNER_PART = (0.5, 0.25)  # of the bone: where a dot on an inner segment sits, and its scatter
 
 
@@ -56,7 +57,7 @@ class HandUnknowns:
         self.places = places
         self.size = MARKERS + 3 * len(places)
         self._base = base
-        self._model = build_model(base)
+        self._model = build_model(msgspec.structs.replace(base, side="right"))
         self.bone_rows = self._model.dh.point_row[1:len(JOINTS)].reshape(5, 4)[:, 1:]  # (5, 3) rows that end each bone
         self.prior = self._make_prior()
 
@@ -65,6 +66,15 @@ class HandUnknowns:
         turns = Rotation.from_rotvec(vector[TURNS:MARKERS].reshape(5, 3)).as_matrix() @ self._model.base_rotation
         return HandShape(vector[:ROOTS].reshape(5, 3), vector[ROOTS:TURNS].reshape(5, 3), turns,
                          vector[MARKERS:].reshape(-1, 3))
+
+    @property
+    def limits(self) -> Array:
+        """(21, 2) rad, the base hand's joint limits."""
+        return self._model.limits
+
+    def model(self, vector: Array) -> HandModel:
+        """The right hand that `vector` describes, to the last digit."""
+        return build_model(msgspec.structs.replace(self.anatomy(vector, _EXACT), side="right"))
 
     def anatomy(self, vector: Array, digits: int = 2) -> HandAnatomy:
         """The hand file of `vector`, to so many `digits` of mm and degrees: name, side and limits of the base hand,

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_coeffs, savgol_filter
 
 Array = NDArray[np.float64]
 
@@ -14,13 +13,16 @@ WINDOW_S = 0.15
 """A hand that shows its joints changes its course more slowly than this."""
 
 _ORDER = 2
+_LEAST_SAMPLES = 5  # in a window: fewer do not average anything
+_WORST_GAIN = 1.5  # a sample with gaps around it is left out: the odd ones would be taken for odd poses
 _MAD = 1.4826  # standard deviation per median absolute deviation of Gaussian noise
+_THIRD_DIFFERENCE = np.sqrt(20.0)  # standard deviation of x0 - 3 x1 + 3 x2 - x3, of one sample's
 
 
 @dataclass(frozen=True, slots=True)
 class SmoothTracks:
-    """`positions` (T, M, 3) m, NaN where they were; `raw_noise_m` standard deviation per axis before and `noise_m`
-    after smoothing, median over the markers. Tracks too slow to smooth stay as they are, and their noise unknown: 0."""
+    """`positions` (T, M, 3) m, NaN where a marker was missing or too alone to be averaged; `raw_noise_m` standard
+    deviation per axis before and `noise_m` after smoothing, median over the markers."""
 
     positions: Array
     raw_noise_m: float
@@ -28,22 +30,50 @@ class SmoothTracks:
 
 
 def smooth(times_s: Array, positions: Array) -> SmoothTracks:
-    """Smooth tracks (T, M, 3) m at even `times_s` (T,)."""
+    """Smooth tracks (T, M, 3) m at even `times_s` (T,). Those too slow for it stay as they are."""
+    raw = _noise(positions)
     period_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else WINDOW_S
-    length = int(WINDOW_S / max(period_s, 1e-6)) | 1  # odd: as many samples before as after
-    if length <= _ORDER + 1 or len(times_s) < length:
-        return SmoothTracks(positions, 0.0, 0.0)
+    half = int(0.5 * WINDOW_S / max(period_s, 1e-6))
+    if 2 * half + 1 < _LEAST_SAMPLES:
+        return SmoothTracks(positions, raw, raw)
     smoothed = np.full_like(positions, np.nan)
-    instants = np.arange(len(positions))
+    gains = []
     for marker in range(positions.shape[1]):
-        seen = np.isfinite(positions[:, marker, 0])
-        if seen.sum() < length:
-            continue
-        filled = np.stack([np.interp(instants, instants[seen], positions[seen, marker, axis]) for axis in range(3)])
-        smoothed[seen, marker] = savgol_filter(filled, length, _ORDER).T[seen]
-    own_weight = float(savgol_coeffs(length, _ORDER)[length // 2])
-    off = np.abs(positions - smoothed)
-    of_marker = [float(np.median(off[:, m][np.isfinite(off[:, m])])) for m in range(off.shape[1])
-                 if np.isfinite(off[:, m]).any()]
-    raw = _MAD * float(np.median(of_marker)) / np.sqrt(1.0 - own_weight) if of_marker else 0.0
-    return SmoothTracks(smoothed, raw, float(raw * np.sqrt(own_weight)))
+        smoothed[:, marker], gain = _parabolas(positions[:, marker], half)
+        gains.append(gain[np.isfinite(smoothed[:, marker, 0])])
+    kept = np.concatenate(gains)
+    return SmoothTracks(smoothed, raw, raw * float(np.sqrt(np.mean(kept))) if len(kept) else raw)
+
+
+def _noise(positions: Array) -> float:
+    """Standard deviation per axis from third differences, which leave nothing of a smooth course."""
+    if len(positions) < 2 * _LEAST_SAMPLES:
+        return 0.0
+    third = np.abs(np.diff(positions, 3, axis=0))
+    of_marker = [float(np.median(track[np.isfinite(track)])) for track in third.transpose(1, 0, 2)
+                 if np.isfinite(track).any()]
+    return _MAD * float(np.median(of_marker)) / float(_THIRD_DIFFERENCE) if of_marker else 0.0
+
+
+def _parabolas(track: Array, half: int) -> tuple[Array, Array]:
+    """Least-squares parabola through the samples of each window of `half` to either side, at its middle: positions
+    (T, 3), NaN where the middle is missing or too few are there, and what is left of the noise's variance (T,)."""
+    seen = np.isfinite(track[:, 0])
+    offsets = np.arange(-half, half + 1) / max(half, 1)
+
+    def moments(values: Array, power: int) -> Array:
+        return np.asarray(np.correlate(values, offsets ** power, mode="same"))
+
+    counts = moments(seen.astype(np.float64), 0)
+    powers = np.stack([moments(seen.astype(np.float64), power) for power in range(2 * _ORDER + 1)], axis=1)
+    matrix = powers[:, np.add.outer(np.arange(_ORDER + 1), np.arange(_ORDER + 1))]
+    usable = seen & (counts >= _LEAST_SAMPLES)
+    matrix[~usable] = np.eye(_ORDER + 1)
+    filled = np.where(seen[:, None], track, 0.0)
+    right = np.stack([[moments(filled[:, axis], power) for axis in range(3)] for power in range(_ORDER + 1)])
+    inverse = np.linalg.inv(matrix + 1e-9 * np.eye(_ORDER + 1))
+    middle = np.einsum("tp,pat->ta", inverse[:, 0], right)
+    gain = np.asarray(inverse[:, 0, 0], dtype=np.float64)
+    if usable.any():
+        usable &= gain <= _WORST_GAIN * float(np.median(gain[usable]))
+    return np.asarray(np.where(usable[:, None], middle, np.nan), dtype=np.float64), gain

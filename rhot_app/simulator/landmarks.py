@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.errors import SimulatorError
+from rhot_app.errors import RecordingError, SimulatorError
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import FINGERS, JOINTS
+from rhot_app.recording.qualisys import read_qualisys
 
 Array = NDArray[np.float64]
 
@@ -47,12 +48,10 @@ class Landmarks:
 def read_landmarks(path: Path, model: HandModel) -> Landmarks:
     """Landmarks of a recording; `model` tells where along a finger a marker must sit. Raises SimulatorError."""
     try:
-        text = path.read_text()
-    except (OSError, UnicodeDecodeError) as exc:
+        landmarks = _qualisys(path, model) if path.suffix.lower() == ".tsv" else _leap(path.read_text())
+    except (OSError, UnicodeDecodeError, RecordingError) as exc:
         raise SimulatorError(f"{path}: cannot be read as a recording ({exc}).") from exc
-    try:
-        landmarks = _qualisys(text, model) if path.suffix.lower() == ".tsv" else _leap(text)
-    except (ValueError, IndexError, KeyError, StopIteration) as exc:
+    except (ValueError, IndexError, KeyError) as exc:
         raise SimulatorError(f"{path}: not a recording this program knows ({exc}). It reads Qualisys .tsv exports with "
                              "finger and hand markers, and Leap Motion .csv exports with joint positions.") from exc
     if len(landmarks.times_s) < 2 or not (np.isfinite(landmarks.points).all(axis=2).sum(axis=1) >= 4).any():
@@ -60,19 +59,13 @@ def read_landmarks(path: Path, model: HandModel) -> Landmarks:
     return landmarks
 
 
-def _qualisys(text: str, model: HandModel) -> Landmarks:
-    lines = text.splitlines()
-    names = next(line for line in lines if line.startswith("MARKER_NAMES")).split("\t")[1:]
-    start = next(k for k, line in enumerate(lines) if line.startswith("Frame\t")) + 1
-    rows = [line.split("\t")[:2 + 3 * len(names)] for line in lines[start:] if line.strip()]
-    table = np.array([[float(cell) if cell.strip() else np.nan for cell in row] for row in rows])
-    points = 1e-3 * table[:, 2:].reshape(len(table), len(names), 3)
-    points[(points == 0.0).all(axis=2)] = np.nan  # the exporter writes a missing marker as zeros
+def _qualisys(path: Path, model: HandModel) -> Landmarks:
+    tracks = read_qualisys(path)
 
     def of(name: str) -> Array:
-        if name not in names:
+        if name not in tracks.names:
             raise ValueError(f"it has no marker {name!r}")
-        return np.asarray(points[:, names.index(name)])
+        return np.asarray(tracks.positions[:, tracks.names.index(name)])
 
     chosen, ends, fractions = [], [], []
     for finger, name in enumerate(FINGERS):
@@ -87,7 +80,7 @@ def _qualisys(text: str, model: HandModel) -> Landmarks:
         # Stretched out, tip to middle spans what is left of the marker's own bone and all that follows.
         fractions += [_TIP_FRACTION, float(np.clip(1.0 - (reach - between) / model.bones[finger, bone], 0.05, 1.0))]
     rigid = np.stack([of(name) for name in TRIAD], axis=1)
-    return Landmarks(table[:, 1] - table[0, 1], np.stack(chosen, axis=1), rigid, np.array(ends), np.array(fractions))
+    return Landmarks(tracks.times_s, np.stack(chosen, axis=1), rigid, np.array(ends), np.array(fractions))
 
 
 def _leap(text: str) -> Landmarks:

@@ -44,7 +44,8 @@ def person(seed: int, size: float | None = None, side: str = "right") -> HandAna
         turn = np.array(finger.base_rotation_deg) + rng.normal(0, 3.0, 3)
         fingers[name] = msgspec.structs.replace(
             finger, bones_mm=tuple(bones.tolist()), base_mm=tuple(root.tolist()),
-            base_rotation_deg=tuple(turn.tolist()), radii_mm=tuple((size * np.array(finger.radii_mm)).tolist()), marker_mm=0.5 * float(bones[2]))
+            base_rotation_deg=tuple(turn.tolist()),
+            radii_mm=tuple((size * np.array(finger.radii_mm)).tolist()), marker_mm=0.5 * float(bones[2]))
     return msgspec.structs.replace(base, fingers=fingers, name="somebody")
 
 

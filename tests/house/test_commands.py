@@ -20,6 +20,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot replay": ("LOG", "--rig"),
     "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--lamp", "--kelvin"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json"),
+    "rhot calibrate bones": ("--log", "--tsv", "--rig", "--roles", "--hand", "--side", "--set", "--out", "--json"),
     "rhot calibrate colours": ("--image", "--sample", "--markers", "--skin", "--out", "--json"),
     "rhot calibrate filters": ("--log-still", "--log-fast", "--rig", "--out", "--per-marker", "--jitter-mm",
                                "--lag-ms", "--json"),

@@ -1,0 +1,108 @@
+"""What six markers can tell of a hand: how far each fingertip gets from the wrist, and so how big the hand is.
+
+A stretched finger is as long as all its bones together. How they share it, nothing shows: single bones follow from the
+hand's size and the proportions of adults (`hand_prior`), and keep their scatter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.hand_bundle_model import Poses, expected
+from rhot_app.calibration.hand_shape import HandUnknowns
+from rhot_app.calibration.marker_places import DISTAL, MarkerTracks
+from rhot_app.calibration.track_noise import smooth
+from rhot_app.errors import CalibrationError
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
+from rhot_app.progress import Progress, silent
+
+Array = NDArray[np.float64]
+
+STRETCH_LOSS = (0.005, 0.01)
+"""By which part the farthest tip falls short of the straight finger, and the scatter of that: nobody stretches a finger
+to the last degree, and 8 degrees in every joint cost one hundredth."""
+
+_QUANTILE = 99.5  # of the distances: the last few are mistakes
+_LEAST_SAMPLES = 100
+_STEP_M = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class ReachFit:
+    """`vector` (G,) and `covariance` of the unknowns after the reaches were seen; per finger the `reach_m` (5,) from
+    the wrist to its marker, NaN where there is none, and how much shorter it gets when bent, `bending_m` (5,)."""
+
+    unknowns: HandUnknowns
+    vector: Array
+    covariance: Array
+    reach_m: Array
+    bending_m: Array
+    raw_noise_m: float
+
+
+def fit_reach(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = silent) -> ReachFit:
+    """Size and reaches from a wrist marker and fingertips. Raises CalibrationError without them."""
+    wrist = next((k for k, place in enumerate(tracks.places) if place.on_palm), None)
+    if wrist is None:
+        raise CalibrationError("no marker shows the palm or the wrist, so nothing can be said of any finger's length.")
+    progress("measuring how far the fingers reach", 0.0)
+    smoothed = smooth(tracks.times_s, tracks.positions)
+    reach, bending, columns = np.full(5, np.nan), np.full(5, np.nan), np.full(5, -1)
+    for k, place in enumerate(tracks.places):
+        if place.segment != DISTAL:
+            continue
+        distance = np.linalg.norm(smoothed.positions[:, k] - smoothed.positions[:, wrist], axis=1)
+        distance = distance[np.isfinite(distance)]
+        if len(distance) >= _LEAST_SAMPLES:
+            near, far = np.percentile(distance, [100.0 - _QUANTILE, _QUANTILE])
+            reach[place.finger], bending[place.finger], columns[place.finger] = far, far - near, k
+    if np.isnan(reach).all():
+        raise CalibrationError(f"no fingertip is seen together with {tracks.places[wrist].name} in at least "
+                               f"{_LEAST_SAMPLES} instants. Record a minute with the whole hand in sight.")
+    unknowns = HandUnknowns(base, tracks.places)
+    vector, covariance = _condition(unknowns, reach, columns, wrist, progress)
+    return ReachFit(unknowns, vector, covariance, reach, bending, smoothed.raw_noise_m)
+
+
+def _condition(unknowns: HandUnknowns, reach: Array, columns: NDArray[np.int64], wrist: int,
+               progress: Progress) -> tuple[Array, Array]:
+    """The prior given the reaches; twice, since a reach is not quite linear in the lengths."""
+    prior = unknowns.prior
+    seen = np.flatnonzero(np.isfinite(reach))
+    vector, covariance = prior.mean, prior.covariance
+    stretched = [_stretched_angles(unknowns, vector, int(columns[finger]), wrist, int(finger)) for finger in seen]
+    for turn in range(2):
+        progress("measuring how far the fingers reach", 0.3 + 0.3 * turn)
+        poses = Poses(np.tile(np.eye(4), (len(seen), 1, 1)), np.array(stretched))
+
+        def reaches(vector: Array, poses: Poses = poses) -> Array:
+            points = expected(unknowns, vector, poses)
+            rows = np.arange(len(seen))
+            return np.asarray(np.linalg.norm(points[rows, columns[seen]] - points[rows, wrist], axis=1))
+
+        at = reaches(vector)
+        slope = np.array([(reaches(vector + step) - at) / _STEP_M for step in _STEP_M * np.eye(unknowns.size)]).T
+        straight = reach[seen] * (1.0 + STRETCH_LOSS[0])
+        noise = np.diag((STRETCH_LOSS[1] * straight) ** 2)
+        gain = prior.covariance @ slope.T @ np.linalg.inv(slope @ prior.covariance @ slope.T + noise)
+        vector = prior.mean + gain @ (straight - at - slope @ (prior.mean - vector))
+        covariance = prior.covariance - gain @ slope @ prior.covariance
+    return vector, covariance
+
+
+def _stretched_angles(unknowns: HandUnknowns, vector: Array, marker: int, wrist: int, finger: int) -> Array:
+    """(21,) rad: of a grid of poses the one in which this finger's marker is farthest from the wrist marker."""
+    limits = unknowns.limits[ANGLE_SLICES[finger]]
+    # Only the first two joints turn the finger as a whole; those behind are straight, at zero, when it is longest.
+    count = 2 if FINGERS[finger] != "thumb" else 5
+    grids = [np.unique(np.clip(np.append(np.linspace(low, high, 7), 0.0), low, high)) for low, high in limits[:count]]
+    grid = np.array(list(product(*grids)))
+    angles = np.zeros((len(grid), 21))
+    angles[:, ANGLE_SLICES[finger].start:ANGLE_SLICES[finger].start + count] = grid
+    points = expected(unknowns, vector, Poses(np.tile(np.eye(4), (len(grid), 1, 1)), angles))
+    return np.asarray(angles[int(np.argmax(np.linalg.norm(points[:, marker] - points[:, wrist], axis=1)))])
