@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,37 +11,52 @@ from rhot_app.calibration.board import Chessboard
 Array = NDArray[np.float64]
 Gray = NDArray[np.uint8]
 
-_QUICK = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
-_SLOW = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-_SAME_LEVEL = 1.0  # grey levels: nearer ones are the same colour
+_EVEN_LIGHT = cv2.CALIB_CB_FAST_CHECK
+_UNEVEN_LIGHT = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+_QUICK = ((1.0, _EVEN_LIGHT), (0.5, _UNEVEN_LIGHT | cv2.CALIB_CB_FAST_CHECK))  # scale, flags; cheapest first
+_THOROUGH = ((1.0, _UNEVEN_LIGHT), (0.5, _UNEVEN_LIGHT))
+_LARGE_PX, _SMALL_PX = 1500, 1000  # longest sides: also searched at a quarter, at twice the size
 _SECTORS = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
+_SAME_LEVEL = 1.0  # grey levels: nearer ones are the same colour
 
 
 def find_chessboard(gray: Gray, board: Chessboard, *, thorough: bool) -> Array | None:
-    """(rows, cols, 2) px in the board's order, good to a pixel or two; None when the whole board is not there."""
+    """(rows, cols, 2) px in the board's order, good to a pixel or two; None when the whole board is not there.
+
+    Without `thorough` only what fits between two frames of a live picture is tried.
+    """
     size = (board.cols, board.rows)
-    found, corners = cv2.findChessboardCorners(gray, size, flags=_QUICK)
-    if not found and thorough:
-        found, corners = _search_again(gray, size)
+    for scale, flags in (*_QUICK, *(_more(gray) if thorough else ())):
+        corners = _search(gray, size, scale, flags)
+        if corners is not None:
+            return in_order(gray, corners)
+    if thorough:
+        found, sectors = cv2.findChessboardCornersSB(gray, size, flags=_SECTORS)
+        if found:
+            return in_order(gray, np.asarray(sectors, float).reshape(board.rows, board.cols, 2))
+    return None
+
+
+def _more(gray: Gray) -> list[tuple[float, int]]:
+    """What else to try: squares of a few pixels survive the search's erosions when enlarged, blurred ones when not."""
+    longest = max(gray.shape)
+    more = list(_THOROUGH)
+    if longest > _LARGE_PX:
+        more.append((0.25, _UNEVEN_LIGHT))
+    if longest < _SMALL_PX:
+        more.append((2.0, _UNEVEN_LIGHT))
+    return more
+
+
+def _search(gray: Gray, size: tuple[int, int], scale: float, flags: int) -> Array | None:
+    scaled = gray
+    if scale != 1.0:
+        smooth = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC
+        scaled = np.asarray(cv2.resize(gray, None, fx=scale, fy=scale, interpolation=smooth), np.uint8)
+    found, corners = cv2.findChessboardCorners(scaled, size, flags=flags)
     if not found:
         return None
-    return in_order(gray, np.asarray(corners, float).reshape(board.rows, board.cols, 2))
-
-
-def _search_again(gray: Gray, size: tuple[int, int]) -> tuple[bool, NDArray[Any]]:
-    found, corners = cv2.findChessboardCorners(gray, size, flags=_SLOW)
-    if found:
-        return True, corners
-    found, corners = cv2.findChessboardCorners(enlarged(gray), size, flags=_SLOW)
-    if found:
-        return True, (corners + 0.5) / 2 - 0.5
-    found, corners = cv2.findChessboardCornersSB(gray, size, flags=_SECTORS)
-    return found, corners
-
-
-def enlarged(gray: Gray) -> Gray:
-    """The picture at twice its size: small squares and thin gaps between them survive the search's erosions."""
-    return np.asarray(cv2.resize(gray, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC), np.uint8)
+    return (np.asarray(corners, float).reshape(size[1], size[0], 2) + 0.5) / scale - 0.5
 
 
 def in_order(gray: Gray, grid: Array) -> Array:
