@@ -8,15 +8,15 @@ some ten steps, where scipy's least_squares with its iterative inner solver is s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from rhot_app.calibration.bundle_layout import Layout, LensFreedom
-from rhot_app.calibration.bundle_model import Array, BundleState, Observations, linearise, residuals
+from rhot_app.calibration.bundle_layout import BoardFreedom, Layout, LensFreedom
+from rhot_app.calibration.bundle_model import POINT, Array, BundleState, Observations, linearise, residuals
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent
 
@@ -34,27 +34,31 @@ _RAYLEIGH_MEDIAN = 1.1774100225154747  # median distance of a 2-D Gaussian, in s
 class Bundle:
     """The adjusted `state` and what is left.
 
-    `residuals` (M, 2) px, seen minus expected; `noise_px` the standard deviation of a corner per axis; `layout` of the
-    unknowns and their `covariance` (size, size), already times noise squared; `steps` taken.
+    `residuals` (M, 2) px, seen minus expected; `noise_px` the standard deviation of a corner per axis, and `determined`
+    how many unknowns were taken from the corners to get it (fewer than all where something is known beforehand);
+    `layout` of the unknowns and their `covariance` (size, size), already times noise squared; `steps` taken.
     """
 
     state: BundleState
     residuals: Array
     noise_px: float
+    determined: float
     layout: Layout
     covariance: Array
     steps: int
 
 
 def adjust(start: BundleState, seen: Observations, lenses: Sequence[LensFreedom], *,
-           progress: Progress = silent) -> Bundle:
-    """Adjust everything that is free to the corners seen.
+           board_errors: BoardFreedom | None = None, progress: Progress = silent) -> Bundle:
+    """Adjust everything that is free to the corners seen; `board_errors` frees the board's own shape, too.
 
     The noise of the corners is estimated, not given: first a fit at a generous guess, then one at its robust estimate.
     Raises CalibrationError when the corners do not determine the unknowns.
     """
-    layout = Layout(lenses, len(start.world_from_board), seen)
-    if 2 * len(seen) <= layout.size:
+    layout = Layout(lenses, len(start.world_from_board), seen, board_errors)
+    if board_errors is not None and start.board_errors is None:
+        start = replace(start, board_errors=np.zeros((board_errors.count, POINT)))
+    if 2 * len(seen) <= layout.errors_at:
         raise CalibrationError(f"{len(seen)} corners do not determine {layout.size} unknowns; add pictures.")
     state, taken = start, 0
     noise = _noise(residuals(state, seen))
@@ -67,8 +71,11 @@ def adjust(start: BundleState, seen: Observations, lenses: Sequence[LensFreedom]
     progress("working out how certain it is", 0.95)
     off = residuals(state, seen)
     weights = _weights(off, noise)
-    spread = _spread(off, weights, layout.size)
-    return Bundle(state, off, spread, layout, _covariance(state, seen, layout, weights, spread), taken)
+    covariance = _covariance(state, seen, layout, weights, noise)
+    known, _ = layout.prior(state)
+    determined = layout.size - float(np.sum((known @ covariance) * known.toarray()))  # the rest is known beforehand
+    spread = _spread(off, weights, determined)
+    return Bundle(state, off, spread, determined, layout, _covariance(state, seen, layout, weights, spread), taken)
 
 
 def _descend(state: BundleState, seen: Observations, layout: Layout, noise: float, progress: Progress,
@@ -131,7 +138,7 @@ def _noise(off: Array) -> float:
     return max(float(np.median(np.linalg.norm(off, axis=1))) / _RAYLEIGH_MEDIAN, LEAST_NOISE_PX)
 
 
-def _spread(off: Array, weights: Array, unknowns: int) -> float:
+def _spread(off: Array, weights: Array, unknowns: float) -> float:
     """Standard deviation of a corner per axis from the weighted residuals and the degrees of freedom left."""
     total = float(np.sum(weights * np.sum(np.square(off), axis=1)))
     return float(np.sqrt(total / (2 * len(off) - unknowns)))

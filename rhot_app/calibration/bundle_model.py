@@ -18,6 +18,8 @@ LENS = 9
 """Parameters of a camera's lens: fx, fy, cx, cy, k1, k2, p1, p2, k3."""
 POSE = 6
 """Parameters of a pose's change: rotation vector (rad), translation (m)."""
+POINT = 3
+"""Parameters of a corner's place on the board, m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,41 +27,50 @@ class Observations:
     """M corners seen.
 
     `camera` (M,) and `shot` (M,) say by which camera in which shot, `points` (M, 3) m where the corner is on the board,
-    `pixels` (M, 2) raw px where it was seen.
+    `pixels` (M, 2) raw px where it was seen; `corner` (M,) which corner of the board it is, needed only where the
+    board's own errors are estimated.
     """
 
     camera: Index
     shot: Index
     points: Array
     pixels: Array
+    corner: Index | None = None
 
     def __len__(self) -> int:
         return len(self.camera)
 
     def only(self, kept: NDArray[np.bool_]) -> Observations:
         """The observations for which `kept` (M,) is true."""
-        return Observations(self.camera[kept], self.shot[kept], self.points[kept], self.pixels[kept])
+        return Observations(self.camera[kept], self.shot[kept], self.points[kept], self.pixels[kept],
+                            None if self.corner is None else self.corner[kept])
 
 
 @dataclass(frozen=True, slots=True)
 class BundleState:
-    """All that is estimated: `lenses` (C, 9) px and OpenCV's distortion, `camera_from_world` (C, 4, 4) and
-    `world_from_board` (S, 4, 4), one per shot, m."""
+    """All that is estimated.
+
+    `lenses` (C, 9) px and OpenCV's distortion, `camera_from_world` (C, 4, 4) and `world_from_board` (S, 4, 4), one per
+    shot, m; `board_errors` (N, 3) m, how far each of the board's corners is from where it should be, None where the
+    board is taken as drawn.
+    """
 
     lenses: Array
     camera_from_world: Array
     world_from_board: Array
+    board_errors: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Linearised:
     """Residuals seen minus expected (M, 2) px, and the derivatives of what is expected: by the camera's pose (M, 2, 6),
-    by the board's pose (M, 2, 6) and by the lens (M, 2, 9)."""
+    by the board's pose (M, 2, 6), by the lens (M, 2, 9) and by the corner's place on the board (M, 2, 3)."""
 
     residuals: Array
     by_camera: Array
     by_board: Array
     by_lens: Array
+    by_point: Array
 
 
 def residuals(state: BundleState, seen: Observations) -> Array:
@@ -84,13 +95,16 @@ def linearise(state: BundleState, seen: Observations) -> Linearised:
         residuals=seen.pixels - _expected(local, lens),
         by_camera=np.concatenate([-_times_skew(by_local, world_rotated), by_local], axis=2),
         by_board=np.concatenate([-_times_skew(by_world, turned), by_world], axis=2),
-        by_lens=by_lens)
+        by_lens=by_lens,
+        by_point=by_world @ state.world_from_board[seen.shot][:, :3, :3])
 
 
 def _local(state: BundleState, seen: Observations) -> tuple[Array, Array]:
     """The corners turned into the world's axes about their board's origin, and in their camera's frame; (M, 3) each."""
-    board = state.world_from_board[seen.shot]
-    turned = np.einsum("mij,mj->mi", board[:, :3, :3], seen.points)
+    board, points = state.world_from_board[seen.shot], seen.points
+    if state.board_errors is not None:
+        points = points + state.board_errors[seen.corner]
+    turned = np.einsum("mij,mj->mi", board[:, :3, :3], points)
     camera = state.camera_from_world[seen.camera]
     return turned, np.einsum("mij,mj->mi", camera[:, :3, :3], turned + board[:, :3, 3]) + camera[:, :3, 3]
 
