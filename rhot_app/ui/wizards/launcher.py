@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ from rhot_app.ui.shapes import shape_icon
 from rhot_app.ui.wizards.catalogue import WIZARDS, Wizard
 from rhot_app.ui.wizards.memory import Memory
 from rhot_app.ui.wizards.models.done import age_text, in_force
+from rhot_app.ui.wizards.models.proposal import Proposal
 from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.versions_dialog import VersionsDialog
 from rhot_app.ui.wizards.window import WizardWindow
@@ -57,7 +60,7 @@ class Launcher(QObject):
 
     def show_ages(self, actions: list[QAction], path: str) -> None:
         """A tick and the age of what is in force, for each wizard's action in the order of `WIZARDS`."""
-        when = in_force(Path(path)) if path else {}
+        when = {**self._noted(path), **(in_force(Path(path)) if path else {})}
         scheme, ratio = self._scheme(), self._window.devicePixelRatioF()
         for action, wizard in zip(actions, WIZARDS, strict=True):
             done = when.get(wizard.reason)
@@ -101,8 +104,21 @@ class Launcher(QObject):
                   self._listen)
         self.wizard = WizardWindow(wizard.make_plan(kit), kit, self._window)
         self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
+        self.wizard.used.connect(lambda proposal, on: self._note(proposal, str(now.path or ""), on=on))
         self.wizard.finished.connect(self._forget)
         self.wizard.open()
+
+    def _note(self, proposal: Proposal, path: str, *, on: bool) -> None:
+        """What leaves no trace in the rig's history, because it is kept by the nodes, is remembered by the app."""
+        if proposal.rig is None:
+            self._memory.remember(f"{proposal.reason} {path}", datetime.now(UTC).isoformat() if on else "")
+
+    def _noted(self, path: str) -> dict[str, datetime]:
+        found = {}
+        for wizard in WIZARDS:
+            with contextlib.suppress(ValueError):
+                found[wizard.reason] = datetime.fromisoformat(self._memory.remembered(f"{wizard.reason} {path}"))
+        return found
 
     def _forget(self) -> None:
         if self.wizard is not None:

@@ -26,12 +26,14 @@ _SIZE = (1280, 800)
 
 
 class WizardWindow(QDialog):
-    """Shows one `Plan`. `rig_used` gives the rig that is in force after "Use this calibration" and after a restore.
+    """Shows one `Plan`. `rig_used` gives the rig that is in force after "Use this calibration" and after a restore;
+    `used` the proposal, and whether it is in force now.
 
     `tick` is one turn of the timer, so that tests can turn by hand.
     """
 
     rig_used = Signal(object)
+    used = Signal(object, bool)
 
     def __init__(self, plan: Plan, kit: Kit, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -155,6 +157,7 @@ class WizardWindow(QDialog):
         rig = step.proposal.rig if outcome == "used" else step.proposal.rig_before
         if rig is not None:
             self.rig_used.emit(rig)
+        self.used.emit(step.proposal, outcome == "used")
         self.refresh()
 
     def _not_applied(self, step: AcceptStep, before: State, sentence: str) -> None:

@@ -17,7 +17,7 @@ class Hands:
         window.activateWindow()
         assert QTest.qWaitForWindowActive(window)
 
-    def until(self, condition, timeout_s=8.0):
+    def until(self, condition, timeout_s=20.0):
         end = time.monotonic() + timeout_s
         while time.monotonic() < end and not condition():
             QTest.qWait(10)

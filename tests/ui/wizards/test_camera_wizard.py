@@ -1,0 +1,181 @@
+"""The camera wizard, clicked through on cameras that obey: knobs, advice, undo, saved to the nodes and nowhere else."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from fake_engine import synthetic_rig
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMessageBox
+from wizard_hands import Hands
+from wizard_rig import FakeMemory, FakeRigAsker
+
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.camera import make_plan
+from rhot_app.ui.wizards.feed import Picture
+from rhot_app.ui.wizards.models.camera_settings import CONTROLS, CameraChoices
+from rhot_app.ui.wizards.models.camera_steps import CameraEye
+from rhot_app.ui.wizards.models.drawing import Layer
+from rhot_app.ui.wizards.plan import Kit
+from rhot_app.ui.wizards.window import WizardWindow
+from rhot_node.config import CameraSettings
+
+EXPOSURE, RED = CONTROLS[0], CONTROLS[5]
+LIT = 150.0  # level of the room at 4 ms
+
+
+class Room:
+    """A grey room before obedient cameras: more exposure, brighter picture; gains colour it."""
+
+    def __init__(self, asker):
+        self.asker = asker
+        ramp = np.linspace(0.6, 1.2, 640)[None, :, None] * np.ones((480, 1, 3))
+        self.scene = ramp.astype(np.float32)
+        self.noise = np.random.default_rng(2).normal(0, 2, (480, 640, 3)).astype(np.float32)
+
+    def draw(self, node_id, t_s):
+        camera = self.asker.settings[node_id].camera
+        gains = np.array([camera.blue_gain or 1.0, 1.0, camera.red_gain or 1.0]) * [1.0, 1.0, 1.25]
+        light = self.scene * gains * camera.exposure_us / 4000.0 * (camera.gain or 1.0)
+        picture = LIT * light ** (1 / 2.2) + self.noise
+        cv2.circle(picture, (320, 240), 20, (30.0, 30.0, 200.0), -1)
+        return np.clip(picture, 0, 255).astype(np.uint8)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """The detector is compiled at its first use, which no test should wait for."""
+    CameraEye(synthetic_rig().markers).look(Picture("left", np.full((480, 640, 3), 90, np.uint8), 1, 0, 0),
+                                            CameraSettings(), None)
+
+
+@pytest.fixture
+def asker():
+    asker = FakeRigAsker(synthetic_rig())
+    asker.draw = Room(asker).draw
+    return asker
+
+
+def node_settings(asker):
+    return {node.node_id: asker.command("node", node_id=node.node_id, request={"request": "settings"})["answer"][
+        "settings"] for node in asker.rig.nodes}
+
+
+@pytest.fixture
+def hands(themed, asker):
+    kit = Kit(asker.rig, None, asker.connect, DARK, FakeMemory(), node_settings(asker))
+    hands = Hands(WizardWindow(make_plan(kit), kit))
+    yield hands
+    hands.window.end().wait(5.0)
+    hands.window.deleteLater()
+
+
+def row(hands, field):
+    return hands.window.page.rows[field]
+
+
+def exposures(asker):
+    return [asker.settings[node_id].camera.exposure_us for node_id in (1, 2)]
+
+
+def drag_grey(hands):
+    view = hands.window.frame.wall.views["left"]
+    hands.until(lambda: view.shown is not None)
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+                     view.rect().center() + QPoint(0, 80))
+
+
+def test_from_a_dark_picture_to_saved_settings(hands, asker):
+    row(hands, "exposure_us").box.setValue(0.3)
+    hands.until(lambda: exposures(asker) == [300.0, 300.0])
+    assert asker.saved == [], "what is tried out is not saved"
+    row(hands, "exposure_us").box.setValue(5.0)
+    hands.until(lambda: exposures(asker) == [5000.0, 5000.0])
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None)
+    hands.next()
+    assert hands.window.page.table.item(0, 2).text() == "5.00 ms"
+    hands.next()
+    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    assert asker.saved == [1, 2] and exposures(asker) == [5000.0, 5000.0]
+    hands.click(hands.window.page.restore_button)
+    hands.until(lambda: hands.sentence == "The old one is back.")
+    assert exposures(asker) == [4000.0, 4000.0] and asker.saved == [1, 2, 2, 1]
+
+
+def test_closing_puts_back_what_was_tried_out(hands, asker, monkeypatch):
+    monkeypatch.setattr(QMessageBox, "question", lambda *args: QMessageBox.StandardButton.Discard)
+    row(hands, "exposure_us").box.setValue(20.0)
+    hands.until(lambda: exposures(asker) == [20000.0, 20000.0])
+    hands.key(Qt.Key.Key_Escape)
+    hands.until(lambda: exposures(asker) == [4000.0, 4000.0])
+    assert asker.saved == []
+
+
+def test_too_bright_pictures_are_striped_and_told(hands, asker):
+    row(hands, "exposure_us").box.setValue(30.0)
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None
+                and "over" in hands.window.frame.verdict.verdict.codes)
+    layer = next(mark for mark in hands.window.frame.wall.views["left"].overlay if isinstance(mark, Layer))
+    assert layer.rgba[..., 3].mean() > 20.0
+    finding = next(f for f in hands.window.frame.verdict.verdict.findings if f.code == "over")
+    assert finding.figure.startswith(("left: ", "right: ")) and "exposure_us" in finding.remedy
+
+
+def test_one_camera_alone_undo_and_a_slider(hands, asker):
+    page = hands.window.page
+    page.which.setCurrentIndex(2)
+    slider = row(hands, "exposure_us").slider
+    slider.setSliderDown(True)
+    for step in (250, 260, 270):
+        slider.setValue(step)
+    slider.setSliderDown(False)
+    hands.until(lambda: exposures(asker)[1] > 4000.0)
+    assert exposures(asker)[0] == 4000.0
+    hands.click(page.undo_button)
+    hands.until(lambda: exposures(asker) == [4000.0, 4000.0])
+    assert not page.undo_button.isEnabled(), "a whole movement of the slider is one step"
+
+
+def test_a_setting_is_left_to_the_camera_or_told(hands, asker):
+    told = row(hands, "gain").told
+    assert not told.isChecked() and not row(hands, "gain").box.isEnabled()
+    told.setChecked(True)
+    hands.until(lambda: asker.settings[1].camera.gain == 1.0)
+    told.setChecked(False)
+    hands.until(lambda: asker.settings[1].camera.gain is None)
+    assert not row(hands, "exposure_us").told.isEnabled(), "a camera must be told how long to expose"
+
+
+def test_grey_paper_balances_the_colours(hands, asker):
+    page = hands.window.page
+    page.which.setCurrentIndex(1)
+    drag_grey(hands)
+    hands.until(page.balance_button.isEnabled)
+    for _ in range(8):
+        if page.balance_button.isEnabled():
+            hands.click(page.balance_button)
+        hands.run(0.8)
+    camera = asker.settings[1].camera
+    assert camera.red_gain == pytest.approx(0.8, abs=0.06) and camera.blue_gain == pytest.approx(1.0, abs=0.06)
+
+
+def test_choices_say_only_what_differs(asker):
+    choices = CameraChoices(asker.rig.nodes, node_settings(asker))
+    assert choices.changed == () and choices.rows() == ()
+    choices.change((2,), RED, 1.5)
+    assert [node.name for node in choices.changed] == ["right"]
+    assert choices.differences(2) == ({"camera": {"red_gain": None}}, {"camera": {"red_gain": 1.5}})
+    assert next(r for r in choices.rows() if r.changed).before == "left to the camera"
+    with pytest.raises(ValueError, match="0"):
+        choices.change((2,), EXPOSURE, -1.0)
+
+
+def test_a_silent_node_has_no_knobs(themed, asker, qtbot):
+    kit = Kit(asker.rig, None, asker.connect, DARK, FakeMemory(), {})
+    plan = make_plan(kit)
+    view = plan.pages[0].step.view()
+    assert view.sentence == "No camera answers."
+    for page in plan.pages:
+        qtbot.addWidget(page)
