@@ -107,6 +107,10 @@ class ColourSamples:
             frame=np.concatenate([np.full(len(sight.colours), sight.picture, np.int32) for sight in sights]),
             area=float(np.median([sight.area for sight in sights]))) for name, sights in self._sights.items())
 
+    def pictures(self, name: str) -> int:
+        """From how many pictures a marker's samples are."""
+        return len(self._sights.get(name, []))
+
     def variety(self, name: str) -> float:
         """0..1: how much of a marker has been seen; 1 from FRAMES_ENOUGH pictures on that each showed something new."""
         return min(1.0, len(self._sights.get(name, [])) / FRAMES_ENOUGH)
@@ -122,6 +126,7 @@ class ColourSamples:
             learn_chroma_from_colours(colours_of(image, region.sample))
         except (SettingsError, CalibrationError) as exc:
             raise CalibrationError(f"{name}: {exc}") from exc
+        self._make_room()
         self._keep(image, {name: region})
         self._detector = None
         return region
@@ -179,6 +184,14 @@ class ColourSamples:
                     and max(new.level / old.level, old.level / new.level) < TURNED:
                 return False
         return True
+
+    def _make_room(self) -> None:
+        """A picture in which somebody names a marker is kept in any case: one goes whose markers others show too."""
+        if len(self._views) == VIEWS_MOST:
+            shown = [name for view in self._views for name in view.paint]
+            spare = next((view for view in self._views if all(shown.count(name) > 1 for name in view.paint)),
+                         self._views[0])
+            self._views = [view for view in self._views if view is not spare]
 
     def _keep(self, image: YuvImage, regions: dict[str, PaintRegion]) -> None:
         if image is not self._last:

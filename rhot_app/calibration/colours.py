@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,12 +78,14 @@ class ColourReport:
 
 
 def solve_colours(samples: Sequence[PaintSamples], views: Sequence[View], *, skin: Colours = NO_COLOURS,
-                  base: MarkerSet | None = None, progress: Progress = silent) -> ColourReport:
+                  base: MarkerSet | None = None, given: Mapping[str, ChromaModel] | None = None,
+                  progress: Progress = silent) -> ColourReport:
     """Colour models for all sampled markers, and how well they can be told apart from each other, skin and the room.
 
     `views`: pictures in which the markers that they show are marked, as `ColourSamples` keeps them. `skin` (N, 3): Y,
     Cb, Cr of bare skin. `base`: the set whose markers are learnt anew; without it their roles are guessed from their
-    names. Raises CalibrationError when there are no samples, or names that `base` has not.
+    names. `given`: models that a person has set, by marker; they are judged as the learnt ones are. Raises
+    CalibrationError when there are no samples, or names that `base` has not.
     """
     if not samples:
         raise CalibrationError("there are no samples; draw a box over at least one marker.")
@@ -91,7 +93,9 @@ def solve_colours(samples: Sequence[PaintSamples], views: Sequence[View], *, ski
     names = tuple(one.name for one in ordered)
     progress("learning the colours", 0.0)
     rooms = tuple(room_colours(views, name) for name in names)
-    models = solve_models(ordered, Obstacles(skin, rooms))
+    own = given or {}
+    models = tuple(own.get(one.name, model)
+                   for one, model in zip(ordered, solve_models(ordered, Obstacles(skin, rooms)), strict=True))
     learnt = {one.name: _marker(one, model, base) for one, model in zip(ordered, models, strict=True)}
     sampled = MarkerSet(markers=tuple(learnt.values()))
     progress("comparing the colours", 0.1)

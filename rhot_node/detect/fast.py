@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
-from rhot_node.detect.gate import ColourGate, merits
+from rhot_node.detect.gate import ColourGate, Labels, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
 from rhot_node.detect.light import DEAD_ZONE, Light
@@ -124,6 +124,13 @@ class FastDetector:
         if lost:
             self._acquire(image, lost, found)
         return tuple(found[index] for index in range(len(self._tracks)))
+
+    def labels(self, image: YuvImage) -> Labels:
+        """(H/2, W/2) for every chroma pixel 1 + the index of the marker that the search takes it for, 0 for none.
+
+        In the light of the last frame that was searched for markers.
+        """
+        return self._gate.labels(self._light.balanced(image))
 
     def all_blobs(self, image: YuvImage) -> list[list[MarkerObservation]]:
         """Every blob of every marker's colour, largest first, without regard to tracks; a list per marker.
