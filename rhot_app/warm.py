@@ -12,6 +12,10 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+import numpy as np
+
+from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.corners import detect
 from rhot_app.engine.warm_up import warm_up as rehearse_tracker
 from rhot_app.project import Rig, load_rig
 from rhot_app.simulator.scene import make_scene, twin_defaults
@@ -40,7 +44,15 @@ def warm_twin(_rig: Rig) -> None:
     make_renderer(shot, 0).render(shot.act.source, t_row0_s=0.0, number=0)
 
 
-STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker, "twin": warm_twin}
+def warm_boards(_rig: Rig) -> None:
+    """Compile the search for calibration boards, on the plainest picture of one."""
+    board = Chessboard(9, 6, 0.03)
+    squares = np.add.outer(np.arange(board.rows + 1), np.arange(board.cols + 1)) % 2 * 200 + 20
+    detect(np.pad(np.kron(squares, np.ones((24, 24))).astype(np.uint8), 48, constant_values=230), board, thorough=False)
+
+
+STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker, "twin": warm_twin,
+                                           "boards": warm_boards}
 
 
 def warm(name: str) -> str:
