@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rhot_app.calibration.stereo_lens_checks import LensEvidence
-from rhot_app.calibration.stereo_report import WORKING_DISTANCE_M, PairFigures, StereoFigures
+from rhot_app.calibration.stereo_report import WORKING_DISTANCE_M, StereoFigures
 from rhot_app.calibration.stereo_views import Dropped
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.geometry.transforms import inverse
@@ -24,8 +24,8 @@ _GOOD_SHOTS = 8
 _ALIKE_RAD = np.radians(10.0)
 _FAIR_ERROR_M, _POOR_ERROR_M = 0.002, 0.010
 _SQUARE_FAIR, _SQUARE_POOR = 0.005, 0.02
-_FLATNESS = 0.005  # of the board's diagonal
-_FEW_DROPPED = 0.1
+_FLATNESS = 0.005  # of the board's diagonal, and
+_BEYOND_NOISE = 2.0  # times what the noise of the corners explains
 
 
 def fit_findings(figures: StereoFigures, *, lenses_from_views: bool) -> list[Finding]:
@@ -99,7 +99,7 @@ def _squares(figures: StereoFigures) -> Finding | None:
     squares, side = figures.squares, figures.board.square_m
     off = abs(squares.mean_m / side - 1.0)
     diagonal = side * float(np.hypot(figures.board.cols - 1, figures.board.rows - 1))
-    bent = squares.flatness_m > _FLATNESS * diagonal
+    bent = squares.flatness_m > max(_FLATNESS * diagonal, _BEYOND_NOISE * squares.flatness_by_noise_m)
     if not off > _SQUARE_FAIR and not bent:
         return None
     return Finding(
@@ -154,8 +154,3 @@ def _mirrored(why: str) -> Finding:
     return Finding("mirrored", Grade.POOR, f"The pictures of all cameras are mirrored: {why}.",
                    "A driver or a setting (hflip, selfie view) mirrors them.",
                    "Switch the mirroring off and take the pictures again; never calibrate on flipped copies.")
-
-
-def shared_by(pair: PairFigures) -> str:
-    """A pair in words, for lines on a terminal."""
-    return f"{pair.first} - {pair.second}: {pair.baseline_m * 1e3:.1f} mm apart, {pair.shared} shared shots"

@@ -19,51 +19,65 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Squares:
-    """Sides of the triangulated squares: their `mean_m` and standard deviation `std_m` over `count` sides; `flatness_m`
-    the rms distance of the corners from the plane of their board."""
+    """Sides of the triangulated squares.
+
+    `mean_m` from whole rows and columns of corners, because noise lengthens every single side; `std_m` the standard
+    deviation of `count` single sides; `flatness_m` the rms distance of the corners from the plane of their board, of
+    which the noise of the corners in the pictures explains `flatness_by_noise_m`.
+    """
 
     mean_m: float
     std_m: float
     count: int
     flatness_m: float
+    flatness_by_noise_m: float
 
 
 def locate(pixels: Array, state: BundleState) -> Array:
     """Points (N, 3) m in the world from raw px (C, N, 2), NaN where a camera does not see one; NaN if not located."""
+    return locate_with_covariance(pixels, state)[0]
+
+
+def locate_with_covariance(pixels: Array, state: BundleState) -> tuple[Array, Array]:
+    """`locate`, and the points' covariances (N, 3, 3) m^2 for noise of 1 px per axis in every camera."""
     cameras = np.ascontiguousarray(state.camera_from_world[:, :3, :])
     focal = np.ascontiguousarray(state.lenses[:, :2])
     rays = np.stack([undistort_points(np.ascontiguousarray(each), lens)
                      for each, lens in zip(pixels, state.lenses, strict=True)])
     spread = np.array([np.diag(1.0 / each**2) for each in focal])
-    points, covariance = np.full((pixels.shape[1], 3), np.nan), np.empty((3, 3))
+    points, covariances = np.full((pixels.shape[1], 3), np.nan), np.full((pixels.shape[1], 3, 3), np.nan)
     every = np.ones(len(cameras), bool)
     for i in range(len(points)):
-        triangulate(np.ascontiguousarray(rays[:, i]), spread, cameras, focal, every, points[i], covariance)
-    return points
+        triangulate(np.ascontiguousarray(rays[:, i]), spread, cameras, focal, every, points[i], covariances[i])
+    return points, covariances
 
 
-def board_grids(used: Sequence[Sequence[BoardView | None]], board: Board, state: BundleState) -> Array:
-    """(S, rows, cols, 3) m, the corners of the board of every shot in the world, located by the cameras alone."""
-    grids = []
+def measure_squares(used: Sequence[Sequence[BoardView | None]], board: Board, state: BundleState,
+                    noise_px: float) -> Squares:
+    """The board of every shot, `used` [shot][camera], located by the cameras alone and held against its geometry.
+
+    `noise_px` of the corners per axis.
+    """
+    sides, spans, off, expected = [np.empty(0)], [(0.0, 0)], [np.empty(0)], [np.empty(0)]
     for those in used:
         pixels = np.full((len(those), board.count, 2), np.nan)
         for camera, view in enumerate(those):
             if view is not None:
                 pixels[camera, view.ids] = view.pixels
-        grids.append(locate(pixels, state).reshape(board.rows, board.cols, 3))
-    return np.array(grids)
-
-
-def measure_squares(grids: Array) -> Squares:
-    """Sides and flatness of located boards (S, rows, cols, 3) m."""
-    across = np.linalg.norm(np.diff(grids, axis=2), axis=3).ravel()
-    down = np.linalg.norm(np.diff(grids, axis=1), axis=3).ravel()
-    sides = np.concatenate([across, down])
-    sides = sides[np.isfinite(sides)]
-    off = np.concatenate([_off_plane(grid.reshape(-1, 3)) for grid in grids])
-    if not len(sides):
-        return Squares(float("nan"), float("nan"), 0, float("nan"))
-    return Squares(float(np.mean(sides)), float(np.std(sides)), len(sides), float(np.sqrt(np.mean(off**2))))
+        points, covariances = locate_with_covariance(pixels, state)
+        grid = points.reshape(board.rows, board.cols, 3)
+        lines = (*grid, *grid.transpose(1, 0, 2))
+        sides += [np.linalg.norm(np.diff(line, axis=0), axis=1) for line in lines]
+        spans += [_span(line) for line in lines]
+        distances, normal = _off_plane(points)
+        off.append(distances)
+        expected.append(noise_px**2 * np.einsum("i,nij,j->n", normal, covariances, normal))
+    length, squares = np.sum(spans, axis=0)
+    every = np.concatenate(sides)
+    every = every[np.isfinite(every)]
+    return Squares(float(length / squares) if squares else float("nan"), float(np.std(every)), len(every),
+                   float(np.sqrt(np.nanmean(np.square(np.concatenate(off))))),
+                   float(np.sqrt(np.nanmean(np.concatenate(expected)))))
 
 
 def epipolar_px(used: Sequence[Sequence[BoardView | None]], state: BundleState, first: int, second: int) -> float:
@@ -87,15 +101,24 @@ def epipolar_px(used: Sequence[Sequence[BoardView | None]], state: BundleState, 
     return float(np.sqrt(np.nanmean(np.concatenate(squares)))) if squares else float("nan")
 
 
+def _span(line: Array) -> tuple[float, int]:
+    """Distance in m between the first and the last located corner of a line (N, 3), and how many squares that is."""
+    located = np.flatnonzero(np.isfinite(line).all(axis=1))
+    if len(located) < 2:
+        return 0.0, 0
+    return float(np.linalg.norm(line[located[-1]] - line[located[0]])), int(located[-1] - located[0])
+
+
 def _homogeneous(pixels: Array, lens: Array) -> Array:
     rays = undistort_points(np.ascontiguousarray(pixels), lens)
     return np.column_stack([rays, np.ones(len(rays))])
 
 
-def _off_plane(points: Array) -> Array:
-    """Distances of the finite ones of `points` (N, 3) from their plane; none for fewer than four."""
-    points = points[np.isfinite(points).all(axis=1)]
-    if len(points) < 4:
-        return np.empty(0)
-    centred = points - points.mean(axis=0)
-    return np.asarray(centred @ np.linalg.svd(centred, full_matrices=False)[2][2])
+def _off_plane(points: Array) -> tuple[Array, Array]:
+    """Distances of `points` (N, 3) from their plane and its normal (3,); NaN for fewer than four located ones."""
+    located = points[np.isfinite(points).all(axis=1)]
+    if len(located) < 4:
+        return np.full(len(points), np.nan), np.full(3, np.nan)
+    middle = located.mean(axis=0)
+    normal = np.linalg.svd(located - middle, full_matrices=False)[2][2]
+    return np.asarray((points - middle) @ normal), normal

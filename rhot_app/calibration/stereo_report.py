@@ -13,7 +13,7 @@ from rhot_app.calibration.bundle_model import BundleState
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.ruler import RulerResult
 from rhot_app.calibration.stereo_certainty import certainty, expected_error
-from rhot_app.calibration.stereo_points import Squares, board_grids, epipolar_px, measure_squares
+from rhot_app.calibration.stereo_points import Squares, epipolar_px, measure_squares
 from rhot_app.calibration.stereo_solve import StereoSolution, view_rms
 from rhot_app.calibration.stereo_views import Dropped
 from rhot_app.calibration.verdict import Verdict
@@ -129,7 +129,7 @@ def figures_of(solution: StereoSolution, lenses: Sequence[LensStart], names: Seq
                   for shot, rms in zip(solution.shots, view_rms(solution), strict=True))
     return StereoFigures(
         state, solution.board, cameras, tuple(pairs), shots, _rms(distances), bundle.noise_px,
-        measure_squares(board_grids(solution.views, solution.board, state)),
+        measure_squares(solution.views, solution.board, state, bundle.noise_px),
         expected_error(state, sure, WORKING_DISTANCE_M, MARKER_NOISE_PX), _tilt_spread(state.world_from_board))
 
 
