@@ -30,6 +30,7 @@ SUBCOMMANDS = {
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
+    "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),
     "check": Subcommand("rhot_app.calibration.commands.check", "check a rig file for what cannot be"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),
     "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "play a simulated run and compare with its truth"),

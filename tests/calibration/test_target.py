@@ -1,0 +1,110 @@
+"""Printed boards: true scale in both file formats, found again by the detectors, refused when they do not fit."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rhot_app.__main__ import main
+from rhot_app.calibration.board import CharucoBoard, Chessboard
+from rhot_app.calibration.corners import detect
+from rhot_app.calibration.target import PAPERS_MM, RULER_MM, draw_target
+from rhot_app.calibration.target_drawing import Drawing
+from rhot_app.errors import CalibrationError
+
+PX_PER_MM = 4.0
+
+BOARDS = [Chessboard(9, 6, 0.025), Chessboard(6, 9, 0.02), CharucoBoard(10, 7, 0.025, 0.018),
+          CharucoBoard(8, 6, 0.025, 0.018, "DICT_5X5_100", legacy=True), CharucoBoard(8, 6, 0.025, 0.018)]
+
+
+def boxes_of_svg(svg: bytes) -> np.ndarray:
+    """(N, 4) mm: x, y, width, height of the black rectangles."""
+    found = re.findall(rb'<rect x="([\d.-]+)" y="([\d.-]+)" width="([\d.-]+)" height="([\d.-]+)"/>', svg)
+    return np.array(found, dtype=np.float64)
+
+
+def boxes_of_pdf(pdf: bytes, page_height_mm: float) -> np.ndarray:
+    """Likewise, from the points of the page's content."""
+    found = np.array(re.findall(rb"([\d.-]+) ([\d.-]+) ([\d.-]+) ([\d.-]+) re", pdf), dtype=np.float64) * 25.4 / 72.0
+    found[:, 1] = page_height_mm - found[:, 1] - found[:, 3]
+    return found
+
+
+def picture_of(drawing: Drawing) -> np.ndarray:
+    """The sheet as a camera straight above would see it."""
+    picture = np.full((round(drawing.height * PX_PER_MM), round(drawing.width * PX_PER_MM)), 255, np.uint8)
+    for x, y, width, height in PX_PER_MM * boxes_of_svg(drawing.to_svg()):
+        picture[round(y):round(y + height), round(x):round(x + width)] = 0
+    return cv2.GaussianBlur(picture, (0, 0), 1.0)
+
+
+@pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.text)
+def test_the_printed_board_is_found_in_true_scale(board) -> None:
+    view = detect(picture_of(draw_target(board)), board)
+    assert view is not None and len(view.ids) == board.count
+    span_mm = np.linalg.norm(view.pixels[-1] - view.pixels[0]) / PX_PER_MM
+    points = board.object_points()[view.ids]
+    assert span_mm == pytest.approx(1e3 * np.linalg.norm(points[-1] - points[0]), abs=0.2)
+
+
+@pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.text)
+def test_both_formats_say_the_same(board) -> None:
+    drawing = draw_target(board)
+    printed = boxes_of_pdf(drawing.to_pdf(), drawing.height)
+    np.testing.assert_allclose(printed, boxes_of_svg(drawing.to_svg()), atol=2e-4)
+    assert b"PrintScaling /None" in drawing.to_pdf()
+
+
+def test_the_ruler_is_as_long_as_it_says() -> None:
+    boxes = boxes_of_svg(draw_target(BOARDS[0]).to_svg())
+    ticks = boxes[(boxes[:, 2] < 0.3) & (boxes[:, 3] > 1.0)]
+    middles = ticks[:, 0] + 0.5 * ticks[:, 2]
+    assert middles.max() - middles.min() == pytest.approx(RULER_MM, abs=1e-3)
+    assert len(ticks) == RULER_MM + 1
+
+
+@pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.text)
+def test_nothing_leaves_the_page_or_lies_on_the_ruler(board) -> None:
+    drawing = draw_target(board)
+    boxes = boxes_of_svg(drawing.to_svg())
+    assert (boxes[:, :2] >= 5.0).all()
+    assert (boxes[:, 0] + boxes[:, 2] <= drawing.width - 5.0).all()
+    squares = boxes[np.isclose(boxes[:, 2], 1e3 * board.square_m)]
+    ruler = boxes[(boxes[:, 2] < 0.3)]
+    assert (squares[:, 1] + squares[:, 3]).max() + 3.0 < ruler[:, 1].min()
+
+
+def test_a_board_too_large_says_what_would_fit() -> None:
+    with pytest.raises(CalibrationError, match=r"does not fit on A4.*Squares of (\d+\.?\d*) mm would, or print it on A3"
+                       ) as caught:
+        draw_target(Chessboard(9, 6, 0.03))
+    square_mm = float(re.search(r"Squares of ([\d.]+) mm", str(caught.value))[1])
+    assert draw_target(Chessboard(9, 6, 1e-3 * square_mm)).width == PAPERS_MM["A4"][1]
+
+
+def test_the_pdf_is_one(tmp_path: Path) -> None:
+    pdf = draw_target(BOARDS[2]).to_pdf()
+    start = int(re.search(rb"startxref\n(\d+)", pdf)[1])
+    assert pdf[start:start + 4] == b"xref"
+    for number, offset in enumerate(re.findall(rb"(\d{10}) 00000 n", pdf), start=1):
+        assert pdf[int(offset):].startswith(b"%d 0 obj" % number)
+
+
+def test_the_command_writes_and_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "board.pdf"
+    assert main(["target", "chessboard", "--board", "9x6", "--square-mm", "25", "--out", str(out)]) == 0
+    assert out.read_bytes().startswith(b"%PDF-1.4")
+    for arguments, sentence in (
+            (["chessboard", "--out", str(tmp_path / "board.png")], "must end in .pdf or .svg"),
+            (["chessboard", "--square-mm", "30", "--out", str(tmp_path / "b.svg")], "does not fit on A4"),
+            (["chessboard", "--paper", "B7", "--out", str(tmp_path / "b.svg")], "no paper 'B7'"),
+            (["charuco", "--dictionary", "DICT_X", "--out", str(tmp_path / "b.svg")], "no marker dictionary"),
+            (["chessboard", "--out", str(tmp_path / "no" / "b.svg")], "cannot be written")):
+        assert main(["target", *arguments]) == 2
+        assert sentence in capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["board.pdf"]
