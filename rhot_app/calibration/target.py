@@ -82,7 +82,8 @@ def _refusal(board: Board, paper: str) -> str:
                                         (page[1] - 2.0 * MARGIN_MM - _FOOT_MM - _quiet_mm(board)) / height)
     larger = f", or print it on {fitting[0]}" if fitting else ""
     return (f"The {board.text} is {width:g} x {height:g} mm large and does not fit on {paper} ({page[0]:g} x "
-            f"{page[1]:g} mm) with its margins and the ruler. Squares of {np.floor(2.0 * square) / 2.0:g} mm would{larger}.")
+            f"{page[1]:g} mm) with its margins and the ruler. Squares of {np.floor(2.0 * square) / 2.0:g} mm "
+            f"would{larger}.")
 
 
 def _board_boxes(board: Board) -> Iterator[Box]:
