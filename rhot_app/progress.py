@@ -18,6 +18,11 @@ def silent(text: str, fraction: float) -> None:
     """The progress of work that nobody watches."""
 
 
+def within(progress: Progress, start: float, end: float) -> Progress:
+    """The progress of a part of the work: its 0..1 are `start`..`end` of the whole's."""
+    return lambda text, fraction: progress(text, start + (end - start) * fraction)
+
+
 class ProgressLine:
     """Shows "what: 42 %, 12 s left" on `stream`; silent where it is not a terminal, except for the end."""
 

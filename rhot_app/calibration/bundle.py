@@ -27,6 +27,7 @@ LEAST_NOISE_PX = 1e-3
 
 _MOST_STEPS = 100
 _STILL_PX = 1e-8  # the step that changes no expected corner by more than this was the last
+_LEAST_GAIN = 1e-7  # of the cost: nothing moves by more than a thousandth of its standard deviation any more
 _RAYLEIGH_MEDIAN = 1.1774100225154747  # median distance of a 2-D Gaussian, in standard deviations per axis
 
 
@@ -95,10 +96,11 @@ def _descend(state: BundleState, seen: Observations, layout: Layout, noise: floa
             damping *= 10.0
             if damping > 1e12:
                 return state, count
-        if new_cost <= cost:
+        gained = cost - new_cost
+        if gained >= 0.0:
             state, cost = after, new_cost
         damping = max(damping * 0.1, 1e-12)
-        if still:
+        if still or gained < _LEAST_GAIN:
             return state, count + 1
     return state, _MOST_STEPS
 

@@ -39,7 +39,7 @@ def find_lens(views: Sequence[BoardView], board: Board, name: str) -> LensStart:
                         np.concatenate([view.object_points(board) for view, _ in usable]),
                         np.concatenate([view.pixels for view, _ in usable]))
     start = BundleState(lens[None], np.eye(4)[None], np.array([pose for _, pose in usable]))
-    free = LensFreedom.free([i != K3 for i in range(9)], lens, _loose(size))
+    free = LensFreedom.free([i != K3 for i in range(9)], lens, loose_prior(size))
     try:
         found = adjust(start, seen, [free]).state.lenses[0]
     except CalibrationError as exc:
@@ -58,7 +58,7 @@ def _closed_form(views: Sequence[BoardView], board: Board, size: tuple[int, int]
     return np.array([focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def _loose(size: tuple[int, int]) -> Array:
+def loose_prior(size: tuple[int, int]) -> Array:
     """Standard deviations (9,) that keep a start from running away, and pull at nothing that pictures determine."""
     longest = float(max(size))
-    return np.array([longest, longest, 0.2 * longest, 0.2 * longest, 1.0, 3.0, 0.05, 0.05, np.inf])
+    return np.array([longest, longest, 0.2 * longest, 0.2 * longest, 1.0, 3.0, 0.05, 0.05, 5.0])

@@ -1,0 +1,154 @@
+"""The fit of one camera's lens to its views of a board: without the views that do not fit, with the board's own shape,
+and with as many distortion coefficients as the views determine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.board import Board
+from rhot_app.calibration.board_errors import BoardErrors, find_board_errors
+from rhot_app.calibration.board_poses import pose_view
+from rhot_app.calibration.bundle import Bundle, adjust
+from rhot_app.calibration.bundle_layout import LensFreedom
+from rhot_app.calibration.bundle_model import LENS, BundleState, Observations
+from rhot_app.calibration.corners import BoardView
+from rhot_app.calibration.lens_search import find_lens, loose_prior
+from rhot_app.errors import CalibrationError
+from rhot_app.progress import Progress, silent, within
+
+Array = NDArray[np.float64]
+
+FEWEST_VIEWS = 3
+K1, K2, K3 = 4, 5, 8
+"""Places of the radial coefficients among the lens parameters."""
+
+SIGNIFICANT = 2.0
+"""Standard deviations: a radial coefficient nearer to zero than this is left out, highest power first."""
+
+_OFF_TIMES = 4.0  # a view whose rms is this many times the median view's, and
+_OFF_PX = 0.3  # this much more than it, does not fit
+_MOST_DROPPED = 0.34  # of the views; who needs more thrown away has another trouble
+
+
+@dataclass(frozen=True, slots=True)
+class LensFit:
+    """The adjusted lens.
+
+    `bundle` of one camera and the corners `seen` in it; `kept` indices of the views in it, in its order; `dropped`
+    index -> rms px of those left out; `free` (9,) which lens parameters were estimated; `left_out` name -> standard
+    deviation of the coefficients that were not told from zero, and were left out; `board_errors` if any were found.
+    """
+
+    bundle: Bundle
+    seen: Observations
+    kept: tuple[int, ...]
+    dropped: dict[int, float]
+    free: NDArray[np.bool_]
+    left_out: dict[str, float]
+    board_errors: BoardErrors | None
+
+    @property
+    def lens(self) -> Array:
+        """(9,) fx, fy, cx, cy, k1, k2, p1, p2, k3."""
+        return self.bundle.state.lenses[0]
+
+    @property
+    def covariance(self) -> Array:
+        """(9, 9) of the lens, poses and board errors marginalised; zero for what was not estimated."""
+        basis = self.bundle.layout.lenses[0].basis
+        at = self.bundle.layout.lens(0)
+        return basis @ self.bundle.covariance[at, at] @ basis.T
+
+    @property
+    def view_rms(self) -> Array:
+        """(K,) px, rms distance of each kept view's corners from where they are expected."""
+        return _view_rms(self.bundle, self.seen)
+
+
+def fit_lens(views: Sequence[BoardView], board: Board, *, square_pixels: bool = False, name: str = "camera",
+             progress: Progress = silent) -> LensFit:
+    """Fit the lens to `views`, all of one size. Raises CalibrationError when they do not determine it."""
+    kept = list(range(len(views)))
+    dropped: dict[int, float] = {}
+    while True:
+        kept, bundle, seen = _plain_fit(views, kept, board, square_pixels, name, within(progress, 0.0, 0.3))
+        strange = {kept[row]: rms for row, rms in _strange(_view_rms(bundle, seen)).items()}
+        if not strange or len(dropped) + len(strange) > _MOST_DROPPED * len(views):
+            break
+        dropped |= strange
+        kept = [index for index in kept if index not in dropped]
+    return _choose_model(bundle, seen, views[0], board, square_pixels, tuple(kept), dropped, progress)
+
+
+def _plain_fit(views: Sequence[BoardView], kept: Sequence[int], board: Board, square_pixels: bool, name: str,
+               progress: Progress) -> tuple[list[int], Bundle, Observations]:
+    """Everything free but the board's shape; returns the views that could be placed, too."""
+    progress("finding a first lens", 0.0)
+    start = find_lens([views[index] for index in kept], board, name).lens
+    if square_pixels:
+        start[:2] = start[:2].mean()
+    posed = {index: pose_view(views[index], board, start) for index in kept}
+    poses = {index: each.camera_from_board[0] for index, each in posed.items() if each is not None}
+    if len(poses) < FEWEST_VIEWS:
+        raise CalibrationError(f"{name}: only {len(poses)} views fit together; {FEWEST_VIEWS} are the least, 15 are "
+                               "good.")
+    seen = _observations([views[index] for index in poses], board)
+    state = BundleState(start[None], np.eye(4)[None], np.array(list(poses.values())))
+    freedom = _freedom(np.ones(LENS, bool), start, views[0], square_pixels)
+    return list(poses), adjust(state, seen, [freedom], progress=progress), seen
+
+
+def _view_rms(bundle: Bundle, seen: Observations) -> Array:
+    squares = np.bincount(seen.shot, np.square(bundle.residuals).sum(axis=1))
+    return np.sqrt(squares / np.bincount(seen.shot))
+
+
+def _choose_model(bundle: Bundle, seen: Observations, view: BoardView, board: Board, square_pixels: bool,
+                  kept: tuple[int, ...], dropped: dict[int, float], progress: Progress) -> LensFit:
+    """Leave out radial coefficients that are zero as far as these views can tell, the highest power first."""
+    free = np.ones(LENS, bool)
+    left_out: dict[str, float] = {}
+    freedom = _freedom(free, bundle.state.lenses[0], view, square_pixels)
+    bundle, errors = find_board_errors(bundle, seen, [freedom], board.count, board.square_m,
+                                       progress=within(progress, 0.3, 0.8))
+    fit = LensFit(bundle, seen, kept, dropped, free, left_out, errors)
+    for place, coefficient in ((K3, "k3"), (K2, "k2"), (K1, "k1")):
+        std = float(np.sqrt(fit.covariance[place, place]))
+        if abs(fit.lens[place]) >= SIGNIFICANT * std:
+            break
+        free, left_out = free.copy(), {**left_out, coefficient: std}
+        free[place] = False
+        bundle = _without(fit, place, free, view, square_pixels, within(progress, 0.8, 0.95))
+        fit = replace(fit, bundle=bundle, free=free, left_out=left_out)
+    return fit
+
+
+def _without(fit: LensFit, place: int, free: NDArray[np.bool_], view: BoardView, square_pixels: bool,
+             progress: Progress) -> Bundle:
+    lens = fit.lens.copy()
+    lens[place] = 0.0
+    return adjust(replace(fit.bundle.state, lenses=lens[None]), fit.seen, [_freedom(free, lens, view, square_pixels)],
+                  board_errors=None if fit.board_errors is None else fit.board_errors.freedom, progress=progress)
+
+
+def _freedom(free: NDArray[np.bool_], lens: Array, view: BoardView, square_pixels: bool) -> LensFreedom:
+    prior = np.where(free, loose_prior(view.size), np.inf)
+    return LensFreedom.free(list(free), lens, prior, square_pixels=square_pixels)
+
+
+def _observations(views: Sequence[BoardView], board: Board) -> Observations:
+    counts = [len(view.ids) for view in views]
+    return Observations(np.zeros(sum(counts), np.intp), np.repeat(np.arange(len(views)), counts),
+                        np.concatenate([view.object_points(board) for view in views]),
+                        np.concatenate([view.pixels for view in views]), np.concatenate([view.ids for view in views]))
+
+
+def _strange(rms: Array) -> dict[int, float]:
+    """Rows of the views that fit far worse than the others, and their rms."""
+    usual = float(np.median(rms))
+    limit = max(_OFF_TIMES * usual, usual + _OFF_PX)
+    return {int(row): float(rms[row]) for row in np.flatnonzero(rms > limit)}
