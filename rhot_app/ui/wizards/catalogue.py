@@ -31,10 +31,10 @@ class Wizard:
 
 
 WIZARDS: tuple[Wizard, ...] = (
-    Wizard("colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
-           "colour calibration"),
     Wizard("camera", "Set the cameras", "Exposure, gains, white balance: what each camera is told, tried out live.",
            "camera settings"),
+    Wizard("colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
+           "colour calibration"),
     Wizard("stereo", "Put the cameras together", "Where the cameras stand to each other and to the table, from a board "
            "that they see at the same time.", "stereo calibration"),
     Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),

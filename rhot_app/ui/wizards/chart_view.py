@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.palette import Scheme, visible_on
 from rhot_app.ui.theme import app_font
 from rhot_app.ui.wizards.models.chart import Chart, Curve
 
@@ -15,6 +15,8 @@ _DOT_PX = 7
 _FAINT_PX = 3
 _WIDTH_PX = 2.0
 _TEXT_PT = 11.0
+_LEGEND_ROWS, _LEGEND_COLUMNS = 5, 4
+_BAND_ALPHA, _OWN_ALPHA = 40, 90
 
 
 class ChartView(QWidget):
@@ -54,10 +56,12 @@ class ChartView(QWidget):
             axis.setTickFont(app_font(_TEXT_PT))
             axis.setPen(scheme.border)
             axis.setTextPen(scheme.muted)
-        plot.addLegend(offset=(-10, 1), labelTextColor=scheme.text, brush=pg.mkBrush(scheme.panel))
+        plot.setLogMode(y=chart.log_y)
+        columns = _LEGEND_COLUMNS if len(chart.curves) > _LEGEND_ROWS else 1
+        plot.addLegend(offset=(-10, 1), labelTextColor=scheme.text, brush=pg.mkBrush(scheme.panel), colCount=columns)
         tones = iter((scheme.accent, scheme.caution, scheme.good, scheme.bad, scheme.muted) * 4)
         for curve in chart.curves:
-            self._add(plot, curve, QColor(next(tones)))
+            self._add(plot, curve, QColor(visible_on(curve.colour, scheme.panel) if curve.colour else next(tones)))
         return plot
 
     def _add(self, plot: pg.PlotWidget, curve: Curve, tone: QColor) -> None:
@@ -73,8 +77,8 @@ class ChartView(QWidget):
 
     def _add_band(self, plot: pg.PlotWidget, curve: Curve, tone: QColor) -> None:
         edge = pg.mkPen(tone, width=1.0)
-        low = plot.plot(curve.x, curve.y, pen=edge, name=curve.name)
+        low = plot.plot(curve.x, curve.y, pen=edge, name=curve.name or None)
         high = plot.plot(curve.x, curve.high if curve.high is not None else curve.y, pen=edge)
         fill = QColor(tone)
-        fill.setAlpha(40)
+        fill.setAlpha(_OWN_ALPHA if curve.colour else _BAND_ALPHA)
         plot.addItem(pg.FillBetweenItem(low, high, brush=fill))

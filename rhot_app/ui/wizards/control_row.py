@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QGridLayout, QSlider, QWidget
 
 from rhot_app.ui.wizards.models.camera_settings import Control, Value
@@ -25,6 +26,11 @@ class ControlRow(QWidget):
         self.told = QCheckBox(control.name)
         self.told.setToolTip(f"{control.meaning}\nUntick it to leave it to the camera." if control.optional
                              else control.meaning)
+        if not control.optional:  # a name, not a choice
+            self.told.setStyleSheet("QCheckBox { spacing: 0 } QCheckBox::indicator { width: 0; height: 0 }")
+            palette = self.told.palette()
+            palette.setColor(QPalette.ColorGroup.Disabled, QPalette.ColorRole.WindowText, palette.windowText().color())
+            self.told.setPalette(palette)
         self.box = QDoubleSpinBox()
         self.box.setRange(control.least, control.most)
         self.box.setDecimals(control.decimals)

@@ -1,0 +1,67 @@
+"""What the real detector makes of the live pictures: each pixel's marker, and where every marker was found. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.ui.wizards.models.drawing import Dots, Layer, Overlay, Tag
+from rhot_app.ui.wizards.models.step import Pictures
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import YuvImage, from_bgr
+from rhot_node.markers import MarkerSet
+from rhot_node.wire.messages import MarkerObservation
+
+_DIMMED = 150  # alpha of the black over everything that is taken for no marker
+_FAINT = 70  # alpha of a marker's colour where it was not asked for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """One camera's picture as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none."""
+
+    image: YuvImage
+    labels: NDArray[np.uint8]
+    seen: tuple[MarkerObservation, ...]
+
+
+Sights = dict[str, Sight]
+
+
+class MaskMaker:
+    """Detectors of all cameras for one marker set after the other. One thread only."""
+
+    def __init__(self) -> None:
+        self._markers: MarkerSet | None = None
+        self._detectors: dict[str, FastDetector] = {}
+
+    def look(self, pictures: Pictures, markers: MarkerSet) -> Sights:
+        """What every camera's detector finds with `markers`."""
+        if markers is not self._markers:
+            self._markers, self._detectors = markers, {}
+        sights = {}
+        for name, picture in pictures.items():
+            detector = self._detectors.setdefault(name, FastDetector(markers))
+            image = from_bgr(picture.bgr)
+            seen = detector.detect(image)
+            sights[name] = Sight(image, detector.labels(image), seen)
+        return sights
+
+
+def mask_overlay(sight: Sight, markers: MarkerSet, chosen: int | None) -> Overlay:
+    """The mask over a dimmed picture, every marker in its own colour, those found with a ring and their name.
+
+    `chosen`: the only marker that is shown in full; None shows all so.
+    """
+    palette = np.zeros((len(markers.markers) + 1, 4), np.uint8)
+    palette[0, 3] = _DIMMED
+    for index, marker in enumerate(markers.markers):
+        palette[index + 1] = (*marker.display_rgb, 255 if chosen in (None, index) else _FAINT)
+    marks: list[Layer | Dots | Tag] = [Layer(palette[sight.labels])]
+    for mark in sight.seen:
+        if mark.found and chosen in (None, mark.index):
+            marks.append(Dots(np.array([[mark.x, mark.y]]), "text", radius=3.0))
+            marks.append(Tag(mark.x + 8.0, mark.y - 4.0, markers.ids[mark.index]))
+    return tuple(marks)

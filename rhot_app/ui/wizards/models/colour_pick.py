@@ -1,0 +1,161 @@
+"""The step in which a person shows which paint is which marker, and moves the hand until enough of it was seen."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+from rhot_app.calibration.colour_gathering import ColourGathering
+from rhot_app.calibration.separability import SKIN
+from rhot_app.errors import CalibrationError
+from rhot_app.ui.wizards.feed import Picture
+from rhot_app.ui.wizards.models.colour_mask import MaskMaker, Sights, mask_overlay
+from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
+from rhot_node.detect.colour import learn_chroma_from_colours
+from rhot_node.markers import MarkerSet
+
+Show = Literal["all", "chosen", "none"]
+"""Whose mask lies over the pictures."""
+
+_CLICK_PX = 5.0  # a drag that is smaller was a click
+_PARTS = 10  # of a marker's variety after which its colour is learnt anew
+
+
+class PickStep(Step):
+    """Every marker of the set in turn: choose it, click its paint. Space holds the pictures, to click in them."""
+
+    title = "Pick the colours"
+    watches = captures = True
+
+    def __init__(self, markers: MarkerSet, cameras: tuple[str, ...]) -> None:
+        self.cameras = cameras
+        self.base = markers
+        self.gathering = ColourGathering(cameras)
+        self.chosen = markers.ids[0]
+        self.show: Show = "all"
+        self.problem = ""
+        self.held: dict[str, Picture] = {}
+        self._live: Pictures = {}
+        self._sights: Sights = {}
+        self._maker = MaskMaker()
+        self._markers = markers
+        self._learnt: dict[str, int] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What can be picked: the markers and, for comparison, bare skin."""
+        return (*self.base.ids, SKIN)
+
+    @property
+    def markers(self) -> MarkerSet:
+        """The set whose mask is shown: new colours where there are samples, the old ones elsewhere."""
+        return self._markers
+
+    @property
+    def keeps(self) -> bool:
+        """Picking takes a person a minute."""
+        return bool(self.gathering.names)
+
+    def see(self, pictures: Pictures) -> tuple[Pictures, Sights]:
+        """The mask; the detectors are the looker's own."""
+        return pictures, self._maker.look(self.held or pictures, self._markers)
+
+    def take(self, seen: tuple[Pictures, Sights]) -> None:
+        """Gather where markers show something new."""
+        self._live, self._sights = seen
+        if not self.held:
+            self.gathering.follow({name: sight.image for name, sight in self._sights.items()})
+        self._learn()
+
+    def capture(self) -> bool:
+        """Hold the pictures, or let them go on."""
+        self.held = {} if self.held else dict(self._live)
+        return bool(self.held)
+
+    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> bool:
+        """The chosen marker's paint is there, px of the frame; whether it could be taken. The next one is chosen."""
+        sight = self._sights.get(camera)
+        if sight is None:
+            return False
+        click = max(width, height) < _CLICK_PX
+        where = (x, y) if click else (round(x), round(y), round(x + width) + 1, round(y + height) + 1)
+        try:
+            self.gathering.pick(self.chosen, camera, sight.image, where)
+        except CalibrationError as exc:
+            self.problem = str(exc)
+            return False
+        self.problem = ""
+        self._learn()
+        self._choose_next()
+        return True
+
+    def undo(self) -> bool:
+        """Take the last pick back, and choose what it was for."""
+        name = self.gathering.take_back()
+        if name is None:
+            return False
+        self.chosen, self.problem = name, ""
+        self._learn()
+        return True
+
+    @property
+    def undoable(self) -> bool:
+        """Whether there is a pick to take back."""
+        return bool(self.gathering.names) or bool(len(self.gathering.skin))
+
+    def _choose_next(self) -> None:
+        missing = [name for name in self.base.ids if name not in self.gathering.names]
+        if missing:
+            self.chosen = missing[0]
+        elif not len(self.gathering.skin):
+            self.chosen = SKIN
+
+    def _learn(self) -> None:
+        """A quick model of every marker, renewed as samples come."""
+        parts = {name: 1 + int(_PARTS * self.gathering.variety(name)) for name in self.gathering.names}
+        if parts == self._learnt:
+            return
+        self._learnt = parts
+        samples = {one.name: one for one in self.gathering.samples}
+        self._markers = msgspec.structs.replace(self.base, markers=tuple(
+            marker if marker.id not in samples else msgspec.structs.replace(
+                marker, chroma=learn_chroma_from_colours(samples[marker.id].colours),
+                display_rgb=samples[marker.id].rgb)
+            for marker in self.base.markers))
+
+    def view(self) -> StepView:
+        """Which paint to show next, and how much has been seen of those named."""
+        names, gathering = self.gathering.names, self.gathering
+        seen = sum(gathering.variety(name) for name in names) / len(names) if names else 0.0
+        bars = (Bar("picked", len(names) / len(self.base.ids), f"{len(names)} of {len(self.base.ids)} markers"),
+                Bar("seen moving", seen, "places and angles at which the markers were seen so far"))
+        return StepView(self._sentence(), done=gathering.enough and len(names) == len(self.base.ids),
+                        passable=bool(names), hint=self.problem or self._hint(), bars=bars, overlays=self._overlays(),
+                        pictures=self.held)
+
+    def _sentence(self) -> str:
+        if self.held:
+            return f"Click {self._paint()} in the held picture."
+        if len(self.gathering.names) < len(self.base.ids):
+            return f"Click {self._paint()}, or drag over it."
+        if not self.gathering.enough:
+            return "Move and turn the hand slowly, near and far."
+        return "Enough: press Next."
+
+    def _paint(self) -> str:
+        return "bare skin" if self.chosen == SKIN else f"the paint of {self.chosen}"
+
+    def _hint(self) -> str:
+        if self.gathering.names and not len(self.gathering.skin):
+            return "Pick bare skin too: then it is said whether a marker looks like it."
+        if not self.gathering.names:
+            return "Space holds the pictures, if your hands are full."
+        missing = [name for name in self.gathering.names if self.gathering.variety(name) < 1.0]
+        return f"Still to be seen in other places: {', '.join(missing)}." if missing else ""
+
+    def _overlays(self) -> dict[str, tuple]:
+        if self.show == "none":
+            return {}
+        chosen = self.base.ids.index(self.chosen) if self.show == "chosen" and self.chosen != SKIN else None
+        return {name: mask_overlay(sight, self._markers, chosen) for name, sight in self._sights.items()}

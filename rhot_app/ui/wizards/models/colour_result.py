@@ -1,0 +1,125 @@
+"""How far the colours can be told apart: the judged report, its histogram and matrix, and what is proposed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from rhot_app.calibration.colour_room import HUE_STEP_DEG
+from rhot_app.calibration.colours import ColourReport
+from rhot_app.project import Rig
+from rhot_app.ui.models.palette import hex_of
+from rhot_app.ui.wizards.models.chart import Chart, ChartedStep, Curve
+from rhot_app.ui.wizards.models.colour_bounds import BoundsStep, learning
+from rhot_app.ui.wizards.models.proposal import Change, NodeChange, Proposal, RigChange, Row
+from rhot_app.ui.wizards.models.rig_rows import rig_rows
+from rhot_app.ui.wizards.models.step import StepView, Task
+from rhot_node.markers import ChromaModel
+
+REASON = "colour calibration"
+
+_HEADROOM = 1.7  # of the chart above the highest column, for the legend
+
+
+class ApartStep(ChartedStep):
+    """The verdict on the colours with the bounds that a person has left them."""
+
+    title = "Tell them apart"
+
+    def __init__(self, bounds: BoundsStep) -> None:
+        self.report: ColourReport | None = None
+        self._bounds = bounds
+        self._learnt: ColourReport | None = None
+        self._given: Mapping[str, ChromaModel] = {}
+        self._problem = ""
+
+    @property
+    def keeps(self) -> bool:
+        """A report is worth a question."""
+        return self.report is not None
+
+    def enter(self) -> None:
+        """Other bounds, another judgement; untouched ones were judged as they were learnt."""
+        if self._learnt is not self._bounds.report or self._given != self._bounds.given:
+            self._learnt, self._given, self._problem = self._bounds.report, dict(self._bounds.given), ""
+            self._take(None if self._given else self._learnt)
+
+    def task(self) -> Task | None:
+        """Judge what was moved by hand."""
+        if self.report is not None or self._learnt is None:
+            return None
+        return learning(self._bounds.picks, dict(self._given), "Trying the new bounds …")
+
+    def take_result(self, result: Any) -> None:
+        """The judgement."""
+        self._take(result)
+
+    def take_failure(self, sentence: str) -> None:
+        """Why there is none."""
+        self._problem = sentence
+
+    def _take(self, report: ColourReport | None) -> None:
+        self.report = report
+        self.charts = () if report is None else (hue_chart(report),)
+
+    def view(self) -> StepView:
+        """The verdict, with what to do about it."""
+        if self.report is None:
+            return StepView("Go back and pick a colour." if self._learnt is None else
+                            "It did not work out." if self._problem else "One moment.", hint=self._problem)
+        apart = self.report.separability.sentences
+        hint = "; ".join(apart[:3]) + "." if apart else "No two colours overlap."
+        return StepView("Read what may be mistaken for a marker, then go on.", done=True, hint=hint,
+                        verdict=self.report.verdict)
+
+
+def hue_chart(report: ColourReport) -> Chart:
+    """Which hues the room has, and which of them each marker's bounds let through."""
+    room = report.room.hue_px
+    left = -180.0 + HUE_STEP_DEG * np.arange(len(room))
+    x = np.stack([left, left + HUE_STEP_DEG], axis=1).ravel()
+    top = 10.0 ** (_HEADROOM * np.log10(max(float(room.max()), 10.0)))
+    chosen = {marker.id: marker for marker in report.markers.markers}
+    curves = [Curve("the room", x, np.repeat(np.maximum(room, 1.0), 2))]
+    for one in report.samples:
+        marker = chosen[one.name]
+        middle = float(np.degrees(marker.chroma.hue_rad))
+        low, high = middle - marker.chroma.hue_tolerance_deg, middle + marker.chroma.hue_tolerance_deg
+        for turn in (-360.0, 0.0, 360.0):  # a band across red is drawn at both ends
+            ends = np.clip(np.array([low + turn, high + turn]), -180.0, 180.0)
+            if ends[1] > ends[0]:
+                name = one.name if low + turn < middle + turn <= 180.0 and middle + turn > -180.0 else ""
+                curves.append(Curve(name, ends, np.ones(2), "band", np.full(2, top), hex_of(one.rgb)))
+    return Chart("Colours of the room beside those of the markers", "hue (angle of chroma), °",
+                 "colour pixels per picture", tuple(curves), log_y=True)
+
+
+def matrix_cells(report: ColourReport) -> tuple[tuple[str, ...], list[tuple[str, list[float]]]]:
+    """The heads of the columns; each row's marker, and what share 0..1 of each column's colour is taken for it."""
+    apart = report.separability
+    return (*report.names, *apart.others), [(name, [float(share) for share in row])
+                                            for name, row in zip(report.names, apart.matrix, strict=True)]
+
+
+def propose(report: ColourReport | None, rig: Rig, path: Path | None,
+            node_settings: Mapping[int, dict[str, Any]]) -> Proposal | None:
+    """The rig with the new marker set, and every node with the very same."""
+    if report is None:
+        return None
+    after = msgspec.structs.replace(rig, markers=report.markers)
+    markers = msgspec.to_builtins(report.markers)
+    changes: list[Change] = [RigChange(rig, after, path, REASON)]
+    rows = list(rig_rows(rig, after))
+    for node in rig.nodes:
+        if node.node_id in node_settings:
+            before = node_settings[node.node_id]["markers"]
+            changes.append(NodeChange(node.node_id, {"markers": before}, {"markers": markers}))
+            rows.append(Row(f"{node.name}: colours", "as the rig" if before == msgspec.to_builtins(rig.markers)
+                            else "others than the rig", "the new ones, as the rig"))
+        elif not node.text_datagrams:
+            rows.append(Row(f"{node.name}: colours", "not known", "not changed: the node does not answer"))
+    return Proposal(REASON, report.verdict, tuple(rows), tuple(changes))

@@ -1,0 +1,185 @@
+"""The colour wizard, clicked through on painted fingertips; its models on their own."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from colour_scenes import PAINTS, picture
+from fake_engine import synthetic_rig
+from paint_scene import PaintScene, compile_detector, other_colours
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from wizard_hands import Hands
+from wizard_rig import FakeMemory, FakeRigAsker
+
+from rhot_app.calibration.separability import SKIN
+from rhot_app.project import load_rig, save_rig
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.colours import make_plan
+from rhot_app.ui.wizards.models.colour_result import hue_chart
+from rhot_app.ui.wizards.models.drawing import Layer, Tag
+from rhot_app.ui.wizards.plan import Kit
+from rhot_app.ui.wizards.window import WizardWindow
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import from_bgr
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return PaintScene()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    compile_detector()
+
+
+@pytest.fixture
+def hands(themed, scene, tmp_path):
+    """The wizard on a rig whose colours are all wrong, before painted fingertips that rest."""
+    scene.moving = False
+    rig, path = synthetic_rig(), tmp_path / "desk.json"
+    rig = msgspec.structs.replace(rig, markers=other_colours(rig.markers))
+    save_rig(path, rig)
+    asker = FakeRigAsker(rig, scene.draw)
+    settings = {node_id: msgspec.to_builtins(one) for node_id, one in asker.settings.items()}
+    kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), settings)
+    hands = Hands(WizardWindow(make_plan(kit), kit))
+    hands.path, hands.asker = path, asker
+    hands.until(lambda: hands.window.step._sights)
+    yield hands
+    hands.window.end().wait(5.0)
+    hands.window.deleteLater()
+
+
+def click_at(hands, camera, x, y, to=None):
+    """Click, or drag to another place, px of the frame."""
+    view = hands.window.frame.wall.views[camera]
+    place = view._place()
+    at = [QPoint(round(place.target.x() + (px + 0.5) * place.scale), round(place.target.y() + (py + 0.5) * place.scale))
+          for px, py in ((x, y), to or (x, y))]
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, at[0])
+    if to is not None:
+        QTest.mouseMove(view, at[1])
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, at[1])
+
+
+def pick_all(hands):
+    for name in PAINTS:
+        assert hands.window.step.chosen == name
+        click_at(hands, "left", *PaintScene.where(name))
+        assert name in hands.window.step.gathering.names, hands.window.step.problem
+
+
+def test_from_clicks_to_a_rig_and_nodes_with_the_new_colours(hands, scene):
+    before = hands.asker.settings[1].markers
+    pick_all(hands)
+    assert hands.window.step.chosen == SKIN
+    x, y = PaintScene.where("thumb")
+    click_at(hands, "right", x - 14.0 - 4, y + 40, to=(x - 14.0 + 4, y + 60))
+    assert len(hands.window.step.gathering.skin) >= 40
+    scene.moving = True
+    hands.until(lambda: hands.window.step.view().done, timeout_s=40.0)
+    page = hands.window.page
+    assert [page.list.item(row, 1).text() for row in range(7)] == [*PAINTS, SKIN]
+    assert int(page.list.item(0, 2).text()) >= 10
+    scene.moving = False
+    hands.next()
+    hands.until(lambda: hands.window.step.report is not None, timeout_s=60.0)
+    move_a_bound(hands)
+    hands.next()
+    hands.until(lambda: hands.window.step.report is not None, timeout_s=60.0)
+    assert hands.window.frame.verdict.verdict.acceptable
+    page = hands.window.page
+    assert page.table.rowCount() == 6 and page.table.horizontalHeaderItem(6).text() == SKIN
+    assert int(page.table.item(0, 0).text()) >= 90 and page.charts.plots
+    hands.next()
+    hands.click(hands.window.frame.next_button)
+    hands.until(lambda: hands.window.step.state == "used")
+    saved = load_rig(hands.path).markers
+    assert all(settings.markers == saved for settings in hands.asker.settings.values())
+    assert saved.markers[0].chroma.hue_tolerance_deg == pytest.approx(7.0)
+    seen = FastDetector(saved).detect(from_bgr(scene.draw(1, 0.0)))
+    for name, mark in zip(PAINTS, seen, strict=True):
+        x, y = PaintScene.where(name)
+        assert mark.found and abs(mark.x - x) < 3.0 and abs(mark.y - y) < 3.0, name
+    hands.click(hands.window.page.restore_button)
+    hands.until(lambda: hands.window.step.state == "restored")
+    assert all(settings.markers == before for settings in hands.asker.settings.values())
+
+
+def move_a_bound(hands):
+    """Type another tolerance, undo it, type it again."""
+    page, step = hands.window.page, hands.window.step
+    learnt = step.model("thumb").hue_tolerance_deg
+    box = page.rows["hue_tolerance_deg"].box
+
+    def enter(value):
+        box.setFocus()
+        box.selectAll()
+        QTest.keyClicks(box, str(value))
+        QTest.keyClick(box, Qt.Key.Key_Tab)
+
+    enter(7.0)
+    assert step.model("thumb").hue_tolerance_deg == 7.0 and "by hand" in page.list.item(0, 2).text()
+    page.list.setFocus()
+    hands.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert step.model("thumb").hue_tolerance_deg == learnt and box.value() == pytest.approx(learnt, abs=0.05)
+    enter(7.0)
+    hands.until(lambda: step._sights)
+
+
+def test_the_mask_is_what_the_detector_takes(hands, scene):
+    pick_all(hands)
+    step = hands.window.step
+    hands.until(lambda: all(mark.found for mark in step._sights["left"].seen))
+    layer, *marks = step.view().overlays["left"]
+    assert isinstance(layer, Layer) and {mark.text for mark in marks if isinstance(mark, Tag)} == set(PAINTS)
+    labels = step._sights["left"].labels
+    assert layer.rgba.shape == (120, 160, 4)
+    assert np.array_equal(layer.rgba[..., 3] == 255, labels > 0)
+    row, column = (round(at / 2) for at in reversed(PaintScene.where("ring")))
+    assert labels[row, column] == 1 + list(PAINTS).index("ring")
+    hands.window.page.mask_choice.setCurrentIndex(2)
+    assert step.view().overlays == {}
+
+
+def test_a_click_beside_the_paint_is_refused_and_undo_takes_the_last_one_back(hands):
+    step = hands.window.step
+    click_at(hands, "left", *PaintScene.where("thumb"))
+    click_at(hands, "left", 310.0, 10.0)
+    assert "index" in hands.window.frame.hint.text() and step.gathering.names == ("thumb",)
+    click_at(hands, "left", *PaintScene.where("index"))
+    assert step.chosen == "middle"
+    hands.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert step.gathering.names == ("thumb",) and step.chosen == "index"
+    hands.click(hands.window.page.undo_button)
+    assert step.gathering.names == () and not hands.window.frame.next_button.isEnabled()
+
+
+def test_space_holds_the_pictures_for_a_click(hands, scene):
+    scene.moving = True
+    hands.window.frame.middle.setFocus()
+    hands.key(Qt.Key.Key_Space)
+    assert hands.window.step.held and "held" in hands.sentence
+    hands.run(0.5)
+    held = hands.window.step.held["left"]
+    assert hands.window.frame.wall.views["left"].shown is held
+    hands.key(Qt.Key.Key_Space)
+    assert not hands.window.step.held
+
+
+def test_alike_paints_are_said_to_be_alike(hands, scene):
+    from rhot_app.calibration.colour_gathering import ColourGathering
+    from rhot_app.calibration.colours import solve_colours
+
+    alike = {**PAINTS, "little": (30, 150, 200)}
+    gathering = ColourGathering(("left",))
+    for name in PAINTS:
+        gathering.pick(name, "left", picture(alike), PaintScene.where(name))
+    report = solve_colours(gathering.samples, gathering.views, base=hands.asker.rig.markers)
+    assert not report.verdict.acceptable
+    bands = [curve for curve in hue_chart(report).curves if curve.style == "band"]
+    assert {curve.name for curve in bands if curve.name} == set(PAINTS)
+    assert all(-180.0 <= curve.x[0] < curve.x[1] <= 180.0 for curve in bands)
