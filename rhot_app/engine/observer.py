@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice
+from rhot_app.engine.health_watch import HealthWatch
 from rhot_app.engine.node_meter import NodeMeter
 from rhot_app.engine.pipeline import Pipeline
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus
@@ -35,10 +36,12 @@ class Observer:
         self._latency: dict[str, LatencySummary] = {}
         self._summarised_ns = 0
         self._ever_tracked = False
+        self._health = HealthWatch(rig)
 
     def restart(self) -> None:
         """A new run begins."""
         self._ever_tracked = False
+        self._health.restart()
 
     def status(self, rig_path: str, session: int, running: bool, recorder: Recorder | None,
                message: NodeMessage, extra: list[Advice]) -> EngineStatus:
@@ -73,6 +76,8 @@ class Observer:
         nowhere = no_marker_advice(facts, running)
         marker_ids = self.rig.markers.ids
         found = [advice for one in facts for advice in node_advice(one, marker_ids, running, sight=not nowhere)]
+        if running:
+            found += self._health.advice(self._pipeline.last_state, self._pipeline.work.tracker, now_ns)
         if self._pipeline.failure:
             found.append(Advice("error", self._pipeline.failure))
         order: tuple[Literal["error", "warning", "info"], ...] = ("error", "warning", "info")

@@ -57,6 +57,10 @@ class ClassicTracker:
         """Take one frame in; about 10 µs."""
         self._pairing.ingest(observations)
 
+    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
+        """Each camera's newest frame, None before its first."""
+        return tuple(self._pairing.newest_frames)
+
     def solve(self) -> HandState | None:
         """The state that is due, or None."""
         clock = _Stopwatch()

@@ -71,6 +71,7 @@ class Pairing:
         self._book[:] = 0
         self._marks[:] = -1
         self._latest: CameraObservations | None = None
+        self.newest_frames: list[CameraObservations | None] = [None] * self._shape[0]
 
     @property
     def heard(self) -> bool:
@@ -84,7 +85,7 @@ class Pairing:
                    observations.pixels, observations.covariances, observations.flags, self._frames,
                    self._book, self._marks, self._times, self._pixels, self._covariances, self._flags, self._counts,
                    self._newest, self._seen_pixels, self._seen_flags):
-            self._latest = observations
+            self._latest = self.newest_frames[camera] = observations
 
     def due(self) -> Paired | None:
         """All cameras at the newest bracketed instant, if a state is due there.

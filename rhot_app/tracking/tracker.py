@@ -46,6 +46,10 @@ class Tracker(Protocol):
         """The state at the newest instant that is due and not yet published, or None."""
         ...
 
+    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
+        """Each camera's newest frame, None before its first. May be called by another thread."""
+        ...
+
     def reset(self) -> None:
         """Forget everything: a new session, or a node's clock was set."""
         ...

@@ -22,6 +22,10 @@ class FakeTracker:
     def ingest(self, observations: CameraObservations) -> None:
         self.ingested.append(observations)
 
+    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
+        found: dict[int, CameraObservations] = {frame.camera: frame for frame in self.ingested}
+        return tuple(found.get(camera) for camera in range(len(self.rig.nodes)))
+
     def reset(self) -> None:
         self.resets += 1
         self.ingested.clear()

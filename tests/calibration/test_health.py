@@ -1,0 +1,87 @@
+"""The health monitor alone: rigid distances, little to go by, times that step back, and its cost."""
+
+from __future__ import annotations
+
+import time
+
+import msgspec
+import numpy as np
+import pytest
+from synthetic_rig import make_rig
+
+from rhot_app.calibration.health import HealthMonitor, HealthSample
+from rhot_app.project import Rig
+
+MARKERS = 6
+
+
+def rig_with_palm_markers() -> Rig:
+    rig = make_rig()
+    roles = ("palm_1", "palm_2", "middle_tip", "ring_tip", "little_tip", "wrist")
+    markers = tuple(msgspec.structs.replace(marker, role=role)
+                    for marker, role in zip(rig.markers.markers, roles, strict=True))
+    return msgspec.structs.replace(rig, markers=msgspec.structs.replace(rig.markers, markers=markers))
+
+
+def sample(k: int, positions: np.ndarray, error_px: float = 0.1) -> HealthSample:
+    return HealthSample(t_ns=10**15 + k * 100_000_000, positions=positions, measured=np.ones(MARKERS, bool),
+                        errors_px=np.full(MARKERS, error_px), qualities=np.ones((2, MARKERS)),
+                        flags=np.zeros((2, MARKERS), np.uint16))
+
+
+def places(rng: np.random.Generator, apart_m: float = 0.04) -> np.ndarray:
+    """A hand somewhere, its first two markers `apart_m` from each other."""
+    points = np.array([[0.0, 0.0, 0.6], [apart_m, 0.0, 0.6], [0.1, 0.0, 0.6], [0.1, 0.02, 0.6], [0.1, 0.04, 0.6],
+                       [0.05, 0.05, 0.6]])
+    return points + rng.normal(0.0, 0.02, 3) + rng.normal(0.0, 3e-4, points.shape)
+
+
+def test_a_marker_that_slipped_is_noticed_and_goes_once_it_is_back() -> None:
+    rng, monitor = np.random.default_rng(1), HealthMonitor(rig_with_palm_markers())
+    seen = []
+    for k in range(800):
+        monitor.feed(sample(k, places(rng, 0.047 if 250 <= k < 500 else 0.04)))
+        seen.append([found.finding.code for found in monitor.findings()])
+    assert not any(seen[:250]) and seen[400] == ["rigid_drift"] and seen[-1] == []
+
+
+def test_little_is_no_reason_to_speak() -> None:
+    rng, monitor = np.random.default_rng(1), HealthMonitor(rig_with_palm_markers())
+    assert monitor.findings() == ()
+    for k in range(20):
+        monitor.feed(sample(k, places(rng), 3.0))
+    assert monitor.findings() == ()
+    for k in range(20, 60):
+        monitor.feed(sample(k, places(rng), 3.0))
+    (found,) = monitor.findings()
+    assert found.mender == "stereo" and not found.finding.grade.rank < 2
+
+
+def test_times_that_step_back_begin_anew() -> None:
+    rng, monitor = np.random.default_rng(1), HealthMonitor(rig_with_palm_markers())
+    for k in range(200, 300):
+        monitor.feed(sample(k, places(rng), 3.0))
+    assert monitor.findings()
+    monitor.feed(sample(0, places(rng), 0.1))
+    assert monitor.findings() == ()
+
+
+@pytest.mark.parametrize("nothing", ["positions", "errors"])
+def test_what_is_not_known_says_nothing(nothing: str) -> None:
+    monitor = HealthMonitor(rig_with_palm_markers())
+    unknown = np.full((MARKERS, 3), np.nan)
+    for k in range(100):
+        monitor.feed(sample(k, unknown if nothing == "positions" else places(np.random.default_rng(k)), float("nan")))
+    assert monitor.findings() == ()
+
+
+def test_it_costs_next_to_nothing() -> None:
+    rng, monitor = np.random.default_rng(1), HealthMonitor(rig_with_palm_markers())
+    samples = [sample(k, places(rng)) for k in range(300)]
+    begun = time.perf_counter()
+    for one in samples:
+        monitor.feed(one)
+    assert (time.perf_counter() - begun) / len(samples) < 1e-3  # 50 µs on an idle machine
+    begun = time.perf_counter()
+    monitor.findings()
+    assert time.perf_counter() - begun < 0.05
