@@ -12,9 +12,9 @@ from rhot_app.calibration.board import Board
 from rhot_app.calibration.board_poses import pose_view
 from rhot_app.calibration.bundle import adjust
 from rhot_app.calibration.bundle_layout import LensFreedom
-from rhot_app.calibration.bundle_model import BundleState, Observations
+from rhot_app.calibration.bundle_model import LENS, BundleState, Observations
 from rhot_app.calibration.corners import BoardView
-from rhot_app.calibration.lens_start import K3, LensStart
+from rhot_app.calibration.lens_start import LensStart, loose_prior
 from rhot_app.errors import CalibrationError
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ FEWEST_VIEWS = 3
 
 
 def find_lens(views: Sequence[BoardView], board: Board, name: str) -> LensStart:
-    """The lens of one camera from its views: Zhang's closed form, then a robust fit of everything but k3.
+    """The lens of one camera from its views: Zhang's closed form, then a robust fit of everything.
 
     Raises CalibrationError naming the camera when the views do not determine a lens.
     """
@@ -39,7 +39,7 @@ def find_lens(views: Sequence[BoardView], board: Board, name: str) -> LensStart:
                         np.concatenate([view.object_points(board) for view, _ in usable]),
                         np.concatenate([view.pixels for view, _ in usable]))
     start = BundleState(lens[None], np.eye(4)[None], np.array([pose for _, pose in usable]))
-    free = LensFreedom.free([i != K3 for i in range(9)], lens, loose_prior(size))
+    free = LensFreedom.free([True] * LENS, lens, loose_prior(lens, size))
     try:
         found = adjust(start, seen, [free]).state.lenses[0]
     except CalibrationError as exc:
@@ -56,9 +56,3 @@ def _closed_form(views: Sequence[BoardView], board: Board, size: tuple[int, int]
     if not 0.3 * longest < focal < 10.0 * longest:  # views seen face on leave it open
         focal = longest
     return np.array([focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2, 0.0, 0.0, 0.0, 0.0, 0.0])
-
-
-def loose_prior(size: tuple[int, int]) -> Array:
-    """Standard deviations (9,) that keep a start from running away, and pull at nothing that pictures determine."""
-    longest = float(max(size))
-    return np.array([longest, longest, 0.2 * longest, 0.2 * longest, 1.0, 3.0, 0.05, 0.05, 5.0])
