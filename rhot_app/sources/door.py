@@ -48,7 +48,7 @@ class NodeDoor:
         self._checksum = rig.markers.checksum
         self._size = (node.intrinsics.width, node.intrinsics.height)
         self._time_offset_ns = round(1e9 * node.time_offset_s)
-        self._text = TextReader(camera, self._count, self._size) if node.text_datagrams else None
+        self._text = TextReader(camera, self._count, self._size, self._time_offset_ns) if node.text_datagrams else None
 
     def expect_session(self, session: int) -> None:
         """Admit only datagrams of `session` from now on (0: none), counted from a new first number."""

@@ -21,11 +21,13 @@ TIME_BOUND_S = 0.005
 class TextReader:
     """Reads text datagrams of one camera."""
 
-    def __init__(self, camera: int, count: int, size: tuple[int, int]) -> None:
-        """`count` markers in the rig's order, image `size` (width, height) px."""
+    def __init__(self, camera: int, count: int, size: tuple[int, int], time_offset_ns: int = 0) -> None:
+        """`count` markers in the rig's order, image `size` (width, height) px; the calibrated `time_offset_ns` is added
+        to the receive time, so a delay that a moving marker showed is taken off here."""
         self._camera = camera
         self._count = count
         self._size = size
+        self._time_offset_ns = time_offset_ns
 
     def read(self, data: bytes, t_receive_ns: int) -> CameraObservations:
         """The observations of one datagram. Raises WireError (length, count, text, or marker: outside the image)."""
@@ -38,8 +40,8 @@ class TextReader:
                 pixels[row] = point
         lost = np.isnan(pixels[:, 0])
         return CameraObservations(
-            camera=self._camera, t_row0_master_ns=t_receive_ns, row_time_ns=0, clock_bound_s=TIME_BOUND_S,
-            t_receive_ns=t_receive_ns, detect_s=float("nan"), network_s=float("nan"), pixels=pixels,
+            camera=self._camera, t_row0_master_ns=t_receive_ns + self._time_offset_ns, row_time_ns=0,
+            clock_bound_s=TIME_BOUND_S, t_receive_ns=t_receive_ns, detect_s=float("nan"), network_s=float("nan"), pixels=pixels,
             covariances=np.where(lost, 0.0, VARIANCE_PX2)[:, None, None] * np.eye(2),
             diameters=np.where(lost, 0.0, DIAMETER_PX), qualities=np.where(lost, 0.0, QUALITY),
             flags=np.where(lost, MarkerFlag.LOST, 0).astype(np.uint16))

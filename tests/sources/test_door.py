@@ -152,6 +152,14 @@ class TestText:
         np.testing.assert_array_equal(frame.covariances[0], np.eye(2))
         assert frame.covariances.shape == (6, 2, 2)
 
+    def test_a_calibrated_delay_is_taken_off(self, rig: Rig) -> None:
+        node = msgspec.structs.replace(rig.nodes[0], text_datagrams=True, time_offset_s=-0.040)
+        door = NodeDoor(msgspec.structs.replace(rig, nodes=(node, rig.nodes[1])), 0, NodeClockModel())
+        door.expect_session(1)
+        frame = door.admit(b"1,2;3.5,4;-1,-1;,;639,479;7,8", NOW_NS)
+        assert frame is not None
+        assert (frame.t_row0_master_ns, frame.t_receive_ns) == (NOW_NS - 40_000_000, NOW_NS)
+
     @pytest.mark.parametrize(("data", "reason"), [
         (b"1,2;3,4", "count"), (b"a,b;3,4;5,6;7,8;9,10;11,12", "text"), (b"900,2;3,4;5,6;7,8;9,10;1,1", "marker"),
         (b"nan,2;3,4;5,6;7,8;9,10;1,1", "text"),
