@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     report = fit_depth(read_depth_table(args.table), _geometry(args, rig))
     written = ""
     if rig is not None and args.out is not None and report.verdict.acceptable:
-        accept(args.out, msgspec.structs.replace(rig, depth=report.settings), "depth correction")
+        accept(args.out, msgspec.structs.replace(rig, depth=report.settings), "depth calibration")
         written = str(args.out)
     return show(_fields(report), _lines(report), report.verdict, as_json=args.json, written=written)
 
