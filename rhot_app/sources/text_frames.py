@@ -41,7 +41,8 @@ class TextReader:
         lost = np.isnan(pixels[:, 0])
         return CameraObservations(
             camera=self._camera, t_row0_master_ns=t_receive_ns + self._time_offset_ns, row_time_ns=0,
-            clock_bound_s=TIME_BOUND_S, t_receive_ns=t_receive_ns, detect_s=float("nan"), network_s=float("nan"), pixels=pixels,
+            clock_bound_s=TIME_BOUND_S, t_receive_ns=t_receive_ns, detect_s=float("nan"), network_s=float("nan"),
+            pixels=pixels,
             covariances=np.where(lost, 0.0, VARIANCE_PX2)[:, None, None] * np.eye(2),
             diameters=np.where(lost, 0.0, DIAMETER_PX), qualities=np.where(lost, 0.0, QUALITY),
             flags=np.where(lost, MarkerFlag.LOST, 0).astype(np.uint16))
