@@ -148,27 +148,33 @@ def _gate(paint: _Paint, most: float, skin: Colours, room: RoomColours) -> tuple
     most = min(max(most, low), high)
     weakest = min(float(np.percentile(magnitude, 2.0)) for _, magnitude in paint.seen)
     least = max(min(SHADE * paint.weakest, weakest), MAGNITUDE_LEAST)
-    skin_away, skin_magnitude, _ = _polar(skin, paint.hue)
-    room_away, room_magnitude, _ = _polar(room.colours, paint.hue)
+    touching, behind = _by_all_lamps(skin, paint.hue), _by_all_lamps(room.colours, paint.hue)
     around = room.weight * len(room.colours)
     best, best_cost = (most, least), math.inf
     for tolerance in np.linspace(most, max(min(paint.core, most), low), TRIES):
         for magnitude in np.linspace(least, max(weakest, least), TRIES):
             lost = max(float(np.mean((a > tolerance) | (m < magnitude))) for a, m in paint.seen)
             window = min(magnitude, WINDOW_LEVEL * paint.level)
-            touching = _share(skin_away, skin_magnitude, tolerance, window)
-            behind = around / room.size * _share(room_away, room_magnitude, tolerance, window)
-            mistaken = around / paint.area * _share(room_away, room_magnitude, tolerance, magnitude)
-            no_shade = max(magnitude / paint.weakest - SHADE, 0.0)
-            cost = (lost + min(4.0 * touching, 1.0) + min(4.0 * behind, 1.0) + min(mistaken, 1.0) + 0.3 * no_shade
-                    + 0.1 * (1.0 - tolerance / most))
+            cost = (lost + min(4.0 * _share(touching, tolerance, window), 1.0)
+                    + min(4.0 * around / room.size * _share(behind, tolerance, window), 1.0)
+                    + min(around / paint.area * _share(behind, tolerance, magnitude), 1.0)
+                    + 0.3 * max(magnitude / paint.weakest - SHADE, 0.0) + 0.1 * (1.0 - tolerance / most))
             if cost < best_cost - 1e-9:
                 best, best_cost = (float(tolerance), float(magnitude)), cost
     return best
 
 
-def _share(away: Array, magnitude: Array, tolerance: float, least: float) -> float:
-    return float(np.mean((np.abs(away) <= tolerance) & (magnitude >= least))) if len(away) else 0.0
+def _by_all_lamps(colours: Colours, hue: float) -> list[tuple[Array, Array]]:
+    """(|degrees from `hue`|, magnitude) of colours as the detector sees them by every lamp."""
+    few = colours[::max(1, len(colours) // PIXELS)]
+    polar = [_polar(balanced(relit(few, lamp), lamp.warmth), hue) for lamp in LAMPS]
+    return [(np.abs(away), magnitude / lamp.gains[1]) for (away, magnitude, _), lamp in zip(polar, LAMPS, strict=True)]
+
+
+def _share(seen: list[tuple[Array, Array]], tolerance: float, least: float) -> float:
+    """Share of colours that pass, by the lamp where most do."""
+    return max(float(np.mean((away <= tolerance) & (magnitude >= least))) if len(away) else 0.0
+               for away, magnitude in seen)
 
 
 def _hue(chroma: Array | Colours) -> float:

@@ -30,6 +30,7 @@ NOISE_START = 1.5  # grey levels of chroma noise, until the first frames have to
 NOISE_MIN = 0.5  # quantisation alone leaves 0.3
 NOISE_GAIN = 0.1
 RECOGNISED = 2  # markers in view that make the light known
+SUDDENLY = 2  # markers fewer than in the last frame: another lamp is likelier than fingers that all close at once
 GUESS_EVERY = 20  # frames without them until the light is guessed anew
 STEADY = 0.7  # of the light is that of the last frame
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
@@ -62,6 +63,7 @@ class FastDetector:
         self._forget_tracks()
         self._light.warmth = 0.0
         self._until_guess = 0
+        self._found = 0
 
     def paint_colours(self) -> NDArray[np.float64]:
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was found last."""
@@ -85,24 +87,28 @@ class FastDetector:
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """One observation per marker, in the order of the marker set; lost markers are stated as lost."""
         self._fit_scratch(image)
-        if self._until_guess > 0:
-            seen = self._find(image)
-            self._read_light(seen, STEADY)
+        if self._until_guess <= 0:
+            guess_light(image, self._light, self._gate, self._set)
+            seen = self._find_in_new_light(image)
         else:
-            seen = self._find_in_unknown_light(image)
-        recognised = sum(mark.found for mark in seen) >= min(RECOGNISED, len(seen))
-        self._until_guess = GUESS_EVERY if recognised else self._until_guess - 1
+            seen = self._find(image)
+            gone = self._found - sum(mark.found for mark in seen)
+            if gone >= SUDDENLY and guess_light(image, self._light, self._gate, self._set):  # somebody switched a lamp
+                seen = self._find_in_new_light(image)
+            else:
+                self._read_light(seen, STEADY)
+        self._found = sum(mark.found for mark in seen)
+        known = self._found >= min(RECOGNISED, len(seen)) or self._until_guess <= 0
+        self._until_guess = GUESS_EVERY if known else self._until_guess - 1
         return seen
 
-    def _find_in_unknown_light(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
-        """Guess the light, find the markers, read the light from them, and find them again in that."""
-        self._until_guess = GUESS_EVERY
-        guess_light(image, self._light, self._gate, self._set)
+    def _find_in_new_light(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """Find the markers, read the light from them, and find them again in that."""
         for _ in range(LIGHT_PASSES):
+            self._forget_tracks()
             seen = self._find(image)
             if self._read_light(seen, 0.0) < DEAD_ZONE:
                 break
-            self._forget_tracks()
         return seen
 
     def _read_light(self, seen: tuple[MarkerObservation, ...], steady: float) -> float:

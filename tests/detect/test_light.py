@@ -57,6 +57,12 @@ def test_a_lamp_that_changes_slowly_is_followed_even_by_one_marker_in_view() -> 
     assert detector.warmth == pytest.approx(0.47, abs=0.06)
 
 
+def test_a_lamp_that_is_switched_costs_no_frame() -> None:
+    detector = FastDetector(RHOT6)
+    for number, lamp in enumerate([SKY, SKY, SKY, BULB, BULB, SKY, BULB]):
+        assert found_at_their_places(detector.detect(lit(lamp, seed=number))), number
+
+
 def test_the_light_of_the_calibration_leaves_the_picture_as_it_is() -> None:
     light, image = Light(RHOT6), lit((1.0, 1.0, 1.0))
     assert light.balanced(image) is image
