@@ -23,7 +23,7 @@ _NEW_PLACE = 0.06  # of the picture's diagonal: corners that moved less since ev
 _ZONES = (3, 3)  # columns and rows of the picture
 _COVERED = 0.7  # of the zones of each camera, over all shared shots
 _SIZES = 1.5  # ratio of the largest to the smallest board seen: near and far
-_LEAN = 1.15  # ratio of opposite sides of the board's picture: tilted
+_TILTED_RAD = np.radians(20.0)  # between the board's normal and the line of sight
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def guide(views: SharedViews) -> Guidance:
     each = [view for shot in shared for view in shot.views if view is not None]
     sizes = [view.square_px for view in each]
     near_and_far = bool(sizes) and max(sizes) > _SIZES * min(sizes)
-    tilted = sum(_lean(view, views.board) > _LEAN for view in each) >= max(4, len(each) // 4)
+    tilted = sum(_tilt_rad(view, views.board) > _TILTED_RAD for view in each) >= max(4, len(each) // 4)
     return Guidance(pairs, covered, near_and_far, tilted, _advice(views.cameras, pairs, covered, near_and_far, tilted))
 
 
@@ -170,10 +170,13 @@ def _moved(before: BoardView | None, view: BoardView | None) -> float:
     return float(np.max(np.linalg.norm(before.pixels[a] - view.pixels[b], axis=1)))
 
 
-def _lean(view: BoardView, board: Board) -> float:
-    """How much longer one side of the board looks than the opposite one; 1 for a board seen face on."""
-    grid = view.grid(board)
-    sides = [float(np.nansum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-             for line in (grid[0], grid[-1], grid[:, 0], grid[:, -1])]
-    ratios = [max(a, b) / min(a, b) for a, b in ((sides[0], sides[1]), (sides[2], sides[3])) if min(a, b) > 0.0]
-    return max(ratios, default=1.0)
+def _tilt_rad(view: BoardView, board: Board) -> float:
+    """How far the board is turned away from the line of sight, about any axis.
+
+    Foreshortening makes its picture narrower one way by the cosine, whatever the lens and the distance; opposite sides
+    that differ in length only show where the board is close.
+    """
+    points, pixels = view.object_points(board)[:, :2], view.pixels
+    linear = np.linalg.lstsq(points - points.mean(axis=0), pixels - pixels.mean(axis=0), rcond=None)[0]
+    wide, narrow = np.linalg.svd(linear, compute_uv=False)
+    return float(np.arccos(np.clip(narrow / wide, 0.0, 1.0)))

@@ -71,6 +71,18 @@ def test_views_all_alike_are_not_complete() -> None:
     assert not guidance.complete
 
 
+def test_a_tilt_counts_at_any_distance() -> None:
+    """From far away opposite sides of a tilted board look equally long; it is tilted all the same."""
+    corners = BOARD.object_points()[:, :2] * 900.0
+    flat = BoardView(corners + 100.0, np.arange(BOARD.count), 640, 480, 20.0, 2.0)
+    tilted = replace(flat, pixels=corners * [np.cos(np.radians(35.0)), 1.0] + 100.0)
+
+    def seen(view: BoardView) -> bool:
+        return guide(SharedViews(NAMES, BOARD, tuple(Shot(str(i), (view, view)) for i in range(6)))).tilted
+
+    assert seen(tilted) and not seen(flat)
+
+
 def test_the_pairs_that_need_views_are_those_that_link_the_cameras() -> None:
     twin = stereo_twin(shots=16)
     three = tuple(Shot(shot.name, (*shot.views, shot.views[1] if i < 5 else None))
