@@ -97,8 +97,8 @@ def read_depth_table(path: Path) -> DepthTable:
                                "real_cm,disparity_px.")
     separator = max(",;\t", key=lines[0][1].count)
     header = _cells(lines[0][1], separator)
-    distance, unit = _column(path, header, _DISTANCE, "the distances, real_cm")
-    disparity, _ = _column(path, header, _DISPARITY, "the disparities, disparity_px")
+    distance, unit = _column(path, header, "real_cm", _DISTANCE, "the distances")
+    disparity, _ = _column(path, header, "disparity_px", _DISPARITY, "the disparities")
     table = DepthTable()
     table.unit_is_guessed = not unit
     for number, line in lines[1:]:
@@ -130,13 +130,15 @@ def _cells(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader(io.StringIO(line), delimiter=separator))]
 
 
-def _column(path: Path, header: Sequence[str], pattern: re.Pattern[str], what: str) -> tuple[int, str]:
-    """Index and unit of the one column whose name matches."""
-    names = [re.sub(r"[^a-z]+", "_", name.lower()).strip("_") for name in header]
-    found = [(index, match) for index, name in enumerate(names) if (match := pattern.match(name))]
+def _column(path: Path, header: Sequence[str], name: str, pattern: re.Pattern[str], what: str) -> tuple[int, str]:
+    """Index and unit of the column `name`, else of the one column whose name matches `pattern`."""
+    names = [re.sub(r"[^a-z]+", "_", cell.lower()).strip("_") for cell in header]
+    found = [(index, match) for index, one in enumerate(names) if (match := pattern.match(one))]
+    if names.count(name) == 1:
+        found = [(index, match) for index, match in found if names[index] == name]
     if len(found) != 1:
         listed = ", ".join(header) or "nothing"
-        problem = f"no column for {what}" if not found else f"{len(found)} columns that may be {what}"
+        problem = f"no column for {what}, {name}" if not found else f"{len(found)} columns that may be {what}"
         raise CalibrationError(f"{path}: {problem}. Its first line names {listed}; it must name real_cm and "
                                "disparity_px once each.")
     index, match = found[0]

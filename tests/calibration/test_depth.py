@@ -65,7 +65,8 @@ def test_a_known_law_comes_back_with_its_uncertainty() -> None:
 
 
 @pytest.mark.parametrize(("header", "separator"), [
-    ("real_cm,disparity_px", ","), ("Distance [cm]; Disparity (px)", ";"), ("# a comment\nREAL CM\tdisparity", "\t")])
+    ("real_cm,disparity_px", ","), ("real_cm,disparity_px,distance_m,disparity", ","),
+    ("Distance [cm]; Disparity (px)", ";"), ("# a comment\nREAL CM\tdisparity", "\t")])
 def test_tables_as_programs_and_people_write_them(tmp_path: Path, header: str, separator: str) -> None:
     rows = [row.replace(",", separator) for row in plain_rows()]
     if separator == ";":
