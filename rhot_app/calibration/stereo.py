@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.ruler import RulerReading, baseline_finding, read_ruler, ruler_finding
+from rhot_app.calibration.stereo_adjust import StereoSolution
 from rhot_app.calibration.stereo_checks import arrangement_findings, dropped_findings, fit_findings
 from rhot_app.calibration.stereo_lens_checks import LensEvidence, lens_evidence, mismatch_finding
 from rhot_app.calibration.stereo_report import StereoFigures, StereoReport, figures_of
-from rhot_app.calibration.stereo_solve import StereoSolution, solve
+from rhot_app.calibration.stereo_solve import solve
 from rhot_app.calibration.stereo_views import Dropped, SharedViews
 from rhot_app.calibration.verdict import Finding, judge
 from rhot_app.errors import CalibrationError

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rhot_app.calibration.stereo_views import Dropped
+from rhot_app.calibration.views import in_natural_order
 from rhot_app.errors import CalibrationError
 
 Key = tuple[int, ...]
@@ -29,12 +30,6 @@ class FileShots:
     shots: tuple[FileShot, ...]
     alone: tuple[Dropped, ...]
     by_number: bool
-
-
-def in_natural_order(files: Sequence[Path]) -> list[Path]:
-    """Sorted as people number them: left2 before left10."""
-    return sorted(files, key=lambda path: [(int(part), "") if part.isdigit() else (-1, part)
-                                           for part in re.split(r"(\d+)", path.name)])
 
 
 def match_files(files: Mapping[str, Sequence[Path]]) -> FileShots:

@@ -17,7 +17,7 @@ from rhot_app.calibration.board_poses import pose_view
 from rhot_app.calibration.bundle import adjust
 from rhot_app.calibration.corners import BoardView
 from rhot_app.calibration.lens_start import LensStart
-from rhot_app.calibration.stereo_solve import StereoSolution
+from rhot_app.calibration.stereo_adjust import StereoSolution
 from rhot_app.calibration.verdict import Finding, Grade
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ from rhot_app.calibration.board import Board
 from rhot_app.calibration.bundle_model import BundleState
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.ruler import RulerResult
+from rhot_app.calibration.stereo_adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo_certainty import certainty, expected_error
 from rhot_app.calibration.stereo_points import Squares, epipolar_px, measure_squares
-from rhot_app.calibration.stereo_solve import StereoSolution, view_rms
 from rhot_app.calibration.stereo_views import Dropped
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.geometry.transforms import inverse, log_so3

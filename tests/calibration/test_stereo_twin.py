@@ -13,9 +13,10 @@ from rhot_app.calibration.board import CharucoBoard, Chessboard
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.ruler import RulerReading, read_ruler
 from rhot_app.calibration.stereo import calibrate
+from rhot_app.calibration.stereo_adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo_points import locate
 from rhot_app.calibration.stereo_report import StereoFigures, StereoReport
-from rhot_app.calibration.stereo_solve import StereoSolution, solve, view_rms
+from rhot_app.calibration.stereo_solve import solve
 from rhot_app.calibration.stereo_views import SharedViews, Shot
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.camera import CameraModel
@@ -171,9 +172,9 @@ def test_forty_stereo_views_are_quick_and_tell_of_it() -> None:
     twin = stereo_twin(shots=40)
     told: list[float] = []
     views = twin.views(np.random.default_rng(0), 0.2)
-    began = time.monotonic()
+    began = time.process_time()
     calibrate(views, about(twin), progress=lambda text, fraction: told.append(fraction))
-    assert time.monotonic() - began < 10.0
+    assert time.process_time() - began < 10.0
     assert told[0] == 0.0
     assert told[-1] == 1.0
     assert len(told) > 10
