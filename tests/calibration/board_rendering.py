@@ -37,11 +37,13 @@ def pose(rotation: tuple[float, float, float], centre_m: tuple[float, float, flo
     return matrix
 
 
-def corners_px(board: Board, camera_from_board: Array, lens: Array | tuple[float, ...]) -> Array:
-    """(N, 2) px, where the board's corners truly are."""
+def corners_px(board: Board, camera_from_board: Array, lens: Array | tuple[float, ...],
+               board_errors: Array | None = None) -> Array:
+    """(N, 2) px, where the board's corners truly are; `board_errors` (N, 3) m moves them on the board."""
     lens = np.asarray(lens)
     matrix = np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
-    return cv2.projectPoints(board.object_points(), cv2.Rodrigues(camera_from_board[:3, :3])[0],
+    points = board.object_points() if board_errors is None else board.object_points() + board_errors
+    return cv2.projectPoints(points, cv2.Rodrigues(camera_from_board[:3, :3])[0],
                              camera_from_board[:3, 3], matrix, lens[4:])[0].reshape(-1, 2)
 
 

@@ -35,7 +35,9 @@ def files_of(args: argparse.Namespace) -> dict[str, list[Path]]:
     if len(patterns) < 2:
         raise CalibrationError("Pictures of at least two cameras are needed: --left PATTERN --right PATTERN, or "
                                "--camera NAME=PATTERN for each.")
-    found = {name: _matching(pattern) for name, pattern in patterns.items()}
+    from rhot_app.calibration.views import matching_files
+
+    found = {name: matching_files(pattern) for name, pattern in patterns.items()}
     for name, paths in found.items():
         if not paths:
             raise CalibrationError(f"{name}: no file matches {patterns[name]!r}. Put the pattern in quotes and see "
@@ -83,13 +85,6 @@ def known_lengths(args: argparse.Namespace, names: list[str]) -> KnownLengths:
                                    f"as {names[0]}=120.5,80,410,95.")
         ends[names.index(name)] = np.reshape(values, (2, 2))
     return KnownLengths(baseline, RulerReading(args.ruler_mm * 1e-3, ends))
-
-
-def _matching(pattern: str) -> list[Path]:
-    """The files that a pattern names, sorted; the folder is what stands before the first wildcard."""
-    parts = Path(pattern).parts
-    wild = next((i for i, part in enumerate(parts) if set(part) & set("*?[")), len(parts) - 1)
-    return sorted(path for path in Path(*parts[:wild]).glob("/".join(parts[wild:])) if path.is_file())
 
 
 def _split(text: str, option: str, form: str) -> tuple[str, str]:
