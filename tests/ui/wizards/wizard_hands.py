@@ -17,11 +17,20 @@ class Hands:
         window.activateWindow()
         assert QTest.qWaitForWindowActive(window)
 
-    def until(self, condition, timeout_s=20.0):
+    @staticmethod
+    def wait(condition, timeout_s=20.0):
         end = time.monotonic() + timeout_s
         while time.monotonic() < end and not condition():
             QTest.qWait(10)
         assert condition()
+
+    def until(self, condition, timeout_s=20.0):
+        try:
+            self.wait(condition, timeout_s)
+        except AssertionError:
+            frame = self.window.frame
+            raise AssertionError(f"at {self.title!r}: {self.sentence!r} {frame.hint.text()!r} "
+                                 f"{frame.verdict.verdict}") from None
 
     def run(self, seconds):
         QTest.qWait(round(1000 * seconds))
