@@ -20,6 +20,7 @@ from rhot_app.engine.warm_up import warm_up as rehearse_tracker
 from rhot_app.project import Rig, load_rig
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.simulator.shot import make_renderer, make_shot
+from rhot_app.simulator.shows import BoardShow, HandShow
 from rhot_app.tracking.make import make_tracker
 from rhot_node.compiled import mark_complete
 from rhot_node.detect.fast import FastDetector
@@ -40,8 +41,10 @@ def warm_tracker(rig: Rig) -> None:
 
 def warm_twin(_rig: Rig) -> None:
     """Compile what the digital twin draws with."""
-    shot = make_shot(make_scene(twin_defaults(), seed=1), "rest", seconds=1.0)
-    make_renderer(shot, 0).render(shot.act.source, t_row0_s=0.0, number=0)
+    scene = make_scene(twin_defaults(), seed=1)
+    for show in (HandShow("rest"), BoardShow(on_table=True)):
+        shot = make_shot(scene, show, seconds=1.0)
+        make_renderer(shot, 0).render(shot.act.source, t_row0_s=0.0, number=0)
 
 
 def warm_boards(_rig: Rig) -> None:

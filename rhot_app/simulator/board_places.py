@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 PLACES = 26
 SHARED = 16  # of the places: seen whole by all cameras
-_CANDIDATES = 400
+_CANDIDATES = 800
 _MARGIN_PX = 5.0
 _WIDTHS = (0.24, 0.6)  # of the picture's width, as wide as the sheet appears
 _TILT_RAD, _ROLL_RAD = 0.75, 0.3
@@ -36,23 +36,25 @@ _TABLE_YAW_RAD = np.radians(12.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Candidate:
-    pose: Array  # (4, 4) world_from_sheet
-    whole: tuple[int, ...]  # cameras that see all of it
-    fields: frozenset[int]  # of all pictures in which it is whole
-    tilt: int  # which way it leans
+class _Candidates:
+    """C poses (C, 4, 4) world_from_sheet; `whole` (C, cameras): seen whole and not too steeply; `fields` (C, F): the
+    fields of all those pictures that they cover; `tilts` (C,): which way they lean, 0..7."""
+
+    poses: Array
+    whole: NDArray[np.bool_]
+    fields: NDArray[np.bool_]
+    tilts: NDArray[np.int64]
 
 
 def board_places(sheet: Sheet, cameras: Sequence[CameraModel], seed: int) -> Array:
     """(PLACES, 4, 4) world_from_sheet: greedily the most new fields of the pictures and ways of leaning, then in an
     order of short ways. Raises SimulatorError when no camera can see such a sheet whole."""
-    rng = np.random.default_rng([seed, 0xB0A2D])
-    candidates = [_candidate(sheet, cameras, rng) for _ in range(_CANDIDATES)]
-    shared = _choose([c for c in candidates if len(c.whole) == len(cameras)], SHARED, [])
-    chosen = shared + _choose([c for c in candidates if c.whole], PLACES - len(shared), shared)
+    found = _candidates(sheet, cameras, np.random.default_rng([seed, 0xB0A2D]))
+    chosen = _choose(found, np.asarray(found.whole.all(axis=1)), SHARED, [])
+    chosen = _choose(found, np.asarray(found.whole.any(axis=1)), PLACES, chosen)
     if not chosen:
         raise SimulatorError("no camera of the simulated rig can see a sheet of this shape whole; choose another size.")
-    return _short_ways(np.array([c.pose for c in chosen]))
+    return _short_ways(found.poses[chosen])
 
 
 def table_place(sheet: Sheet, scene_centre: Array) -> Array:
@@ -76,52 +78,64 @@ def _rigid(rotation: Array, translation: Array) -> Array:
     return pose
 
 
-def _candidate(sheet: Sheet, cameras: Sequence[CameraModel], rng: np.random.Generator) -> _Candidate:
-    """A random pose that fills part of a random camera's picture about a random pixel."""
-    camera = cameras[int(rng.integers(len(cameras)))]
-    pixel = rng.uniform((0.1, 0.1), (0.9, 0.9)) * (camera.width, camera.height)
-    width_px = rng.uniform(*_WIDTHS) * camera.width
-    depth = camera.intrinsics[0] * np.ptp(sheet.x_lines) / width_px
-    ray = np.append(camera.undistort(pixel[None])[0], 1.0)
-    around = rng.uniform(0.0, 2.0 * np.pi)
-    tilt = rng.uniform(0.2, 1.0) * _TILT_RAD * np.array([np.cos(around), np.sin(around), 0.0])
-    rotation = (Rotation.from_rotvec(tilt) * Rotation.from_rotvec([0.0, 0.0, rng.uniform(-_ROLL_RAD, _ROLL_RAD)]))
-    turned = camera.world_from_camera[:3, :3] @ rotation.as_matrix()
-    middle = camera.world_from_camera[:3, :3] @ (depth * ray) + camera.centre
-    pose = _rigid(turned, middle - turned @ sheet.middle)
-    seen = [_fields(sheet, pose, other) for other in cameras]
-    fields = frozenset(index * _COLUMNS * _ROWS + field for index, some in enumerate(seen) for field in some)
-    return _Candidate(pose, tuple(k for k, some in enumerate(seen) if some), fields, int(around / (np.pi / 4.0)))
+def _candidates(sheet: Sheet, cameras: Sequence[CameraModel], rng: np.random.Generator) -> _Candidates:
+    """Random poses, each of which fills part of a random camera's picture about a random pixel."""
+    count = _CANDIDATES // len(cameras)
+    around = rng.uniform(0.0, 2.0 * np.pi, (len(cameras), count))
+    lean = rng.uniform(0.2, 1.0, (len(cameras), count)) * _TILT_RAD
+    roll = rng.uniform(-_ROLL_RAD, _ROLL_RAD, (len(cameras), count))
+    poses = []
+    for index, camera in enumerate(cameras):
+        pixels = rng.uniform((0.1, 0.1), (0.9, 0.9), (count, 2)) * (camera.width, camera.height)
+        depths = camera.intrinsics[0] * np.ptp(sheet.x_lines) / (rng.uniform(*_WIDTHS, count) * camera.width)
+        zeros = np.zeros(count)
+        tilt = np.column_stack([np.cos(around[index]), np.sin(around[index]), zeros]) * lean[index, :, None]
+        turn = Rotation.from_rotvec(tilt) * Rotation.from_rotvec(np.column_stack([zeros, zeros, roll[index]]))
+        local = np.tile(np.eye(4), (count, 1, 1))
+        local[:, :3, :3] = turn.as_matrix()
+        rays = np.column_stack([camera.undistort(pixels), np.ones(count)])
+        local[:, :3, 3] = depths[:, None] * rays - local[:, :3, :3] @ sheet.middle
+        poses.append(camera.world_from_camera @ local)
+    every = np.concatenate(poses)
+    seen = [_fields(sheet, every, camera) for camera in cameras]
+    return _Candidates(every, np.stack([fields.any(axis=1) for fields in seen], axis=1), np.hstack(seen),
+                       (around.ravel() / (np.pi / 4.0)).astype(np.int64))
 
 
-def _fields(sheet: Sheet, pose: Array, camera: CameraModel) -> set[int]:
-    """The fields of a picture that the sheet covers; none when it is not whole in it, or seen too steeply."""
-    outline = sheet.outline @ pose[:3, :3].T + pose[:3, 3]
-    sight = outline.mean(axis=0) - camera.centre
-    if pose[:3, 2] @ sight < _STEEPEST * np.linalg.norm(sight):
-        return set()
-    pixels = camera.project(outline)
-    inside = (pixels > _MARGIN_PX) & (pixels < np.array([camera.width, camera.height]) - 1.0 - _MARGIN_PX)
-    if not inside.all():
-        return set()
-    points = sheet.middle + _INSIDE * (sheet.outline - sheet.middle).max(axis=0)
-    x, y = camera.project(points @ pose[:3, :3].T + pose[:3, 3]).T
-    columns, rows = (x * _COLUMNS / camera.width).astype(int), (y * _ROWS / camera.height).astype(int)
-    return set((rows * _COLUMNS + columns).tolist())
+def _fields(sheet: Sheet, poses: Array, camera: CameraModel) -> NDArray[np.bool_]:
+    """(C, fields) the fields of a picture that the sheet covers; none when it is not whole in it, or too steep."""
+    sight = poses[:, :3, :3] @ sheet.middle + poses[:, :3, 3] - camera.centre
+    facing = np.einsum("ci,ci->c", poses[:, :3, 2], sight) > _STEEPEST * np.linalg.norm(sight, axis=1)
+    size = np.array([camera.width, camera.height])
+    outline = _project(camera, poses, sheet.outline)
+    whole = facing & ((outline > _MARGIN_PX) & (outline < size - 1.0 - _MARGIN_PX)).all(axis=(1, 2))
+    pixels = _project(camera, poses, sheet.middle + _INSIDE * (sheet.outline - sheet.middle).max(axis=0))
+    columns, rows = np.moveaxis(np.floor(np.nan_to_num(pixels) * (_COLUMNS, _ROWS) / size).astype(np.int64), 2, 0)
+    covered = np.zeros((len(poses), _COLUMNS * _ROWS), dtype=bool)
+    here = np.flatnonzero(whole)
+    covered[here[:, None], (rows * _COLUMNS + columns)[here]] = True
+    return covered
 
 
-def _choose(candidates: list[_Candidate], count: int, before: Sequence[_Candidate]) -> list[_Candidate]:
-    """Greedily up to `count` candidates that add most to those chosen `before`."""
-    fields = {field for one in before for field in one.fields}
-    tilts = [one.tilt for one in before]
-    left = [c for c in candidates if c not in before]
-    chosen: list[_Candidate] = []
-    while left and len(chosen) < count:
-        best = max(left, key=lambda c: len(c.fields - fields) + _NOVEL_TILT / (1.0 + tilts.count(c.tilt)))
-        left.remove(best)
+def _project(camera: CameraModel, poses: Array, points: Array) -> Array:
+    """(C, N, 2) px of points (N, 3) m of a sheet at each of its poses."""
+    world = np.einsum("cij,nj->cni", poses[:, :3, :3], points) + poses[:, None, :3, 3]
+    return camera.project(world.reshape(-1, 3)).reshape(len(poses), -1, 2)
+
+
+def _choose(found: _Candidates, allowed: NDArray[np.bool_], count: int, before: Sequence[int]) -> list[int]:
+    """`before` and, greedily, those of the `allowed` that add most to them, up to `count` in all."""
+    chosen, left = list(before), allowed.copy()
+    left[chosen] = False
+    covered = found.fields[chosen].any(axis=0)
+    leans = np.bincount(found.tilts[chosen], minlength=9)
+    while left.any() and len(chosen) < count:
+        worth = (found.fields & ~covered).sum(axis=1) + _NOVEL_TILT / (1.0 + leans[found.tilts])
+        best = int(np.argmax(np.where(left, worth, -1.0)))
+        left[best] = False
         chosen.append(best)
-        fields |= best.fields
-        tilts.append(best.tilt)
+        covered |= found.fields[best]
+        leans[found.tilts[best]] += 1
     return chosen
 
 

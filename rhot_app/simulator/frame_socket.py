@@ -1,8 +1,12 @@
-"""The sending end of a ``stream:`` camera: a Unix socket to which one node at a time may connect."""
+"""The twin's end of a ``stream:`` camera: a Unix socket to which one node at a time may connect.
+
+Frames go out; what the node tells its camera comes in.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import select
 import socket
 from pathlib import Path
 from typing import Any
@@ -10,7 +14,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rhot_app.errors import SimulatorError
-from rhot_node.capture.stream import StreamHeader, pack_header
+from rhot_node.capture.stream import StreamHeader, pack_header, take_settings
+from rhot_node.config import CameraSettings
+from rhot_node.errors import CameraError
 
 _SEND_TIMEOUT_S = 0.25  # a node that takes no bytes for so long is stuck; it may connect again
 _BUFFER_BYTES = 1 << 20
@@ -23,6 +29,7 @@ class FrameSocket:
         """Raises SimulatorError when the socket cannot be made."""
         self._path = path
         self._peer: socket.socket | None = None
+        self._received = bytearray()
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             path.unlink(missing_ok=True)
@@ -32,9 +39,22 @@ class FrameSocket:
         self._listener.setblocking(False)
         self._listener.listen(4)
 
-    def send(self, header: StreamHeader, frame: NDArray[Any]) -> bool:
-        """Send one packed I420 frame; False when no node takes it."""
+    def hear(self) -> CameraSettings | None:
+        """Let in a node that waits, and return what a node has told its camera since the last call; None: nothing."""
         self._accept()
+        told = None
+        if self._peer is not None:
+            try:
+                if select.select([self._peer], [], [], 0.0)[0]:
+                    self._received += self._peer.recv(_BUFFER_BYTES)
+                while (settings := take_settings(self._received)) is not None:
+                    told = settings
+            except (OSError, CameraError):
+                self._drop()
+        return told
+
+    def send(self, header: StreamHeader, frame: NDArray[Any]) -> bool:
+        """Send one packed I420 frame to the node that `hear` has let in; False when there is none to take it."""
         if self._peer is None:
             return False
         try:
@@ -59,6 +79,7 @@ class FrameSocket:
         if self._peer is not None:
             self._peer.close()
             self._peer = None
+        self._received.clear()
 
     def close(self) -> None:
         """Close and remove the socket. May be called twice."""

@@ -42,7 +42,7 @@ class TwinNode:
     def __init__(self, directory: Path, settings: NodeSettings, camera: str) -> None:
         """Start the daemon; `wait_ready` tells when it can be used. Raises SimulatorError, OSError."""
         self.name = settings.name
-        self._settings_path = directory / f"{settings.name}.node.json"
+        self._settings_path = settings_path(directory, settings.name)
         self._log_path = directory / f"{settings.name}.log"
         save_settings(self._settings_path, settings)
         with self._log_path.open("ab") as log:
@@ -100,6 +100,11 @@ class TwinNode:
         self._process.wait()
         if self._process.stdout is not None:
             self._process.stdout.close()
+
+
+def settings_path(directory: Path, name: str) -> Path:
+    """The settings file of the daemon of this name."""
+    return directory / f"{name}.node.json"
 
 
 def _read_line(stream: IO[bytes] | None, deadline_s: float) -> bytes | None:

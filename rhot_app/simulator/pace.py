@@ -19,6 +19,8 @@ class Pace:
         self._began_s: float | None = None
         self._frames = 0
         self._said_hz = preset_hz
+        self.rate_hz = 0.0
+        """Frames per second, of late; 0 until that is known."""
 
     def note(self, now_s: float) -> dict[str, Any] | None:
         """A frame is out at monotonic time `now_s`. Returns an event for programs to read, or None:
@@ -31,7 +33,7 @@ class Pace:
         if now_s - self._began_s < WINDOW_S:
             return None
         achieved_hz = self._frames / (now_s - self._began_s)
-        self._began_s, self._frames = now_s, 0
+        self._began_s, self._frames, self.rate_hz = now_s, 0, achieved_hz
         slow, was_slow = (rate < SHORT * self._preset_hz for rate in (achieved_hz, self._said_hz))
         if slow == was_slow and (not slow or abs(achieved_hz - self._said_hz) < CHANGE * self._said_hz):
             return None

@@ -161,14 +161,15 @@ def make_scene(settings: TwinSettings, seed: int) -> Scene:
 def node_settings(scene: Scene, index: int, *, detector: Literal["fast", "reference"] = "fast",
                   ports: NodePorts | None = None) -> NodeSettings:
     """What the daemon of one camera is told; without `ports` it takes any free ones. Loopback only, no broadcast."""
-    preset = scene.preset
+    preset, controls = scene.preset, scene.settings.controls
     chosen = ports or NodePorts(0, 0, 0)
     return NodeSettings(
         node_id=index + 1, name=scene.names[index], markers=scene.markers, bind_address="127.0.0.1",
         udp_port=chosen.udp_port, control_port=chosen.control_port, preview_port=chosen.preview_port,
         broadcast_port=None, detector=detector,
         camera=CameraSettings(width=preset.width, height=preset.height, fps=preset.fps,
-                              exposure_us=1e3 * scene.settings.exposure_ms, row_time_us=preset.row_time_us),
+                              exposure_us=1e3 * scene.settings.exposure_ms, row_time_us=preset.row_time_us,
+                              **msgspec.structs.asdict(controls)),
         clock=ClockSettings(offset_s=scene.clocks[index].offset_s, drift_ppm=scene.clocks[index].drift_ppm))
 
 

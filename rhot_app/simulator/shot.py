@@ -14,6 +14,7 @@ from rhot_app.simulator.acts import Act, make_act
 from rhot_app.simulator.background import background_image
 from rhot_app.simulator.moments import Shutter
 from rhot_app.simulator.nodes import NodePorts
+from rhot_app.simulator.painter import Image, Painter
 from rhot_app.simulator.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.scene import Scene, TwinSettings, build_rig, make_scene, node_settings
 from rhot_app.simulator.shows import HandShow, Show
@@ -70,15 +71,19 @@ def make_shot(scene: Scene, show: Show | str, seconds: float, hidden: frozenset[
 
 def make_renderer(shot: Shot, index: int) -> FrameRenderer:
     """The renderer of one camera of the shot."""
-    scene = shot.scene
-    settings, camera = scene.settings, scene.camera(index)
-    seed = camera_seed(scene, index)
-    background = background_image(settings.background, camera, settings.distance_m, scene.seed)
-    painter = shot.act.painter(camera, background, settings.shading, seed)
+    scene, camera = shot.scene, shot.scene.camera(index)
+    background = background_image(scene.settings.background, camera, scene.settings.distance_m, scene.seed)
+    painter = shot.act.painter(camera, background, scene.settings.shading, camera_seed(scene, index))
+    return renderer_of(scene, index, painter, background)
+
+
+def renderer_of(scene: Scene, index: int, painter: Painter, background: Image) -> FrameRenderer:
+    """The renderer of one camera of the scene, which sees what `painter` paints before `background` (3, H, W)."""
+    settings = scene.settings
     optics = Optics(settings.psf_sigma_px, settings.noise_mid_grey, settings.noise_read)
     shutter = Shutter(1e-9 * scene.exposure_ns, 1e-9 * scene.row_time_ns)
     exposure = Exposure(shutter, shutter.exposure_s, settings.lamp, settings.controls)
-    return FrameRenderer(painter, background, optics, exposure, seed)
+    return FrameRenderer(painter, background, optics, exposure, camera_seed(scene, index))
 
 
 def camera_seed(scene: Scene, index: int) -> int:

@@ -31,7 +31,7 @@ def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera
     if spec.startswith("/dev/"):
         return Webcam(spec, settings, clock)
     if spec.startswith("stream:"):
-        return StreamCamera(Path(spec.removeprefix("stream:")), clock)
+        return StreamCamera(Path(spec.removeprefix("stream:")), settings, clock)
     if spec.startswith("yuv:"):
         name, options = _split_options(spec.removeprefix("yuv:"), spec, "start")
         return YuvRecording(Path(name), clock, Path(options["start"]) if "start" in options else None)
@@ -42,8 +42,8 @@ def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera
 
 
 def takes_settings(spec: str) -> bool:
-    """Whether camera settings mean anything to this source; a recording or twin brings its own."""
-    return not spec.startswith(("yuv:", "stream:"))
+    """Whether camera settings mean anything to this source; a recording brings its own."""
+    return not spec.startswith("yuv:")
 
 
 def _files(path: Path, spec: str, settings: CameraSettings, clock: NodeClock, *, rate_max: bool) -> Camera:

@@ -1,11 +1,13 @@
 """Frames over a Unix socket: how a live twin, in another process, acts as a camera.
 
 The twin listens on a Unix stream socket and sends, per frame, a header of 40 bytes (`pack_header`) and the packed
-I420 bytes. The node connects, so that the twin need not know when nodes start or come back.
+I420 bytes. The node connects, so that the twin need not know when nodes start or come back, and says first of all what
+its camera is told (`pack_settings`), as a driver tells a sensor.
 """
 
 from __future__ import annotations
 
+import contextlib
 import select
 import socket
 import time
@@ -13,14 +15,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct
 
+import msgspec
 import numpy as np
 
 from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings
 from rhot_node.detect.image import from_i420
 from rhot_node.errors import CameraError
 
 MAGIC = b"RYUV"
+SETTINGS_MAGIC = b"RSET"
 VERSION = 1
 CONNECT_S = 5.0  # how long to wait for the twin to listen and to send its first frame
 SILENCE_S = 3.0  # after this long without a frame the twin counts as gone
@@ -28,6 +33,8 @@ CATCH_UP_FRAMES = 8  # waiting frames thrown away in one read, at most; a flood 
 
 _HEADER = Struct("<4sHHIIqII8x")
 HEADER_BYTES = _HEADER.size
+_SETTINGS_HEADER = Struct("<4sI")
+SETTINGS_BYTES_MAX = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +72,46 @@ def unpack_header(data: bytes | bytearray | memoryview) -> StreamHeader:
     return StreamHeader(width, height, number, t_mid, exposure, row_time)
 
 
+def pack_settings(settings: CameraSettings) -> bytes:
+    """What the node sends once it has connected: ``RSET``, how many bytes follow (u32), the settings as JSON."""
+    document = msgspec.json.encode(settings)
+    return _SETTINGS_HEADER.pack(SETTINGS_MAGIC, len(document)) + document
+
+
+def take_settings(received: bytearray) -> CameraSettings | None:
+    """Cut the first whole settings message off what was received; None while it is incomplete.
+
+    Raises CameraError when this is not one.
+    """
+    if len(received) < _SETTINGS_HEADER.size:
+        return None
+    magic, length = _SETTINGS_HEADER.unpack_from(received)
+    if magic != SETTINGS_MAGIC or length > SETTINGS_BYTES_MAX:
+        raise CameraError(f"a node sent {bytes(magic)!r} where it should say its camera's settings.")
+    end = _SETTINGS_HEADER.size + length
+    if len(received) < end:
+        return None
+    document = bytes(received[_SETTINGS_HEADER.size:end])
+    del received[:end]
+    try:
+        return msgspec.json.decode(document, type=CameraSettings)
+    except msgspec.DecodeError as exc:
+        raise CameraError(f"a node's camera settings cannot be read ({exc}).") from exc
+
+
 class StreamCamera:
     """A live twin as a camera. When several frames wait, only the newest is used; the number shows the gap."""
 
-    def __init__(self, path: Path, clock: NodeClock, *, connect_s: float = CONNECT_S,
+    def __init__(self, path: Path, settings: CameraSettings, clock: NodeClock, *, connect_s: float = CONNECT_S,
                  silence_s: float = SILENCE_S) -> None:
-        """Connect and receive the first frame; raises CameraError when there is none within `connect_s`."""
+        """Connect, tell the twin the settings and receive the first frame; raises CameraError when there is none within
+        `connect_s`."""
         self._path = path
         self._clock = clock
         self._silence_s = silence_s
         self._socket = _connect(path, time.monotonic() + connect_s)
+        with contextlib.suppress(OSError):  # a twin that is gone already shows by its missing frame
+            self._socket.sendall(pack_settings(settings))
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
         self._header_buffer = bytearray(HEADER_BYTES)

@@ -132,8 +132,8 @@ def test_yuv_and_its_start_file(tmp_path: Path) -> None:
 
 
 def test_recordings_and_twins_bring_their_own_settings() -> None:
-    assert takes_settings("0") and takes_settings("folder")
-    assert not takes_settings("yuv:folder") and not takes_settings("stream:socket")
+    assert takes_settings("0") and takes_settings("folder") and takes_settings("stream:socket")
+    assert not takes_settings("yuv:folder")
 
 
 def test_an_image_of_another_size_ends_in_an_error(tmp_path: Path) -> None:

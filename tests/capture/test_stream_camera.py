@@ -16,9 +16,12 @@ from rhot_node.capture.stream import (
     StreamCamera,
     StreamHeader,
     pack_header,
+    pack_settings,
+    take_settings,
     unpack_header,
 )
 from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings
 from rhot_node.errors import CameraError
 
 WIDTH, HEIGHT = 64, 48
@@ -37,12 +40,14 @@ class Twin:
         self.listener.bind(str(path))
         self.listener.listen()
         self.serve = serve
+        self.settings: CameraSettings | None = None
         self.thread = threading.Thread(target=self._run, daemon=True)
         self.thread.start()
 
     def _run(self) -> None:
         connection, _ = self.listener.accept()
         with connection:
+            self.settings = take_settings(bytearray(connection.recv(4096)))
             self.serve(connection)
 
     def close(self) -> None:
@@ -78,6 +83,33 @@ def test_a_foreign_header_is_refused(data: bytes) -> None:
         unpack_header(data)
 
 
+def test_settings_survive_the_way_in_pieces() -> None:
+    settings = CameraSettings(exposure_us=2500.0, gain=2.0, blue_gain=1.5)
+    whole, received = pack_settings(settings) * 2, bytearray()
+    taken = []
+    for byte in whole:
+        received.append(byte)
+        told = take_settings(received)
+        if told is not None:
+            taken.append(told)
+    assert taken == [settings, settings] and not received
+    for junk in (b"JUNKjunk", b"RSET" + bytes([255] * 4), b"RSET" + bytes([2, 0, 0, 0]) + b"{]"):
+        with pytest.raises(CameraError):
+            take_settings(bytearray(junk))
+
+
+def test_the_twin_is_told_the_settings_before_it_sends(tmp_path: Path) -> None:
+    def serve(connection: socket.socket) -> None:
+        connection.sendall(frame_bytes(1))
+        time.sleep(0.2)
+
+    twin = Twin(tmp_path / "twin.sock", serve)
+    settings = CameraSettings(exposure_us=1234.0, contrast=0.5)
+    StreamCamera(tmp_path / "twin.sock", settings, NodeClock()).close()
+    twin.close()
+    assert twin.settings == settings
+
+
 def test_frames_arrive_with_times_in_the_nodes_clock(twin: Callable[..., Path]) -> None:
     go_on = threading.Event()
 
@@ -88,7 +120,7 @@ def test_frames_arrive_with_times_in_the_nodes_clock(twin: Callable[..., Path]) 
         time.sleep(0.4)
 
     clock = NodeClock(offset_ns=10**12)
-    camera = StreamCamera(twin(serve), clock)
+    camera = StreamCamera(twin(serve), CameraSettings(), clock)
     assert camera.size == (WIDTH, HEIGHT)
     first = camera.read(1.0)
     assert first is not None and first.number == 1 and (first.image.v == 1).all()
@@ -111,7 +143,7 @@ def test_the_newest_of_several_waiting_frames_wins(twin: Callable[..., Path]) ->
         sent.set()
         time.sleep(0.4)
 
-    camera = StreamCamera(twin(serve), NodeClock())
+    camera = StreamCamera(twin(serve), CameraSettings(), NodeClock())
     assert sent.wait(2)
     frame = camera.read(1.0)
     assert frame is not None and frame.number == 4 and (frame.image.y == 4).all()
@@ -127,7 +159,7 @@ def test_a_flood_does_not_keep_the_reader_for_ever(twin: Callable[..., Path]) ->
         except OSError:
             return
 
-    camera = StreamCamera(twin(serve), NodeClock())
+    camera = StreamCamera(twin(serve), CameraSettings(), NodeClock())
     began = time.monotonic()
     for _ in range(5):
         assert camera.read(1.0) is not None
@@ -141,25 +173,25 @@ def test_waits_for_a_twin_that_starts_later(twin: Callable[..., Path], tmp_path:
         time.sleep(0.4)
 
     threading.Timer(0.3, lambda: twin(serve)).start()
-    camera = StreamCamera(tmp_path / "twin.sock", NodeClock(), connect_s=3.0)
+    camera = StreamCamera(tmp_path / "twin.sock", CameraSettings(), NodeClock(), connect_s=3.0)
     assert camera.read(0.1) is not None
 
 
 def test_no_twin_is_an_error_with_a_remedy(tmp_path: Path) -> None:
     with pytest.raises(CameraError, match="Start the simulator"):
-        StreamCamera(tmp_path / "nobody.sock", NodeClock(), connect_s=0.1)
+        StreamCamera(tmp_path / "nobody.sock", CameraSettings(), NodeClock(), connect_s=0.1)
 
 
 def test_a_twin_that_never_sends_is_an_error(twin: Callable[..., Path]) -> None:
     with pytest.raises(CameraError, match="no frame came"):
-        StreamCamera(twin(lambda connection: time.sleep(0.4)), NodeClock(), connect_s=0.2)
+        StreamCamera(twin(lambda connection: time.sleep(0.4)), CameraSettings(), NodeClock(), connect_s=0.2)
 
 
 def test_closing_in_the_middle_of_a_frame_is_an_error(twin: Callable[..., Path]) -> None:
     def serve(connection: socket.socket) -> None:
         connection.sendall(frame_bytes(1) + frame_bytes(2)[:1000])
 
-    camera = StreamCamera(twin(serve), NodeClock())
+    camera = StreamCamera(twin(serve), CameraSettings(), NodeClock())
     with pytest.raises(CameraError, match="closed"):
         for _ in range(3):
             camera.read(1.0)
@@ -170,7 +202,7 @@ def test_silence_is_an_error(twin: Callable[..., Path]) -> None:
         connection.sendall(frame_bytes(1))
         time.sleep(0.6)
 
-    camera = StreamCamera(twin(serve), NodeClock(), silence_s=0.2)
+    camera = StreamCamera(twin(serve), CameraSettings(), NodeClock(), silence_s=0.2)
     assert camera.read(1.0) is not None
     with pytest.raises(CameraError, match="no frame for"):
         for _ in range(10):
@@ -182,7 +214,7 @@ def test_a_changed_image_size_is_an_error(twin: Callable[..., Path]) -> None:
         connection.sendall(frame_bytes(1) + frame_bytes(2, width=32))
         time.sleep(0.4)
 
-    camera = StreamCamera(twin(serve), NodeClock())
+    camera = StreamCamera(twin(serve), CameraSettings(), NodeClock())
     with pytest.raises(CameraError, match="size changed from 64 x 48 to 32 x 48"):
         for _ in range(3):
             camera.read(0.5)
@@ -193,6 +225,6 @@ def test_frames_can_be_read_as_arrays_of_the_ordinary_kind(twin: Callable[..., P
         connection.sendall(frame_bytes(1))
         time.sleep(0.4)
 
-    frame = StreamCamera(twin(serve), NodeClock()).read(1.0)
+    frame = StreamCamera(twin(serve), CameraSettings(), NodeClock()).read(1.0)
     assert frame is not None
     assert type(frame.image.u) is np.ndarray and frame.image.u.flags.writeable

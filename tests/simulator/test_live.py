@@ -11,10 +11,14 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+import zmq
 
 from rhot_app.project import load_rig
+from rhot_app.simulator.remote import TwinRemote
+from rhot_app.simulator.shows import BoardShow
 
 READY_S = 90.0
 
@@ -31,6 +35,21 @@ def udp_ports_open(ports: list[int]) -> bool:
     lines = Path("/proc/net/udp").read_text().splitlines()[1:]
     bound = {int(line.split()[1].split(":")[1], 16) for line in lines}
     return set(ports) <= bound
+
+
+def ask_node(rig_path: Path, request: dict[str, Any]) -> dict[str, Any]:
+    """The left node's answer to a request over its control channel."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    try:
+        requests = context.socket(zmq.REQ)
+        requests.linger = 0
+        requests.connect(f"tcp://127.0.0.1:{load_rig(rig_path).nodes[0].control_port}")
+        requests.send_json(request)
+        assert requests.poll(10_000), "the node gives no answer"
+        answer: dict[str, Any] = json.loads(requests.recv_multipart()[0])
+        return answer
+    finally:
+        context.destroy(0)
 
 
 @pytest.fixture
@@ -53,13 +72,21 @@ def twin(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
         process.stdout.close()
 
 
-def test_live_twin_gets_ready_heals_a_killed_node_and_ends_with_its_nodes(
+def test_live_twin_obeys_heals_a_killed_node_and_ends_with_its_nodes(
         twin: tuple[subprocess.Popen[bytes], Path]) -> None:
     process, rig_path = twin
     assert process.stdout is not None
     ready = json.loads(process.stdout.readline())
     assert ready["event"] == "ready" and ready["rig"] == str(rig_path)
     ports = [node.udp_port for node in load_rig(rig_path).nodes]
+    changed = ask_node(rig_path, {"request": "set_settings", "settings": {"camera": {"exposure_us": 6000.0}}})
+    assert changed["ok"]
+    with TwinRemote(rig_path.parent) as remote:
+        remote.show(BoardShow(on_table=True))
+        deadline = time.monotonic() + 10.0
+        while remote.state().cameras["left"].exposure_us != 6000.0 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert remote.state().cameras["left"].exposure_us == 6000.0, "what the node is told, the twin's sensor does"
     nodes = children(process.pid)
     assert len(nodes) == 2 and len(set(ports)) == 2 and udp_ports_open(ports)
 
@@ -71,11 +98,13 @@ def test_live_twin_gets_ready_heals_a_killed_node_and_ends_with_its_nodes(
     healed = children(process.pid)
     assert len(healed) == 2 and nodes[0] not in healed and nodes[1] in healed
     assert udp_ports_open(ports), "the new node listens where the old one did"
+    kept = ask_node(rig_path, {"request": "settings"})["settings"]
+    assert kept["camera"]["exposure_us"] == 6000.0, "a node that comes back keeps its settings"
 
     process.send_signal(signal.SIGTERM)
     assert process.wait(10.0) == 0
     assert not any(Path(f"/proc/{pid}").exists() for pid in healed)
-    assert not list(rig_path.parent.glob("*.frames")), "no socket is left behind"
+    assert not [*rig_path.parent.glob("*.frames"), *rig_path.parent.glob("*.ipc")], "no socket is left behind"
 
 
 def test_unknown_motion_ends_with_a_sentence(tmp_path: Path) -> None:

@@ -1,0 +1,164 @@
+"""What the live twin shows can be changed while it runs, and its cameras obey what their nodes tell them."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.corners import detect
+from rhot_app.errors import CalibrationError, SimulatorError
+from rhot_app.simulator.frame_socket import FrameSocket
+from rhot_app.simulator.lamp import Lamp
+from rhot_app.simulator.live_cameras import LiveCameras
+from rhot_app.simulator.remote import TwinRemote
+from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.simulator.shows import BoardShow, HandShow, MarkerShow
+from rhot_app.simulator.stage import Stage
+from rhot_app.simulator.twin_door import TwinDoor
+from rhot_app.simulator.twin_requests import LampRequest, ShowRequest, StateRequest
+from rhot_node.capture.stream import HEADER_BYTES, StreamHeader, pack_settings, unpack_header
+from rhot_node.config import CameraSettings
+
+WIDTH, HEIGHT = 320, 240
+
+
+class Rig:
+    """A stage, its cameras and a node that has connected to the left one; steps are taken by hand."""
+
+    def __init__(self, folder: Path) -> None:
+        settings = twin_defaults()
+        wide = msgspec.structs.replace(settings.presets["wide"], width=WIDTH, height=HEIGHT)
+        self.scene = make_scene(msgspec.structs.replace(settings, presets={"wide": wide}), 1)
+        self.sockets = [FrameSocket(folder / f"{name}.frames") for name in self.scene.names]
+        self.stage = Stage(self.scene, HandShow("still"))
+        self.cameras = LiveCameras(self.scene, self.stage, self.sockets)
+        self.node = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.node.connect(str(folder / "left.frames"))
+        self.node.settimeout(2.0)
+
+    def frame(self) -> tuple[StreamHeader, np.ndarray]:
+        """The left camera's next frame: header and Y plane."""
+        self.cameras.step()
+        header = unpack_header(self._receive(HEADER_BYTES))
+        planes = np.frombuffer(self._receive(header.frame_bytes), np.uint8)
+        return header, planes[:WIDTH * HEIGHT].reshape(HEIGHT, WIDTH)
+
+    def ask(self, request: ShowRequest | LampRequest) -> None:
+        """What the door's thread does, while the cameras go on."""
+        asking = threading.Thread(target=self.stage.perform, args=(request,))
+        asking.start()
+        while asking.is_alive():
+            self.frame()
+
+    def _receive(self, count: int) -> bytearray:
+        data = bytearray()
+        while len(data) < count:
+            data += self.node.recv(count - len(data))
+        return data
+
+    def close(self) -> None:
+        self.node.close()
+        for each in self.sockets:
+            each.close()
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Rig]:
+    rig = Rig(tmp_path)
+    yield rig
+    rig.close()
+
+
+def test_a_board_takes_the_hands_place_and_begins_with_a_pause(rig: Rig) -> None:
+    hand = rig.frame()[1].astype(float)
+    rig.ask(ShowRequest(BoardShow(on_table=True)))
+    picture = rig.frame()[1]
+    assert np.abs(picture - hand).mean() > 5.0
+    view = detect(np.ascontiguousarray(picture), Chessboard(9, 6, 0.03))
+    assert view is not None and len(view.pixels) == 54
+    rig.ask(ShowRequest(MarkerShow(distance_m=0.4)))
+    assert rig.stage.perform(StateRequest())["name"] == "marker thumb at 0.4 m"
+    assert (rig.frame()[1][:20] < 80).all(), "nothing is left of the board"
+
+
+def test_lamp_changes_every_picture_and_stays_for_what_is_shown_next(rig: Rig) -> None:
+    rig.frame()
+    bright = rig.frame()[1].mean()
+    rig.ask(LampRequest(brightness=0.25))
+    assert rig.frame()[1].mean() == pytest.approx(0.25 ** (1 / 2.2) * bright, rel=0.05)
+    rig.ask(ShowRequest(HandShow("rest")))
+    rig.ask(LampRequest(kelvin=3000.0))
+    assert rig.stage.setting.lamp == Lamp(brightness=0.25, kelvin=3000.0)
+
+
+def test_what_cannot_be_shown_changes_nothing(rig: Rig) -> None:
+    before = rig.stage.setting
+    with pytest.raises(CalibrationError):
+        rig.stage.perform(ShowRequest(BoardShow(size="1x1")))
+    with pytest.raises(SimulatorError, match="kelvin"):
+        rig.stage.perform(LampRequest(kelvin=3.0))
+    assert rig.stage.setting is before
+
+
+def test_cameras_obey_what_their_node_says(rig: Rig) -> None:
+    rig.frame()
+    header, picture = rig.frame()
+    assert header.exposure_ns == 4_000_000
+    rig.node.sendall(pack_settings(CameraSettings(exposure_us=8000.0, gain=1.5)))
+    header, brighter = rig.frame()
+    assert header.exposure_ns == 8_000_000
+    assert brighter.mean() == pytest.approx(3.0 ** (1 / 2.2) * picture.mean(), rel=0.06)
+    report = rig.cameras.report()
+    assert report["left"]["exposure_us"] == 8000.0 and report["left"]["gain"] == 1.5
+    assert report["right"]["exposure_us"] == 4000.0
+    rig.node.sendall(pack_settings(CameraSettings(exposure_us=900_000.0)))
+    assert rig.frame()[0].exposure_ns == 25_000_000, "no exposure outlasts a frame"
+
+
+def test_a_node_that_talks_nonsense_is_cut_off_and_may_come_back(rig: Rig, tmp_path: Path) -> None:
+    rig.frame()
+    rig.node.sendall(b"good morning, sensor")
+    rig.cameras.step()
+    rig.node.close()
+    rig.node = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    rig.node.connect(str(tmp_path / "left.frames"))
+    rig.node.settimeout(2.0)
+    assert rig.frame()[0].width == WIDTH
+
+
+def test_remote_and_door_understand_each_other(rig: Rig, tmp_path: Path) -> None:
+    rig.stage.report = {"cameras": rig.cameras.report(), "rate_hz": 21.5, "preset_hz": 40.0}
+    door = TwinDoor(tmp_path, rig.stage.perform)
+    door.start()
+    ending = threading.Event()
+    running = threading.Thread(target=lambda: [rig.cameras.step() for _ in iter(ending.is_set, True)])
+    running.start()
+    try:
+        with TwinRemote(tmp_path) as twin:
+            assert twin.state().show == HandShow("still")
+            state = twin.show(BoardShow(pattern="charuco", size="8x6", square_mm=25.0))
+            assert state.show == BoardShow(pattern="charuco", size="8x6", square_mm=25.0)
+            assert state.cameras["right"].contrast == 1.0 and (state.rate_hz, state.preset_hz) == (21.5, 40.0)
+            assert twin.lamp(mains_hz=50.0).lamp.mains_hz == 50.0
+            with pytest.raises(SimulatorError, match="toe"):
+                twin.show(MarkerShow(marker="toe"))
+            with pytest.raises(SimulatorError, match="distance_m"):
+                twin.show(MarkerShow(distance_m=0.01))
+    finally:
+        ending.set()
+        running.join()
+        door.close()
+    assert not (tmp_path / "twin.ipc").exists()
+
+
+def test_no_twin_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rhot_app.simulator.remote.STATE_S", 0.05)
+    with TwinRemote(tmp_path) as twin, pytest.raises(SimulatorError, match="gave no answer"):
+        twin.state()
