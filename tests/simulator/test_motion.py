@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rhot_app.errors import RigError, SimulatorError
 from rhot_app.hand.anatomy import load_hand
@@ -25,7 +26,7 @@ def model() -> HandModel:
 
 
 def test_the_named_motions_are_there() -> None:
-    assert {"still", "rest", "wave", "grasp", "pinch", "point", "spread", "fast"} <= set(motion_names())
+    assert {"still", "rest", "wave", "grasp", "pinch", "point", "spread", "fast", "sweep"} <= set(motion_names())
 
 
 @pytest.mark.parametrize("name", motion_names())
@@ -33,7 +34,7 @@ def test_markers_stay_in_view_of_both_wide_cameras_at_each_distance(name: str, m
     focal = 320.0 / np.tan(np.radians(31.1))
     for distance in (0.4, 0.6, 1.0) if name != "fast" else (0.6, 1.0):
         motion = load_motion(name, model, np.array([0.0375, 0.0, distance]), seed=2)
-        transforms, angles = motion.sample(np.linspace(0.0, 8.0, 160))
+        transforms, angles = motion.sample(np.arange(0.0, max(8.0, motion.period_s), 0.05))
         points = np.array([[*forward(model, HandPose(t, a)).marker_centres, t[:3, 3]]
                            for t, a in zip(transforms, angles, strict=True)])
         for camera_x in (0.0, 0.075):
@@ -64,6 +65,19 @@ def test_fast_peaks_at_two_metres_per_second(model: HandModel) -> None:
     positions = motion.sample(times)[0][:, :3, 3]
     speed = np.linalg.norm(np.gradient(positions, 1e-3, axis=0), axis=1)
     assert speed.max() == pytest.approx(2.0, abs=0.1)
+
+
+def test_sweep_moves_every_joint_far_and_takes_about_a_minute(model: HandModel) -> None:
+    motion = load_motion("sweep", model, CENTRE, seed=1)
+    assert 50.0 < motion.period_s < 70.0
+    times = np.arange(0.0, motion.period_s, 0.05)
+    transforms, angles = motion.sample(times)
+    swing = np.degrees(np.ptp(angles, axis=0))
+    for name, degrees in zip(ANGLES, swing, strict=True):
+        least = 6.0 if name == "middle_mcp_abduction" else 15.0
+        assert degrees > (least if "abduction" in name else 40.0), name
+    turns = Rotation.from_matrix(transforms[:, :3, :3] @ FACING.T).as_rotvec(degrees=True)
+    assert (np.ptp(turns, axis=0) > 35.0).all()
 
 
 def test_still_is_still_and_faces_the_cameras(model: HandModel) -> None:
