@@ -7,9 +7,9 @@ from typing import Literal
 
 from rhot_app.calibration.verdict import Finding, Grade
 
-FAIR_ERROR_PX, POOR_ERROR_PX = 0.7, 1.5
+FAIR_ERROR_PX, POOR_ERROR_PX = 0.5, 1.5
 """Median reprojection error (rms over cameras; half the distance of a pair's epipolar lines). A calibrated rig has 0.1
-to 0.4; markers are refused from 2.5 on."""
+to 0.3; markers are refused from 2.5 on."""
 
 RIGID_PART, RIGID_M = 0.03, 3e-3
 """How far the distance of two markers on one bone may change, and at least."""
