@@ -38,9 +38,10 @@ class Beyond:
 def look_beyond(gray: Gray, view: BoardView, board: Chessboard) -> Beyond:
     """Look at the ring after next around the corners of `view` in its picture."""
     targets = np.column_stack(np.divmod(view.ids, board.cols)[::-1]).astype(np.float64)
-    pixel_from_board, _ = cv2.findHomography(targets, view.pixels)
-    if pixel_from_board is None:
+    found, _ = cv2.findHomography(targets, view.pixels)
+    if found is None:
         return Beyond(False, False)
+    pixel_from_board = np.asarray(found, dtype=np.float64)
     inner = np.array([(x + 0.5, y + 0.5) for y in range(board.rows - 1) for x in range(board.cols - 1)])
     contrast = _contrast(gray, inner, pixel_from_board)
     if not contrast:

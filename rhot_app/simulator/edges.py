@@ -32,6 +32,10 @@ def reach_by_id(meta: Indices, sweep: Array) -> Indices:
 @njit(cache=True)
 def mark_edges(ids: NDArray[np.int8], edges: NDArray[np.uint8], rows: Indices, top: int, bottom: int,
                 reach: Indices) -> None:
+    """Mark in `edges` (H, W) what lies within a body's `reach` (codes, 2) px of a border between two of `ids` (H, W).
+
+    `rows` (H, 2): first and last column of each row in which anything is; rows from `top` to before `bottom` count.
+    """
     height, width = ids.shape
     for y in range(max(top - 1, 0), bottom):
         below = min(y + 1, height - 1)
