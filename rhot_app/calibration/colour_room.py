@@ -14,6 +14,7 @@ from rhot_node.detect.colour import Colours, colours_of
 from rhot_node.detect.gate import ColourGate, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.search import AREA, SUM_X, SUM_Y
+from rhot_node.detect.whereabouts import Whereabouts, whereabouts
 from rhot_node.markers import MarkerSet
 
 HUE_STEP_DEG = 5
@@ -112,10 +113,20 @@ def _rival(gate: ColourGate, markers: MarkerSet, index: int, name: str, view: Vi
     shape = view.image.u.shape
     best_own = float(np.max(merits(own, chroma, shape), initial=0.0)) or view.paint[name].area
     worth = merits(blobs, chroma, shape)
+    hand = _hand(view, [marker.id for marker in markers.markers if marker.role is not None])
+    if hand is not None and markers.markers[index].role is not None:
+        worth = worth * hand.nearness(blobs[:, SUM_X] / blobs[:, AREA], blobs[:, SUM_Y] / blobs[:, AREA])
     best = blobs[int(np.argmax(worth))]
     return Rival(name, picture, x=2.0 * float(best[SUM_X] / best[AREA]) + 0.5,
                  y=2.0 * float(best[SUM_Y] / best[AREA]) + 0.5, area_px=4.0 * float(best[AREA]),
                  passing_px=4.0 * float(blobs[:, AREA].sum()), merit=float(worth.max()) / best_own)
+
+
+def _hand(view: View, worn: list[str]) -> Whereabouts | None:
+    """Where the hand is, by the worn markers that are known in the picture."""
+    regions = [region for name, region in view.paint.items() if name in worn]
+    places = [np.argwhere(region.sample).mean(axis=0)[::-1] for region in regions]
+    return whereabouts(np.array(places), np.array([region.area for region in regions]))
 
 
 def _hue_bins() -> NDArray[np.uint8]:

@@ -19,6 +19,7 @@ from rhot_node.detect.light_guess import guess_light
 from rhot_node.detect.outline import INTERIOR, OUTSIDE
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
 from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, Track, lost_observation
+from rhot_node.detect.whereabouts import Whereabouts, whereabouts
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
@@ -127,6 +128,9 @@ class FastDetector:
                 found[index] = self._observe(index, MarkerFlag(0))
             else:
                 lost.append(index)
+        for index in self._strays(found):  # what was taken for a marker, far from the hand
+            self._tracks[index] = Track(self._markers[index].shape)
+            lost.append(index)
         if lost:
             self._acquire(image, lost, found)
         return tuple(found[index] for index in range(len(self._tracks)))
@@ -188,9 +192,14 @@ class FastDetector:
     def _acquire(self, image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
         """Search the whole frame for the lost markers and state each as found or lost."""
         blobs = self._gate.blobs(image, lost).copy()
+        worth = self._worth(blobs)
+        hand = self._whereabouts(lost, blobs, worth)
         for index in lost:
             track = self._tracks[index]
-            ranked, flags = self._rank(index, blobs[blobs[:, LABEL] == index + 1])
+            own = blobs[:, LABEL] == index + 1
+            if hand is not None and self._markers[index].role is not None:
+                worth[own] *= hand.nearness(blobs[own, SUM_X] / blobs[own, AREA], blobs[own, SUM_Y] / blobs[own, AREA])
+            ranked, flags = self._rank(index, blobs[own], worth[own])
             for blob in ranked[:CANDIDATES]:
                 if self._measure(image, index, self._blob_request(index, blob)):
                     self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
@@ -200,8 +209,35 @@ class FastDetector:
                 track.lose()
                 found[index] = lost_observation(index)
 
-    def _rank(self, index: int, blobs: Blobs) -> tuple[Blobs, MarkerFlag]:
-        """The blobs from the likeliest on: by motion and size while the marker is remembered, else by merit."""
+    def _worth(self, blobs: Blobs) -> NDArray[np.float64]:
+        """(N,) merit of every blob as the marker whose colour it has."""
+        worth = np.zeros(len(blobs))
+        for index, marker in enumerate(self._markers):
+            own = blobs[:, LABEL] == index + 1
+            worth[own] = merits(blobs[own], marker.chroma, self._scratch.mask.shape)
+        return worth
+
+    def _whereabouts(self, lost: list[int], blobs: Blobs, worth: NDArray[np.float64]) -> Whereabouts | None:
+        """Where the hand is: by the worn markers that are tracked, and by the likeliest blob of each lost one."""
+        worn = [(track.x, track.y, track.area) for index, track in enumerate(self._tracks)
+                if index not in lost and self._markers[index].role is not None]
+        for index in lost:
+            own = blobs[:, LABEL] == index + 1
+            if self._markers[index].role is not None and own.any():
+                blob = blobs[own][int(np.argmax(worth[own]))]
+                worn.append((blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA]))
+        return _middle(worn)
+
+    def _strays(self, found: dict[int, MarkerObservation]) -> list[int]:
+        """Tracked worn markers that no hand can wear together with the others."""
+        worn = [index for index in found if self._markers[index].role is not None]
+        hand = _middle([(self._tracks[index].x, self._tracks[index].y, self._tracks[index].area) for index in worn])
+        if hand is None:
+            return []
+        return [index for index in worn if hand.beyond(self._tracks[index].x, self._tracks[index].y)]
+
+    def _rank(self, index: int, blobs: Blobs, worth: NDArray[np.float64]) -> tuple[Blobs, MarkerFlag]:
+        """The blobs from the likeliest on: by motion and size while the marker is remembered, else by `worth`."""
         track = self._tracks[index]
         if track.remembered:
             costs = np.array([track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
@@ -209,7 +245,6 @@ class FastDetector:
             order = np.argsort(costs)
             doubtful = len(blobs) > 1 and costs[order[1]] < costs[order[0]] + RIVAL_MARGIN
         else:
-            worth = merits(blobs, self._markers[index].chroma, self._scratch.mask.shape)
             order = np.argsort(-worth)
             doubtful = len(blobs) > 1 and worth[order[1]] > AS_PLAUSIBLE * worth[order[0]]
         return blobs[order], MarkerFlag.ACQUIRED | MarkerFlag.AMBIGUOUS if doubtful else MarkerFlag.ACQUIRED
@@ -226,3 +261,9 @@ class FastDetector:
         request[m.LEVEL_REF] = (blob[SUM_U] * direction[0] + blob[SUM_V] * direction[1]) / area
         request[m.IS_BAND] = self._markers[index].shape == "band"
         return request
+
+
+def _middle(worn: list[tuple[float, float, float]]) -> Whereabouts | None:
+    """Of worn markers (x, y, area)."""
+    places = np.array(worn).reshape(-1, 3)
+    return whereabouts(places[:, :2], places[:, 2])

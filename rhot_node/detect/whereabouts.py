@@ -1,0 +1,44 @@
+"""Where the hand is in a picture, by the markers that it wears: a thing of a marker's colour far from it is not worn.
+
+All coordinates are chroma pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MARKERS_LEAST = 3
+BEYOND = 12.0  # sides of a marker; an open hand's wrist is 9 from the middle of its fingertips
+REACH = 5.0  # standard deviation of a marker's distance from the middle of the others, in sides of a marker
+FAR = 0.02  # what the merit of a thing beyond all reach is multiplied with
+
+
+@dataclass(frozen=True, slots=True)
+class Whereabouts:
+    """The middle of the markers, and the side of a square as large as one: how near the hand is."""
+
+    x: float
+    y: float
+    side: float
+
+    def nearness(self, x: Array, y: Array) -> Array:
+        """FAR..1: how well something at (x, y) can be part of this hand."""
+        away = np.hypot(x - self.x, y - self.y)
+        return np.maximum(np.exp(-0.5 * (away / (REACH * self.side)) ** 2), FAR)
+
+    def beyond(self, x: float, y: float) -> bool:
+        """Whether no hand reaches from its other markers to (x, y)."""
+        return bool(np.hypot(x - self.x, y - self.y) > BEYOND * self.side)
+
+
+def whereabouts(places: Array, areas: Array) -> Whereabouts | None:
+    """Of markers at `places` (N, 2) with `areas` (N,); None for less than MARKERS_LEAST. Few wrong ones do no harm."""
+    if len(places) < MARKERS_LEAST:
+        return None
+    x, y = np.median(places, axis=0)
+    return Whereabouts(float(x), float(y), float(np.median(np.sqrt(areas))))
