@@ -1,0 +1,124 @@
+"""Colour calibration on the twin: is a marker lost by another lamp, and does the warning come where tracking fails?
+
+    python benchmarks/colours.py [--seeds N] [--frames N] [--only lamps|paints] [--json FILE]
+
+First table: colours learnt by a lamp of 4300 K on wood with things on it, and on cloth; then other poses by lamps of
+3000 to 6500 K with 80 to 120 % of the light. Every marker of which half can be seen counts; lost, or found in another
+place. Compared with the nominal colours of the marker set.
+
+Second table: one paint mixed step by step with the colours of skin, wood and another marker. Warned: the calibration
+says anything of that marker. Fails: in more than 5 % of the pictures the marker is lost or found elsewhere.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "calibration"))
+
+from colour_twin import SKIN, WOOD_RGB, HandScene, calibrate, repainted, tally  # noqa: E402
+
+from rhot_app.calibration.colours import ColourReport  # noqa: E402
+from rhot_app.calibration.verdict import Grade  # noqa: E402
+from rhot_node.files import resource_path  # noqa: E402
+from rhot_node.markers import load_markers  # noqa: E402
+
+MARKERS = load_markers(resource_path("markers", "rhot6.json"))
+KELVINS = (3000.0, 3600.0, 4300.0, 5200.0, 6500.0)
+BRIGHTNESSES = (0.8, 1.0, 1.2)
+LEARN_S = np.array([0.2, 0.5, 0.9, 1.4, 2.0, 2.7])
+FAILS = 0.05
+TARGETS: dict[str, tuple[float, float, float]] = {
+    "skin": SKIN, "wood": WOOD_RGB, **{name: MARKERS.markers[MARKERS.ids.index(name)].display_rgb
+                                       for name in ("wrist", "ring", "middle")}}
+MIXTURES = (("thumb", "skin"), ("index", "skin"), ("wrist", "skin"), ("index", "wood"), ("thumb", "wrist"),
+            ("little", "ring"), ("index", "middle"))
+SHARES = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+
+
+def lamps(background: str, seeds: int, frames: int) -> dict[str, Any]:
+    """Counts over all lamps for one background."""
+    rows: dict[str, np.ndarray] = {}
+    warned = 0
+    for seed in range(1, seeds + 1):
+        scene = HandScene(background, seed)
+        report = calibrate(scene, LEARN_S)
+        warned += sum(finding.grade is not Grade.GOOD for finding in report.verdict.findings)
+        for kelvin in KELVINS:
+            for brightness in BRIGHTNESSES:
+                shown = list(scene.frames(np.arange(frames) * 0.43 + 3.1, kelvin, brightness))
+                for name, markers in (("learnt", report.markers), ("nominal", scene.markers)):
+                    for way in ("stills", "tracked"):
+                        got = tally(markers, shown, way == "stills")
+                        counts = np.array([got.visible.sum(), got.lost.sum(), got.misplaced.sum()])
+                        rows[f"{name}, {way}"] = rows.get(f"{name}, {way}", np.zeros(3, dtype=int)) + counts
+    return {"warnings": warned, **{name: counts.tolist() for name, counts in rows.items()}}
+
+
+def paint(name: str, target: str, share: float, frames: int, seed: int) -> dict[str, Any]:
+    """Whether one mixed paint is warned of, and how often it fails by all lamps."""
+    scene = HandScene("cloth" if target != "wood" else "clutter", seed,
+                      markers=repainted(MARKERS, name, TARGETS[target], share))
+    report = calibrate(scene, LEARN_S)
+    shown = [frame for kelvin in KELVINS[::2] for brightness in BRIGHTNESSES[::2]
+             for frame in scene.frames(np.arange(frames) * 0.61 + 3.1, kelvin, brightness)]
+    index = scene.markers.ids.index(name)
+    failed = max(float(tally(report.markers, shown, stills).failed[index]) for stills in (True, False))
+    return {"marker": name, "towards": target, "share": share, "warned": warnings_of(report, name),
+            "failed": round(failed, 3)}
+
+
+def warnings_of(report: ColourReport, name: str) -> list[str]:
+    """Codes of the findings that concern a marker."""
+    return [finding.code for finding in report.verdict.findings
+            if finding.grade is not Grade.GOOD and name in finding.figure]
+
+
+def print_paints(rows: list[dict[str, Any]]) -> None:
+    """One line per mixture, and how well warnings and failures agree."""
+    print(f"\n{'paint':<8} {'mixed with':<10} {'share':>6} {'failed %':>9}  warned")
+    for row in rows:
+        print(f"{row['marker']:<8} {row['towards']:<10} {row['share']:6.2f} {100 * row['failed']:9.1f}  "
+              f"{', '.join(row['warned']) or '-'}")
+    warned = np.array([bool(row["warned"]) for row in rows])
+    fails = np.array([row["failed"] > FAILS for row in rows])
+    both = int((warned & fails).sum())
+    print(f"\nwarned {warned.sum()}, fails {fails.sum()}, both {both} of {len(rows)}: "
+          f"precision {both / max(warned.sum(), 1):.2f}, recall {both / max(fails.sum(), 1):.2f}")
+
+
+def main() -> int:
+    """Run, print the tables, write the JSON."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--frames", type=int, default=8)
+    parser.add_argument("--only", choices=("lamps", "paints"))
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    result: dict[str, Any] = {"seeds": options.seeds, "frames": options.frames}
+    if options.only != "paints":
+        print(f"{'background':<10} {'colours':<18} {'in view':>8} {'lost':>6} {'elsewhere':>10}")
+        for background in ("cloth", "clutter"):
+            result[background] = lamps(background, options.seeds, options.frames)
+            for name, counts in result[background].items():
+                if isinstance(counts, list):
+                    print(f"{background:<10} {name:<18} {counts[0]:8d} {counts[1]:6d} {counts[2]:10d}", flush=True)
+            print(f"{background:<10} warnings: {result[background]['warnings']}")
+    if options.only != "lamps":
+        rows = [paint(name, target, share, options.frames, seed=11) for name, target in MIXTURES for share in SHARES]
+        result["paints"] = rows
+        print_paints(rows)
+    if options.json:
+        options.json.write_text(json.dumps(result, indent=2) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

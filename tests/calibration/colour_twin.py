@@ -1,0 +1,135 @@
+"""Colour calibrations on the digital twin: a hand on wood or cloth by any lamp, in any paint, and what is lost."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from rhot_app.calibration.colour_samples import ColourSamples
+from rhot_app.calibration.colours import ColourReport, solve_colours
+from rhot_app.simulator.acts import Act
+from rhot_app.simulator.body import SKIN_RGB, HandBody
+from rhot_app.simulator.lamp import Lamp
+from rhot_app.simulator.render import FrameRenderer
+from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
+from rhot_app.simulator.shot import make_renderer, make_shot
+from rhot_node.detect.colour import box_mask, colours_of
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import YuvImage, from_i420
+from rhot_node.markers import Marker, MarkerSet
+from rhot_node.wire.messages import MarkerObservation
+
+LEARNT_KELVIN = 4300.0
+SEEN = 0.5  # of a marker's area that must be in view for a person to see it as what it is
+AWAY = 0.5  # diameters from its place: another thing
+WOOD_RGB = (142.0, 104.0, 70.0)
+SKIN = SKIN_RGB
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture, and of every marker its visible part and where its centre is, (M, 2) px."""
+
+    image: YuvImage
+    visible: np.ndarray
+    places: np.ndarray
+    palm: tuple[float, float]
+
+
+class HandScene:
+    """One camera before a hand that moves, in one paint, whose lamp can be changed."""
+
+    def __init__(self, background: str, seed: int, motion: str = "grasp", markers: MarkerSet | None = None) -> None:
+        settings = msgspec.structs.replace(twin_defaults(), background=background)
+        scene: Scene = make_scene(settings, seed)
+        self.scene = scene if markers is None else dataclasses.replace(scene, markers=markers)
+        shot = make_shot(self.scene, motion, 60.0)
+        self._act: Act = shot.act
+        self._renderer: FrameRenderer = make_renderer(shot, 0)
+        self._camera = self.scene.camera(0)
+        self._readout_s = 1e-9 * self.scene.row_time_ns * self.scene.preset.height
+
+    @property
+    def markers(self) -> MarkerSet:
+        """The paints that the hand wears."""
+        return self.scene.markers
+
+    def frames(self, times_s: np.ndarray, kelvin: float = LEARNT_KELVIN, brightness: float = 1.0) -> Iterator[Frame]:
+        """Pictures by one lamp."""
+        body = self._act.thing
+        assert isinstance(body, HandBody)
+        preset = self.scene.preset
+        self._renderer.expose(dataclasses.replace(self._renderer.exposure,
+                                                  lamp=Lamp(kelvin=kelvin, brightness=brightness)))
+        for number, time_s in enumerate(times_s):
+            data, visible = self._renderer.render(self._act.source, float(time_s), number)
+            points = body.points(*self._act.source.sample(np.array([time_s + 0.5 * self._readout_s])))
+            places = self._camera.project(body.marker_centres(points)[0])
+            wrist, knuckle = self._camera.project(points[0, [0, 9]])
+            palm = 0.35 * wrist + 0.65 * knuckle
+            yield Frame(from_i420(data.copy(), preset.width, preset.height), visible.copy(), places,
+                        (float(palm[0]), float(palm[1])))
+
+
+def calibrate(scene: HandScene, times_s: np.ndarray, half: int = 4) -> ColourReport:
+    """Learn the colours as a person would: a box on every marker, one on the palm, then the hand moves."""
+    first, *others = scene.frames(times_s)
+    collector = ColourSamples()
+    for name, (x, y), part in zip(scene.markers.ids, first.places, first.visible, strict=True):
+        if part > SEEN:
+            collector.add(name, first.image, (round(x) - half, round(y) - half, round(x) + half, round(y) + half))
+    for frame in others:
+        collector.follow(frame.image)
+    x, y = first.palm
+    skin = box_mask(first.image, [(round(x) - 10, round(y) - 10, round(x) + 10, round(y) + 10)])
+    return solve_colours(collector.samples, collector.views, skin=colours_of(first.image, skin), base=scene.markers)
+
+
+@dataclass
+class Tally:
+    """How often each marker was in view, not found, and found elsewhere, (M,)."""
+
+    visible: np.ndarray
+    lost: np.ndarray
+    misplaced: np.ndarray
+
+    @property
+    def failed(self) -> np.ndarray:
+        """(M,) share of the pictures with the marker in view in which it was not found where it is."""
+        return (self.lost + self.misplaced) / np.maximum(self.visible, 1)
+
+
+def tally(markers: MarkerSet, frames: list[Frame], stills: bool) -> Tally:
+    """What the detector makes of the frames: as unrelated pictures, or as they follow each other."""
+    result = Tally(*(np.zeros(len(markers.markers), dtype=int) for _ in range(3)))
+    detector = FastDetector(markers)
+    for frame in frames:
+        if stills:
+            detector.reset()
+        for seen, part, place in zip(detector.detect(frame.image), frame.visible, frame.places, strict=True):
+            if part > SEEN:
+                result.visible[seen.index] += 1
+                result.lost[seen.index] += not seen.found
+                result.misplaced[seen.index] += seen.found and _away(seen, place) > AWAY
+    return result
+
+
+def _away(seen: MarkerObservation, place: np.ndarray) -> float:
+    return math.hypot(seen.x - place[0], seen.y - place[1]) / max(seen.diameter, 12.0)
+
+
+def repainted(markers: MarkerSet, name: str, towards: tuple[float, float, float], share: float) -> MarkerSet:
+    """The set with one paint mixed with another colour."""
+    def mix(marker: Marker) -> Marker:
+        if marker.id != name:
+            return marker
+        red, green, blue = (round((1.0 - share) * own + share * other)
+                            for own, other in zip(marker.display_rgb, towards, strict=True))
+        return msgspec.structs.replace(marker, display_rgb=(red, green, blue))
+
+    return MarkerSet(markers=tuple(mix(marker) for marker in markers.markers))
