@@ -9,6 +9,7 @@ from types import ModuleType
 KINDS: dict[str, str] = {
     "bones": "the hand's bones and where the markers sit, from a minute of free movement or a ruler",
     "filters": "the filters' settings, from a hand held still and one that moves fast",
+    "intrinsics": "one camera's lens from pictures of a board",
     "stereo": "two or more cameras from pictures of a board that they took together",
     "time": "when each camera sees, from a moving marker",
     "colours": "the markers' colours, from boxes on their paint in pictures",

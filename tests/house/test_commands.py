@@ -26,6 +26,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                                "--lag-ms", "--json"),
     "rhot calibrate time": ("--log", "--rig", "--out", "--json"),
     "rhot calibrate depth": ("--table", "--rig", "--out", "--baseline-mm", "--view-angle-deg", "--json"),
+    "rhot calibrate intrinsics": ("--images", "--board", "--square-mm", "--marker-mm", "--dictionary",
+                                  "--legacy-pattern", "--square-pixels", "--out", "--rig", "--node", "--json"),
     "rhot target": ("chessboard", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
                     "--paper", "--out"),
     "rhot check": ("RIG", "--json"),

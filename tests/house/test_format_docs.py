@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from rhot_app import project
+from rhot_app.calibration import intrinsics_file
 from rhot_app.hand import anatomy
 from rhot_node import config, markers
 
@@ -20,6 +21,8 @@ PAGES: dict[str, tuple[str, int, tuple[type[msgspec.Struct], ...]]] = {
         project.OneEuroSettings)),
     "markers.md": (markers.FORMAT, markers.VERSION, (
         markers.MarkerSet, markers.Marker, markers.ChromaModel, markers.RangeModel)),
+    "calibration-files.md": (intrinsics_file.FORMAT, intrinsics_file.VERSION, (
+        intrinsics_file.IntrinsicsFile, intrinsics_file.BoardUsed)),
     "hand.md": (anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy)),
     "node.md": (config.FORMAT, config.VERSION, (config.NodeSettings, config.CameraSettings, config.ClockSettings)),
 }

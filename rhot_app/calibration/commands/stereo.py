@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rhot_app.calibration.commands.board_arguments import add_board_arguments, board_of
 from rhot_app.calibration.commands.output import add_json_argument, show
 from rhot_app.calibration.commands.stereo_arguments import (
-    board_of,
     files_of,
     known_lengths,
     named_paths,
@@ -36,13 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     pictures.add_argument("--right", metavar="PATTERN", help="pictures of the camera called right")
     pictures.add_argument("--camera", action="append", default=[], metavar="NAME=PATTERN",
                           help="pictures of a camera of the rig; once per camera")
-    board = parser.add_argument_group("board")
-    board.add_argument("--board", required=True, metavar="COLSxROWS",
-                       help="inner corners of the chessboard, such as 9x6; with --marker-mm squares of a ChArUco board")
-    board.add_argument("--square-mm", type=float, required=True, metavar="S", help="side of a square, as measured")
-    board.add_argument("--marker-mm", type=float, metavar="M", help="side of a marker: the board is a ChArUco board")
-    board.add_argument("--dictionary", default="", metavar="NAME", help="its markers (default DICT_4X4_50)")
-    board.add_argument("--legacy-pattern", action="store_true", help="it was drawn by OpenCV before 4.6")
+    add_board_arguments(parser)
     lenses = parser.add_argument_group("lenses; found from the same pictures where they are not given")
     lenses.add_argument("--left-intrinsics", type=Path, metavar="FILE", help="lens of left")
     lenses.add_argument("--right-intrinsics", type=Path, metavar="FILE", help="lens of right")
@@ -115,13 +109,13 @@ def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig
 
 
 def _given_lenses(args: argparse.Namespace, names: list[str]) -> dict[str, LensStart]:
-    from rhot_app.calibration.lens_file import read_lens
+    from rhot_app.calibration.intrinsics_file import load_intrinsics
 
     given = named_paths(args.intrinsics, "--intrinsics", names)
     for name, path in (("left", args.left_intrinsics), ("right", args.right_intrinsics)):
         if path is not None:
             given[name] = path
-    return {name: read_lens(path) for name, path in given.items()}
+    return {name: load_intrinsics(path).lens for name, path in given.items()}
 
 
 def _base_rig(args: argparse.Namespace) -> Rig:

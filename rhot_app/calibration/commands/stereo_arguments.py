@@ -9,19 +9,7 @@ from typing import TYPE_CHECKING
 from rhot_app.errors import CalibrationError
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.board import Board
     from rhot_app.calibration.stereo import KnownLengths
-
-
-def board_of(args: argparse.Namespace) -> Board:
-    """The board; raises CalibrationError for an impossible one."""
-    from rhot_app.calibration.board import DEFAULT_DICTIONARY, CharucoBoard, Chessboard, parse_size
-
-    cols, rows = parse_size(args.board)
-    if args.marker_mm is None:
-        return Chessboard(cols, rows, args.square_mm * 1e-3)
-    return CharucoBoard(cols, rows, args.square_mm * 1e-3, args.marker_mm * 1e-3,
-                        args.dictionary or DEFAULT_DICTIONARY, args.legacy_pattern)
 
 
 def files_of(args: argparse.Namespace) -> dict[str, list[Path]]:

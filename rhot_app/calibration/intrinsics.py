@@ -1,0 +1,134 @@
+"""The intrinsics of one camera from views of a board: the fit, what it leaves, how certain it is, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.board import Board
+from rhot_app.calibration.board_errors import BoardErrors
+from rhot_app.calibration.corners import BoardView
+from rhot_app.calibration.coverage import Coverage, cover
+from rhot_app.calibration.intrinsics_checks import Figures, check
+from rhot_app.calibration.lens_certainty import ExpectedErrors, blind_share, expected_errors
+from rhot_app.calibration.lens_fit import LensFit, fit_lens
+from rhot_app.calibration.residual_field import ResidualField, residual_field
+from rhot_app.calibration.stereo_views import Dropped
+from rhot_app.calibration.verdict import Finding, Verdict, judge
+from rhot_app.errors import CalibrationError
+from rhot_app.progress import Progress, silent, within
+from rhot_app.project import Intrinsics
+
+Array = NDArray[np.float64]
+
+_BLURRIER = 1.6  # times the median view's blur: that explains a bad fit
+_MIXED_UP_PX = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class ViewFit:
+    """One view that was used: its file or name, rms px of its corners, how many there are, blur and square side, px."""
+
+    source: str
+    rms_px: float
+    corners: int
+    blur_px: float
+    square_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class IntrinsicsReport:
+    """Everything a page or a file needs to know.
+
+    `lens` (9,): fx, fy, cx, cy, k1, k2, p1, p2, k3 for pictures of `size` (width, height), and its `covariance` (9, 9)
+    with poses and board errors marginalised. `rms_px` over all corners. `undetermined` names the coefficients that the
+    views leave open; `errors` what the uncertainty means in millimetres at the working distance.
+    """
+
+    board: Board
+    lens: Array
+    covariance: Array
+    size: tuple[int, int]
+    rms_px: float
+    views: tuple[ViewFit, ...]
+    dropped: tuple[Dropped, ...]
+    field: ResidualField
+    coverage: Coverage
+    undetermined: tuple[str, ...]
+    board_errors: BoardErrors | None
+    errors: ExpectedErrors
+    verdict: Verdict
+
+    @property
+    def std(self) -> Array:
+        """(9,) standard deviations of the lens parameters."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """As a rig holds them."""
+        fx, fy, cx, cy, k1, k2, p1, p2, k3 = map(float, self.lens)
+        return Intrinsics(*self.size, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
+
+
+def solve(views: Sequence[BoardView], board: Board, *, square_pixels: bool = False, dropped: Sequence[Dropped] = (),
+          noticed: Sequence[Finding] = (), progress: Progress = silent) -> IntrinsicsReport:
+    """Calibrate one camera from `views`, all of one picture size.
+
+    `square_pixels` forces fx = fy. `dropped` pictures and `noticed` findings of whoever read the views join the report.
+    Raises CalibrationError when the views do not determine a lens at all; anything doubtful is in the verdict.
+    """
+    if len({view.size for view in views}) > 1:
+        raise CalibrationError("The pictures have different sizes: calibrate each size by itself.")
+    fit = fit_lens(views, board, square_pixels=square_pixels, progress=within(progress, 0.0, 0.95))
+    if not (np.isfinite(fit.lens).all() and np.isfinite(fit.covariance).all() and (fit.lens[:2] > 0.0).all()):
+        raise CalibrationError("No lens explains these views: are they of one camera, with one zoom, and one board?")
+    progress("judging the result", 0.97)
+    return _report(fit, views, board, tuple(dropped), noticed)
+
+
+def _report(fit: LensFit, views: Sequence[BoardView], board: Board, dropped: tuple[Dropped, ...],
+            noticed: Sequence[Finding]) -> IntrinsicsReport:
+    used = [views[index] for index in fit.kept]
+    size = used[0].size
+    usual = float(np.median(fit.view_rms))
+    dropped += tuple(Dropped(views[index].source, _why_off(views[index], rms, usual, used), "residual")
+                     for index, rms in sorted(fit.dropped.items()))
+    residuals = fit.bundle.residuals
+    rms = float(np.sqrt(np.mean(np.sum(np.square(residuals), axis=1))))
+    field = residual_field(fit.seen.pixels, residuals, fit.seen.shot, size)
+    coverage = cover(used, board)
+    errors = expected_errors(fit.lens, fit.covariance, size)
+    figures = Figures(
+        lens=fit.lens, std=np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), size=size, rms_px=rms,
+        views=len(used), misfits=len(fit.dropped), coverage=coverage, pattern_px=field.pattern_px,
+        tilt_rad=_tilt(fit.bundle.state.world_from_board), undetermined=fit.undetermined,
+        blind=blind_share(fit.lens, size), errors=errors, board=board, board_errors=fit.board_errors,
+        blur_px=float(np.nanmedian([view.blur_px for view in used] + [0.0])),
+        square_px=float(np.median([view.square_px for view in used])))
+    summary = f"rms {rms:.2f} px over {len(used)} views, f {fit.lens[0]:.1f} px."
+    return IntrinsicsReport(
+        board, fit.lens, fit.covariance, size, rms,
+        tuple(ViewFit(view.source, float(off), len(view.ids), view.blur_px, view.square_px)
+              for view, off in zip(used, fit.view_rms, strict=True)),
+        dropped, field, coverage, fit.undetermined, fit.board_errors, errors,
+        judge(summary, [*noticed, *check(figures)]))
+
+
+def _why_off(view: BoardView, rms: float, usual: float, used: Sequence[BoardView]) -> str:
+    """Why a view fits so much worse than the others."""
+    figure = f"its corners are {rms:.2f} px from where the other views place them (usual: {usual:.2f} px)"
+    if view.blur_px > _BLURRIER * float(np.median([each.blur_px for each in used])):
+        return f"{figure}: it is blurred, the board moved or is out of focus"
+    if rms > _MIXED_UP_PX:
+        return f"{figure}: corners are mixed up, or it is another board, zoom or focus"
+    return f"{figure}: the board was bent or moved, or something covers a part of it"
+
+
+def _tilt(world_from_board: Array) -> float:
+    """The largest angle between the boards of two views, rad: without it a plane does not show the focal length."""
+    normals = world_from_board[:, :3, 2]
+    return float(np.arccos(np.clip((normals @ normals.T).min(), -1.0, 1.0)))
