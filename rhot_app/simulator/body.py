@@ -1,4 +1,4 @@
-"""The hand as solids: skin, painted fingertips, forearm and wrist band, posed for the renderer.
+"""The hand as solids: skin, forearm and the markers it wears, posed for the renderer.
 
 Skin and fingertips are the capsules of `rhot_app.hand.shape`; forearm and band are elliptic cylinders, flat as wrists
 are. Each solid rides on one row of the hand's kinematic table.
@@ -21,6 +21,7 @@ from rhot_app.hand.kinematics import forward, forward_arrays
 from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.shape import segments
 from rhot_app.hand.skeleton import FINGERS, JOINTS, TIP_ROLES, WRIST_ROLE
+from rhot_app.simulator.worn import KNUCKLE_ROLES, Place, place_of
 from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]
@@ -34,7 +35,9 @@ PALM_GROUP = len(FINGERS)
 
 SKIN_RGB = (201.0, 152.0, 128.0)
 FOREARM_M = 0.45  # it reaches out of the picture, as arms do
-BAND_LENGTH_MM = 22.0  # where the marker set gives none
+BAND_LENGTH_MM = 22.0  # where the marker set gives none, as the next two
+KNUCKLE_RADIUS_MM, BALL_RADIUS_MM = 12.5, 5.0
+POINT_M = 1e-7  # a capsule of this length is a ball
 
 TIP_MARGIN, BAND_MARGIN = 1.05, 2.1
 """Of a marker's largest half width: how far its own finger's (wrist's) skin may stand before it and still be paint."""
@@ -51,8 +54,8 @@ class HandBody:
     `kind`, `group`, `marker` (N,): what it is, which part of the hand, index in the marker set or SKIN. `size`
     (N, 3) m: capsule (radius, 0, 0), cylinder (half length, half breadth, half thickness). `rgb` (N, 3) 0..255.
     `margin` (N,) m: by how much paint wins over skin of its own group. `row` (N,): kinematic row that carries the
-    solid, `ends` (N, 2, 3) m: a capsule's ends, a cylinder's centre, in that row's frame. `marker_point` (M,): which
-    of `points` is the marker's centre.
+    solid, `ends` (N, 2, 3) m: a capsule's ends, a cylinder's centre, in that row's frame. `places` (M,): where the
+    markers sit.
     """
 
     model: HandModel
@@ -64,24 +67,23 @@ class HandBody:
     margin: Array
     row: Indices
     ends: Array
-    marker_point: Indices
+    places: tuple[Place, ...]
 
     @property
     def marker_count(self) -> int:
         """Number of markers of the set, hidden ones included."""
-        return len(self.marker_point)
+        return len(self.places)
 
-    def points(self, world_from_palm: Array, angles: Array) -> Array:
-        """(T, 26, 3) m: joints, then the five painted centres, for poses (T, 4, 4) and (T, 21)."""
-        return self._forward(world_from_palm, angles)[1]
-
-    def marker_centres(self, points: Array) -> Array:
-        """(T, M, 3) m from `points`."""
-        return np.asarray(points[:, self.marker_point])
+    def joints_and_markers(self, world_from_palm: Array, angles: Array) -> tuple[Array, Array]:
+        """(T, 21, 3) m joints and (T, M, 3) m marker centres for poses (T, 4, 4) and (T, 21)."""
+        frames, points = self._forward(world_from_palm, angles)
+        worn = frames[:, [place.row for place in self.places]]
+        offsets = np.array([place.point for place in self.places])
+        return points[:, :len(JOINTS)], np.einsum("tmij,mj->tmi", worn[..., :3], offsets) + worn[..., 3]
 
     def marker_positions(self, world_from_palm: Array, angles: Array) -> Array:
         """(T, M, 3) m, the markers' centres for poses (T, 4, 4) and (T, 21)."""
-        return self.marker_centres(self.points(world_from_palm, angles))
+        return self.joints_and_markers(world_from_palm, angles)[1]
 
     def place(self, world_from_palm: Array, angles: Array) -> Array:
         """(T, N, 12) parameters of the solids in the world for poses (T, 4, 4) and (T, 21)."""
@@ -122,10 +124,10 @@ def build_body(model: HandModel, markers: MarkerSet, hidden: frozenset[str] = fr
     unknown = sorted(hidden - set(markers.ids))
     if unknown:
         raise RigError(f"marker {unknown[0]!r} cannot be hidden: the marker set has {', '.join(markers.ids)}.")
-    roles = [_role(marker) for marker in markers.markers]
+    places = tuple(place_of(marker, model) for marker in markers.markers)
     skin = list(_skin(model))
     worn = [k for k, name in enumerate(markers.ids) if name not in hidden]
-    solids = [_paint(model, k, markers.markers[k], skin) for k in worn] + [solid for _, solid in skin]
+    solids = [_paint(model, k, markers.markers[k], places[k], skin) for k in worn] + [solid for _, solid in skin]
     reach = [max(solid.size) for solid in solids]
     factor = [0.0 if solid.marker == SKIN else TIP_MARGIN if solid.kind == CAPSULE else BAND_MARGIN for solid in solids]
     return HandBody(
@@ -139,25 +141,23 @@ def build_body(model: HandModel, markers: MarkerSet, hidden: frozenset[str] = fr
         margin=np.array(factor) * np.array(reach),
         row=np.array([solid.row for solid in solids], dtype=np.int64),
         ends=np.array([solid.ends for solid in solids]),
-        marker_point=np.array([JOINTS.index("wrist") if role == WRIST_ROLE else len(JOINTS) + TIP_ROLES.index(role)
-                               for role in roles], dtype=np.int64),
+        places=places,
     )
 
 
-def _role(marker: Marker) -> str:
-    if marker.role is None or marker.role not in (*TIP_ROLES, WRIST_ROLE):
-        raise RigError(f"marker {marker.id!r} has the role {marker.role!r}; the simulated hand wears markers only at "
-                       f"{', '.join((*TIP_ROLES, WRIST_ROLE))}.")
-    return marker.role
-
-
-def _paint(model: HandModel, index: int, marker: Marker, skin: list[tuple[str, _Solid]]) -> _Solid:
-    """A fingertip's whole distal capsule, or a band round the wrist, as flat as the wrist is."""
+def _paint(model: HandModel, index: int, marker: Marker, place: Place, skin: list[tuple[str, _Solid]]) -> _Solid:
+    """A fingertip's whole distal capsule, a band round the wrist, as flat as the wrist is, or a ball."""
     if marker.role == WRIST_ROLE:
         breadth, thickness = _wrist(model)
         scale = 1e-3 * marker.radius_mm / (0.5 * (breadth + thickness)) if marker.radius_mm else 1.03
         half = 0.5e-3 * (marker.length_mm or BAND_LENGTH_MM)
         return _Solid(CYLINDER, PALM_GROUP, index, (half, scale * breadth, scale * thickness), ROOT, np.zeros((2, 3)))
+    if marker.role not in TIP_ROLES:
+        knuckle = marker.role in KNUCKLE_ROLES
+        radius = 1e-3 * (marker.radius_mm or (KNUCKLE_RADIUS_MM if knuckle else BALL_RADIUS_MM))
+        group = place.finger if place.finger >= 0 else PALM_GROUP
+        return _Solid(CAPSULE, group, index, (radius, 0.0, 0.0), place.row,
+                      place.point + np.array([[0.0, 0.0, 0.0], [POINT_M, 0.0, 0.0]]))
     distal = dict(skin)[f"{str(marker.role).removesuffix('_tip')}_distal"]
     radius = 1e-3 * marker.radius_mm if marker.radius_mm else distal.size[0]
     return _Solid(CAPSULE, distal.group, index, (radius, 0.0, 0.0), distal.row, distal.ends)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.simulator.body import CAPSULE, PALM_GROUP, PARAMETERS, SKIN
+from rhot_app.simulator.body import CAPSULE, PALM_GROUP, PARAMETERS, POINT_M, SKIN
 from rhot_node.markers import MarkerSet
 
 Array = NDArray[np.float64]
@@ -16,7 +16,6 @@ Indices = NDArray[np.int64]
 STICK_RGB = (70.0, 68.0, 66.0)
 BALL_RADIUS_M = 0.012
 _STICK_RADIUS_M, _STICK_M = 0.003, 0.4
-_POINT_M = 1e-7  # a capsule of this length is a ball
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,4 +70,4 @@ def ball_on_stick(markers: MarkerSet, index: int) -> Prop:
         group=np.array([0, PALM_GROUP], dtype=np.int64), marker=np.array([index, SKIN], dtype=np.int64),
         size=np.array([[BALL_RADIUS_M, 0.0, 0.0], [_STICK_RADIUS_M, 0.0, 0.0]]),
         rgb=np.array([markers.markers[index].display_rgb, STICK_RGB], dtype=np.float64),
-        ends=np.array([[np.zeros(3), [0.0, _POINT_M, 0.0]], [top, top + down]]), centres=centres)
+        ends=np.array([[np.zeros(3), [0.0, POINT_M, 0.0]], [top, top + down]]), centres=centres)

@@ -28,6 +28,8 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
                         help="distance of the hand from the cameras in metres (default 0.6)")
     parser.add_argument("--background", default=None, choices=("cloth", "clutter"),
                         help="what stands behind the hand (default cloth)")
+    parser.add_argument("--markers", default=None, metavar="SET",
+                        help="which markers the hand wears: rhot6 (default), rhot8, rich, or another of the project's")
     parser.add_argument("--lamp", type=float, default=None, metavar="F",
                         help="brightness of the lamp, a factor on its light (default 1)")
     parser.add_argument("--kelvin", type=float, default=None, metavar="K",
@@ -43,7 +45,8 @@ def scene_of(args: argparse.Namespace) -> Scene:
     from rhot_app.errors import SimulatorError
     from rhot_app.simulator.scene import TwinSettings, make_scene, twin_defaults
 
-    chosen = {"preset": args.preset, "distance_m": args.distance, "background": args.background}
+    chosen = {"preset": args.preset, "distance_m": args.distance, "background": args.background,
+              "markers": args.markers}
     lamp = {"brightness": args.lamp, "kelvin": args.kelvin, "mains_hz": args.mains}
     merged = _with(msgspec.to_builtins(twin_defaults()), chosen)
     merged["lamp"] = _with(merged["lamp"], lamp)

@@ -96,8 +96,8 @@ def true_act(act: Act, seconds: float, cameras: tuple[FrameTruth, ...]) -> Truth
     times = np.arange(0.0, seconds + 1.0 / SAMPLE_HZ, 1.0 / SAMPLE_HZ)
     transforms, angles = act.source.sample(times)
     if isinstance(act.thing, HandBody):
-        points = act.thing.points(transforms, angles)
-        return Truth(times, act.thing.marker_centres(points), points[:, :21], angles, transforms, cameras)
+        joints, worn = act.thing.joints_and_markers(transforms, angles)
+        return Truth(times, worn, joints, angles, transforms, cameras)
     markers = np.zeros((len(times), 0, 3))
     if isinstance(act.thing, Prop):
         markers = act.thing.marker_positions(transforms, angles)

@@ -50,7 +50,8 @@ class HandScene:
         self.scene = scene if markers is None else dataclasses.replace(scene, markers=markers)
         shot = make_shot(self.scene, motion, 60.0)
         self._act: Act = shot.act
-        self._renderer: FrameRenderer = make_renderer(shot, 0)
+        self.source = shot.act.source
+        self.renderer: FrameRenderer = make_renderer(shot, 0)
         self._camera = self.scene.camera(0)
         self._readout_s = 1e-9 * self.scene.row_time_ns * self.scene.preset.height
 
@@ -64,13 +65,14 @@ class HandScene:
         body = self._act.thing
         assert isinstance(body, HandBody)
         preset = self.scene.preset
-        self._renderer.expose(dataclasses.replace(self._renderer.exposure,
+        self.renderer.expose(dataclasses.replace(self.renderer.exposure,
                                                   lamp=Lamp(kelvin=kelvin, brightness=brightness)))
         for number, time_s in enumerate(times_s):
-            data, visible = self._renderer.render(self._act.source, float(time_s), number)
-            points = body.points(*self._act.source.sample(np.array([time_s + 0.5 * self._readout_s])))
-            places = self._camera.project(body.marker_centres(points)[0])
-            wrist, knuckle = self._camera.project(points[0, [0, 9]])
+            data, visible = self.renderer.render(self.source, float(time_s), number)
+            pose = self.source.sample(np.array([time_s + 0.5 * self._readout_s]))
+            joints, centres = body.joints_and_markers(*pose)
+            places = self._camera.project(centres[0])
+            wrist, knuckle = self._camera.project(joints[0, [0, 9]])
             palm = 0.35 * wrist + 0.65 * knuckle
             yield Frame(from_i420(data.copy(), preset.width, preset.height), visible.copy(), places,
                         (float(palm[0]), float(palm[1])))

@@ -7,16 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.anatomy import load_hand
-from rhot_app.hand.dh import ROOT
-from rhot_app.hand.model import build_model
-from rhot_app.simulator.body import CAPSULE, PALM_GROUP, SKIN, HandBody
+from rhot_app.simulator.body import PALM_GROUP, SKIN
 from rhot_app.simulator.controls import Controls
 from rhot_app.simulator.lamp import Lamp
 from rhot_app.simulator.moments import Shutter
+from rhot_app.simulator.painter import Solids
+from rhot_app.simulator.prop import Prop
 from rhot_app.simulator.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.solids_painter import SolidsPainter
-from rhot_node.files import resource_path
 
 Array = NDArray[np.float64]
 
@@ -39,21 +37,19 @@ class Gliding:
         return transforms, np.zeros((len(times_s), 21))
 
 
-def balls(radii: list[float], places: list[tuple[float, float, float]], painted: list[bool]) -> HandBody:
-    """Balls at fixed places about the palm's origin; painted ones (white) first, the others are black skin."""
+def balls(radii: list[float], places: list[tuple[float, float, float]], painted: list[bool]) -> Prop:
+    """Balls at fixed places about the prop's origin; painted ones (white) first, the others are black skin."""
     count = len(radii)
-    return HandBody(
-        model=build_model(load_hand(resource_path("hands", "right.json"))),
-        kind=np.full(count, CAPSULE), group=np.arange(count) % PALM_GROUP,
+    return Prop(
+        group=np.arange(count) % PALM_GROUP,
         marker=np.array([k if paint else SKIN for k, paint in enumerate(painted)]),
         size=np.array([[radius, 0.0, 0.0] for radius in radii]),
         rgb=np.array([[255.0] * 3 if paint else [0.0] * 3 for paint in painted]),
-        margin=np.zeros(count), row=np.full(count, ROOT),
         ends=np.array([[place, np.add(place, (0.0, 1e-7, 0.0))] for place in places]),
-        marker_point=np.zeros(sum(painted), dtype=np.int64))
+        centres=np.array([place for place, paint in zip(places, painted, strict=True) if paint]))
 
 
-def renderer(body: HandBody, shutter: Shutter = STILL, seed: int = 1, background: NDArray[np.float32] | None = None,
+def renderer(body: Solids, shutter: Shutter = STILL, seed: int = 1, background: NDArray[np.float32] | None = None,
              shading: float = 0.0, lamp: Lamp = STEADY) -> FrameRenderer:
     """A renderer of `body` before black, or another background (3, H, W)."""
     if background is None:

@@ -116,7 +116,7 @@ def test_open_hand_shows_every_marker_whole_in_its_colour() -> None:
     hand = StillHand((0.0375, 0.085, 0.6))
     image, box, visible = camera.radiance(hand, 0.0, 0)
     assert visible.min() > 0.98
-    centres = CAMERA.project(body.marker_centres(body.points(*hand.sample(np.zeros(1))))[0])
+    centres = CAMERA.project(body.marker_positions(*hand.sample(np.zeros(1)))[0])
     for marker, (x, y) in zip(MARKERS.markers, centres, strict=True):
         seen = image[:, round(y), round(x)]
         colour = np.array(marker.display_rgb, dtype=np.float64)

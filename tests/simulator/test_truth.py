@@ -28,9 +28,9 @@ def test_between_samples_the_hand_is_where_the_motion_says() -> None:
     times = np.random.default_rng(1).uniform(0.0, 0.5, 50)
     body = shot.act.thing
     assert isinstance(body, HandBody)
-    points = body.points(*shot.act.source.sample(times))
-    np.testing.assert_allclose(truth.joints_at(times), points[:, :21], atol=2e-5)
-    np.testing.assert_allclose(truth.markers_at(times), body.marker_centres(points), atol=2e-5)
+    joints, markers = body.joints_and_markers(*shot.act.source.sample(times))
+    np.testing.assert_allclose(truth.joints_at(times), joints, atol=2e-5)
+    np.testing.assert_allclose(truth.markers_at(times), markers, atol=2e-5)
     np.testing.assert_allclose(truth.angles_at(times), shot.act.source.sample(times)[1], atol=1e-4)
 
 

@@ -55,7 +55,7 @@ def hand_trajectory(rig: Rig, motion: str, seconds: float, distance_m: float = 0
     body = build_body(model, rig.markers)
     moving = load_motion(motion, model, np.array([0.0375, 0.0, distance_m]), seed)
     times = np.arange(-0.5, seconds + 0.5, 1e-3)
-    return CubicSpline(times, body.marker_centres(body.points(*moving.sample(times))))
+    return CubicSpline(times, body.marker_positions(*moving.sample(times)))
 
 
 def still_trajectory(points: np.ndarray) -> Trajectory:

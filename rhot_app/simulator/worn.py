@@ -1,0 +1,75 @@
+"""Where on the hand a marker sits, by its role: the place rides on one row of the hand's kinematic table.
+
+Roles: the five ``<finger>_tip`` (the whole last bone, painted), ``wrist`` (a band), ``palm_<finger>`` (a painted
+knuckle, which moves with the palm), ``<finger>_<bone>`` for the inner bones (a ball glued to the back of the finger,
+half-way), and ``hand_1`` to ``hand_3`` (balls on the back of the hand: below index and little knuckle, and near the
+wrist).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.errors import RigError
+from rhot_app.hand.dh import ROOT
+from rhot_app.hand.kinematics import forward_arrays
+from rhot_app.hand.model import HandModel
+from rhot_app.hand.skeleton import ANGLES, BONES, FINGERS, JOINTS, TIP_ROLES, WRIST_ROLE
+from rhot_node.markers import Marker
+
+Array = NDArray[np.float64]
+
+KNUCKLE_ROLES = tuple(f"palm_{finger}" for finger in FINGERS)
+INNER_ROLES = tuple(f"{finger}_{bone}" for finger, bones in zip(FINGERS, BONES, strict=True) for bone in bones[:2])
+BACK_ROLES = ("hand_1", "hand_2", "hand_3")
+ROLES = (*TIP_ROLES, WRIST_ROLE, *KNUCKLE_ROLES, *INNER_ROLES, *BACK_ROLES)
+
+_BACK = {"hand_1": (1, 0.7, 0.8), "hand_2": (4, 0.75, 0.8), "hand_3": (2, 0.3, 0.0)}
+"""On the back of the hand: which finger's knuckle, and which parts of the way there, along and across the palm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A marker's centre: `point` (3,) m in the frame of kinematic row `row`; `finger` indexes FINGERS, -1: the palm."""
+
+    row: int
+    point: Array
+    finger: int
+
+
+def place_of(marker: Marker, model: HandModel) -> Place:
+    """Where the marker sits; raises RigError when its role is no place on the simulated hand."""
+    role = marker.role or ""
+    dh = model.dh
+    mirrored = np.array([1.0, model.mirror, 1.0])
+    if role == WRIST_ROLE:
+        return Place(ROOT, np.zeros(3), -1)
+    if role in TIP_ROLES:
+        finger = TIP_ROLES.index(role)
+        row = int(dh.point_row[len(JOINTS) + finger])
+        return Place(row, dh.point_offset[len(JOINTS) + finger].copy(), finger)
+    if role in KNUCKLE_ROLES:
+        return Place(ROOT, mirrored * model.base[KNUCKLE_ROLES.index(role)], -1)
+    if role in BACK_ROLES:
+        finger, along, across = _BACK[role]
+        skin = 0.5e-3 * model.anatomy.palm_thickness_mm
+        return Place(ROOT, mirrored * (along * model.base[finger, 0], across * model.base[finger, 1], skin), -1)
+    if role in INNER_ROLES:
+        finger, bone = divmod(INNER_ROLES.index(role), 2)
+        row = int(dh.point_row[1 + 4 * finger + bone + 1])
+        skin = model.radii[finger, bone] * _dorsal(model, finger, row)
+        return Place(row, np.array([-0.5 * model.bones[finger, bone], 0.0, 0.0]) + skin, finger)
+    raise RigError(f"marker {marker.id!r} has the role {marker.role!r}; the simulated hand wears markers only at "
+                   f"{', '.join(ROLES)}.")
+
+
+def _dorsal(model: HandModel, finger: int, row: int) -> Array:
+    """(3,) unit vector out of the back of a finger, in the frame of one of its rows."""
+    frames = np.empty((len(model.dh.parent), 3, 4))
+    points = np.empty((len(model.dh.point_row), 3))
+    forward_arrays(model.dh, np.eye(4), np.zeros(len(ANGLES)), frames, points)
+    dorsal = model.base_rotation[finger][:, 2] * np.array([1.0, model.mirror, 1.0])
+    return np.asarray(frames[row, :, :3].T @ dorsal)
