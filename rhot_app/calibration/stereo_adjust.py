@@ -24,6 +24,8 @@ from rhot_app.progress import Progress, within
 Array = NDArray[np.float64]
 
 FEWEST_SHOTS = 3
+ALIKE_RAD = float(np.radians(10.0))
+"""Boards whose normals are all within this angle tell focal length from distance badly, and not their own shape."""
 
 _OFF_TIMES = 4.0  # a view whose rms is this many times the median view's, and
 _OFF_PX = 0.3  # this much more than it, does not fit
@@ -81,6 +83,9 @@ def adjust_rig(views: SharedViews, lenses: Sequence[LensStart], posed: Sequence[
 
 def _settled(solution: StereoSolution, freedom: list[LensFreedom], progress: Progress) -> StereoSolution:
     """With the board's own errors, and without the k3 of lenses that do not need one."""
+    kept = any(lens.basis.shape[1] == 0 for lens in freedom)
+    if kept or tilt_spread(solution.bundle.state.world_from_board) < ALIKE_RAD:
+        return solution  # what is wrong with a lens that may not change, or with views all alike, would bend the board
     board, seen = solution.board, solution.seen
     progress("finding the board's own errors", 0.5)
     bundle, errors = find_board_errors(solution.bundle, seen, freedom, board.count, board.square_m,
@@ -137,6 +142,12 @@ def view_rms(solution: StereoSolution) -> Array:
     squares = np.bincount(cell, np.sum(np.square(solution.bundle.residuals), axis=1), minlength=shape[0] * shape[1])
     counts = np.bincount(cell, minlength=shape[0] * shape[1])
     return np.sqrt(squares / np.where(counts, counts, np.nan)).reshape(shape)
+
+
+def tilt_spread(world_from_board: Array) -> float:
+    """Largest angle in rad between the normals of any two boards."""
+    normals = world_from_board[:, :3, 2]
+    return float(np.arccos(np.clip(np.min(normals @ normals.T), -1.0, 1.0)))
 
 
 def _strange(solution: StereoSolution) -> dict[int, str]:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rhot_app.calibration.stereo_adjust import ALIKE_RAD
 from rhot_app.calibration.stereo_lens_checks import LensEvidence
 from rhot_app.calibration.stereo_report import WORKING_DISTANCE_M, StereoFigures
 from rhot_app.calibration.stereo_views import Dropped
@@ -21,20 +22,20 @@ FAIR_PX, POOR_PX = 0.6, 1.5
 
 _DIAGONAL_PX = 800.0
 _GOOD_SHOTS = 8
-_ALIKE_RAD = np.radians(10.0)
 _FAIR_ERROR_M, _POOR_ERROR_M = 0.002, 0.010
 _SQUARE_FAIR, _SQUARE_POOR = 0.005, 0.02
 _FLATNESS = 0.005  # of the board's diagonal, and
+_BOARD_OFF = 0.01  # of a square's side
 _BEYOND_NOISE = 2.0  # times what the noise of the corners explains
 
 
 def fit_findings(figures: StereoFigures, *, lenses_from_views: bool) -> list[Finding]:
     """How well the corners fit, how much they say, and what comes out in space."""
-    found = [_rms(figures), _squares(figures), _error(figures)]
+    found = [_rms(figures), _squares(figures), _error(figures), _board(figures)]
     if len(figures.shots) < _GOOD_SHOTS:
         found.append(Finding("few_views", Grade.FAIR, f"Only {len(figures.shots)} shots were used.",
                              remedy="Take 15, with the board near and far, tilted, and in all corners."))
-    if figures.tilt_rad < _ALIKE_RAD:
+    if figures.tilt_rad < ALIKE_RAD:
         found.append(Finding(
             "alike", Grade.POOR if lenses_from_views else Grade.FAIR,
             f"The views are all alike: the board is tilted by {np.degrees(figures.tilt_rad):.0f} degrees at most "
@@ -108,6 +109,16 @@ def _squares(figures: StereoFigures) -> Finding | None:
         f"{side * 1e3:g}) and the board is flat to {squares.flatness_m * 1e3:.2f} mm.",
         "The board is bent, or the cameras' geometry is not well determined.",
         "Use a stiff, flat board and take more pictures, also near and tilted.")
+
+
+def _board(figures: StereoFigures) -> Finding | None:
+    errors = figures.board_errors
+    if errors is None or max(errors.in_plane_m, errors.across_m) < _BOARD_OFF * figures.board.square_m:
+        return None
+    return Finding("board", Grade.FAIR, f"The board's corners are {errors.in_plane_m * 1e3:.2f} mm off in its plane "
+                   f"and {errors.across_m * 1e3:.2f} mm across, as all pictures together show.",
+                   "It is bent, or printed or glued unevenly. This was allowed for, as far as it did not change.",
+                   "Use a flat, stiff board: glass, or paper glued to a plate without bubbles.")
 
 
 def _error(figures: StereoFigures) -> Finding | None:

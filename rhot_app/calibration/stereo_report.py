@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.board import Board
+from rhot_app.calibration.board_errors import BoardErrors
 from rhot_app.calibration.bundle_model import BundleState
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.ruler import RulerResult
-from rhot_app.calibration.stereo_adjust import StereoSolution, view_rms
+from rhot_app.calibration.stereo_adjust import StereoSolution, tilt_spread, view_rms
 from rhot_app.calibration.stereo_certainty import certainty, expected_error
 from rhot_app.calibration.stereo_points import Squares, epipolar_px, measure_squares
 from rhot_app.calibration.stereo_views import Dropped
@@ -74,7 +75,8 @@ class ShotFigures:
 @dataclass(frozen=True, slots=True)
 class StereoFigures:
     """All figures of a solved rig. `distances_px` (M,) of all corners; `error_m` expected in space at
-    `WORKING_DISTANCE_M`: by the calibration, and by `MARKER_NOISE_PX` in the pictures."""
+    `WORKING_DISTANCE_M`: by the calibration, and by `MARKER_NOISE_PX` in the pictures. `tilt_rad` the largest angle
+    between two boards; `board_errors` how far the board is from its drawing, None when the pictures show nothing."""
 
     state: BundleState
     board: Board
@@ -86,6 +88,7 @@ class StereoFigures:
     squares: Squares
     error_m: tuple[float, float]
     tilt_rad: float
+    board_errors: BoardErrors | None = None
     ruler: RulerResult | None = None
 
     @property
@@ -130,13 +133,8 @@ def figures_of(solution: StereoSolution, lenses: Sequence[LensStart], names: Seq
     return StereoFigures(
         state, solution.board, cameras, tuple(pairs), shots, _rms(distances), bundle.noise_px,
         measure_squares(solution.views, solution.board, state, bundle.noise_px),
-        expected_error(state, sure, WORKING_DISTANCE_M, MARKER_NOISE_PX), _tilt_spread(state.world_from_board))
-
-
-def _tilt_spread(world_from_board: Array) -> float:
-    """Largest angle in rad between the normals of any two boards."""
-    normals = world_from_board[:, :3, 2]
-    return float(np.arccos(np.clip(np.min(normals @ normals.T), -1.0, 1.0)))
+        expected_error(state, sure, WORKING_DISTANCE_M, MARKER_NOISE_PX), tilt_spread(state.world_from_board),
+        solution.board_errors)
 
 
 def _rms(distances: Array) -> float:

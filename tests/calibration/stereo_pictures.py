@@ -40,10 +40,10 @@ def views_of(camera: str, *, mirrored: bool = False) -> list[BoardView | None]:
 
 
 def shared(left: list[BoardView | None], right: list[BoardView | None],
-           names: tuple[str, str] = ("left", "right")) -> SharedViews:
-    """Shots of two lists, pair by pair."""
-    return SharedViews(names, BOARD, tuple(Shot(f"{number:02d}", pair)
-                                           for number, pair in enumerate(zip(left, right, strict=False), 1)))
+           names: tuple[str, str] = ("left", "right"), most: int = 14) -> SharedViews:
+    """Shots of two lists, pair by pair; the first `most` of them."""
+    pairs = list(zip(left, right, strict=False))[:most]
+    return SharedViews(names, BOARD, tuple(Shot(f"{number:02d}", pair) for number, pair in enumerate(pairs, 1)))
 
 
 def rough() -> list[LensStart]:

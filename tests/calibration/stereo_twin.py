@@ -32,6 +32,7 @@ class Twin:
     lenses: Array
     camera_from_world: Array
     world_from_board: Array
+    board_errors_m: Array | float = 0.0  # (N, 3), how far the printed corners are from where they should be
 
     def starts(self, **fields: object) -> list[LensStart]:
         """The true lenses as given ones."""
@@ -47,7 +48,7 @@ class Twin:
 
     def _view(self, camera: int, world_from_board: Array, rng: np.random.Generator | None,
               noise_px: float) -> BoardView | None:
-        points = self.board.object_points()
+        points = self.board.object_points() + self.board_errors_m
         world = points @ world_from_board[:3, :3].T + world_from_board[:3, 3]
         camera_from_world = self.camera_from_world[camera]
         facing = (camera_from_world @ world_from_board)[:3, 2] @ (camera_from_world @ world_from_board)[:3, 3]

@@ -26,6 +26,8 @@ def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
         "rms_px": figures.rms_px, "noise_px": figures.noise_px, **pairs[0],
         "square_mm_triangulated": squares.mean_m * 1e3, "square_std_mm": squares.std_m * 1e3,
         "flatness_mm": squares.flatness_m * 1e3,
+        "board_error_mm": None if figures.board_errors is None else {
+            "in_plane": figures.board_errors.in_plane_m * 1e3, "across": figures.board_errors.across_m * 1e3},
         "expected_error_mm": {"distance_m": WORKING_DISTANCE_M, "by_calibration": _number(by_rig * 1e3),
                               "marker_noise_px": MARKER_NOISE_PX, "by_marker_noise": _number(by_noise * 1e3)},
         "std_method": "inverse of the bundle adjustment's normal equations at the corners' own spread",
@@ -57,6 +59,9 @@ def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
     squares = figures.squares
     lines.append(f"squares as the cameras see them: {squares.mean_m * 1e3:.3f} +- {squares.std_m * 1e3:.3f} mm, board "
                  f"flat to {squares.flatness_m * 1e3:.2f} mm")
+    if figures.board_errors is not None:
+        lines.append(f"the board's corners are {figures.board_errors.in_plane_m * 1e3:.2f} mm off in its plane and "
+                     f"{figures.board_errors.across_m * 1e3:.2f} mm across; allowed for")
     lines.append(f"a marker {WORKING_DISTANCE_M:g} m away: {figures.error_m[0] * 1e3:.1f} mm uncertain by this "
                  f"calibration, {figures.error_m[1] * 1e3:.1f} mm by {MARKER_NOISE_PX:g} px of noise")
     if frame is not None:
