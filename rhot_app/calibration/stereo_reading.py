@@ -1,4 +1,4 @@
-"""From picture files to shared views: what cannot be read is named and left out, the rest goes on."""
+"""From the picture files of several cameras to shared views: what cannot be used is named and left out."""
 
 from __future__ import annotations
 
@@ -35,27 +35,26 @@ def read_shared(files: Mapping[str, Sequence[Path]], board: Board, *, progress: 
     rows: list[list[Read]] = []
     for number, shot in enumerate(matched.shots):
         progress(f"looking for the board in {shot.name}", number / len(matched.shots))
-        rows.append([Read(path) if path is None else read_picture(path, board) for path in shot.files])
+        rows.append([Read(None) if path is None else read_picture(path, board) for path in shot.files])
     dropped = list(matched.alone)
-    for camera in range(len(files)):
-        column = [row[camera] for row in rows]
-        drop_other_sizes(column)
-        explain(column, board)
-    for row in rows:
-        dropped += [Dropped(_name(each.path, camera), each.trouble, each.code)
-                    for each, camera in zip(row, files, strict=True) if each.path and each.trouble]
+    for camera, name in enumerate(files):
+        reads = [row[camera] for row in rows]
+        drop_other_sizes(reads)
+        explain(reads, board)
+        if not any(each.view is not None for each in reads):
+            raise CalibrationError(no_board(name, reads, board))
+        dropped += [Dropped(_name(each.path, name), each.trouble, each.code)
+                    for each in reads if each.path and each.trouble]
     shots = tuple(Shot(shot.name, tuple(each.view for each in row))
                   for shot, row in zip(matched.shots, rows, strict=True))
-    views = SharedViews(tuple(files), board, shots)
-    for camera, name in enumerate(files):
-        if not views.of_camera(camera):
-            raise CalibrationError(no_board(name, [row[camera] for row in rows], board))
-    return ReadPictures(views, tuple(dropped), size_of([each for row in rows for each in row], board))
+    size = size_of([each for row in rows for each in row], board)
+    return ReadPictures(SharedViews(tuple(files), board, shots), tuple(dropped), size)
 
 
 def read_view(path: Path, board: Board) -> BoardView:
     """The board in one picture; raises CalibrationError when the file cannot be read or the board is not there."""
     read = read_picture(path, board)
+    explain([read], board)
     if read.view is None:
         raise CalibrationError(f"{path}: {read.trouble}.")
     return read.view
