@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
@@ -16,7 +17,9 @@ _FAINT_PX = 3
 _WIDTH_PX = 2.0
 _TEXT_PT = 11.0
 _LEGEND_ROWS, _LEGEND_COLUMNS = 5, 4
+_LEGEND_ROOM = 0.35  # of the chart's height, above what a large legend would cover
 _BAND_ALPHA, _OWN_ALPHA = 40, 90
+_FEW_DECADES = 2.5
 
 
 class ChartView(QWidget):
@@ -56,12 +59,18 @@ class ChartView(QWidget):
             axis.setTickFont(app_font(_TEXT_PT))
             axis.setPen(scheme.border)
             axis.setTextPen(scheme.muted)
-        plot.setLogMode(y=chart.log_y)
+        plot.setLogMode(x=chart.log_x, y=chart.log_y)
         columns = _LEGEND_COLUMNS if len(chart.curves) > _LEGEND_ROWS else 1
         plot.addLegend(offset=(-10, 1), labelTextColor=scheme.text, brush=pg.mkBrush(scheme.panel), colCount=columns)
         tones = iter((scheme.accent, scheme.caution, scheme.good, scheme.bad, scheme.muted) * 4)
         for curve in chart.curves:
             self._add(plot, curve, QColor(visible_on(curve.colour, scheme.panel) if curve.colour else next(tones)))
+        for side, logarithmic in (("bottom", chart.log_x), ("left", chart.log_y)):
+            if logarithmic:
+                plot.getAxis(side).setTicks([_log_ticks(chart, side)])
+        if columns > 1:
+            low, high = _reach(chart)
+            plot.setYRange(low, high + _LEGEND_ROOM * (high - low))
         return plot
 
     def _add(self, plot: pg.PlotWidget, curve: Curve, tone: QColor) -> None:
@@ -82,3 +91,21 @@ class ChartView(QWidget):
         fill = QColor(tone)
         fill.setAlpha(_OWN_ALPHA if curve.colour else _BAND_ALPHA)
         plot.addItem(pg.FillBetweenItem(low, high, brush=fill))
+
+
+def _reach(chart: Chart) -> tuple[float, float]:
+    """Lowest and highest y of all curves, in the axis's own units."""
+    values = np.concatenate([np.asarray(part, dtype=np.float64) for curve in chart.curves
+                             for part in (curve.y, curve.high) if part is not None])
+    values = np.log10(values) if chart.log_y else values
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+
+
+def _log_ticks(chart: Chart, side: str) -> list[tuple[float, str]]:
+    """1, 2, 5, 10, ...; powers of ten alone where there are many of them."""
+    values = np.concatenate([curve.x if side == "bottom" else curve.y for curve in chart.curves])
+    low, high = np.log10(values[values > 0.0].min()), np.log10(values[values > 0.0].max())
+    steps = (1.0, 2.0, 5.0) if high - low < _FEW_DECADES else (1.0,)
+    ticks = [step * 10.0**decade for decade in range(int(np.floor(low)), int(np.ceil(high)) + 1) for step in steps]
+    return [(float(np.log10(tick)), f"{tick:g}") for tick in ticks]

@@ -6,12 +6,16 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from rhot_app.errors import EngineError
+from rhot_app.ui.backend.session import Asker
 from rhot_app.ui.wizards.models.movement import Coach, MovementStep
 from rhot_app.ui.wizards.movement_page import MovementPage
 from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.state_feed import StateFeed
+
+PageT = TypeVar("PageT", bound=MovementPage)
 
 
 class Movements:
@@ -27,9 +31,14 @@ class Movements:
 
     def page(self, title: str, sentence: str, seconds: float, coach: Callable[[], Coach]) -> MovementPage:
         """A page that records `seconds` of a movement; see `MovementStep`."""
+        return self.page_of(MovementPage, title, sentence, seconds, coach)
+
+    def page_of(self, make: Callable[[MovementStep, Callable[[], Asker], StateFeed], PageT], title: str, sentence: str,
+                seconds: float, coach: Callable[[], Coach]) -> PageT:
+        """The same on a page that shows more."""
         step = MovementStep(title, sentence, seconds, self._folder, coach, self.states.recent)
         self._steps.append(step)
-        return MovementPage(step, self._connect, self.states)
+        return make(step, self._connect, self.states)
 
     def end(self) -> None:
         """End a recording that still runs, and throw the logs away. In a worker."""

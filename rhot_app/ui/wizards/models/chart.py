@@ -29,12 +29,13 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chart:
-    """Curves over one pair of axes with their units; `log_y`: a logarithmic y axis, all y above 0."""
+    """Curves over one pair of axes with their units; `log_x`, `log_y`: a logarithmic axis, all values above 0."""
 
     title: str
     x_label: str
     y_label: str
     curves: tuple[Curve, ...]
+    log_x: bool = False
     log_y: bool = False
 
 

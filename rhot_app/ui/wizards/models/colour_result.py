@@ -22,7 +22,7 @@ from rhot_node.markers import ChromaModel
 
 REASON = "colour calibration"
 
-_HEADROOM = 1.7  # of the chart above the highest column, for the legend
+_HEADROOM = 1.05  # of the chart above the highest column
 
 
 class ApartStep(ChartedStep):

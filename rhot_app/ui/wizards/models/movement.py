@@ -47,12 +47,13 @@ class MovementStep(Step):
     def __init__(self, title: str, sentence: str, seconds: float, folder: Path, coach: Callable[[], Coach],
                  recent: Callable[[], Sequence[HandState]]) -> None:
         """`sentence` says what to do before it begins; it ends by itself after `seconds`. `recent` gives the states of
-        the last seconds; logs are written into `folder`."""
+        the last seconds; logs are written into `folder`. `unneeded` may be set to say why nothing need be recorded."""
         self.title = title
         self.seconds = seconds
         self.phase: Phase = "waiting"
         self.problem = ""
         self.log: Path | None = None
+        self.unneeded: Callable[[], str] = lambda: ""
         self._sentence = sentence
         self._folder = folder
         self._make_coach = coach
@@ -103,6 +104,8 @@ class MovementStep(Step):
 
     def view(self) -> StepView:
         """Time and guidance while it is recorded."""
+        if self.phase in ("waiting", "recorded") and self.unneeded():
+            return StepView(self.unneeded(), done=True)
         elapsed = time.monotonic() - self._began_s
         if self.phase == "recording":
             assert self._coach is not None
@@ -130,6 +133,7 @@ class QuietCoach:
     """Says one sentence all the time, and shows how many of the markers are seen."""
 
     def __init__(self, sentence: str) -> None:
+        self.unneeded: Callable[[], str] = lambda: ""
         self._sentence = sentence
         self._seen = 0.0
 

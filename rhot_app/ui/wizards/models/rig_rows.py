@@ -77,5 +77,5 @@ def _filters(filters: FilterSettings) -> Iterator[tuple[str, str]]:
 
 def one_euro_text(settings: OneEuroSettings) -> str:
     """A filter's parameters."""
-    return (f"{settings.min_cutoff_hz:.2f} Hz, beta {settings.beta:.3g}, "
+    return (f"{settings.min_cutoff_hz:.2f} Hz, beta {settings.beta:.4g}, "
             f"derivative {settings.derivative_cutoff_hz:.1f} Hz")

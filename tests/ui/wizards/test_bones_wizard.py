@@ -1,0 +1,167 @@
+"""The bones wizard: a minute of movement, or a ruler; what is known of each bone; a rig with that hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bones_twin import SIX, TWO_PER_FINGER, Sloppiness, person, record
+from fake_engine import FakeEngine
+from log_writing import write_log
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from synthetic_rig import WIDE, Sight, make_rig, observe
+from wizard_hand import HeldMarker, RecordingAsker
+from wizard_hands import Hands
+from wizard_rig import FakeMemory
+
+from rhot_app.calibration.bones import solve_bones
+from rhot_app.project import load_rig, save_rig
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.bones import make_plan
+from rhot_app.ui.wizards.models.bones_steps import SweepCoach, make_coach
+from rhot_app.ui.wizards.models.movement import QuietCoach
+from rhot_app.ui.wizards.plan import Kit
+from rhot_app.ui.wizards.window import WizardWindow
+
+SECONDS = 12.0
+SIZE = 1.06
+
+
+def write_movement(rig, path):
+    """What the engine would have recorded of a larger hand with six painted markers."""
+    tracks = record(person(3, SIZE), SIX, 3, seconds=SECONDS, sloppiness=Sloppiness(0.0, 0.0, 0.0))
+
+    def trajectory(times):
+        columns = tracks.positions.reshape(len(tracks.times_s), -1).T
+        return np.stack([np.interp(times, tracks.times_s, column) for column in columns], axis=1).reshape(-1, 6, 3)
+
+    write_log(Path(path), rig, observe(rig, WIDE, trajectory, SECONDS - 0.5, Sight(noise_px=0.05)))
+
+
+def twin_report(rig):
+    """What a minute of that hand with a triad and ten finger markers shows."""
+    return solve_bones(record(person(3, SIZE), TWO_PER_FINGER, 3, seconds=20.0, rate_hz=20.0), rig.hand)
+
+
+class FreeHand:
+    """A listener that hears six markers of a hand that moves freely, three times as fast as anybody would."""
+
+    def __init__(self):
+        self.engine = FakeEngine(make_rig())
+        self.tracks = record(person(3), SIX, 3, seconds=40.0, sloppiness=Sloppiness(0.0, 0.0, 0.0))
+
+    def connect(self):
+        return self
+
+    def close(self):
+        """Nothing to close."""
+
+    def poll(self):
+        now = self.engine.clock()
+        at = self.tracks.positions[int(180.0 * now) % len(self.tracks.positions)]
+        return [replace(self.engine.state(now), marker_raw_positions=at)]
+
+
+@pytest.fixture
+def hands(themed, tmp_path):
+    rig, path = make_rig(), tmp_path / "desk.json"
+    asker = RecordingAsker(rig, write=lambda log: write_movement(rig, log))
+    save_rig(path, rig)
+    kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), {}, HeldMarker(FakeEngine()).connect)
+    hands = Hands(WizardWindow(make_plan(kit), kit))
+    hands.path, hands.asker, hands.rig = path, asker, rig
+    yield hands
+    hands.window.end().wait(5.0)
+    hands.window.deleteLater()
+
+
+def use(hands):
+    hands.next()
+    hands.click(hands.window.frame.next_button)
+    hands.until(lambda: hands.window.step.state == "used")
+    return load_rig(hands.path).hand
+
+
+def enter(box, text):
+    box.setFocus()
+    box.selectAll()
+    QTest.keyClicks(box, text)
+    QTest.keyClick(box, Qt.Key.Key_Tab)
+
+
+def test_from_a_movement_to_a_rig_with_that_hand(hands):
+    hands.next()
+    hands.window.step.seconds = 0.5
+    hands.key(Qt.Key.Key_Space)
+    hands.until(lambda: hands.window.step.phase == "recorded", timeout_s=20.0)
+    hands.next()
+    step, page = hands.window.step, hands.window.page
+    hands.until(lambda: step.report is not None or step.view().hint, timeout_s=90.0)
+    assert step.report is not None, step.view().hint
+    assert page.table.rowCount() == 15
+    words = {page.table.item(row, 3).text() for row in range(15)}
+    assert "observed" not in words, "six markers show no single phalanx"
+    styles = {page.table.item(row, 3).background().style() for row in range(15)}
+    assert Qt.BrushStyle.BDiagPattern in styles, "what is only usual is hatched"
+    assert "index" in page.reaches.text()
+    before = load_rig(hands.path).hand
+    saved = use(hands)
+    ratio = sum(saved.fingers["index"].bones_mm) / sum(before.fingers["index"].bones_mm)
+    assert ratio == pytest.approx(step.report.hand.fingers["index"].bones_mm[0] / before.fingers["index"].bones_mm[0],
+                                  rel=0.05) and saved != before
+    hands.click(hands.window.page.restore_button)
+    hands.until(lambda: hands.window.step.state == "restored")
+    assert load_rig(hands.path).hand == before
+
+
+def test_bones_entered_by_hand_need_no_movement(hands):
+    page, step = hands.window.page, hands.window.step
+    enter(page.boxes["index.proximal"], "47.5")
+    assert step.lengths == {"index.proximal": 47.5} and hands.window.frame.verdict.verdict.acceptable
+    enter(page.boxes["index.medial"], "25")
+    page.undo_button.setFocus()
+    hands.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert step.lengths == {"index.proximal": 47.5}
+    hands.until(lambda: page.boxes["index.medial"].value() == 0.0)
+    hands.next()
+    assert "entered" in hands.sentence
+    hands.next()
+    table = hands.window.page.table
+    known = {table.item(row, 0).text(): table.item(row, 3).text() for row in range(15)}
+    assert known["index proximal"] == "entered" and known["ring medial"].startswith(("prior", "partly"))
+    saved = use(hands)
+    assert saved.fingers["index"].bones_mm[0] == 47.5
+    assert saved.fingers["ring"] == hands.rig.hand.fingers["ring"]
+
+
+def test_centimetres_are_found_out(hands):
+    enter(hands.window.page.boxes["middle.proximal"], "4.9")
+    verdict = hands.window.frame.verdict.verdict
+    assert verdict is not None and not verdict.acceptable and "centimetres" in verdict.findings[0].sentence
+
+
+def test_the_coach_counts_what_each_finger_has_done():
+    tracks = record(person(3), SIX, 3, seconds=40.0, rate_hz=30.0, sloppiness=Sloppiness(0.0, 0.0, 0.0))
+    engine, coach = FakeEngine(make_rig()), make_coach(make_rig())
+    assert isinstance(coach, SweepCoach)
+    states = [replace(engine.state(float(t_s)), marker_raw_positions=at)
+              for t_s, at in zip(tracks.times_s, tracks.positions, strict=True)]
+    coach.watch(states[:60])
+    early = sum(bar.fraction for bar in coach.bars())
+    for end in range(120, len(states), 60):
+        coach.watch(states[end - 120:end])
+    assert len(coach.bars()) == 5 and sum(bar.fraction for bar in coach.bars()) > early + 1.0
+    assert coach.sentence()
+
+
+def test_markers_that_name_no_place_get_a_quiet_coach():
+    import msgspec
+
+    rig = make_rig()
+    free = tuple(msgspec.structs.replace(marker, id=f"m{k}", role=None)
+                 for k, marker in enumerate(rig.markers.markers))
+    rig = msgspec.structs.replace(rig, markers=msgspec.structs.replace(rig.markers, markers=free))
+    assert isinstance(make_coach(rig), QuietCoach)

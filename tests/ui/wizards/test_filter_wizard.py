@@ -1,0 +1,132 @@
+"""The filter wizard: a hand held still, a hand that waves, charts, and a rig with other filters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from fake_engine import FakeEngine
+from log_writing import write_log
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from synthetic_rig import WIDE, Sight, make_rig, observe, still_trajectory
+from waving import waving
+from wizard_hand import RecordingAsker
+from wizard_hands import Hands
+from wizard_rig import FakeMemory
+
+from rhot_app.project import FilterSettings, OneEuroSettings, load_rig, save_rig
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.filters import make_plan
+from rhot_app.ui.wizards.models.filter_meters import FastCoach, LiveMeters, StillCoach
+from rhot_app.ui.wizards.plan import Kit
+from rhot_app.ui.wizards.window import WizardWindow
+
+SECONDS = 5.0
+LAZY = FilterSettings(pixel=OneEuroSettings(0.3, 0.0001, 1.0), position=OneEuroSettings(0.3, 0.001, 1.0))
+
+
+class MovingHand:
+    """A listener that hears the fake engine's hand, at the rate of its states."""
+
+    def __init__(self, engine):
+        self.engine = engine
+
+    def connect(self):
+        return self
+
+    def close(self):
+        """Nothing to close."""
+
+    def poll(self):
+        return [self.engine.state(self.engine.clock())]
+
+
+def write_movement(rig, path):
+    """What the engine would have recorded: a resting hand or a waving one, by the page's title."""
+    moving = waving(rig, SECONDS)
+    trajectory = moving if "fast" in Path(path).name else still_trajectory(moving(np.zeros(1))[0])
+    write_log(Path(path), rig, observe(rig, WIDE, trajectory, SECONDS, Sight(noise_px=0.05)))
+
+
+@pytest.fixture
+def hands(themed, tmp_path):
+    rig, path = msgspec.structs.replace(make_rig(), filters=LAZY), tmp_path / "desk.json"
+    asker = RecordingAsker(rig, write=lambda log: write_movement(rig, log))
+    save_rig(path, rig)
+    kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), {}, MovingHand(FakeEngine()).connect)
+    hands = Hands(WizardWindow(make_plan(kit), kit))
+    hands.path, hands.asker = path, asker
+    yield hands
+    hands.window.end().wait(5.0)
+    hands.window.deleteLater()
+
+
+def record(hands):
+    """Press Space, wait for the end."""
+    hands.window.step.seconds = 0.5
+    hands.key(Qt.Key.Key_Space)
+    hands.until(lambda: hands.window.step.phase == "recorded", timeout_s=20.0)
+
+
+def test_from_two_movements_to_a_rig_with_other_filters(hands):
+    hands.until(lambda: hands.window.page.table.rowCount() == 6)
+    record(hands)
+    hands.next()
+    record(hands)
+    hands.next()
+    step = hands.window.step
+    hands.until(lambda: step.report is not None or step.view().hint, timeout_s=90.0)
+    assert step.report is not None, step.view().hint
+    page = hands.window.page
+    first = step.report
+    assert [plot.getAxis("left").labelText for plot in page.charts.plots] == ["jitter, mm", "lag, ms"]
+    page.stage.setCurrentIndex(1)
+    hands.until(lambda: "px/s" in page.charts.plots[1].getAxis("bottom").labelText)
+    page.jitter.setFocus()
+    page.jitter.selectAll()
+    QTest.keyClicks(page.jitter, "2.00")
+    QTest.keyClick(page.jitter, Qt.Key.Key_Tab)
+    hands.until(lambda: step.report is not None and step.report is not first, timeout_s=90.0)
+    assert step.report.position.chosen.min_cutoff_hz > first.position.chosen.min_cutoff_hz, "more jitter is allowed"
+    page.own.setChecked(True)
+    hands.next()
+    table = hands.window.page.table
+    words = [table.item(row, 0).text() for row in range(table.rowCount())]
+    assert "filter of positions" in words and "index: jitter at rest" in words and "index: lag" in words
+    hands.click(hands.window.frame.next_button)
+    hands.until(lambda: hands.window.step.state == "used")
+    saved = load_rig(hands.path).filters
+    assert saved.position == step.report.position.chosen and set(saved.position_markers) == set(make_rig().markers.ids)
+    hands.click(hands.window.page.restore_button)
+    hands.until(lambda: hands.window.step.state == "restored")
+    assert load_rig(hands.path).filters == LAZY
+
+
+def heard(speed_m_s, noise_m=2e-4, seconds=3.0):
+    """States of a hand that moves to and fro at this speed."""
+    engine = FakeEngine()
+    random = np.random.default_rng(3)
+    states = []
+    for t_s in np.arange(0.0, seconds, 0.02):
+        state = engine.state(float(t_s))
+        at = np.tile((0.1 * np.sin(10.0 * speed_m_s * t_s), 0.0, 0.5), (len(state.marker_ids), 1))
+        raw = at + noise_m * random.standard_normal(at.shape)
+        late = np.tile((0.1 * np.sin(10.0 * speed_m_s * (t_s - 0.01)), 0.0, 0.5), (len(at), 1))
+        states.append(replace(state, marker_raw_positions=raw, marker_positions=late))
+    return states
+
+
+def test_the_coaches_tell_a_still_hand_from_a_fast_one():
+    still, fast = LiveMeters(), LiveMeters()
+    still.watch(heard(0.0))
+    fast.watch(heard(0.8))
+    assert StillCoach(still).sentence() == "Good, hold still." and "rest the hand" in StillCoach(fast).sentence()
+    assert "Faster" in FastCoach(still).sentence() and FastCoach(fast).sentence() == "Good, go on."
+    assert FastCoach(fast).bars()[0].full and FastCoach(fast).bars()[1].full
+    assert [row[3] for row in still.rows()] == ["–"] * 6, "a hand at rest shows no lag"
+    assert float(fast.rows()[0][3]) == pytest.approx(10.0, abs=1.0)
+    assert float(still.rows()[0][1]) == pytest.approx(0.2 * 3**0.5, abs=0.05)
