@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.simulator.show_arguments import add_show_arguments, show_of
 
 if TYPE_CHECKING:
+    from rhot_app.simulator.film import Progress
     from rhot_app.simulator.scene import Scene
+    from rhot_app.simulator.shot import Shot
 
 MOST_PICTURES = 999
+POINT_SIGMA_PX = 0.12
 
 
 def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,6 +75,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pictures", type=int, default=None, metavar="N",
                         help="N pictures per camera (DIR/left/000.png ...) instead of a recording: of a board, one at "
                              "each place where it is held still")
+    parser.add_argument("--points", type=float, nargs="?", const=POINT_SIGMA_PX, default=None, metavar="PX",
+                        help="no pictures: a raw log (DIR/points.log) of every marker's position in both, with a noise "
+                             f"of PX (default {POINT_SIGMA_PX:g}); nothing hides anything")
     parser.add_argument("--hide", action="append", default=[], metavar="ID",
                         help="leave a marker unpainted; repeatable")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
@@ -79,22 +85,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Render; Ctrl-C leaves nothing half-written."""
-    from rhot_app.errors import SimulatorError
     from rhot_app.progress import ProgressLine
-    from rhot_app.simulator.film import film
-    from rhot_app.simulator.pictures import take_pictures
     from rhot_app.simulator.shot import make_shot
 
-    if args.pictures is not None and not 1 <= args.pictures <= MOST_PICTURES:
-        raise SimulatorError(f"--pictures is a number from 1 to {MOST_PICTURES}, not {args.pictures}.")
+    _check(args)
     began = time.monotonic()
     shot = make_shot(scene_of(args), show_of(args), args.seconds, frozenset(args.hide))
-    line = ProgressLine(f"rendering {args.seconds:g} s of {shot.act.name}" if args.pictures is None
-                        else f"taking pictures of {shot.act.name}")
-    if args.pictures is None:
-        film(shot, args.out.absolute(), line)
-    else:
-        take_pictures(shot, args.out.absolute(), args.pictures, line)
+    line = ProgressLine(f"simulating {shot.act.name}" if args.pictures else
+                        f"simulating {args.seconds:g} s of {shot.act.name}")
+    _write(shot, args, line)
     line.finish()
     frames = {name: args.pictures or len(shot.scene.frame_times_ns(k, args.seconds))
               for k, name in enumerate(shot.scene.names)}
@@ -104,6 +103,34 @@ def run(args: argparse.Namespace) -> int:
                           "distance_m": shot.scene.settings.distance_m, "frames": frames,
                           "elapsed_s": round(time.monotonic() - began, 3)}))
     else:
-        what = "frames" if args.pictures is None else "pictures"
+        what = "pictures" if args.pictures else "frames"
         print(f"{args.out}: " + ", ".join(f"{count} {what} of {name}" for name, count in frames.items()))
     return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    from rhot_app.errors import SimulatorError
+
+    if args.pictures is not None and args.points is not None:
+        raise SimulatorError("--pictures and --points exclude each other: points are seen without pictures.")
+    if args.pictures is not None and not 1 <= args.pictures <= MOST_PICTURES:
+        raise SimulatorError(f"--pictures is a number from 1 to {MOST_PICTURES}, not {args.pictures}.")
+    if args.points is not None and not args.points >= 0.0:
+        raise SimulatorError(f"--points is a noise of 0 px or more, not {args.points:g}.")
+
+
+def _write(shot: Shot, args: argparse.Namespace, progress: Progress) -> None:
+    """Pictures, points or recordings, whatever was asked for."""
+    folder = args.out.absolute()
+    if args.pictures is not None:
+        from rhot_app.simulator.pictures import take_pictures
+
+        take_pictures(shot, folder, args.pictures, progress)
+    elif args.points is not None:
+        from rhot_app.simulator.points import PointNoise, write_points
+
+        write_points(shot, folder, PointNoise(args.points), progress)
+    else:
+        from rhot_app.simulator.film import film
+
+        film(shot, folder, progress)

@@ -1,0 +1,63 @@
+"""The ideal detector's log goes through the real door and says what the truth says, within its noise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot_app.errors import SimulatorError
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.recording.observation_table import read_observations
+from rhot_app.simulator.points import LOG_NAME, T0_MASTER_NS, PointNoise, write_points
+from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
+from rhot_app.simulator.shot import make_shot
+from rhot_app.simulator.shows import BoardShow, MarkerShow
+from rhot_app.simulator.truth import load_thing_truth, load_truth
+
+
+def scene(markers: str = "rich") -> Scene:
+    return make_scene(msgspec.structs.replace(twin_defaults(), markers=markers), 4)
+
+
+def test_every_marker_is_seen_where_it_was_at_its_own_rows_time(tmp_path: Path) -> None:
+    noise = PointNoise(sigma_px=0.1, loss=0.05)
+    write_points(make_shot(scene(), "grasp", 2.0), tmp_path / "take", noise)
+    rig, table = read_observations(tmp_path / "take" / LOG_NAME)
+    truth = load_truth(tmp_path / "take" / "truth.npz")
+    assert len(rig.markers.ids) == 19
+    for node, seen, frames in zip(rig.nodes, table.cameras, truth.cameras, strict=True):
+        model = CameraModel.from_rig(node.intrinsics, node.pose)
+        assert len(seen.times_ns) == 80
+        errors = []
+        for k in range(19):
+            times_s = 1e-9 * (seen.times_ns[:, k] - T0_MASTER_NS)
+            found = np.isfinite(seen.pixels[:, k, 0])
+            places = truth.markers_at(times_s[found])[:, k]
+            errors.append(seen.pixels[found, k] - model.project(places))
+            assert (frames.visible[found, k] == 1.0).all()
+        every = np.concatenate(errors)
+        assert every.std() == pytest.approx(0.1, rel=0.08)
+        assert np.abs(every.mean(axis=0)).max() < 0.02
+        lost = 1.0 - len(every) / (80 * 19)
+        assert 0.02 < lost < 0.15
+
+
+def test_a_single_marker_has_a_log_too(tmp_path: Path) -> None:
+    write_points(make_shot(scene("rhot6"), MarkerShow(marker="ring", distance_m=0.3), 1.0), tmp_path / "take",
+                 PointNoise(0.0, 0.0))
+    _, table = read_observations(tmp_path / "take" / LOG_NAME)
+    for seen in table.cameras:
+        assert np.isfinite(seen.pixels[:, 3]).all() and np.isnan(np.delete(seen.pixels, 3, axis=1)).all()
+    disparity = table.cameras[0].pixels[:, 3, 0].mean() - table.cameras[1].pixels[:, 3, 0].mean()
+    truth = load_thing_truth(tmp_path / "take" / "truth.npz")
+    focal = scene().intrinsics.fx
+    assert focal * 0.075 / disparity == pytest.approx(truth.markers[:, 3, 2].mean(), rel=0.01)
+
+
+def test_a_board_wears_no_markers(tmp_path: Path) -> None:
+    with pytest.raises(SimulatorError, match="wears no markers"):
+        write_points(make_shot(scene("rhot6"), BoardShow(), 1.0), tmp_path / "take", PointNoise())
+    assert list(tmp_path.iterdir()) == []
