@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import cv2
@@ -50,20 +51,42 @@ def corners_px(board: Board, camera_from_board: Array, lens: Array | tuple[float
 def take(board: Board, camera_from_board: Array, photo: Photo = Photo(), seed: int = 0) -> NDArray[np.uint8]:
     """(H, W) uint8, the board on a white sheet in a grey room."""
     n = photo.oversampling
-    lens = np.array(photo.lens)
-    matrix = np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
-    v, u = np.mgrid[:photo.height * n, :photo.width * n]
-    rays = cv2.undistortPointsIter(np.stack([(u + 0.5) / n - 0.5, (v + 0.5) / n - 0.5], -1).reshape(-1, 1, 2), matrix,
-                                   lens[4:], None, None, (cv2.TERM_CRITERIA_COUNT, 12, 0)).reshape(-1, 2)
+    rays = _rays(photo)
+    image = np.full((photo.height, photo.width), ROOM)
+    v0, v1, u0, u1 = _sheet_px(board, camera_from_board, photo)
+    part = rays[v0 * n:v1 * n, u0 * n:u1 * n]
     plane = np.linalg.inv(camera_from_board[:, [0, 1, 3]][:3])  # rays to (x, y, 1) on the board
-    spot = np.column_stack([rays, np.ones(len(rays))]) @ plane.T
-    ahead = spot[:, 2] > 0
-    x, y = spot[:, 0] / spot[:, 2], spot[:, 1] / spot[:, 2]
-    image = np.where(ahead, paint(board, x, y), ROOM).reshape(photo.height, n, photo.width, n).mean(axis=(1, 3))
+    x, y, w = (part[..., 0] * row[0] + part[..., 1] * row[1] + row[2] for row in plane)
+    level = np.where(w > 0, paint(board, x / w, y / w), ROOM)
+    image[v0:v1, u0:u1] = level.reshape(v1 - v0, n, u1 - u0, n).mean(axis=(1, 3))
     if photo.blur_px:
         image = cv2.GaussianBlur(image, (0, 0), photo.blur_px)
     image = image + np.random.default_rng(seed).normal(0, photo.noise, image.shape)
     return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+@functools.lru_cache(maxsize=2)
+def _rays(photo: Photo) -> Array:
+    """(H n, W n, 2) normalised coordinates of all sub-pixels; slow, and the same for every picture of a camera."""
+    n, lens = photo.oversampling, np.array(photo.lens)
+    matrix = np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
+    v, u = np.mgrid[:photo.height * n, :photo.width * n]
+    places = np.stack([(u + 0.5) / n - 0.5, (v + 0.5) / n - 0.5], -1).reshape(-1, 1, 2)
+    rays = cv2.undistortPointsIter(places, matrix, lens[4:], None, None, (cv2.TERM_CRITERIA_COUNT, 12, 0))
+    return rays.reshape(*u.shape, 2)
+
+
+def _sheet_px(board: Board, camera_from_board: Array, photo: Photo) -> tuple[int, int, int, int]:
+    """First and last row, first and last column of the part of the picture that the sheet may be in."""
+    margin = 2.5 * board.square_m
+    outline = board.outline() + margin * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    lens = np.array(photo.lens)
+    local = outline @ camera_from_board[:3, :3].T + camera_from_board[:3, 3]
+    if not (local[:, 2] > 0).all():
+        return 0, photo.height, 0, photo.width
+    places = lens[:2] * local[:, :2] / local[:, 2:] + lens[2:4]  # undistorted: barrel distortion only draws them in
+    low, high = np.floor(places.min(axis=0)).astype(int), np.ceil(places.max(axis=0)).astype(int)
+    return (max(low[1], 0), min(high[1], photo.height), max(low[0], 0), min(high[0], photo.width))
 
 
 def paint(board: Board, x: Array, y: Array) -> Array:
@@ -73,17 +96,20 @@ def paint(board: Board, x: Array, y: Array) -> Array:
     wide, high = board.cols + 1, board.rows + 1
     printed = (col >= 0) & (row >= 0) & (col < wide) & (row < high)
     sheet = (x > -2.2 * side) & (y > -2.2 * side) & (x < (wide + 0.2) * side) & (y < (high + 0.2) * side)
-    if isinstance(board, Chessboard):
-        black = (col + row) % 2 == 0
-    else:
-        black = ink_of_charuco(board, x + side, y + side)
+    chess = isinstance(board, Chessboard)
+    black = (col + row) % 2 == 0 if chess else ink_of_charuco(board, x + side, y + side)
     return np.where(printed & black, INK, np.where(sheet, PAPER, ROOM))
 
 
 def ink_of_charuco(board: CharucoBoard, x: Array, y: Array) -> NDArray[np.bool_]:
     """Where OpenCV's own drawing of the board is black, at (x, y) m from its upper left corner."""
-    per_square = 240
-    drawn = board.opencv().generateImage((board.squares_x * per_square, board.squares_y * per_square))
+    per_square = 120
+    drawn = _charuco_drawing(board, per_square)
     row = np.clip((y / board.square_m * per_square).astype(int), 0, drawn.shape[0] - 1)
     col = np.clip((x / board.square_m * per_square).astype(int), 0, drawn.shape[1] - 1)
     return drawn[row, col] < 128
+
+
+@functools.lru_cache(maxsize=8)
+def _charuco_drawing(board: CharucoBoard, per_square: int) -> NDArray[np.uint8]:
+    return board.opencv().generateImage((board.squares_x * per_square, board.squares_y * per_square))
