@@ -13,7 +13,7 @@ Gray = NDArray[np.uint8]
 
 _EVEN_LIGHT = cv2.CALIB_CB_FAST_CHECK
 _UNEVEN_LIGHT = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-_QUICK = ((1.0, _EVEN_LIGHT), (0.5, _UNEVEN_LIGHT | cv2.CALIB_CB_FAST_CHECK))  # scale, flags; cheapest first
+_QUICK = ((1.0, _EVEN_LIGHT), (0.4, cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_FAST_CHECK))  # scale, flags
 _THOROUGH = ((1.0, _UNEVEN_LIGHT), (0.5, _UNEVEN_LIGHT))
 _LARGE_PX, _SMALL_PX = 1500, 1000  # longest sides: also searched at a quarter, at twice the size
 _SECTORS = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY

@@ -18,7 +18,9 @@ Array = NDArray[np.float64]
 Gray = NDArray[np.uint8]
 
 UNKNOWNS = 8  # x, y, the directions of both edges, their blurs, contrast, level
+FIELDS = 6  # of what is said about a corner
 SHARPEST_PX, BLURRIEST_PX = 0.3, 8.0
+_FAINTEST = 1.0  # grey levels
 _STEPS = 20
 _STILL_PX = 1e-3
 
@@ -79,8 +81,8 @@ def _start(gray: Gray, about: Array, radius: float, p: Array) -> None:
 
 
 @njit(cache=True)
-def _fit(gray: Gray, about: Array, radius: float, along: float, down: float) -> Array:
-    """The parameters (8,) of the crossing near `about`; NaN where the pixels do not determine it."""
+def _fit(gray: Gray, about: Array, radius: float, along: float, down: float) -> tuple[Array, float]:
+    """The parameters (8,) of the crossing near `about`, and the rms misfit; NaN where the pixels do not show one."""
     p = np.array([about[0], about[1], along, down, 1.0, 1.0, 0.0, 0.0])
     _start(gray, about, radius, p)
     normal, trial_normal = np.empty((UNKNOWNS, UNKNOWNS)), np.empty((UNKNOWNS, UNKNOWNS))
@@ -106,21 +108,24 @@ def _fit(gray: Gray, about: Array, radius: float, along: float, down: float) -> 
             break
     near = math.hypot(p[0] - about[0], p[1] - about[1]) < 0.6 * radius
     crossing = abs(math.sin(p[2] - p[3])) > 0.1  # edges that fell together cross nowhere
-    if not (near and crossing):
+    if not (near and crossing and abs(p[6]) > _FAINTEST):
         p[:] = math.nan
-    return p
+    return p, math.sqrt(cost / (math.pi * radius * radius))
 
 
 @njit(cache=True)
 def fit_saddles(gray: Gray, corners: Array, directions: Array, radii: Array) -> Array:
-    """Corners (N, 2) px near `corners` (N, 2), and the blur (SD, px) of either edge: (N, 4); NaN where nothing fits.
+    """Corners near `corners` (N, 2) px: (N, 6) x, y px, blur of either edge (SD, px), contrast, misfit; NaN for none.
 
-    `gray` (H, W); `directions` (N, 2) rad, of the edges along the board's x and y; `radii` (N,) px of the discs: what
-    lies within must be the two edges alone.
+    The contrast, in grey levels, is positive where the quadrant between the first edge and the second is the lighter
+    one; on a chessboard it changes sign from corner to corner. The misfit is the rms difference between picture and
+    model, in parts of the contrast. `gray` (H, W); `directions` (N, 2) rad, of the edges along the board's x and y;
+    `radii` (N,) px of the discs: what lies within must be the two edges alone.
     """
-    found = np.full((len(corners), 4), math.nan)
+    found = np.full((len(corners), FIELDS), math.nan)
     for i in range(len(corners)):
         if corners[i, 0] >= 0 and corners[i, 1] >= 0 and radii[i] > 0:  # False for NaN
-            p = _fit(gray, corners[i], radii[i], directions[i, 0], directions[i, 1])
-            found[i, 0], found[i, 1], found[i, 2], found[i, 3] = p[0], p[1], p[4], p[5]
+            p, misfit = _fit(gray, corners[i], radii[i], directions[i, 0], directions[i, 1])
+            found[i, 0], found[i, 1], found[i, 2], found[i, 3], found[i, 4] = p[0], p[1], p[4], p[5], p[6]
+            found[i, 5] = misfit / abs(p[6])
     return found

@@ -12,7 +12,7 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.saddle import fit_saddles
+from rhot_app.calibration.saddle import FIELDS, fit_saddles
 
 Array = NDArray[np.float64]
 
@@ -20,29 +20,64 @@ REACH = 0.45  # of the free space: the disc's radius
 WIDEST_PX, NARROWEST_PX = 12.0, 2.5  # radii of the disc: more only costs time; less does not determine a crossing
 _ASTRAY = 0.12  # of the free space: a corner farther than this from where its neighbours expect it is tried again
 _ASTRAY_PX = 0.5
+_BESIDE = 0.05  # of the free space: how well neighbours foretell a corner that was not found
+_WORSE = 2.5  # times the misfit of the others
+_FAINTER = 0.6  # of the others' contrast, or the reverse: what has less is not the board
 
 
 def refine(gray: NDArray[np.uint8], grid: Array, *, free: float = 1.0) -> tuple[Array, float]:
     """`grid` (rows, cols, 2) px, NaN where a corner is absent, moved to where the picture has the corners.
 
     `free` says which part of the way to the next grid line is empty around a corner: less than 1 where squares hold
-    markers. Returns the grid and the blur of the edges (median SD in px, of the blurrier direction). A corner whose
-    edges cannot be fitted becomes NaN.
+    markers. Absent corners that the picture shows beside others are added. Returns the grid and the blur of the edges
+    (median SD in px, of the blurrier direction). A corner whose edges cannot be fitted becomes NaN.
     """
+    fitted = _fit(gray, grid, grid, free)
+    expected = _expected(fitted[..., :2])
+    astray = _apart(fitted, expected) > np.maximum(_ASTRAY * clearance_px(grid), _ASTRAY_PX)
+    again = np.logical_and(astray | np.isnan(fitted[..., 0]), np.isfinite(grid[..., 0])).reshape(*astray.shape, 1)
+    fitted = np.where(again, _fit(gray, np.where(again, expected, np.nan), grid, free), fitted)
+    for _ in range(max(grid.shape) if np.isnan(grid).any() else 0):
+        more = _beside(gray, fitted, free)
+        if not np.isfinite(more[..., 0]).any():
+            break
+        fitted = np.where(np.isfinite(more), more, fitted)
+    blurs = fitted[..., 2:4].max(axis=-1)
+    return fitted[..., :2], float(np.nanmedian(blurs)) if np.isfinite(blurs).any() else float("nan")
+
+
+def _fit(gray: NDArray[np.uint8], starts: Array, grid: Array, free: float) -> Array:
+    """(rows, cols, 6) of `fit_saddles` from `starts` (rows, cols, 2) px, NaN for none, with the lines of `grid`."""
     space = clearance_px(grid)
     radii = np.where(np.isfinite(space), np.clip(REACH * free * space, NARROWEST_PX, WIDEST_PX), 0.0)
-    directions = _directions(grid)
-    fitted = fit_saddles(gray, grid.reshape(-1, 2), directions.reshape(-1, 2), radii.reshape(-1))
-    places = fitted[:, :2].reshape(grid.shape)
-    expected = _expected(places)
-    again = np.linalg.norm(places - expected, axis=-1) <= np.maximum(_ASTRAY * space, _ASTRAY_PX)
-    again = ~again & np.isfinite(expected).all(axis=-1) & (radii > 0.0)  # the comparison is False for NaN
-    if again.any():
-        retried = fit_saddles(gray, expected[again], directions[again], radii[again])
-        fitted[again.reshape(-1)] = retried
-        places[again] = retried[:, :2]
-    blurs = fitted[np.isfinite(fitted).all(axis=1), 2:].max(axis=1)
-    return places, float(np.median(blurs)) if len(blurs) else float("nan")
+    fitted = fit_saddles(gray, np.ascontiguousarray(starts).reshape(-1, 2), _directions(grid).reshape(-1, 2),
+                         radii.reshape(-1))
+    return fitted.reshape(*grid.shape[:2], FIELDS)
+
+
+def _beside(gray: NDArray[np.uint8], fitted: Array, free: float) -> Array:
+    """(rows, cols, 6), NaN for most: absent corners that the picture shows where their neighbours expect them.
+
+    They count when they fit like the others, at the place and with the contrast that the board has there: a finger or
+    the rim of a sheet does not.
+    """
+    known = np.isfinite(fitted[..., :1])
+    expected = np.where(known, np.nan, _expected(fitted[..., :2]))
+    inside = np.all((expected > 0.0) & (expected < np.array(gray.shape[::-1]) - 1.0), axis=-1, keepdims=True)
+    expected = np.where(inside, expected, np.nan)
+    filled = np.where(known, fitted[..., :2], expected)
+    found = _fit(gray, expected, filled, free)
+    row, col = np.indices(known.shape[:2])
+    sign = (-1.0) ** (row + col)
+    contrast = found[..., 4] * sign / np.nanmedian(fitted[..., 4] * sign)
+    good = (contrast > _FAINTER) & (contrast < 1.0 / _FAINTER) & (found[..., 5] < _WORSE * np.nanmedian(fitted[..., 5]))
+    good &= _apart(found, expected) < np.maximum(_BESIDE * clearance_px(filled), _ASTRAY_PX)
+    return np.where(good[..., None], found, np.nan)
+
+
+def _apart(fitted: Array, places: Array) -> Array:
+    """(rows, cols) px."""
+    return np.asarray(np.linalg.norm(fitted[..., :2] - places, axis=-1))
 
 
 def _expected(grid: Array) -> Array:

@@ -1,0 +1,136 @@
+"""Corners found in rendered pictures, held against where they truly are; and how long a live picture takes."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from board_rendering import LENS, Photo, corners_px, pose, take
+from stereo_pictures import NUMBERS, needs_pictures, picture
+
+from rhot_app.calibration.board import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.corners import detect
+from rhot_app.calibration.missing import why_missing
+
+BOARD = Chessboard(9, 6, 0.03)
+TURN = (0.3, -0.35, 0.15)
+
+
+def photo(board: Board, square_px: float, blur_px: float = 0.7, turn: tuple[float, float, float] = TURN,
+          seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """A picture of the board with squares of about `square_px`, and (N, 2) px where its corners are."""
+    depth = LENS[0] * board.square_m / square_px
+    camera_from_board = pose(turn, (0.02 * depth, -0.03 * depth, depth), board)
+    return take(board, camera_from_board, Photo(blur_px=blur_px, noise=3.0, oversampling=3), seed), corners_px(
+        board, camera_from_board, LENS)
+
+
+def off(view, truth: np.ndarray) -> np.ndarray:
+    """(N,) px."""
+    return np.linalg.norm(view.pixels - truth[view.ids], axis=1)
+
+
+@pytest.mark.parametrize(("square_px", "blur_px", "limit_px"), [(30, 0.7, 0.03), (14, 1.0, 0.04), (7, 0.6, 0.06)])
+def test_corners_are_found_to_a_few_hundredths_of_a_pixel(square_px: float, blur_px: float, limit_px: float) -> None:
+    image, truth = photo(BOARD, square_px, blur_px)
+    view = detect(image, BOARD)
+    assert view is not None and len(view.ids) == 54
+    assert np.sqrt(np.mean(off(view, truth) ** 2)) < limit_px
+    assert off(view, truth).max() < 4 * limit_px
+    assert view.blur_px == pytest.approx(blur_px, abs=0.15)
+    assert view.square_px == pytest.approx(square_px, rel=0.35)
+
+
+def test_the_usual_window_is_a_trap_on_small_squares() -> None:
+    image, truth = photo(BOARD, 12, 0.7)
+    view = detect(image, BOARD)
+    assert view is not None
+    usual = view.pixels.astype(np.float32).reshape(-1, 1, 2).copy()
+    cv2.cornerSubPix(image, usual, (11, 11), (-1, -1), (3, 60, 1e-3))
+    usual = usual[:, 0]
+    assert np.sqrt(np.mean(np.sum((usual - truth) ** 2, axis=1))) > 10 * np.sqrt(np.mean(off(view, truth) ** 2))
+
+
+def test_counting_begins_at_the_black_end_however_the_board_is_held() -> None:
+    for roll in (0.0, 1.4, 3.0, -1.7):
+        image, truth = photo(BOARD, 26, turn=(0.2, 0.1, roll))
+        view = detect(image, BOARD)
+        assert view is not None
+        assert off(view, truth).max() < 0.3, f"counted from another end at {roll} rad"
+
+
+def test_a_board_that_is_its_own_half_turn_is_counted_from_the_upper_left() -> None:
+    board = Chessboard(8, 6, 0.03)
+    image, truth = photo(board, 26, turn=(0.1, 0.2, 3.1))
+    view = detect(image, board)
+    assert view is not None
+    assert off(view, truth[::-1]).max() < 0.3
+    assert off(view.turned(board), truth).max() < 0.3
+
+
+@pytest.mark.parametrize("board", [CharucoBoard(10, 7, 0.03, 0.022), CharucoBoard(8, 6, 0.03, 0.022, "DICT_5X5_100"),
+                                   CharucoBoard(8, 6, 0.03, 0.022, "DICT_5X5_100", legacy=True)],
+                         ids=lambda board: board.text)
+def test_charuco_corners_of_both_layouts(board: CharucoBoard) -> None:
+    image, truth = photo(board, 34)
+    view = detect(image, board)
+    assert view is not None and len(view.ids) >= 0.9 * board.count
+    assert np.sqrt(np.mean(off(view, truth) ** 2)) < 0.06
+
+
+def test_part_of_a_charuco_board_is_enough() -> None:
+    board = CharucoBoard(10, 7, 0.03, 0.022)
+    image, truth = photo(board, 34)
+    image[:, 330:] = 128
+    view = detect(image, board)
+    assert view is not None and 10 < len(view.ids) < board.count
+    assert off(view, truth).max() < 0.3
+    assert np.isnan(view.grid(board)).any()
+
+
+def test_why_a_charuco_board_was_not_found() -> None:
+    board = CharucoBoard(8, 6, 0.03, 0.022, "DICT_5X5_100")
+    image, _ = photo(board, 34)
+    old = replace(board, legacy=True)
+    assert detect(image, old) is None
+    assert "layout is today's" in why_missing(image, old)
+    flipped = np.ascontiguousarray(image[:, ::-1])
+    assert detect(flipped, board) is None
+    assert "mirrored" in why_missing(flipped, board)
+    assert "squares counted" in why_missing(image, replace(board, squares_x=12, squares_y=11))
+    assert "wrong dictionary" in why_missing(image, replace(board, dictionary="DICT_6X6_100"))
+
+
+@needs_pictures
+def test_why_a_chessboard_was_not_found() -> None:
+    gray = picture("left", 1)
+    assert "seems to have 9x6" in why_missing(gray, Chessboard(12, 9, 0.03))
+    assert "all of them must be visible" in why_missing(gray[:, :330], BOARD)
+    assert "one brightness" in why_missing(np.full_like(gray, 3), BOARD)
+
+
+@needs_pictures
+def test_live_pictures_take_less_than_two_frames() -> None:
+    """On one core; the best of three counts, because the machine has other things to do."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        boards = [picture("left", number) for number in NUMBERS[:5]]
+        desks = [np.ascontiguousarray(np.vstack([gray[240:], gray[:240]])[:, ::-1]) for gray in boards]
+        detect(boards[0], BOARD, thorough=False)
+        seconds = {"board": [], "none": []}
+        for kind, images in (("board", boards), ("none", desks)):
+            for image in images:
+                times = []
+                for _ in range(3):
+                    begun = time.process_time()
+                    view = detect(image, BOARD, thorough=False)
+                    times.append(time.process_time() - begun)
+                assert (view is not None) == (kind == "board")
+                seconds[kind].append(min(times))
+    finally:
+        cv2.setNumThreads(threads)
+    assert np.median(seconds["board"]) < 0.05 and np.median(seconds["none"]) < 0.05, seconds
