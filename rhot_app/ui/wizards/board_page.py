@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QFormLayout, QLabel, QSpinBox
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QFormLayout, QLabel, QSpinBox, QWidget
 
 from rhot_app.ui.wizards.memory import Memory
 from rhot_app.ui.wizards.models.board_form import DICTIONARIES, BoardFields, BoardStep, usual_marker_mm
@@ -56,6 +56,10 @@ class BoardPage(Page):
             box.valueChanged.connect(self._take)
         self.marker.valueChanged.connect(self._take)
         self.square.valueChanged.connect(self._square_changed)
+
+    def add_field(self, label: str, field: QWidget) -> None:
+        """One more field, above the others."""
+        self._form.insertRow(0, label, field)
 
     def entered(self) -> None:
         """Show what stands in the step; another page may have changed it."""

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Wizard:
-    """One wizard. `module` in this package has ``make_plan(kit)``; `reason` is what it writes into a rig's history, so
-    that the menu can tell when it was used last."""
+    """One wizard. `module` in this package has ``make_plan(kit)``; `reason` begins what it writes into a rig's history,
+    so that the menu can tell when it was used last."""
 
     module: str
     title: str
@@ -33,11 +33,17 @@ class Wizard:
 WIZARDS: tuple[Wizard, ...] = (
     Wizard("camera", "Set the cameras", "Exposure, gains, white balance: what each camera is told, tried out live.",
            "camera settings"),
-    Wizard("colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
-           "colour calibration"),
+    Wizard("lens", "Find the lens of a camera", "Focal length, centre and distortion of one camera, from a board that "
+           "is held all over its picture.", "intrinsics of"),
     Wizard("stereo", "Put the cameras together", "Where the cameras stand to each other and to the table, from a board "
            "that they see at the same time.", "stereo calibration"),
+    Wizard("colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
+           "colour calibration"),
     Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),
     Wizard("depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
            "depth calibration"),
+    Wizard("bones", "Bones of the hand", "How long the bones are, from a minute of movement or by a ruler.",
+           "bones calibration"),
+    Wizard("filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
+           "filter tuning"),
 )

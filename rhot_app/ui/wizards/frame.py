@@ -102,7 +102,6 @@ class WizardFrame:
         """Another step: its controls, and its own middle or the pictures."""
         self.pages.setCurrentWidget(page)
         self.middle.setCurrentWidget(page.centre if page.centre is not None else self.wall)
-        self.wall.show_cameras(page.step.cameras)
         self.wall.set_pickable(page.pickable)
         self.back_button.setEnabled(number > 0)
         (page.first_field or self.middle).setFocus()  # so that Space captures and no button has it
@@ -110,6 +109,7 @@ class WizardFrame:
     def show_view(self, view: StepView, step: Step, current: int, done: list[bool]) -> None:
         """What the step says now."""
         self.steps.show_steps(current, done)
+        self.wall.show_cameras(step.cameras)
         self.wall.show_view(view)
         self.sentence.setText(view.sentence)
         working = self.work_view.wanted(step)

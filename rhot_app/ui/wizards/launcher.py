@@ -63,7 +63,7 @@ class Launcher(QObject):
         when = {**self._noted(path), **(in_force(Path(path)) if path else {})}
         scheme, ratio = self._scheme(), self._window.devicePixelRatioF()
         for action, wizard in zip(actions, WIZARDS, strict=True):
-            done = when.get(wizard.reason)
+            done = max((at for reason, at in when.items() if reason.startswith(wizard.reason)), default=None)
             shape, tone = ("tick", scheme.good) if done is not None else ("ring", scheme.neutral)
             action.setIcon(shape_icon(shape, tone, ratio))
             action.setText(f"{wizard.title} …\t{age_text(done) if done is not None else 'not yet'}")

@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygo
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.models.drawing import Array, Cells, Dots, Layer, Line, Mark, Overlay, Tag
 
-_CELL_ALPHA = 90
+_CELL_ALPHA = 60
 _SHADE_ALPHA = 60
 
 

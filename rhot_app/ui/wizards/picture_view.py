@@ -148,6 +148,7 @@ class PictureWall(QWidget):
     def __init__(self, cameras: tuple[str, ...], scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.views = {name: PictureView(name, scheme) for name in cameras}
+        self._shown = cameras
         self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(8)
@@ -157,9 +158,12 @@ class PictureWall(QWidget):
 
     def show_cameras(self, cameras: tuple[str, ...] | None) -> None:
         """Show only these; None shows all."""
-        for name, view in self.views.items():
-            view.setVisible(cameras is None or name in cameras)
-        self._arrange()
+        wanted = tuple(self.views) if cameras is None else cameras
+        if wanted != self._shown:
+            self._shown = wanted
+            for name, view in self.views.items():
+                view.setVisible(name in wanted)
+            self._arrange()
 
     def refresh(self, feed: LiveFeed, frozen: Mapping[str, Picture]) -> None:
         """Newest pictures; those in `frozen` instead of them."""

@@ -126,8 +126,8 @@ class WizardWindow(QDialog):
         self.work.leave()
         self.current = number
         page = self.plan.pages[number]
-        self.frame.show_page(page, number)
         page.step.enter()
+        self.frame.show_page(page, number)
         page.entered()
         self.looker.watch(page.step)
         self.feed.pause(page.centre is not None and not page.step.watches)

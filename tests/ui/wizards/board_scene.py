@@ -59,10 +59,12 @@ class BoardScene:
 
     def seen_in(self, views: dict[str, BoardView | None]) -> bool:
         """Whether every camera's view shows the board where it is now."""
-        return all(view is not None and self._near(node.node_id, view) for node in self.rig.nodes
-                   for view in [views.get(node.name)])
+        return all(self.near(node.node_id, views.get(node.name)) for node in self.rig.nodes)
 
-    def _near(self, node_id: int, view: BoardView) -> bool:
+    def near(self, node_id: int, view: BoardView | None) -> bool:
+        """Whether a camera's view shows the board where it is now."""
+        if view is None:
+            return False
         middle = np.array(self._texture.shape[::-1]) / 2.0
         spot = self.homography(node_id) @ [*middle, 1.0]
         return bool(np.linalg.norm(view.pixels.mean(axis=0) - spot[:2] / spot[2]) < _NEAR_PX)

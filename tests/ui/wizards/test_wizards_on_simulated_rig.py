@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt
 
 from rhot_app.project import CameraPose
 from rhot_app.simulator.shows import BoardShow
+from rhot_node.config import load_settings
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -29,12 +30,17 @@ def test_cameras_are_put_together(simulated_rig, open_on_rig):
     hands = open_on_rig("stereo")
     simulated_rig.stage.show(BoardShow(size="9x6", square_mm=30.0))
     hands.until(lambda: hands.sentence == "Seen by left and right: this is the board.", 60.0)
+    hands.keep("stereo-board")
     hands.next()
+    hands.until(lambda: len(hands.window.step.views.shots) >= 9, 120.0)
+    hands.keep("stereo-show")
     hands.until(lambda: hands.sentence == "Enough: press Next.", 120.0)
     hands.next()
     hands.window.page.baseline.setValue(75.0)
+    hands.keep("stereo-length")
     hands.next()
     hands.until(lambda: hands.window.frame.verdict.verdict is not None, 60.0)
+    hands.keep("stereo-result")
     assert hands.window.frame.verdict.verdict.acceptable, hands.window.frame.verdict.verdict
     hands.next()
     simulated_rig.stage.show(BoardShow(on_table=True))
@@ -44,9 +50,64 @@ def test_cameras_are_put_together(simulated_rig, open_on_rig):
         if hands.sentence == "The table is known: press Next.":
             break
     assert hands.sentence == "The table is known: press Next.", hands.window.frame.hint.text()
+    hands.keep("stereo-table")
     hands.next()
+    hands.keep("stereo-accept", 8)
     hands.next()
     hands.until(lambda: hands.window.frame.next_button.text() == "Close", 40.0)
     saved = simulated_rig.saved
     assert saved.up == "z" and saved.nodes[0].pose.translation_m[2] > 0.1
     assert baseline_of(saved) == pytest.approx(baseline_of(truth), abs=0.0005)
+
+
+def saved_exposures(simulated_rig):
+    return [load_settings(simulated_rig.session.directory / f"{name}.node.json").camera.exposure_us
+            for name in ("left", "right")]
+
+
+def obeyed_exposures(simulated_rig):
+    return [camera.exposure_us for camera in simulated_rig.stage.state().cameras.values()]
+
+
+def test_cameras_are_set_and_the_nodes_keep_it(simulated_rig, open_on_rig):
+    before = saved_exposures(simulated_rig)
+    hands = open_on_rig("camera")
+    hands.window.page.rows["exposure_us"].box.setValue(6.0)
+    hands.until(lambda: obeyed_exposures(simulated_rig) == [6000.0, 6000.0])
+    assert saved_exposures(simulated_rig) == before, "nothing is saved before it is used"
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None)
+    hands.keep("cameras-settings")
+    hands.next()
+    hands.keep("cameras-accept", 8)
+    hands.next()
+    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    assert saved_exposures(simulated_rig) == [6000.0, 6000.0]
+    hands.click(hands.window.page.restore_button)
+    hands.until(lambda: hands.sentence == "The old one is back.")
+    assert saved_exposures(simulated_rig) == before
+    hands.until(lambda: obeyed_exposures(simulated_rig) == before)
+
+
+def test_a_lens_is_found(simulated_rig, open_on_rig):
+    truth = simulated_rig.truth
+    lens = msgspec.structs.replace(truth.nodes[0].intrinsics, fx=600.0, fy=600.0)
+    left = msgspec.structs.replace(truth.nodes[0], intrinsics=lens)
+    simulated_rig.use(msgspec.structs.replace(truth, nodes=(left, truth.nodes[1])))
+    hands = open_on_rig("lens")
+    simulated_rig.stage.show(BoardShow(size="9x6", square_mm=30.0))
+    hands.until(lambda: hands.sentence == "Seen by left: this is the board.", 60.0)
+    hands.keep("lens-board")
+    hands.next()
+    hands.until(lambda: len(hands.window.step.views) >= 9, 120.0)
+    hands.keep("lens-show")
+    hands.until(lambda: len(hands.window.step.views) >= 17, 120.0)  # the twin never brings the board really near
+    hands.next()
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None, 60.0)
+    hands.keep("lens-result")
+    assert hands.window.frame.verdict.verdict.acceptable, hands.window.frame.verdict.verdict
+    hands.next()
+    hands.keep("lens-accept", 8)
+    hands.next()
+    hands.until(lambda: hands.window.frame.next_button.text() == "Close", 40.0)
+    found, true = simulated_rig.saved.nodes[0].intrinsics, truth.nodes[0].intrinsics
+    assert found.fx == pytest.approx(true.fx, rel=0.01) and found.cx == pytest.approx(true.cx, abs=4.0)

@@ -6,6 +6,7 @@ import time
 
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
+from screen_pictures import SIZE, check
 
 
 class Hands:
@@ -13,6 +14,7 @@ class Hands:
 
     def __init__(self, window):
         self.window = window
+        window.resize(SIZE)
         window.show()
         window.activateWindow()
         assert QTest.qWaitForWindowActive(window)
@@ -42,6 +44,11 @@ class Hands:
 
     def key(self, key, modifier=Qt.KeyboardModifier.NoModifier):
         QTest.keyClick(self.window, key, modifier)
+
+    def keep(self, name, least_colours=20):
+        """Take the picture of the page as it is now, for the guide."""
+        self.run(0.4)
+        check(name, self.window.grab().toImage(), least_colours)
 
     def next(self):
         """Click Next once it can be clicked."""

@@ -68,7 +68,8 @@ class AcceptStep(Step):
     def view(self) -> StepView:
         """One sentence for each state."""
         verdict = self.proposal.verdict if self.proposal is not None else None
-        return StepView(self._sentence(), done=self.state == "used", hint=self.problem, verdict=verdict)
+        afterwards = self.proposal.afterwards if self.proposal is not None and self.state == "used" else ""
+        return StepView(self._sentence(), done=self.state == "used", hint=self.problem or afterwards, verdict=verdict)
 
     def _sentence(self) -> str:
         if self.proposal is None:

@@ -83,8 +83,12 @@ class BoardStep(Step):
         self._build()
         return True
 
-    def _build(self) -> None:
+    def forget_views(self) -> None:
+        """What was seen is of another board or camera."""
         self._views = {}
+
+    def _build(self) -> None:
+        self.forget_views()
         try:
             self.board, self.problem = self._fields.board(), ""
         except CalibrationError as exc:

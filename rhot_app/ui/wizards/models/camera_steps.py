@@ -153,7 +153,7 @@ class SettingsStep(Step):
 
     def take(self, seen: dict[str, Look]) -> None:
         """The newest advice."""
-        self._looks = seen
+        self._looks = {**self._looks, **seen}
         for name, look in seen.items():
             if look.problem and name in self._grey:
                 self.mark_grey(name, None)

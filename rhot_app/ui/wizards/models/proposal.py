@@ -97,12 +97,14 @@ class NodeChange:
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """The result of a wizard. `verdict` decides whether it may be used at all."""
+    """The result of a wizard. `verdict` decides whether it may be used at all; `afterwards` says what to do next once
+    it is in use."""
 
     reason: str
     verdict: Verdict
     rows: tuple[Row, ...]
     changes: tuple[Change, ...] = field(default=())
+    afterwards: str = ""
 
     def use(self, command: Command) -> None:
         """Make all changes, or none: what was made is taken back when a later one fails. Raises RhotError."""

@@ -121,7 +121,8 @@ class ShowStep(BoardLooker):
                  in zip(self.cameras or (), guidance.covered, strict=True)]
         bars += [Bar("tilted", float(guidance.tilted), "the board was seen tilted: this tells the focal length"),
                  Bar("near and far", float(guidance.near_and_far), "the board was seen large and small")]
-        return StepView(self._sentence(guidance.advice), done=guidance.complete, hint=self._offer.why,
+        hint = self._offer.why.removesuffix(guidance.advice).strip()
+        return StepView(self._sentence(guidance.advice), done=guidance.complete, hint=hint,
                         bars=tuple(bars), overlays=self._overlays(shots), kept=len(shots),
                         passable=len(shots) >= FEWEST)
 
