@@ -11,7 +11,7 @@ from fake_engine import FakeEngine, synthetic_rig
 from rhot_app.project import CameraPose
 from rhot_app.tracking.state import Knowledge
 from rhot_app.ui.scene import stage
-from rhot_app.ui.scene.frames import DISPLAY_FROM_RIG, frustum_lines, rotation_of, to_display
+from rhot_app.ui.scene.frames import DISPLAY_FROM_RIG, camera_like_state, frustum_lines, rotation_of, to_display
 from rhot_app.ui.scene.hand_mesh import HandMesh, SkeletonMesh, palm_hull
 from rhot_app.ui.scene.marker_mesh import CloudMesh, MarkerMesh
 from rhot_app.ui.scene.meshes import capsule_template, elliptic_band, pose_capsules, sphere
@@ -117,3 +117,28 @@ def test_the_floor_has_ticks_in_millimetres():
     texts = [label.text for label in stage.tick_labels()]
     assert {"-400", "400", "1000", "x [mm]", "z [mm]", "up [mm]"} <= set(texts)
     assert "-0" not in texts
+
+
+def test_a_rig_on_a_table_stands_on_the_floor_with_z_up(engine):
+    state = replace(engine.state(2.0), joint_positions=np.tile([0.1, -0.2, 0.3], (21, 1)))
+    shown = camera_like_state(state, "z")
+    assert to_display(shown.joint_positions)[0] == pytest.approx([0.1, 0.3, 0.3 + stage.FLOOR_M])
+    palm = shown.world_from_palm
+    assert np.linalg.det(palm[:3, :3]) == pytest.approx(1.0)
+    up_in_palm = state.world_from_palm[:3, :3].T @ [0.0, 0.0, 1.0]
+    assert to_display(palm[:3, :3] @ up_in_palm) == pytest.approx([0.0, 0.0, 1.0])
+    spread = np.trace(shown.marker_covariances[0])
+    assert spread == pytest.approx(np.trace(state.marker_covariances[0]))
+    assert camera_like_state(state, "-y") is state
+
+
+def test_cameras_over_a_table_and_its_axes_are_drawn_alike(engine):
+    node = engine.rig.nodes[1]
+    over = CameraPose(rotation_wxyz=(0.0, 1.0, 0.0, 0.0), translation_m=(0.0, 0.0, 0.4))  # straight down
+    lines = frustum_lines(node.intrinsics, over, 0.1, "z")
+    assert lines[0] == pytest.approx([0.0, 0.5, 0.4 + stage.FLOOR_M])
+    assert lines[1][2] == pytest.approx(0.3 + stage.FLOOR_M)
+    axes, _ = stage.axis_lines(on_table=True)
+    assert axes[5] - axes[4] == pytest.approx([0.0, 0.0, 0.08])
+    texts = [label.text for label in stage.tick_labels(on_table=True)]
+    assert {"-500", "500", "y [mm]", "up [mm]"} <= set(texts)

@@ -12,6 +12,9 @@ Array = NDArray[np.float64]
 FLOOR_M = -0.2
 """Height of the floor grid in the scene's frame: 200 mm below the rig's origin, where a desk usually is."""
 
+TABLE_ORIGIN = (0.0, 0.5, FLOOR_M)
+"""Where the origin of a rig frame that lies on a table is drawn: on the floor, in the middle of the grid."""
+
 X_RANGE = (-0.4, 0.4)
 Y_RANGE = (0.0, 1.0)
 Z_RANGE = (FLOOR_M, 0.4)
@@ -58,26 +61,35 @@ def height_lines() -> Array:
     return np.array(segments)
 
 
-def axis_lines(length_m: float = 0.08) -> tuple[Array, Array]:
+def axis_lines(length_m: float = 0.08, *, on_table: bool = False) -> tuple[Array, Array]:
     """The rig frame's own axes at its origin: segments (6, 3) m in the scene's frame and colours (6, 4) 0..1."""
-    ends = length_m * np.array([(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
-    segments = np.array([point for end in ends for point in ((0.0, 0.0, 0.0), tuple(end))])
+    origin = np.array(TABLE_ORIGIN if on_table else (0.0, 0.0, 0.0))
+    segments = np.array([point for axis in _axes(on_table) for point in (origin, origin + length_m * axis)])
     colours = np.array([(0.90, 0.45, 0.35, 1.0), (0.35, 0.75, 0.50, 1.0), (0.40, 0.65, 0.95, 1.0)])
     return segments, np.repeat(colours, 2, axis=0)
 
 
-def axis_labels(length_m: float = 0.092) -> list[Label]:
+def axis_labels(length_m: float = 0.092, *, on_table: bool = False) -> list[Label]:
     """Names of the rig frame's axes at their ends."""
-    return [Label((length_m, 0.0, 0.0), "x"), Label((0.0, 0.0, -length_m), "y"), Label((0.0, length_m, 0.0), "z")]
+    origin = np.array(TABLE_ORIGIN if on_table else (0.0, 0.0, 0.0))
+    ends = [origin + length_m * axis for axis in _axes(on_table)]
+    return [Label((float(x), float(y), float(z)), name) for (x, y, z), name in zip(ends, "xyz", strict=True)]
 
 
-def tick_labels() -> list[Label]:
-    """Numbers along the grid's edges in the rig's axes, mm: x in front, z at the right, -y at the upright scale."""
+def _axes(on_table: bool) -> Array:
+    """Directions (3, 3) of the rig frame's x, y and z in the scene: a table's are the scene's own."""
+    return np.eye(3) if on_table else np.array([(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
+
+
+def tick_labels(*, on_table: bool = False) -> list[Label]:
+    """Numbers along the grid's edges in the rig's axes, mm: x in front; at the right z, or a table's y; height."""
+    away, zero, floor = ("y", TABLE_ORIGIN[1], FLOOR_M) if on_table else ("z", 0.0, 0.0)
     labels = [Label((float(x), Y_RANGE[0] - 0.035, FLOOR_M), f"{x * 1e3:.0f}") for x in _steps(*X_RANGE, TICK_M)]
     labels.append(Label((0.3, Y_RANGE[0] - 0.035, FLOOR_M), "x [mm]"))
-    labels += [Label((X_RANGE[1] + 0.03, float(y), FLOOR_M), f"{y * 1e3:.0f}") for y in _steps(*Y_RANGE, TICK_M)]
-    labels.append(Label((X_RANGE[1] + 0.03, 0.9, FLOOR_M), "z [mm]"))
-    labels += [Label((X_RANGE[0] - 0.05, Y_RANGE[1], float(z)), f"{abs(z) * 1e3:.0f}")
-               for z in _steps(0.0, Z_RANGE[1], TICK_M)]
+    labels += [Label((X_RANGE[1] + 0.03, float(y), FLOOR_M), f"{round((y - zero) * 1e3)}")
+               for y in _steps(*Y_RANGE, TICK_M)]
+    labels.append(Label((X_RANGE[1] + 0.03, 0.9, FLOOR_M), f"{away} [mm]"))
+    labels += [Label((X_RANGE[0] - 0.05, Y_RANGE[1], float(z)), f"{abs(z - floor) * 1e3:.0f}")
+               for z in _steps(floor, Z_RANGE[1], TICK_M)]
     labels.append(Label((X_RANGE[0] - 0.05, Y_RANGE[1], Z_RANGE[1] - 0.1), "up [mm]"))
     return labels

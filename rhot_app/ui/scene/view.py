@@ -16,7 +16,7 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.scene import stage
 from rhot_app.ui.scene.actors import Actors
-from rhot_app.ui.scene.frames import frustum_lines, to_display
+from rhot_app.ui.scene.frames import Up, camera_like_state, frustum_lines, to_display
 from rhot_app.ui.scene.labels import LabelPainter, TextStyle
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ class SceneView(GLViewWidget):
 
     def show_state(self, state: HandState | None) -> None:
         """Pose hand and markers; None hides them."""
-        self._state = state
+        self._state = None if state is None else camera_like_state(state, self._up)
         self._pose()
         self.update()
 
@@ -85,7 +85,8 @@ class SceneView(GLViewWidget):
         self._show_clouds = visible
         if self._actors is not None:
             self._actors.show_clouds = visible
-        self.show_state(self._state)
+        self._pose()
+        self.update()
 
     def offer_start(self, offered: bool) -> None:
         """A button in the middle while nothing streams: the next step where the hand will be."""
@@ -162,6 +163,10 @@ class SceneView(GLViewWidget):
         self._pose()
         self.update()
 
+    @property
+    def _up(self) -> Up:
+        return "-y" if self._rig is None else self._rig.up
+
     def _pose(self) -> None:
         if self._actors is None:
             return
@@ -180,11 +185,11 @@ class SceneView(GLViewWidget):
         segments, strong = stage.floor_lines()
         self._add_lines(segments[~strong], self._scheme.grid)
         self._add_lines(np.concatenate([segments[strong], stage.height_lines()]), self._scheme.grid_strong)
-        axes, colours = stage.axis_lines()
+        axes, colours = stage.axis_lines(on_table=self._up == "z")
         self._add_lines(axes, colours, width=2.0, depth=-5)
 
     def _add_cameras(self, rig: Rig) -> None:
-        frusta = [frustum_lines(node.intrinsics, node.pose, _FRUSTUM_M) for node in rig.nodes]
+        frusta = [frustum_lines(node.intrinsics, node.pose, _FRUSTUM_M, self._up) for node in rig.nodes]
         self._add_lines(np.concatenate(frusta), self._scheme.frustum, width=1.5, depth=-5)
         self._cameras = [(node.name, lines[-2]) for node, lines in zip(rig.nodes, frusta, strict=True)]
 
@@ -192,7 +197,9 @@ class SceneView(GLViewWidget):
         matrix = self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()
         size = (self.width(), self.height())
         muted, plain = TextStyle(self._scheme.muted), TextStyle(self._scheme.text)
-        for labels, style in ((stage.tick_labels(), muted), (stage.axis_labels(), plain)):
+        on_table = self._up == "z"
+        for labels, style in ((stage.tick_labels(on_table=on_table), muted),
+                              (stage.axis_labels(on_table=on_table), plain)):
             self._labels.paint(painter, matrix, size, np.array([label.place for label in labels]),
                                [label.text for label in labels], style)
         self._labels.paint(painter, matrix, size, np.array([place for _, place in self._cameras]),
