@@ -51,7 +51,7 @@ def corners_px(board: Board, camera_from_board: Array, lens: Array | tuple[float
 def take(board: Board, camera_from_board: Array, photo: Photo = Photo(), seed: int = 0) -> NDArray[np.uint8]:
     """(H, W) uint8, the board on a white sheet in a grey room."""
     n = photo.oversampling
-    rays = _rays(photo)
+    rays = _rays(photo.width, photo.height, photo.lens, n)
     image = np.full((photo.height, photo.width), ROOM)
     v0, v1, u0, u1 = _sheet_px(board, camera_from_board, photo)
     part = rays[v0 * n:v1 * n, u0 * n:u1 * n]
@@ -66,11 +66,11 @@ def take(board: Board, camera_from_board: Array, photo: Photo = Photo(), seed: i
 
 
 @functools.lru_cache(maxsize=2)
-def _rays(photo: Photo) -> Array:
+def _rays(width: int, height: int, parameters: tuple[float, ...], n: int) -> Array:
     """(H n, W n, 2) normalised coordinates of all sub-pixels; slow, and the same for every picture of a camera."""
-    n, lens = photo.oversampling, np.array(photo.lens)
+    lens = np.array(parameters)
     matrix = np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
-    v, u = np.mgrid[:photo.height * n, :photo.width * n]
+    v, u = np.mgrid[:height * n, :width * n]
     places = np.stack([(u + 0.5) / n - 0.5, (v + 0.5) / n - 0.5], -1).reshape(-1, 1, 2)
     rays = cv2.undistortPointsIter(places, matrix, lens[4:], None, None, (cv2.TERM_CRITERIA_COUNT, 12, 0))
     return rays.reshape(*u.shape, 2)
