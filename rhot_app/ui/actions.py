@@ -35,7 +35,7 @@ class Actions(QObject):
         self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
         self.markers = self._make("Markers …", "", "The marker set that the rig file says.")
         self.hand = self._make("Hand …", "", "The hand's bones that the rig file says.")
-        self.files = self._make("How calibration files are made", "", "Opens the guide.")
+        self.files = self._make("How to calibrate", "", "Opens the guide.")
         self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene (F).")
         self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
         self.names = self._make("Marker names", "", "Names beside the markers in the scene.", checkable=True)
