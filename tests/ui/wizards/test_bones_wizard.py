@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bones_twin import SIX, TWO_PER_FINGER, Sloppiness, person, record
+from bones_twin import SIX, Sloppiness, person, record
 from fake_engine import FakeEngine
 from log_writing import write_log
 from PySide6.QtCore import Qt
@@ -42,8 +42,8 @@ def write_movement(rig, path):
 
 
 def twin_report(rig):
-    """What a minute of that hand with a triad and ten finger markers shows."""
-    return solve_bones(record(person(3, SIZE), TWO_PER_FINGER, 3, seconds=20.0, rate_hz=20.0), rig.hand)
+    """What that hand with six painted markers shows."""
+    return solve_bones(record(person(3, SIZE), SIX, 3, seconds=40.0, rate_hz=20.0), rig.hand)
 
 
 class FreeHand:

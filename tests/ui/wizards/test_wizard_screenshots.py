@@ -6,7 +6,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 from colour_scenes import PAINTS
-from fake_engine import synthetic_rig
+from fake_engine import FakeEngine, synthetic_rig
 from paint_scene import PaintScene, compile_detector, other_colours
 from screen_pictures import SIZE, check
 from wizard_hands import Hands
@@ -72,3 +72,57 @@ def test_colours(open_wizard):
     keep(hands, "colours-apart")
     hands.next()
     keep(hands, "colours-accept", 10)
+
+
+def test_filters(open_wizard):
+    import test_filter_wizard as filter_wizard
+    from wizard_hand import RecordingAsker
+
+    from rhot_app.ui.wizards.filters import make_plan
+
+    rig = filter_wizard.make_rig()
+    asker = RecordingAsker(rig, write=lambda log: filter_wizard.write_movement(rig, log))
+    hands = open_wizard(make_plan, rig, asker, listen=filter_wizard.MovingHand(FakeEngine()).connect)
+    for name in ("still", "fast"):
+        hands.window.step.seconds = 3.0
+        hands.window.step.capture()
+        hands.until(lambda: hands.window.step.phase == "recording")
+        hands.run(2.3)
+        keep(hands, f"filters-{name}")
+        hands.until(lambda: hands.window.step.phase == "recorded", timeout_s=20.0)
+        hands.next()
+    hands.until(lambda: hands.window.step.report is not None, timeout_s=120.0)
+    keep(hands, "filters-result")
+    hands.next()
+    keep(hands, "filters-accept", 8)
+
+
+def test_bones(open_wizard):
+    import test_bones_wizard as bones_wizard
+    from wizard_hand import RecordingAsker
+
+    from rhot_app.ui.wizards.bones import make_plan
+
+    rig = bones_wizard.make_rig()
+    asker = RecordingAsker(rig, write=lambda log: None)
+    hands = open_wizard(make_plan, rig, asker, listen=bones_wizard.FreeHand().connect)
+    page = hands.window.page
+    page.boxes["index.proximal"].setValue(44.0)
+    page.boxes["index.medial"].setValue(25.5)
+    keep(hands, "bones-entry", 10)
+    for _ in range(2):
+        hands.window.step.undo()
+    hands.next()
+    movement = hands.window.step
+    movement.seconds = 8.0
+    movement.capture()
+    hands.until(lambda: movement.phase == "recording")
+    hands.run(6.5)
+    keep(hands, "bones-movement")
+    hands.until(lambda: movement.phase == "recorded")
+    movement.log = None  # the fit of the twin's own tracks is shown instead of one of a log
+    hands.next()
+    hands.window.step.take_result(bones_wizard.twin_report(rig))
+    keep(hands, "bones-hand", 12)
+    hands.next()
+    keep(hands, "bones-accept", 8)

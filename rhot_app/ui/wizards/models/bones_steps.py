@@ -213,7 +213,7 @@ def knowledge_of(bone: BoneLength) -> str:
 def word_of(bone: BoneLength) -> str:
     """The same as a person reads it."""
     return {"observed": "observed", "entered": "entered", "partly": "partly observed"}.get(
-        bone.known.value, "prior: usual for this size")
+        bone.known.value, "prior: what is usual")
 
 
 def propose(report: Any, rig: Rig, path: Path | None) -> Proposal | None:
@@ -221,7 +221,7 @@ def propose(report: Any, rig: Rig, path: Path | None) -> Proposal | None:
     if report is None:
         return None
     after = msgspec.structs.replace(rig, hand=report.hand)
-    size = Row("size beside the hand before", "100 %", f"{100 * report.size:.1f} ± {100 * report.size_std:.1f} %")
+    size = Row("size", "100 %", f"{100 * report.size:.1f} ± {100 * report.size_std:.1f} %")
     return Proposal(REASON, report.verdict, (size, *rig_rows(rig, after)), (RigChange(rig, after, path, REASON),))
 
 
