@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from rhot_app.simulator.film import TRUTH_NAME, Progress, new_folder
 from rhot_app.simulator.painter import Solids
-from rhot_app.simulator.sheet import Sheet
+from rhot_app.simulator.sheet import Sheet, ruler_ends
 from rhot_app.simulator.shot import Shot, make_renderer, save_shot
+from rhot_app.simulator.shows import RulerShow
 from rhot_app.simulator.stations import Stations
 from rhot_app.simulator.truth import FrameTruth, save_truth, true_act
 from rhot_node.detect.image import from_i420, to_bgr
@@ -37,11 +38,12 @@ _PAINT_M = 0.008
 
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One file. `t_s`: mid-exposure of row 0, scene time. `samples`: x, y, width, height px of a box on the paint of
-    each marker that is seen whole."""
+    each marker that is seen whole. `ruler`: x, y, x, y px of the ruler's crosses, where a person would mark them."""
 
     file: str
     t_s: float
     samples: dict[str, tuple[int, int, int, int]]
+    ruler: tuple[float, float, float, float] | None = None
 
 
 class PicturesFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -94,11 +96,22 @@ def _expose(shot: Shot, index: int, folder: Path, times: Array, progress: Progre
         frame, fractions = renderer.render(shot.act.source, float(t_s), number)
         file = f"{name}/{number:03d}.png"
         cv2.imwrite(str(folder / file), to_bgr(from_i420(frame, preset.width, preset.height)))
-        pictures.append(Picture(file, float(t_s), _samples(shot, index, float(t_s), fractions)))
+        pictures.append(Picture(file, float(t_s), _samples(shot, index, float(t_s), fractions),
+                                _ruler(shot, index, float(t_s))))
         visible.append(fractions.copy())
         if progress is not None:
             progress(index * len(times) + number + 1, len(shot.scene.names) * len(times))
     return _Roll(pictures, FrameTruth(times, np.array(visible)))
+
+
+def _ruler(shot: Shot, index: int, t_s: float) -> tuple[float, float, float, float] | None:
+    """Where a ruler's crosses are, to a tenth of a pixel."""
+    if not isinstance(shot.show, RulerShow):
+        return None
+    pose = shot.act.source.sample(np.array([t_s]))[0][0]
+    ends = ruler_ends(1e-3 * shot.show.length_mm) @ pose[:3, :3].T + pose[:3, 3]
+    (x0, y0), (x1, y1) = np.round(shot.scene.camera(index).project(ends), 1)
+    return float(x0), float(y0), float(x1), float(y1)
 
 
 def _samples(shot: Shot, index: int, t_s: float, visible: Array) -> dict[str, tuple[int, int, int, int]]:

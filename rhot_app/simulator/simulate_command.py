@@ -78,6 +78,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--points", type=float, nargs="?", const=POINT_SIGMA_PX, default=None, metavar="PX",
                         help="no pictures: a raw log (DIR/points.log) of every marker's position in both, with a noise "
                              f"of PX (default {POINT_SIGMA_PX:g}); nothing hides anything")
+    parser.add_argument("--depth-table", default=None, metavar="CM,CM,...",
+                        help="no pictures: a table (DIR/table.csv) of disparities of a marker held at these distances")
     parser.add_argument("--hide", action="append", default=[], metavar="ID",
                         help="leave a marker unpainted; repeatable")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
@@ -89,6 +91,8 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.simulator.shot import make_shot
 
     _check(args)
+    if args.depth_table is not None:
+        return _write_depth_table(args)
     began = time.monotonic()
     shot = make_shot(scene_of(args), show_of(args), args.seconds, frozenset(args.hide))
     line = ProgressLine(f"simulating {shot.act.name}" if args.pictures else
@@ -117,6 +121,23 @@ def _check(args: argparse.Namespace) -> None:
         raise SimulatorError(f"--pictures is a number from 1 to {MOST_PICTURES}, not {args.pictures}.")
     if args.points is not None and not args.points >= 0.0:
         raise SimulatorError(f"--points is a noise of 0 px or more, not {args.points:g}.")
+
+
+def _write_depth_table(args: argparse.Namespace) -> int:
+    from rhot_app.errors import SimulatorError
+    from rhot_app.simulator.distances import TABLE_NAME, write_distances
+    from rhot_app.simulator.points import PointNoise
+
+    try:
+        distances = [0.01 * float(text) for text in args.depth_table.split(",")]
+    except ValueError as exc:
+        raise SimulatorError(f"--depth-table takes distances in cm, as 20,40,60, not {args.depth_table!r}.") from exc
+    sigma_px = POINT_SIGMA_PX if args.points is None else args.points
+    write_distances(scene_of(args), distances, args.out.absolute(), PointNoise(sigma_px))
+    table = args.out.absolute() / TABLE_NAME
+    print(json.dumps({"out": str(args.out.absolute()), "table": str(table)}) if args.json
+          else f"{table}: {len(distances)} distances")
+    return 0
 
 
 def _write(shot: Shot, args: argparse.Namespace, progress: Progress) -> None:

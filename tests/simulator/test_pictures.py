@@ -13,7 +13,7 @@ from rhot_app.calibration.corners import detect
 from rhot_app.simulator.pictures import PicturesFile, picture_times, take_pictures
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.simulator.shot import make_shot, read_shot
-from rhot_app.simulator.shows import BoardShow
+from rhot_app.simulator.shows import BoardShow, RulerShow
 from rhot_app.simulator.truth import load_thing_truth, load_truth
 
 
@@ -46,3 +46,15 @@ def test_samples_lie_on_the_markers_paint(tmp_path: Path) -> None:
         paint = np.array(marker.display_rgb)
         assert np.dot(colour, paint) / (np.linalg.norm(colour) * np.linalg.norm(paint)) > 0.985, marker.id
     assert load_truth(tmp_path / "take" / "truth.npz").cameras[0].visible.shape == (1, 6)
+
+
+def test_the_rulers_crosses_are_told_where_they_are_drawn(tmp_path: Path) -> None:
+    shot = make_shot(make_scene(twin_defaults(), 3), RulerShow(180.0), 1.0)
+    take_pictures(shot, tmp_path / "take", 1)
+    file = msgspec.json.decode((tmp_path / "take" / "pictures.json").read_bytes(), type=PicturesFile)
+    for name, pictures in file.cameras.items():
+        image = cv2.imread(str(tmp_path / "take" / name / "000.png"), cv2.IMREAD_GRAYSCALE)
+        assert pictures[0].ruler is not None
+        for x, y in np.reshape(pictures[0].ruler, (2, 2)):
+            around = image[round(y) - 12:round(y) + 13, round(x) - 12:round(x) + 13]
+            assert image[round(y), round(x)] < 90 < 150 < np.percentile(around, 70)

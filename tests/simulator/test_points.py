@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import msgspec
@@ -11,6 +12,7 @@ import pytest
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.recording.observation_table import read_observations
+from rhot_app.simulator.distances import write_distances
 from rhot_app.simulator.points import LOG_NAME, T0_MASTER_NS, PointNoise, write_points
 from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
 from rhot_app.simulator.shot import make_shot
@@ -55,6 +57,17 @@ def test_a_single_marker_has_a_log_too(tmp_path: Path) -> None:
     truth = load_thing_truth(tmp_path / "take" / "truth.npz")
     focal = scene().intrinsics.fx
     assert focal * 0.075 / disparity == pytest.approx(truth.markers[:, 3, 2].mean(), rel=0.01)
+
+
+def test_table_of_distances_follows_the_law_of_depth(tmp_path: Path) -> None:
+    write_distances(scene("rhot6"), [0.2, 0.6, 1.5], tmp_path / "take", PointNoise(0.1))
+    rows = list(csv.DictReader((tmp_path / "take" / "table.csv").open()))
+    assert [row["real_cm"] for row in rows] == ["20", "60", "150"]
+    for row in rows:
+        expected = 100.0 * scene().intrinsics.fx * 0.075 / float(row["real_cm"])
+        assert float(row["disparity_px"]) == pytest.approx(expected, rel=0.012), "but for the lens's distortion"
+    with pytest.raises(SimulatorError, match="not at 1 cm"):
+        write_distances(scene("rhot6"), [0.01], tmp_path / "other", PointNoise())
 
 
 def test_a_board_wears_no_markers(tmp_path: Path) -> None:
