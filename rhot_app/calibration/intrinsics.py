@@ -25,7 +25,7 @@ from rhot_app.project import Intrinsics
 Array = NDArray[np.float64]
 
 _BLURRIER = 1.6  # times the median view's blur: that explains a bad fit
-_MIXED_UP_PX = 5.0
+_MIXED_UP_PX = 3.0
 
 
 @dataclass(frozen=True, slots=True)

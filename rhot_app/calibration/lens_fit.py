@@ -33,6 +33,7 @@ PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Names of the lens parameters, in their order."""
 
 _OPEN = 0.5  # of what is known of any lens: a standard deviation above it says that the views have added nothing
+_LOOSE = 0.05  # of the focal length: a standard deviation above it
 _OFF_TIMES = 4.0  # a view whose rms is this many times the median view's, and
 _OFF_PX = 0.3  # this much more than it, does not fit
 _MOST_DROPPED = 0.34  # of the views; who needs more thrown away has another trouble
@@ -90,6 +91,9 @@ def fit_lens(views: Sequence[BoardView], board: Board, *, square_pixels: bool = 
             break
         dropped |= strange
         kept = [index for index in kept if index not in dropped]
+    plain = LensFit(bundle, seen, tuple(kept), dropped, None)
+    if plain.covariance[0, 0] > (_LOOSE * plain.lens[0]) ** 2:
+        return plain  # what leaves the lens open says nothing about the board
     freedom = _freedom(bundle.state.lenses[0], views[0].size, square_pixels)
     bundle, errors = find_board_errors(bundle, seen, [freedom], board.count, board.square_m,
                                        progress=within(progress, 0.3, 0.95))
