@@ -139,14 +139,14 @@ def fitting_order(first: Sequence[PosedView | None], second: Sequence[PosedView 
 
     Each combination proposes how the cameras stand; the right ones all propose the same, the wrong ones anything.
     """
-    left = [i for i, view in enumerate(first) if view is not None][:_MOST_COMPARED]
-    right = [j for j, view in enumerate(second) if view is not None]
+    left = {i: view.camera_from_board[0] for i, view in enumerate(first) if view is not None}
+    left = dict(list(left.items())[:_MOST_COMPARED])
+    right = {j: view.camera_from_board[0] for j, view in enumerate(second) if view is not None}
     pairs = [(i, j) for i in left for j in right]
     if not pairs:
         return {}
-    poses = np.array([second[j].camera_from_board[0] @ inverse(first[i].camera_from_board[0])  # type: ignore[union-attr]
-                      for i, j in pairs])
-    distance = np.median([first[i].camera_from_board[0, 2, 3] for i in left])  # type: ignore[union-attr]
+    poses = np.array([right[j] @ inverse(left[i]) for i, j in pairs])
+    distance = np.median([pose[2, 3] for pose in left.values()])
     near = ((cdist(*2 * [poses[:, :3, :3].reshape(-1, 9)]) < _SAME_ROTATION)
             & (cdist(*2 * [poses[:, :3, 3]]) < _SAME_PLACE * distance))
     support = [len({pairs[k][0] for k in np.flatnonzero(row)}) for row in near]

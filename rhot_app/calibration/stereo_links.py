@@ -21,7 +21,7 @@ AGREEMENT = 0.01
 """Of the picture's diagonal: as far as a board carried over from one camera to the other may miss. A pose from one
 camera alone carries an error in depth with it; a shot that does not belong misses by many times this."""
 
-_MOST_PROPOSALS = 25
+_MOST_PROPOSALS = 12  # where most shots belong together, one of a dozen surely does
 
 Pair = tuple[PosedView | None, PosedView | None]
 

@@ -20,6 +20,7 @@ from rhot_app.progress import Progress, silent
 
 Array = NDArray[np.float64]
 
+
 def solve(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool = False,
           progress: Progress = silent) -> StereoSolution | Finding:
     """All cameras in the first one's frame; or the finding that says why they cannot be put together.

@@ -31,7 +31,7 @@ class SharedViews:
 
     def of_camera(self, camera: int) -> list[BoardView]:
         """All views of one camera."""
-        return [shot.views[camera] for shot in self.shots if shot.views[camera] is not None]  # type: ignore[misc]
+        return [view for shot in self.shots if (view := shot.views[camera]) is not None]
 
     def shared(self, first: int, second: int) -> int:
         """How many shots both cameras have seen."""
