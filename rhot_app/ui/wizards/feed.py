@@ -21,7 +21,7 @@ from rhot_app.ui.backend.session import Asker
 
 Image = NDArray[np.uint8]
 
-RATE_HZ = 12.0
+RATE_HZ = 15.0
 """Pictures per second and camera; more would only warm the machine."""
 
 _IN_FLIGHT = 2

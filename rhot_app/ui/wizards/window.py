@@ -183,10 +183,11 @@ class WizardWindow(QDialog):
         """Ask the step and show it; begin its long work if it has some."""
         self._dirty = False
         self.work.offer(self.step)
-        view = self.step.view()
+        views = [page.step.view() for page in self.plan.pages]
+        view = views[self.current]
         self._frozen = view.pictures
         self.plan.pages[self.current].show_view(view)
-        self.frame.show_view(view, self.step, self.current, [page.step.view().done for page in self.plan.pages])
+        self.frame.show_view(view, self.step, self.current, [each.done for each in views])
         if view.kept > self._kept:
             self.frame.wall.flash()
         self._kept = view.kept

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rhot_app.calibration.board import Board
 from rhot_app.calibration.capture_guide import CaptureGuide
 from rhot_app.calibration.corners import BoardView, detect
+from rhot_app.calibration.coverage import Coverage
 from rhot_app.ui.wizards.models.board_drawing import board_marks
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
 from rhot_app.ui.wizards.models.drawing import Cells, Overlay
@@ -47,6 +48,7 @@ class LensShowStep(Step):
         self._of: tuple[str, Board] | None = None
         self._seen: tuple[BoardView | None, float] = (None, 0.0)
         self._sentence = ""
+        self._covered: tuple[int, Coverage, bool] | None = None  # by the number of views: it takes milliseconds
 
     def enter(self) -> None:
         """Another board or camera makes the views useless."""
@@ -55,7 +57,7 @@ class LensShowStep(Step):
         self.cameras = (camera,)
         if self._of != (camera, board):
             self._of, self._guide = (camera, board), CaptureGuide(board)
-            self._seen, self._sentence = (None, 0.0), ""
+            self._seen, self._sentence, self._covered = (None, 0.0), "", None
 
     @property
     def camera(self) -> str:
@@ -112,8 +114,10 @@ class LensShowStep(Step):
         """What to do with the board, and what is covered."""
         if self._guide is None:
             return StepView("Show the whole board to the camera.")
-        coverage, complete = self._guide.coverage, self._guide.complete
         count = len(self.views)
+        if self._covered is None or count != self._covered[0]:
+            self._covered = count, self._guide.coverage, self._guide.complete
+        _, coverage, complete = self._covered
         bars = [Bar(_BARS[key][0], share, _BARS[key][1]) for key, share in coverage.bars.items()]
         bars.append(Bar("picture", min(coverage.share / 0.7, 1.0), "parts of the picture in which corners were seen"))
         overlay: Overlay = (Cells(coverage.cells / _CELL_FULL),)

@@ -11,7 +11,7 @@ from rhot_app.calibration.board import Board
 from rhot_app.calibration.corners import BoardView, detect
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.stereo import KnownLengths
-from rhot_app.calibration.stereo_collector import Offer, StereoCollector
+from rhot_app.calibration.stereo_collector import Guidance, Offer, StereoCollector
 from rhot_app.calibration.stereo_report import StereoReport
 from rhot_app.calibration.stereo_views import SharedViews
 from rhot_app.calibration.world_frame import WorldFrame, place_world
@@ -68,12 +68,14 @@ class ShowStep(BoardLooker):
         self._collector: StereoCollector | None = None
         self._of: Board | None = None
         self._offer = Offer(False, "")
+        self._guidance: Guidance | None = None  # of the first `_guided` shots: it takes milliseconds to find
+        self._guided = 0
 
     def enter(self) -> None:
         """Another board makes what was kept useless."""
         if self._collector is None or self._of != self.board:
             self._of, self._collector = self.board, StereoCollector(self.cameras or (), self.board)
-            self._offer = Offer(False, "")
+            self._offer, self._guidance = Offer(False, ""), None
 
     @property
     def views(self) -> SharedViews:
@@ -112,7 +114,10 @@ class ShowStep(BoardLooker):
         """What to do with the board, and how far it is."""
         if self._collector is None:
             return StepView("Show the board to both cameras.")
-        guidance, shots = self._collector.guidance(), self.views.shots
+        shots = self.views.shots
+        if self._guidance is None or len(shots) != self._guided:
+            self._guidance, self._guided = self._collector.guidance(), len(shots)
+        guidance = self._guidance
         bars = [Bar(f"{pair.first} + {pair.second}", pair.shared / (pair.shared + pair.missing),
                     "shots that both cameras share") for pair in guidance.pairs]
         if not guidance.pairs:
