@@ -26,7 +26,7 @@ from rhot_app.ui.wizards.models.movement import QuietCoach
 from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.window import WizardWindow
 
-SECONDS = 12.0
+SECONDS = 8.0
 SIZE = 1.06
 
 
