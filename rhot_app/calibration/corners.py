@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Gray = NDArray[np.uint8]
 
 FEWEST_CORNERS = 6  # of a board that is seen in part
+SMALLEST_PX = 48  # the shorter side of a picture; smaller ones hold no board, and OpenCV's searches fail on them
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,8 @@ def detect(image: NDArray[np.uint8], board: Board, *, thorough: bool = True, sou
     quick search fails: for pictures from files; live pictures come again.
     """
     gray = to_gray(image)
+    if min(gray.shape) < SMALLEST_PX:
+        return None
     if isinstance(board, Chessboard):
         rough = find_chessboard(gray, board, thorough=thorough)
     else:

@@ -12,7 +12,7 @@ from rhot_app.geometry.camera import undistort_points
 Array = NDArray[np.float64]
 
 WORKING_DISTANCE_M = 0.6
-"""Where hands are, seen from the cameras."""
+"""Where hands are tracked; errors in space are stated there."""
 
 _GRID = (12, 16)  # rows, columns of pixels at which rays are looked at
 _PERCENTILE = 95.0

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board import Board
 from rhot_app.calibration.board_errors import BoardErrors
 from rhot_app.calibration.bundle_model import BundleState
+from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.ruler import RulerResult
 from rhot_app.calibration.stereo_adjust import StereoSolution, tilt_spread, view_rms
@@ -22,8 +23,6 @@ from rhot_app.geometry.transforms import inverse, log_so3
 
 Array = NDArray[np.float64]
 
-WORKING_DISTANCE_M = 0.6
-"""Where a hand is tracked; errors in space are stated there."""
 MARKER_NOISE_PX = 0.1
 """Of a marker's position in a picture, per axis, for the part of the error that is not the calibration's."""
 

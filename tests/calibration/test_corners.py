@@ -104,6 +104,13 @@ def test_why_a_charuco_board_was_not_found() -> None:
     assert "wrong dictionary" in why_missing(image, replace(board, dictionary="DICT_6X6_100"))
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (10, 400), (480, 640), (480, 640, 3)])
+def test_pictures_without_a_board_are_no_trouble(shape: tuple[int, ...]) -> None:
+    for image in (np.zeros(shape, np.uint8), np.full(shape, 255, np.uint8)):
+        assert detect(image, BOARD) is None
+        assert detect(image, CharucoBoard(8, 6, 0.03, 0.022)) is None
+
+
 @needs_pictures
 def test_why_a_chessboard_was_not_found() -> None:
     gray = picture("left", 1)

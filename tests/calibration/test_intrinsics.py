@@ -152,7 +152,7 @@ def test_work_can_be_watched_and_stopped() -> None:
 
 
 def test_certainty_in_millimetres_is_what_lenses_from_the_covariance_do(noisy: IntrinsicsReport) -> None:
-    """A wrong principal point alone is a turn of the camera, nearly nothing; a wrong focal length is felt at the rim."""
+    """A wrong principal point is nearly a turn of the camera; a wrong focal length is felt at the rim."""
     tenth = np.zeros((9, 9))
     tenth[2, 2] = 4.0
     turned = expected_errors(LENS, tenth, (640, 480), 0.6)

@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 
     board = board_of(args)
     rig = _rig(args)
-    files = [path for pattern in args.images for path in matching_files(pattern)]
+    files = list(dict.fromkeys(path for pattern in args.images for path in matching_files(pattern)))
     if not files:
         raise CalibrationError(f"No file matches {' '.join(args.images)}. Put the pattern in quotes and see that the "
                                "folder is right.")
