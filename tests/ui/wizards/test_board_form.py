@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from board_scene import BoardScene
+from board_scene import BoardScene, compile_search
 from fake_engine import synthetic_rig
 from wizard_rig import FakeMemory
 
 from rhot_app.calibration.board import CharucoBoard, Chessboard
+from rhot_app.calibration.board_size_check import Beyond
 from rhot_app.ui.wizards.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.feed import Picture
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep, fields_from
 from rhot_app.ui.wizards.models.drawing import Dots
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    compile_search()
 
 
 @pytest.fixture
@@ -55,13 +63,33 @@ def test_the_board_is_confirmed_by_what_is_seen(scene):
     assert np.abs(np.sort(dots.points, axis=0) - np.sort(expected, axis=0)).max() < 0.3
 
 
-def test_another_board_is_not_confirmed(scene):
+def test_a_smaller_count_is_found_out(scene):
     step = BoardStep(BoardFields(cols=8))
-    step.take(step.see(pictures_of(scene)))
+    for _ in range(3):
+        step.take(step.see(pictures_of(scene)))
+    assert "9x6" in step.view().hint
     seen_before = step.see(pictures_of(scene))
-    step.change(BoardFields(cols=7))
+    step.change(BoardFields(cols=9))
     step.take(seen_before)
-    assert "show it to check" in step.view().sentence, "what was seen of another board does not count"
+    assert step.view().hint == "", "what was seen of another board is past"
+
+
+def test_squares_that_go_on_forbid_the_count(scene):
+    step = BoardStep(BoardFields())
+    sight = step.see(pictures_of(scene))
+    for _ in range(3):
+        step.take(replace(sight, beyond=(Beyond(column=True, row=False),) * 2))
+    view = step.view()
+    assert not view.done and view.sentence == "Count the corners again." and "10x6" in view.hint
+
+
+def test_a_larger_count_is_explained(scene):
+    step = BoardStep(BoardFields(cols=10, rows=7))
+    step.take(step.see(pictures_of(scene)))
+    assert "seems to have 9x6" in step.view().hint
+    scene.world_from_board = None
+    step.take(step.see(pictures_of(scene)))
+    assert "seems to have 9x6" in step.view().hint, "the reason is looked for now and then only"
 
 
 def test_a_board_without_a_right_way_up_is_told():

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
+from dataclasses import dataclass
 from typing import Literal
 
 import msgspec
 
 from rhot_app.calibration.board import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard
-from rhot_app.calibration.corners import BoardView, detect
+from rhot_app.calibration.board_size_check import Beyond, look_beyond, size_finding
+from rhot_app.calibration.corners import BoardView, detect, to_gray
+from rhot_app.calibration.missing import why_missing
+from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.models.board_drawing import board_marks
 from rhot_app.ui.wizards.models.step import Pictures, Step, StepView
 
 DICTIONARIES = (DEFAULT_DICTIONARY, "DICT_4X4_250", "DICT_5X5_100", "DICT_5X5_250", "DICT_6X6_250",
                 "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11")
+_WHY_S = 2.0  # between looks into why no board is seen
+_JUDGED, _JUDGED_LEAST = 30, 4  # views that judge the board's size
 _USUAL_SHARE = 0.75  # of a ChArUco square that its marker fills
 
 
@@ -48,6 +56,17 @@ def fields_from(text: str) -> BoardFields:
         return BoardFields()
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BoardSight:
+    """What one look saw: the board it looked for, the board by camera, whether its squares go on where they should end,
+    and why no camera sees it, when that was looked into."""
+
+    board: Board
+    views: dict[str, BoardView | None]
+    beyond: tuple[Beyond, ...] = ()
+    missing: str | None = None
+
+
 class BoardStep(Step):
     """Choose the board, and see at once whether the cameras recognise it."""
 
@@ -59,6 +78,9 @@ class BoardStep(Step):
         self._fields = fields
         self._undone: list[BoardFields] = []
         self._views: dict[str, BoardView | None] = {}
+        self._beyond: deque[Beyond] = deque(maxlen=_JUDGED)
+        self._missing = ""
+        self._next_why_s = 0.0  # the looker's own
         self.board: Board | None = None
         self.problem = ""
         self._build()
@@ -85,7 +107,8 @@ class BoardStep(Step):
 
     def forget_views(self) -> None:
         """What was seen is of another board or camera."""
-        self._views = {}
+        self._views, self._missing = {}, ""
+        self._beyond.clear()
 
     def _build(self) -> None:
         self.forget_views()
@@ -94,26 +117,47 @@ class BoardStep(Step):
         except CalibrationError as exc:
             self.board, self.problem = None, str(exc)
 
-    def see(self, pictures: Pictures) -> tuple[Board, dict[str, BoardView | None]] | None:
-        """Look for the board in each picture."""
+    def see(self, pictures: Pictures) -> BoardSight | None:
+        """Look for the board in each picture; where it is in none, find out why now and then, for that takes long."""
         board = self.board
         if board is None:
             return None
-        return board, {name: detect(picture.bgr, board, thorough=False, source=name)
-                       for name, picture in pictures.items()}
+        views = {name: detect(picture.bgr, board, thorough=False, source=name) for name, picture in pictures.items()}
+        seen = {name: view for name, view in views.items() if view is not None}
+        if seen:
+            beyond = tuple(look_beyond(to_gray(pictures[name].bgr), view, board) for name, view in seen.items()
+                           ) if isinstance(board, Chessboard) else ()
+            return BoardSight(board, views, beyond, "")
+        now_s = time.monotonic()
+        if now_s < self._next_why_s:
+            return BoardSight(board, views)
+        self._next_why_s = now_s + _WHY_S
+        return BoardSight(board, views, missing=why_missing(to_gray(next(iter(pictures.values())).bgr), board))
 
-    def take(self, seen: tuple[Board, dict[str, BoardView | None]]) -> None:
+    def take(self, seen: BoardSight) -> None:
         """Where the board was seen."""
-        board, views = seen
-        if board == self.board:
-            self._views = views
+        if seen.board == self.board:
+            self._views = seen.views
+            self._beyond.extend(seen.beyond)
+            if seen.missing is not None:
+                self._missing = seen.missing
+
+    @property
+    def size_finding(self) -> Finding | None:
+        """What the pictures say against the board's size."""
+        if not isinstance(self.board, Chessboard) or len(self._beyond) < _JUDGED_LEAST:
+            return None
+        return size_finding(tuple(self._beyond), self.board)
 
     def view(self) -> StepView:
         """The question, and whether the answer fits what is seen."""
         if self.board is None:
             return StepView("Say which board you hold.", hint=self.problem)
         overlays = {name: board_marks(view, self.board) for name, view in self._views.items() if view is not None}
-        return StepView(self._sentence(len(overlays)), done=True, hint=self._hint(), overlays=overlays)
+        wrong = self.size_finding
+        if wrong is not None:
+            return StepView("Count the corners again.", hint=f"{wrong.figure} {wrong.cause}", overlays=overlays)
+        return StepView(self._sentence(len(overlays)), done=True, hint=self._hint(len(overlays)), overlays=overlays)
 
     def _sentence(self, found: int) -> str:
         if found == 0:
@@ -121,7 +165,9 @@ class BoardStep(Step):
         names = " and ".join(name for name, view in self._views.items() if view is not None)
         return f"Seen by {names}: this is the board."
 
-    def _hint(self) -> str:
+    def _hint(self, found: int) -> str:
+        if found == 0 and self._missing:
+            return f"Not seen: {self._missing}."
         if isinstance(self.board, Chessboard) and not self.board.one_way_up:
             return ("This board looks the same turned by 180°: hold it the same way up all the time, or use one with "
                     "an even and an odd number of corners.")
