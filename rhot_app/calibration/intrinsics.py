@@ -15,6 +15,7 @@ from rhot_app.calibration.coverage import Coverage, cover
 from rhot_app.calibration.intrinsics_checks import Figures, check
 from rhot_app.calibration.lens_certainty import ExpectedErrors, blind_share, expected_errors
 from rhot_app.calibration.lens_fit import LensFit, fit_lens
+from rhot_app.calibration.misfits import tilt_spread
 from rhot_app.calibration.residual_field import ResidualField, residual_field
 from rhot_app.calibration.stereo_views import Dropped
 from rhot_app.calibration.verdict import Finding, Verdict, judge
@@ -105,7 +106,7 @@ def _report(fit: LensFit, views: Sequence[BoardView], board: Board, dropped: tup
     figures = Figures(
         lens=fit.lens, std=np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), size=size, rms_px=rms,
         views=len(used), misfits=len(fit.dropped), coverage=coverage, pattern_px=field.pattern_px,
-        tilt_rad=_tilt(fit.bundle.state.world_from_board), undetermined=fit.undetermined,
+        tilt_rad=tilt_spread(fit.bundle.state.world_from_board), undetermined=fit.undetermined,
         blind=blind_share(fit.lens, size), errors=errors, board=board, board_errors=fit.board_errors,
         blur_px=float(np.nanmedian([view.blur_px for view in used] + [0.0])),
         square_px=float(np.median([view.square_px for view in used])))
@@ -126,9 +127,3 @@ def _why_off(view: BoardView, rms: float, usual: float, used: Sequence[BoardView
     if rms > _MIXED_UP_PX:
         return f"{figure}: corners are mixed up, or it is another board, zoom or focus"
     return f"{figure}: the board was bent or moved, or something covers a part of it"
-
-
-def _tilt(world_from_board: Array) -> float:
-    """The largest angle between the boards of two views, rad: without it a plane does not show the focal length."""
-    normals = world_from_board[:, :3, 2]
-    return float(np.arccos(np.clip((normals @ normals.T).min(), -1.0, 1.0)))

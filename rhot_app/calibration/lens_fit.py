@@ -23,6 +23,7 @@ from rhot_app.calibration.bundle_model import LENS, BundleState, Observations
 from rhot_app.calibration.corners import BoardView
 from rhot_app.calibration.lens_search import find_lens
 from rhot_app.calibration.lens_start import loose_prior
+from rhot_app.calibration.misfits import MOST_DROPPED, misfit_limit
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent, within
 
@@ -34,9 +35,6 @@ PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 
 _OPEN = 0.5  # of what is known of any lens: a standard deviation above it says that the views have added nothing
 _LOOSE = 0.05  # of the focal length: a standard deviation above it
-_OFF_TIMES = 4.0  # a view whose rms is this many times the median view's, and
-_OFF_PX = 0.3  # this much more than it, does not fit
-_MOST_DROPPED = 0.34  # of the views; who needs more thrown away has another trouble
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +85,7 @@ def fit_lens(views: Sequence[BoardView], board: Board, *, square_pixels: bool = 
     while True:
         kept, bundle, seen = _plain_fit(views, kept, board, square_pixels, name, within(progress, 0.0, 0.3))
         strange = {kept[row]: rms for row, rms in _strange(_view_rms(bundle, seen)).items()}
-        if not strange or len(dropped) + len(strange) > _MOST_DROPPED * len(views):
+        if not strange or len(dropped) + len(strange) > MOST_DROPPED * len(views):
             break
         dropped |= strange
         kept = [index for index in kept if index not in dropped]
@@ -137,6 +135,5 @@ def _observations(views: Sequence[BoardView], board: Board) -> Observations:
 
 def _strange(rms: Array) -> dict[int, float]:
     """Rows of the views that fit far worse than the others, and their rms."""
-    usual = float(np.median(rms))
-    limit = max(_OFF_TIMES * usual, usual + _OFF_PX)
+    limit, _ = misfit_limit(rms)
     return {int(row): float(rms[row]) for row in np.flatnonzero(rms > limit)}

@@ -16,6 +16,7 @@ from rhot_app.calibration.bundle_layout import LensFreedom
 from rhot_app.calibration.bundle_model import BundleState, Observations
 from rhot_app.calibration.corners import BoardView
 from rhot_app.calibration.lens_start import K3, LensStart
+from rhot_app.calibration.misfits import MOST_DROPPED, misfit_limit, tilt_spread
 from rhot_app.calibration.stereo_start import PlacedShot
 from rhot_app.calibration.stereo_views import Dropped, SharedViews
 from rhot_app.errors import CalibrationError
@@ -27,9 +28,6 @@ FEWEST_SHOTS = 3
 ALIKE_RAD = float(np.radians(10.0))
 """Boards whose normals are all within this angle tell focal length from distance badly, and not their own shape."""
 
-_OFF_TIMES = 4.0  # a view whose rms is this many times the median view's, and
-_OFF_PX = 0.3  # this much more than it, does not fit
-_MOST_DROPPED = 0.34  # of the shots; a rig that needs more thrown away has another trouble
 _SIGNIFICANT = 2.0  # standard deviations: a k3 nearer to zero is left out
 
 
@@ -73,7 +71,7 @@ def adjust_rig(views: SharedViews, lenses: Sequence[LensStart], posed: Sequence[
         solution = StereoSolution(views.cameras, views.board, bundle, seen, tuple(b.shot for b in boards), used,
                                   tuple(dropped))
         strange = _strange(solution)
-        if not strange or total - len(boards) + len(strange) > _MOST_DROPPED * total:
+        if not strange or total - len(boards) + len(strange) > MOST_DROPPED * total:
             return _settled(solution, freedom, progress)
         dropped += [Dropped(views.shots[boards[row].shot].name, reason, "residual") for row, reason in strange.items()]
         state = bundle.state
@@ -144,17 +142,10 @@ def view_rms(solution: StereoSolution) -> Array:
     return np.sqrt(squares / np.where(counts, counts, np.nan)).reshape(shape)
 
 
-def tilt_spread(world_from_board: Array) -> float:
-    """Largest angle in rad between the normals of any two boards."""
-    normals = world_from_board[:, :3, 2]
-    return float(np.arccos(np.clip(np.min(normals @ normals.T), -1.0, 1.0)))
-
-
 def _strange(solution: StereoSolution) -> dict[int, str]:
     """Rows of the shots that fit far worse than the others, and why they are left out."""
     rms = view_rms(solution)
-    usual = float(np.nanmedian(rms))
-    limit = max(_OFF_TIMES * usual, usual + _OFF_PX)
+    limit, usual = misfit_limit(rms)
     found = {}
     for row in range(len(rms)):
         camera = int(np.nanargmax(rms[row]))

@@ -13,8 +13,9 @@ from rhot_app.calibration.board_errors import BoardErrors
 from rhot_app.calibration.bundle_model import BundleState
 from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M
 from rhot_app.calibration.lens_start import LensStart
+from rhot_app.calibration.misfits import tilt_spread
 from rhot_app.calibration.ruler import RulerResult
-from rhot_app.calibration.stereo_adjust import StereoSolution, tilt_spread, view_rms
+from rhot_app.calibration.stereo_adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo_certainty import certainty, expected_error
 from rhot_app.calibration.stereo_points import Squares, epipolar_px, measure_squares
 from rhot_app.calibration.stereo_views import Dropped
