@@ -36,6 +36,9 @@ from rhot_app.ui.wizards.catalogue import WIZARDS
 from rhot_app.ui.wizards.launcher import Launcher
 
 TICK_MS = 16
+BEHIND_S = 0.5
+"""Between drawings of the screen behind a wizard: the pictures in front are what the person looks at."""
+
 _SIZE = (1280, 800)
 
 
@@ -47,6 +50,7 @@ class MainWindow(QMainWindow):
         self.controller = controller
         self.settings = settings
         self._buttons_shown: tuple[bool, bool] | None = None
+        self._next_behind = 0.0
         self.passing = PassingNotices()
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, self.tell)
@@ -222,7 +226,9 @@ class MainWindow(QMainWindow):
         now = time.monotonic()
         self.recordings.step()
         self.rig_watch.step(now)
-        self.screen_parts.refresh(self.controller.live, now)
+        if self.wizards.wizard is None or now >= self._next_behind:
+            self._next_behind = now + BEHIND_S
+            self.screen_parts.refresh(self.controller.live, now)
         self._show_buttons()
         self._show_rig_name()
         status = self.controller.live.status
