@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QListWidget, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app import rig_history
@@ -37,7 +37,10 @@ class VersionsDialog(QDialog):
         self._versions: list[Version] = []
         self._job: Job | None = None
         self.list = QListWidget()
-        self.list.setFixedWidth(380)
+        self.list.setFixedWidth(300)
+        self.list.setSpacing(4)
+        self.list.setWordWrap(True)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.currentRowChanged.connect(self._show_version)
         self.table = RowTable(scheme, ("", "now", "then"))
         self.sentence = QLabel()
@@ -66,7 +69,7 @@ class VersionsDialog(QDialog):
         self._versions = rig_history.versions(self._path)
         self.list.clear()
         for version in self._versions:
-            self.list.addItem(f"{version.replaced_at.astimezone():%d %B %Y, %H:%M}   before {version.replaced_by}")
+            self.list.addItem(f"{version.replaced_at.astimezone():%d %B %Y, %H:%M}\nbefore {version.replaced_by}")
         self.back_button.setEnabled(bool(self._versions))
         if self._versions:
             self.list.setCurrentRow(0)

@@ -10,6 +10,7 @@ import sample_wizard
 from fake_backend import FakeBackend
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from screen_pictures import check
 from wizard_hands import Hands
 from wizard_rig import FakeRigAsker
 
@@ -113,6 +114,8 @@ def test_an_earlier_version_is_brought_back_and_that_is_undone(bench):
     dialog = bench.window.wizards.versions
     assert "before time calibration" in dialog.list.item(0).text()
     assert [dialog.table.item(0, c).text() for c in range(3)] == ["right: time offset", "2.00 ms", "0.00 ms"]
+    bench.run(0.2)
+    check("earlier-calibrations", dialog.grab().toImage(), 8)
     bench.click(dialog.back_button)
     bench.until(lambda: "back in force" in dialog.sentence.text())
     assert asker.rig.name == "test bench" == load_rig(path).name and dialog.list.count() == 2
