@@ -27,7 +27,7 @@ LEAST_NOISE_PX = 1e-3
 
 _MOST_STEPS = 100
 _STILL_PX = 1e-8  # the step that changes no expected corner by more than this was the last
-_LEAST_GAIN = 1e-7  # of the cost: nothing moves by more than a thousandth of its standard deviation any more
+_LEAST_GAIN = 1e-5  # of the cost: nothing moves by half a hundredth of its standard deviation any more
 _RAYLEIGH_MEDIAN = 1.1774100225154747  # median distance of a 2-D Gaussian, in standard deviations per axis
 
 

@@ -142,6 +142,7 @@ def test_a_mistake_is_a_sentence(pictures: Path, arguments: tuple[str, ...], mes
                                  capsys: pytest.CaptureFixture[str]) -> None:
     for number in range(3, 9):
         (pictures / f"left{number:02d}.jpg").unlink()
+        (pictures / f"right{number:02d}.jpg").unlink()
     assert stereo(pictures, *arguments) == 2
     assert message in capsys.readouterr().err
 
