@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -78,12 +79,19 @@ def _refusal(board: Board, paper: str) -> str:
     width, height = _board_size_mm(board)
     fitting = [name for name in PAPERS_MM if _fits(board, name)]
     page = _page(paper, across=width >= height)
-    square = 1e3 * board.square_m * min((page[0] - 2.0 * MARGIN_MM) / width,
-                                        (page[1] - 2.0 * MARGIN_MM - _FOOT_MM - _quiet_mm(board)) / height)
+    squares_mm = np.arange(1.0, 1e3 * board.square_m, 0.5)
+    square = max((side for side in squares_mm if _fits(_scaled(board, 1e-3 * side), paper)), default=0.0)
     larger = f", or print it on {fitting[0]}" if fitting else ""
     return (f"The {board.text} is {width:g} x {height:g} mm large and does not fit on {paper} ({page[0]:g} x "
-            f"{page[1]:g} mm) with its margins and the ruler. Squares of {np.floor(2.0 * square) / 2.0:g} mm "
+            f"{page[1]:g} mm) with its margins and the ruler. Squares of {square:g} mm "
             f"would{larger}.")
+
+
+def _scaled(board: Board, square_m: float) -> Board:
+    """The same board with other squares."""
+    if isinstance(board, Chessboard):
+        return replace(board, square_m=square_m)
+    return replace(board, square_m=square_m, marker_m=board.marker_m * square_m / board.square_m)
 
 
 def _board_boxes(board: Board) -> Iterator[Box]:

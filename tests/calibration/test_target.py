@@ -85,6 +85,10 @@ def test_a_board_too_large_says_what_would_fit() -> None:
         draw_target(Chessboard(9, 6, 0.03))
     square_mm = float(re.search(r"Squares of ([\d.]+) mm", str(caught.value))[1])
     assert draw_target(Chessboard(9, 6, 1e-3 * square_mm)).width == PAPERS_MM["A4"][1]
+    with pytest.raises(CalibrationError):
+        draw_target(Chessboard(9, 6, 1e-3 * (square_mm + 0.5)))
+    with pytest.raises(CalibrationError, match=f"Squares of {square_mm:g} mm"):  # however large the wish was
+        draw_target(Chessboard(9, 6, 0.2))
 
 
 def test_the_pdf_is_one(tmp_path: Path) -> None:
