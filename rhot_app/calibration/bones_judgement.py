@@ -11,7 +11,7 @@ from rhot_app.calibration.bones_report import BoneLength, Known
 from rhot_app.calibration.marker_places import PALM, MarkerPlace, MarkerTracks
 from rhot_app.calibration.rigid_segments import RigidPair, find_slip, find_step
 from rhot_app.calibration.verdict import Finding, Grade
-from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
+from rhot_app.hand.skeleton import FINGERS, FLEXIONS
 
 Array = NDArray[np.float64]
 
@@ -56,9 +56,7 @@ def stillness_findings(angles: Array) -> list[Finding]:
     """Fingers that hardly moved, from joint angles (F, 21) rad."""
     found = []
     for finger, name in enumerate(FINGERS):
-        flexions = angles[:, ANGLE_SLICES[finger]][:, -3:].sum(axis=1)
-        if finger == 0:
-            flexions = angles[:, [1, 3, 4]].sum(axis=1)
+        flexions = angles[:, list(FLEXIONS[finger])].sum(axis=1)
         bent = float(np.degrees(np.subtract(*np.percentile(flexions, [97.5, 2.5]))))
         if bent < STILL_DEG:
             found.append(_still(name, f"bent by {bent:.0f} degrees only, all joints together"))
@@ -163,8 +161,9 @@ def bone_findings(bones: Sequence[BoneLength]) -> list[Finding]:
     seen = [bone.name for bone in bones if bone.known is not Known.PRIOR]
     which = ("no bone by itself" if not seen else f"only {', '.join(seen)}" if len(seen) < len(unseen)
              else f"all but {', '.join(unseen)}")
-    return [Finding("not_observed", Grade.GOOD if seen else Grade.FAIR, f"The recording shows {which}; the lengths not shown are what is usual "
-                    "in a hand of this size.", "No marker, or no movement, tells them from their neighbours.",
+    return [Finding("not_observed", Grade.GOOD if seen else Grade.FAIR,
+                    f"The recording shows {which}; the lengths not shown are what is usual in a hand of this size.",
+                    "No marker, or no movement, tells them from their neighbours.",
                     "Bend every joint by itself, or add markers.")]
 
 

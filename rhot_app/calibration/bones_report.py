@@ -22,6 +22,10 @@ OBSERVED_BELOW, PRIOR_ABOVE = 0.4, 0.8
 they do not, and the length is what is usual."""
 
 
+MODEL_STD_MM = 0.3
+"""No length is stated to be better than this: skin slides otherwise than it is modelled, and joints are no hinges."""
+
+
 class Known(enum.Enum):
     """How a length came to be known."""
 
@@ -128,7 +132,7 @@ def bone_name(finger: int, bone: int) -> str:
 def bone_lengths(unknowns: HandUnknowns, vector: Array, covariance: Array) -> tuple[BoneLength, ...]:
     """Every bone with what is known of it."""
     usual = np.sqrt(np.diag(unknowns.prior.fixed_size)[:BONE_COUNT])
-    std = np.sqrt(np.diag(covariance)[:BONE_COUNT])
+    std = np.hypot(np.sqrt(np.diag(covariance)[:BONE_COUNT]), 1e-3 * MODEL_STD_MM)
     found = []
     for k in range(BONE_COUNT):
         left = std[k] / usual[k]
@@ -154,8 +158,9 @@ def finger_reaches(unknowns: HandUnknowns, vector: Array, covariance: Array) -> 
 
 def marker_spots(unknowns: HandUnknowns, vector: Array, covariance: Array) -> tuple[MarkerSpot, ...]:
     """Where every marker sits."""
-    spots = (1e3 * vector[MARKERS:].reshape(-1, 3)).tolist()
-    deviations = (1e3 * np.sqrt(np.diag(covariance)[MARKERS:]).reshape(-1, 3)).tolist()
+    rows = slice(MARKERS, unknowns.slides)
+    spots = (1e3 * vector[rows].reshape(-1, 3)).tolist()
+    deviations = (1e3 * np.sqrt(np.diag(covariance)[rows]).reshape(-1, 3)).tolist()
     return tuple(MarkerSpot(place.name, place.word, spot[0], spot[1], spot[2], (std[0], std[1], std[2]))
                  for place, spot, std in zip(unknowns.places, spots, deviations, strict=True))
 

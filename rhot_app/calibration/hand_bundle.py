@@ -33,7 +33,7 @@ LIMIT_SD = np.radians(5.0)
 LIMIT_MARGIN = np.radians(10.0)
 """Joints may go this far past the base hand's limits, which nobody measured on this hand, and then pay."""
 
-_STILL = 1e-4  # the step that gains less than this part of the cost was the last
+_STILL = 1e-3  # the step that makes the hand less than this more likely (logarithm) was the last
 _DAMPING_MAX = 1e8
 
 
@@ -94,7 +94,7 @@ class HandAdjustment:
                 break
             gain, cost, vector, poses = cost - trial, trial, trial_vector, trial_poses
             damping = max(0.1 * damping, 1e-9)
-            if gain < _STILL * (1.0 + cost):
+            if gain < _STILL:
                 break
         residuals = self._seen - expected(self._unknowns, vector, poses)
         return HandBundle(vector, poses, residuals, self._covariance(vector, poses), cost, taken)

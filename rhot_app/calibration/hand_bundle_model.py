@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.hand_shape import MARKERS, ROOTS, TURNS, HandUnknowns, left_jacobian
 from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.kinematics import TWIST, forward_arrays, jacobian_arrays, move
-from rhot_app.hand.skeleton import ANGLES
+from rhot_app.hand.skeleton import ANGLES, FLEXIONS
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,9 @@ def expected(unknowns: HandUnknowns, vector: Array, poses: Poses) -> Array:
     """(F, M, 3) m, world: where the markers of the hand `vector` (G,) are in these poses."""
     dh = _table(unknowns, vector)
     points = np.empty((len(poses.angles), len(unknowns.places), 3))
-    _forward_all(dh, poses.world, poses.angles, np.empty((len(poses.angles), len(dh.parent), 3, 4)), points)
+    frames = np.empty((len(poses.angles), len(dh.parent), 3, 4))
+    _forward_all(dh, poses.world, poses.angles, frames, points)
+    _slide(unknowns, vector, poses, frames, points)
     return points
 
 
@@ -66,13 +68,14 @@ def linearise(unknowns: HandUnknowns, vector: Array, poses: Poses) -> Linearised
     points = np.empty((count, len(places), 3))
     per_pose = np.empty((count, len(places), 3, POSE))
     _forward_all(dh, poses.world, poses.angles, frames, points)
-    _jacobian_all(dh, poses.world, frames, points, per_pose)
+    _slide(unknowns, vector, poses, frames, points)
+    _jacobian_all(dh, poses.world, frames, points, per_pose)  # that a bending joint also slides the skin is left out
     return Linearised(points, per_pose, _per_shape(unknowns, vector, poses, frames, points))
 
 
 def in_segments(unknowns: HandUnknowns, vector: Array, poses: Poses, offsets: Array) -> Array:
     """Offsets (F, M, 3) m in the world as (F, M, 3) along, across and above each marker's own segment."""
-    axes = linearise(unknowns, vector, poses).per_shape[..., MARKERS:]
+    axes = linearise(unknowns, vector, poses).per_shape[..., MARKERS:unknowns.slides]
     own = np.stack([axes[:, m, :, 3 * m:3 * m + 3] for m in range(len(unknowns.places))], axis=1)
     return np.asarray(np.einsum("fmij,fmi->fmj", own, offsets))
 
@@ -97,7 +100,25 @@ def _per_shape(unknowns: HandUnknowns, vector: Array, poses: Poses, frames: Arra
         turn = slice(TURNS + 3 * finger, TURNS + 3 * finger + 3)
         columns = np.cross(left_jacobian(vector[turn]).T[None], lever[:, None])  # (F, 3 of the turn, 3)
         out[:, m, :, turn] = np.einsum("fij,fkj->fik", palm, columns)
+    for k, m in enumerate(unknowns.sliding):
+        first = unknowns.slides + 2 * k
+        out[:, m, :, first:first + 2] = _slide_slopes(unknowns, m, poses, frames)
     return out
+
+
+def _slide(unknowns: HandUnknowns, vector: Array, poses: Poses, frames: Array, points: Array) -> None:
+    """Move the markers that slide, in place."""
+    for k, m in enumerate(unknowns.sliding):
+        first = unknowns.slides + 2 * k
+        points[:, m] += _slide_slopes(unknowns, m, poses, frames) @ vector[first:first + 2]
+
+
+def _slide_slopes(unknowns: HandUnknowns, marker: int, poses: Poses, frames: Array) -> Array:
+    """(F, 3, 2): the bone's direction times the sines of the flexions at its beginning and its end."""
+    place = unknowns.places[marker]
+    along = frames[:, unknowns.bone_rows[place.finger, place.segment], :, 0]
+    joints = FLEXIONS[place.finger][place.segment:place.segment + 2]
+    return np.asarray(along[:, :, None] * np.sin(poses.angles[:, list(joints)])[:, None, :])
 
 
 def segment_axes(finger: int, segment: int) -> Array:

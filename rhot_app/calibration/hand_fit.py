@@ -19,7 +19,7 @@ from rhot_app.progress import Progress, silent
 
 Array = NDArray[np.float64]
 
-INSTANTS = 400
+INSTANTS = 800
 LEAST_INSTANTS = 30
 
 INDEPENDENT_ERRORS = 3.0
@@ -98,7 +98,8 @@ def _believe(unknowns: HandUnknowns, seen: Array, start: HandBundle, smoothed: S
         noise = min(smoothed.noise_m, error)
         beyond = float(np.sqrt(max(error ** 2 - _NOISE_DOUBT * noise ** 2, 0.0)))
         # Noise averages out over the instants; what is beyond it does not.
-        weights = Weights(error, error ** 2 / (noise ** 2 / len(seen) + beyond ** 2 / INDEPENDENT_ERRORS + 1e-18))
+        looks = min(float(len(seen)), smoothed.looks)
+        weights = Weights(error, error ** 2 / (noise ** 2 / looks + beyond ** 2 / INDEPENDENT_ERRORS + 1e-18))
     return bundle, beyond
 
 

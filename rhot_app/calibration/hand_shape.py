@@ -2,8 +2,10 @@
 
 All hands are right hands here: a left one is the mirror image (`mirrored`). The vector holds, in this order: the bones
 (5, 3) m; the finger roots (5, 3) m in the palm frame; how far each finger's neutral frame is turned from the base
-hand's, rotation vectors (5, 3) rad in the palm frame; the markers (M, 3) m. A marker's place is told from the joint at
-which its segment begins: along the bone, towards the thumb's side, and out of the back. On the palm: in the palm frame.
+hand's, rotation vectors (5, 3) rad in the palm frame; the markers (M, 3) m; and how far each dot on an inner bone
+slides along it, m, per sine of the flexion at the bone's beginning and at its end. A marker's place is told from the
+joint at which its segment begins: along the bone, towards the thumb's side, and out of the back. On the palm: in the
+palm frame.
 """
 
 from __future__ import annotations
@@ -28,6 +30,10 @@ Array = NDArray[np.float64]
 BONE_COUNT = 15
 ROOTS, TURNS, MARKERS = 15, 30, 45
 """Where each part of the vector begins; the bones begin at 0."""
+
+SLIDE_SD_M = 0.5e-3
+"""How far skin slides over a phalanx when a joint at its end bends fully. Unknown for each marker, and hardly to be
+told from a longer bone: without it, places on small circles would be believed much too exactly."""
 
 _ACROSS_SD_M, _PAINT_SD_M, _WRIST_SD_M = 3e-3, 0.7e-3, 2e-3
 _PALM_SD_M = (30e-3, 30e-3, 10e-3)
@@ -55,7 +61,10 @@ class HandUnknowns:
 
     def __init__(self, base: HandAnatomy, places: tuple[MarkerPlace, ...]) -> None:
         self.places = places
-        self.size = MARKERS + 3 * len(places)
+        self.slides = MARKERS + 3 * len(places)  # where this part of the vector begins
+        self.sliding = tuple(k for k, place in enumerate(places)
+                             if not place.on_palm and place.segment != DISTAL and not place.painted)
+        self.size = self.slides + 2 * len(self.sliding)
         self._base = base
         self._model = build_model(msgspec.structs.replace(base, side="right"))
         self.bone_rows = self._model.dh.point_row[1:len(JOINTS)].reshape(5, 4)[:, 1:]  # (5, 3) rows that end each bone
@@ -65,7 +74,7 @@ class HandUnknowns:
         """The hand that `vector` (G,) describes."""
         turns = Rotation.from_rotvec(vector[TURNS:MARKERS].reshape(5, 3)).as_matrix() @ self._model.base_rotation
         return HandShape(vector[:ROOTS].reshape(5, 3), vector[ROOTS:TURNS].reshape(5, 3), turns,
-                         vector[MARKERS:].reshape(-1, 3))
+                         vector[MARKERS:self.slides].reshape(-1, 3))
 
     @property
     def limits(self) -> Array:
@@ -120,6 +129,8 @@ class HandUnknowns:
             causes[rows, rows] = np.diag(scatter)
             if not place.on_palm:
                 causes[rows.start] += bone_part * causes[3 * place.finger + place.segment]
+        slides = np.arange(self.slides, count)
+        causes[slides, slides] = SLIDE_SD_M
         size = mean.copy()
         size[TURNS:MARKERS] = 0.0
         fixed_size = causes @ causes.T

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _CANDIDATES = 3000
+_SMALL_M = 5e-3
 _CLOSINGS = (0.0, 1.0, 2.0, 3.0)
 
 
@@ -32,8 +33,9 @@ def choose_instants(positions: Array, count: int) -> Indices:
     features = np.linalg.norm(positions[usable][:, first] - positions[usable][:, second], axis=2)
     middle = np.nanmedian(features, axis=0)
     low, high = np.nanpercentile(features, [1.0, 99.0], axis=0)  # what lies beyond are mistakes rather than poses
-    features = np.where(np.isfinite(features), np.clip(features, low, high), middle)
-    chosen = [int(np.argmin(np.linalg.norm(features - middle, axis=1)))]
+    features = np.where(np.isfinite(features), np.clip(features, low, high), middle) - middle
+    features /= np.maximum(high - low, _SMALL_M)  # the last joint's small circles count as much as a whole finger's
+    chosen = [int(np.argmin(np.linalg.norm(features, axis=1)))]
     distance = np.full(len(usable), np.inf)
     while len(chosen) < count:
         distance = np.minimum(distance, np.linalg.norm(features - features[chosen[-1]], axis=1))

@@ -22,11 +22,13 @@ _THIRD_DIFFERENCE = np.sqrt(20.0)  # standard deviation of x0 - 3 x1 + 3 x2 - x3
 @dataclass(frozen=True, slots=True)
 class SmoothTracks:
     """`positions` (T, M, 3) m, NaN where a marker was missing or too alone to be averaged; `raw_noise_m` standard
-    deviation per axis before and `noise_m` after smoothing, median over the markers."""
+    deviation per axis before and `noise_m` after smoothing, median over the markers; `looks`: as many independent
+    instants with `noise_m` are worth as much as the recording."""
 
     positions: Array
     raw_noise_m: float
     noise_m: float
+    looks: float
 
 
 def smooth(times_s: Array, positions: Array) -> SmoothTracks:
@@ -35,14 +37,15 @@ def smooth(times_s: Array, positions: Array) -> SmoothTracks:
     period_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else WINDOW_S
     half = int(0.5 * WINDOW_S / max(period_s, 1e-6))
     if 2 * half + 1 < _LEAST_SAMPLES:
-        return SmoothTracks(positions, raw, raw)
+        return SmoothTracks(positions, raw, raw, float(len(positions)))
     smoothed = np.full_like(positions, np.nan)
     gains = []
     for marker in range(positions.shape[1]):
         smoothed[:, marker], gain = _parabolas(positions[:, marker], half)
         gains.append(gain[np.isfinite(smoothed[:, marker, 0])])
     kept = np.concatenate(gains)
-    return SmoothTracks(smoothed, raw, raw * float(np.sqrt(np.mean(kept))) if len(kept) else raw)
+    left = float(np.mean(kept)) if len(kept) else 1.0
+    return SmoothTracks(smoothed, raw, raw * float(np.sqrt(left)), left * len(positions))
 
 
 def _noise(positions: Array) -> float:

@@ -36,6 +36,9 @@ ANGLES: tuple[str, ...] = (
 ANGLE_SLICES: tuple[slice, ...] = (slice(0, 5), *(slice(5 + 4 * k, 9 + 4 * k) for k in range(4)))
 """Slice of `ANGLES` that belongs to each finger, in the order of `FINGERS`."""
 
+FLEXIONS: tuple[tuple[int, int, int], ...] = ((1, 3, 4), *((6 + 4 * k, 7 + 4 * k, 8 + 4 * k) for k in range(4)))
+"""Indices into `ANGLES` of the flexions at the beginning of each finger's three bones, in the order of `FINGERS`."""
+
 JOINT_SLICES: tuple[slice, ...] = tuple(slice(1 + 4 * k, 5 + 4 * k) for k in range(5))
 """Slice of `JOINTS` that belongs to each finger, in the order of `FINGERS`."""
 

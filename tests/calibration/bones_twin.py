@@ -9,12 +9,12 @@ import numpy as np
 
 from rhot_app.calibration import hand_prior
 from rhot_app.calibration.hand_bundle_model import Poses, expected
-from rhot_app.calibration.hand_shape import HandUnknowns
+from rhot_app.calibration.hand_shape import MARKERS, HandUnknowns
 from rhot_app.calibration.marker_places import PALM, MarkerPlace, MarkerTracks
 from rhot_app.geometry.transforms import exp_so3
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.model import build_model
-from rhot_app.hand.skeleton import ANGLES, BONES, FINGERS
+from rhot_app.hand.skeleton import ANGLES, BONES, FINGERS, FLEXIONS
 from rhot_node.files import resource_path
 
 TRIAD = tuple(MarkerPlace(f"palm_{k}", PALM, PALM) for k in range(1, 4))
@@ -83,13 +83,13 @@ def free_movement(hand: HandAnatomy, seconds: float, rate_hz: float, seed: int) 
                  for _ in range(2)]
         return 0.5 + 0.5 * np.clip(sum(parts) / 1.5, -1, 1)  # 0..1, resting at both ends now and then
 
-    together = wave()
+    fist = wave()
     for k, name in enumerate(ANGLES):
         if name.endswith("dip_flexion"):
             angles[:, k] = 2.0 / 3.0 * angles[:, k - 1] + np.radians(8.0) * (wave() - 0.5)
         elif name.endswith("flexion"):
-            closing = 0.6 * together + 0.4 * wave()
-            angles[:, k] = 0.85 * high[k] * closing if low[k] > -0.2 else low[k] + (high[k] - low[k]) * wave()
+            closing = np.clip(1.5 * (0.6 * fist + 0.4 * wave()) - 0.25, 0.0, 1.0)  # stays stretched, stays closed
+            angles[:, k] = 0.95 * high[k] * closing if low[k] > -0.2 else low[k] + (high[k] - low[k]) * wave()
         else:
             angles[:, k] = 0.7 * (low[k] + (high[k] - low[k]) * wave())
     angles = np.clip(angles, low, high)
@@ -109,7 +109,7 @@ def record(hand: HandAnatomy, places: tuple[MarkerPlace, ...], seed: int = 1, *,
     right = msgspec.structs.replace(hand, side="right")
     unknowns = HandUnknowns(right, places)
     vector = unknowns.prior.mean.copy()
-    worn = vector[45:].reshape(-1, 3)
+    worn = vector[MARKERS:unknowns.slides].reshape(-1, 3)
     for k, place in enumerate(places):
         if place.on_palm and not place.painted:
             worn[k] = np.array([[50.0, 15.0, 14.0], [75.0, -5.0, 15.0], [35.0, -20.0, 13.0]])[k % 3] * 1e-3
@@ -117,11 +117,11 @@ def record(hand: HandAnatomy, places: tuple[MarkerPlace, ...], seed: int = 1, *,
         elif not place.painted:
             worn[k] += rng.normal(0, 1.0, 3) * [4e-3, 2e-3, 1.5e-3]
     positions = expected(unknowns, vector, poses)
-    for k, place in enumerate(places):  # skin slides towards the knuckle of a bent joint
-        if not place.on_palm:
-            bent = np.sin(poses.angles[:, min(20, 1 + 4 * place.finger + 1 + place.segment)])
+    for k, place in enumerate(places):  # skin slides over a bent joint; paint all over a bone only stretches
+        if not place.on_palm and not place.painted:
+            bent = 1.0 - np.cos(poses.angles[:, FLEXIONS[place.finger][place.segment]])
             along = np.zeros_like(vector)
-            along[45 + 3 * k] = 1e-3
+            along[MARKERS + 3 * k] = 1e-3
             positions[:, k] += bent[:, None] * sloppiness.skin_m / 1e-3 * (
                 expected(unknowns, vector + along, poses) - expected(unknowns, vector, poses))[:, k]
     positions += rng.normal(0, sloppiness.noise_m, positions.shape)

@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="calibrated rig for the log (default: the log's own)")
     parser.add_argument("--roles", nargs="+", default=[], metavar="NAME=ROLE",
                         help="where markers sit, as m1=index_tip m2=index_medial m3=palm_1 m4=wrist")
-    parser.add_argument("--hand", type=Path, metavar="BASE", help="hand file to begin from (default: the rig's hand, or "
-                        "the adult hand that ships with the project)")
+    parser.add_argument("--hand", type=Path, metavar="BASE",
+                        help="hand file to begin from (default: the rig's hand, or the adult hand of the project)")
     parser.add_argument("--side", choices=("right", "left"), help="which hand it is (default: the base hand's)")
     parser.add_argument("--set", nargs="+", default=[], metavar="BONE=MM", dest="lengths",
                         help="enter lengths by hand, as index.proximal=41")

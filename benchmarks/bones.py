@@ -1,0 +1,143 @@
+"""How well bones are found: hands whose bones are known, two halves of a real recording, and six markers.
+
+``python benchmarks/bones.py [--persons N] [--json FILE]`` prints a table for each. Beside each figure stands the plain
+average: every bone scaled as the mean distance between the markers at its two ends is scaled against the base hand.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "calibration"))
+
+from bones_twin import RICH, SIX, Sloppiness, base_hand, bones_mm, person, record
+
+from rhot_app.calibration.bones import solve_bones
+from rhot_app.calibration.bones_report import BonesReport, Known
+from rhot_app.calibration.hand_bundle_model import Poses, expected
+from rhot_app.calibration.hand_shape import HandUnknowns
+from rhot_app.calibration.marker_places import MarkerTracks, tracks_of
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.model import neutral_pose
+from rhot_app.recording.qualisys import read_qualisys
+
+Array = NDArray[np.float64]
+
+QUALISYS = Path(__file__).parents[2] / "shared" / "data" / "hand_motion" / "qualisys_hand_30s.tsv"
+TARGET_MM, TARGET_HALVES_MM, TARGET_SIZE = 2.0, 1.0, 0.02
+
+
+def plain_average(tracks: MarkerTracks, base: HandAnatomy) -> Array:
+    """(5, 3) mm: what the mean distances between neighbouring markers of a finger make of the base hand's bones."""
+    unknowns = HandUnknowns(base, tracks.places)
+    relaxed = Poses(np.eye(4)[None], neutral_pose().angles[None])
+    typical = expected(unknowns, unknowns.prior.mean, relaxed)[0]
+    out = bones_mm(base)
+    for finger in range(5):
+        worn = sorted((place.segment, k) for k, place in enumerate(tracks.places) if place.finger == finger)
+        for (segment, a), (last, b) in pairwise(worn):
+            seen = float(np.nanmean(np.linalg.norm(tracks.positions[:, a] - tracks.positions[:, b], axis=1)))
+            out[finger, segment:last + 1] *= np.sqrt(seen / np.linalg.norm(typical[a] - typical[b]))
+    return out
+
+
+def lengths_mm(report: BonesReport) -> Array:
+    """(5, 3) mm."""
+    return np.array([bone.length_mm for bone in report.bones]).reshape(5, 3)
+
+
+def rich_twin(persons: int) -> list[dict[str, Any]]:
+    """Known hands with a marker on every bone and three on the back of the hand, left and right in turn."""
+    rows = []
+    for seed in range(persons):
+        side = "left" if seed % 2 else "right"
+        hand = person(seed, side=side)
+        tracks = record(hand, RICH, seed, sloppiness=Sloppiness(noise_m=0.3e-3 if seed % 3 == 0 else 0.4e-3))
+        begun = time.perf_counter()
+        report = solve_bones(tracks, base_hand(side))
+        errors = np.abs(lengths_mm(report) - bones_mm(hand))
+        plain = np.abs(plain_average(tracks, base_hand(side)) - bones_mm(hand))
+        deviations = np.array([bone.std_mm for bone in report.bones]).reshape(5, 3)
+        rows.append({"person": seed, "side": side, "worst_mm": float(errors.max()), "inner_bones_mm":
+                     float(errors[:, :2].max()), "rms_mm": float(np.sqrt(np.mean(errors ** 2))),
+                     "errors_per_std": float(np.sqrt(np.mean((errors / deviations) ** 2))),
+                     "plain_worst_mm": float(plain.max()), "seconds": time.perf_counter() - begun})
+    return rows
+
+
+def real_halves() -> dict[str, Any] | None:
+    """The two halves of the recording of a real hand; None where it is not there."""
+    if not QUALISYS.exists():
+        return None
+    points = read_qualisys(QUALISYS)
+    tracks = tracks_of(points.times_s, points.positions, points.names)
+    middle = 0.5 * tracks.duration_s
+    halves = [tracks.within(0.0, middle), tracks.within(middle, np.inf)]
+    reports = [solve_bones(half, base_hand()) for half in halves]
+    apart = np.abs(lengths_mm(reports[0]) - lengths_mm(reports[1]))
+    plain = np.abs(np.subtract(*(plain_average(half, base_hand()) for half in halves)))
+    return {"worst_mm": float(apart.max()), "rms_mm": float(np.sqrt(np.mean(apart ** 2))),
+            "plain_worst_mm": float(plain.max()), "sizes": [report.size for report in reports],
+            "observed": [sum(bone.known is not Known.PRIOR for bone in report.bones) for report in reports]}
+
+
+def six_markers(persons: int) -> list[dict[str, Any]]:
+    """Painted fingertips and a wrist band, 40 frames a second, noise as of two cameras."""
+    base = base_hand()
+    rows = []
+    for seed in range(persons):
+        hand = person(seed)
+        tracks = record(hand, SIX, seed, rate_hz=40.0, sloppiness=Sloppiness(noise_m=0.5e-3))
+        report = solve_bones(tracks, base)
+        truth = HandUnknowns(hand, ()).shape(HandUnknowns(hand, ()).prior.mean).reaches
+        usual = HandUnknowns(base, ()).shape(HandUnknowns(base, ()).prior.mean).reaches
+        size = float(np.mean(truth[1:] / usual[1:]))
+        rows.append({"person": seed, "size": size, "size_error": report.size / size - 1.0,
+                     "stated_std": report.size_std,
+                     "not_observed": sum(bone.known is Known.PRIOR for bone in report.bones)})
+    return rows
+
+
+def show(rich: list[dict[str, Any]], halves: dict[str, Any] | None, six: list[dict[str, Any]]) -> None:
+    """Print the tables."""
+    print(f"Rich marker set, error of bones, mm (target: all within {TARGET_MM:g})")
+    print(f"{'person':>8}{'side':>8}{'worst':>8}{'inner':>8}{'rms':>8}{'per std':>9}{'plain':>8}{'seconds':>9}")
+    for row in rich:
+        print(f"{row['person']:8}{row['side']:>8}{row['worst_mm']:8.2f}{row['inner_bones_mm']:8.2f}{row['rms_mm']:8.2f}"
+              f"{row['errors_per_std']:9.2f}{row['plain_worst_mm']:8.2f}{row['seconds']:9.1f}")
+    if halves is None:
+        print(f"Real recording: {QUALISYS} is not there.")
+    else:
+        print(f"Real recording, two halves apart, mm (target: {TARGET_HALVES_MM:g}): worst {halves['worst_mm']:.2f}, "
+              f"rms {halves['rms_mm']:.2f}, plain average {halves['plain_worst_mm']:.2f}; bones that it shows at all: "
+              f"{halves['observed']} of 15")
+    print(f"Six markers, error of the hand's size, % (target: {100 * TARGET_SIZE:g})")
+    print(f"{'person':>8}{'size':>8}{'error':>8}{'stated':>8}{'not observed':>14}")
+    for row in six:
+        print(f"{row['person']:8}{row['size']:8.3f}{100 * row['size_error']:8.2f}{100 * row['stated_std']:8.2f}"
+              f"{row['not_observed']:11} /15")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--persons", type=int, default=6)
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    args = parser.parse_args()
+    rich, halves, six = rich_twin(args.persons), real_halves(), six_markers(args.persons)
+    show(rich, halves, six)
+    if args.json is not None:
+        args.json.write_text(json.dumps({"rich": rich, "halves": halves, "six": six}, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
