@@ -1,0 +1,150 @@
+"""Wizards that need a hand or a marker, from start to saved rig on the simulated rig, by clicks and real processes."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from paint_scene import other_colours
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from rhot_app.calibration.separability import SKIN
+from rhot_app.project import FilterSettings, OneEuroSettings
+from rhot_app.simulator.shows import HandShow, MarkerShow
+from rhot_node.config import load_settings
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import from_bgr
+
+
+def use(hands):
+    """The last page: use it, and see that it is used."""
+    hands.until(lambda: hands.window.frame.next_button.text() == "Use this calibration", 60.0)
+    hands.next()
+    hands.until(lambda: hands.window.frame.next_button.text() == "Close", 40.0)
+
+
+def recorded(hands, seconds):
+    """Record a movement with Space, for so long."""
+    movement = hands.window.page.movement
+    movement.seconds = seconds
+    hands.key(Qt.Key.Key_Space)
+    hands.until(lambda: movement.phase == "recorded", seconds + 30.0)
+
+
+def solved(hands, seconds=120.0):
+    """Wait for the result of the page."""
+    step = hands.window.step
+    hands.until(lambda: step.report is not None or step.view().hint, seconds)
+    assert step.report is not None, step.view().hint
+
+
+def test_the_time_of_the_cameras_is_found(simulated_rig, open_on_rig):
+    truth = simulated_rig.truth
+    late = msgspec.structs.replace(truth.nodes[1], time_offset_s=0.02)
+    simulated_rig.use(msgspec.structs.replace(truth, nodes=(truth.nodes[0], late)))
+    simulated_rig.stage.show(HandShow("wave"))
+    hands = open_on_rig("time")
+    recorded(hands, 15.0)
+    hands.next()
+    solved(hands)
+    hands.next()
+    use(hands)
+    assert simulated_rig.saved.nodes[1].time_offset_s == pytest.approx(0.0, abs=0.003)
+
+
+def test_depth_is_found_without_a_board(simulated_rig, open_on_rig):
+    hands = open_on_rig("depth")
+    page = hands.window.page
+    page.marker.setCurrentText("index")
+    for number, distance_m in enumerate((0.3, 0.4, 0.55, 0.75, 1.0), 1):
+        simulated_rig.stage.show(MarkerShow(marker="index", distance_m=distance_m))
+        page.distance.setValue(100.0 * distance_m)
+        for _ in range(40):
+            hands.run(0.5)
+            hands.click(page.take_button)
+            if len(page.distances.rows) == number:
+                break
+        assert len(page.distances.rows) == number, hands.window.frame.hint.text()
+    hands.next()
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None)
+    hands.next()
+    use(hands)
+    left, right = simulated_rig.truth.nodes
+    baseline_m = float(np.linalg.norm(np.subtract(right.pose.translation_m, left.pose.translation_m)))
+    depth = simulated_rig.saved.depth
+    assert depth.mode == "disparity" and depth.z == pytest.approx(-1.0, abs=0.05)
+    assert depth.k == pytest.approx(baseline_m * left.intrinsics.fx, rel=0.06)
+
+
+def click_marker(hands, camera, at):
+    view = hands.window.frame.wall.views[camera]
+    place = view._place()
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+                     QPoint(round(place.target.x() + (at[0] + 0.5) * place.scale),
+                            round(place.target.y() + (at[1] + 0.5) * place.scale)))
+
+
+def test_colours_are_learnt(simulated_rig, open_on_rig):
+    truth = simulated_rig.truth
+    simulated_rig.use(msgspec.structs.replace(truth, markers=other_colours(truth.markers)))
+    simulated_rig.stage.show(HandShow("still"))
+    hands = open_on_rig("colours")
+    step = hands.window.step
+    hands.until(lambda: step._sights and hands.window.feed.newest("left") is not None)
+    hands.run(1.0)
+    image = from_bgr(hands.window.feed.newest("left").bgr)
+    seen = {truth.markers.ids[mark.index]: (mark.x, mark.y) for mark in FastDetector(truth.markers).detect(image)}
+    for name in truth.markers.ids:
+        assert step.chosen == name
+        click_marker(hands, "left", seen[name])
+        assert name in step.gathering.names, step.problem
+    assert step.chosen == SKIN
+    click_marker(hands, "left", (seen["wrist"][0], seen["wrist"][1] + 40.0))
+    simulated_rig.stage.show(HandShow("grasp"))
+    hands.until(lambda: step.view().may_go_on, 90.0)
+    hands.next()
+    solved(hands)
+    hands.next()
+    solved(hands)
+    hands.next()
+    use(hands)
+    saved = simulated_rig.saved.markers
+    for name in ("left", "right"):
+        assert load_settings(simulated_rig.session.directory / f"{name}.node.json").markers == saved
+    found = FastDetector(saved).detect(image)
+    for mark in found:
+        x, y = seen[saved.ids[mark.index]]
+        assert mark.found and np.hypot(mark.x - x, mark.y - y) < 3.0, saved.ids[mark.index]
+    hands.click(hands.window.page.restore_button)
+    hands.until(lambda: hands.sentence == "The old one is back.", 40.0)
+
+
+def test_bones_are_measured(simulated_rig, open_on_rig):
+    simulated_rig.stage.show(HandShow("sweep"))
+    hands = open_on_rig("bones")
+    hands.next()
+    recorded(hands, 25.0)
+    hands.next()
+    solved(hands)
+    hands.next()
+    use(hands)
+    true, found = (rig.hand.fingers["index"] for rig in (simulated_rig.truth, simulated_rig.saved))
+    assert sum(found.bones_mm) == pytest.approx(sum(true.bones_mm), rel=0.1)
+
+
+def test_filters_are_tuned(simulated_rig, open_on_rig):
+    lazy = OneEuroSettings(min_cutoff_hz=0.05, beta=0.0)
+    simulated_rig.use(msgspec.structs.replace(simulated_rig.truth, filters=FilterSettings(pixel=lazy, position=lazy)))
+    simulated_rig.stage.show(HandShow("still"))
+    hands = open_on_rig("filters")
+    recorded(hands, 12.0)
+    hands.next()
+    simulated_rig.stage.show(HandShow("wave"))
+    recorded(hands, 20.0)
+    hands.next()
+    solved(hands)
+    hands.next()
+    use(hands)
+    saved = simulated_rig.saved.filters
+    assert saved.position.min_cutoff_hz > 0.05 and saved.position.beta > 0.0, "a fast hand is followed"
