@@ -46,13 +46,13 @@ def _no_chessboard(gray: Gray, board: Board) -> str:
 
 def _no_charuco(gray: Gray, board: CharucoBoard) -> str:
     seen = markers_seen(gray, board)
+    if markers_seen(np.ascontiguousarray(gray[:, ::-1]), board) > seen:  # a few are read by chance either way
+        return "the picture is mirrored: its markers can be read only when it is flipped; switch the mirroring off"
     other_layout = replace(board, legacy=not board.legacy)
     if seen >= _FEW_MARKERS and board.layouts_differ and find_charuco(gray, other_layout) is not None:
         other = "the one of OpenCV before 4.6" if not board.legacy else "today's, not the one of OpenCV before 4.6"
         return f"the board's layout is {other}"
     if seen >= _FEW_MARKERS:
-        return (f"{seen} markers of {board.dictionary}, but not as on a board of {board.size_text} squares: are "
-                "squares counted, not corners?")
-    if markers_seen(np.ascontiguousarray(gray[:, ::-1]), board) > seen:
-        return "the picture is mirrored: its markers can be read only when it is flipped; switch the mirroring off"
+        return (f"{seen} markers of {board.dictionary}, but not as on a board of {board.size_text} squares; squares "
+                "are counted, not corners")
     return f"no markers of {board.dictionary}: wrong dictionary, too small (a marker needs 20 pixels), or blurred"
