@@ -53,6 +53,6 @@ def _no_charuco(gray: Gray, board: CharucoBoard) -> str:
         other = "the one of OpenCV before 4.6" if not board.legacy else "today's, not the one of OpenCV before 4.6"
         return f"the board's layout is {other}"
     if seen >= _FEW_MARKERS:
-        return (f"{seen} markers of {board.dictionary}, but not as on a board of {board.size_text} squares; squares "
-                "are counted, not corners")
+        return (f"{seen} markers of {board.dictionary}, but not as on a board of {board.size_text} squares "
+                "(squares counted, not corners)")
     return f"no markers of {board.dictionary}: wrong dictionary, too small (a marker needs 20 pixels), or blurred"
