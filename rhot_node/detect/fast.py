@@ -14,7 +14,7 @@ from rhot_node.detect import measure as m
 from rhot_node.detect.gate import ColourGate, Labels, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
-from rhot_node.detect.light import DEAD_ZONE, Light
+from rhot_node.detect.light import DEAD_ZONE, SWITCHED, Light
 from rhot_node.detect.light_guess import guess_light
 from rhot_node.detect.outline import INTERIOR, OUTSIDE
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
@@ -30,9 +30,8 @@ CANDIDATES = 4  # blobs per marker that are measured until one proves to be pain
 NOISE_START = 1.5  # grey levels of chroma noise, until the first frames have told
 NOISE_MIN = 0.5  # quantisation alone leaves 0.3
 NOISE_GAIN = 0.1
-RECOGNISED = 2  # markers in view that make the light known
-SUDDENLY = 2  # markers fewer than in the last frame: another lamp is likelier than fingers that all close at once
-GUESS_EVERY = 20  # frames without them until the light is guessed anew
+SUDDENLY = 2  # markers fewer in plain view than in the last frame: was a lamp switched?
+GUESS_EVERY = 20  # frames without all markers in plain view until the light is guessed anew
 STEADY = 0.7  # of the light is that of the last frame
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
@@ -46,7 +45,9 @@ class FastDetector:
         self._set = markers
         self._markers = markers.markers
         self._light = Light(markers)
-        self._until_guess = 0
+        self._fresh = True  # no picture has been seen yet
+        self._until_guess = GUESS_EVERY
+        self._plain = 0  # markers in plain view in the last frame
         self._directions = directions(markers)
         self._sector = sector_table(markers)
         self._gate = ColourGate(markers)
@@ -63,8 +64,7 @@ class FastDetector:
         """Forget all tracks and the light: the next frame is searched as a whole."""
         self._forget_tracks()
         self._light.warmth = 0.0
-        self._until_guess = 0
-        self._found = 0
+        self._fresh = True
 
     def paint_colours(self) -> NDArray[np.float64]:
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was found last."""
@@ -88,20 +88,25 @@ class FastDetector:
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """One observation per marker, in the order of the marker set; lost markers are stated as lost."""
         self._fit_scratch(image)
-        if self._until_guess <= 0:
+        if self._fresh:
             guess_light(image, self._light, self._gate, self._set)
             seen = self._find_in_new_light(image)
         else:
             seen = self._find(image)
-            gone = self._found - sum(mark.found for mark in seen)
-            if gone >= SUDDENLY and guess_light(image, self._light, self._gate, self._set):  # somebody switched a lamp
+            if ((self._light_in_doubt(seen) and guess_light(image, self._light, self._gate, self._set))
+                    or self._read_light(seen, STEADY) >= SWITCHED):  # somebody switched a lamp
                 seen = self._find_in_new_light(image)
-            else:
-                self._read_light(seen, STEADY)
-        self._found = sum(mark.found for mark in seen)
-        known = self._found >= min(RECOGNISED, len(seen)) or self._until_guess <= 0
-        self._until_guess = GUESS_EVERY if known else self._until_guess - 1
+        self._fresh, self._plain = False, len(self._plainly(seen))
         return seen
+
+    def _light_in_doubt(self, seen: tuple[MarkerObservation, ...]) -> bool:
+        """Whether markers went out of plain view together, or some have not been in plain view for a while."""
+        plain = len(self._plainly(seen))
+        self._until_guess -= 1
+        doubt = self._plain - plain >= SUDDENLY or self._until_guess <= 0
+        if doubt or plain == len(seen):
+            self._until_guess = GUESS_EVERY
+        return doubt and plain < len(seen)
 
     def _find_in_new_light(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """Find the markers, read the light from them, and find them again in that."""
@@ -112,10 +117,14 @@ class FastDetector:
                 break
         return seen
 
+    def _plainly(self, seen: tuple[MarkerObservation, ...]) -> list[int]:
+        """Indices of the markers that are in plain view, so that their paint's colour can be relied on."""
+        return [mark.index for mark in seen if mark.found and not mark.flags & DOUBTFUL
+                and self._paint_pixels[mark.index] >= PAINT_PIXELS_MIN]
+
     def _read_light(self, seen: tuple[MarkerObservation, ...], steady: float) -> float:
         """Take the light from the markers that are plainly seen; returns by how much its warmth changed."""
-        plain = [mark.index for mark in seen if mark.found and not mark.flags & DOUBTFUL
-                 and self._paint_pixels[mark.index] >= PAINT_PIXELS_MIN]
+        plain = self._plainly(seen)
         return self._light.read(plain, self._paint[plain], steady)
 
     def _find(self, camera_image: YuvImage) -> tuple[MarkerObservation, ...]:

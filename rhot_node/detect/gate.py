@@ -40,14 +40,14 @@ class ColourGate:
         label_plane(image.y, image.u, image.v, self.table, self.luma_limits, out)
         return out
 
-    def blobs(self, image: YuvImage, indices: list[int] | range) -> NDArray[np.float64]:
+    def blobs(self, image: YuvImage, indices: list[int] | range, area_min: int = AREA_MIN) -> NDArray[np.float64]:
         """(N, 10) blobs of the markers `indices`, columns as in rhot_node.detect.search; a view, valid until the next.
 
-        A blob has at least AREA_MIN chroma pixels.
+        A blob has at least `area_min` chroma pixels.
         """
         wanted = np.zeros(len(self.luma_limits) + 1, dtype=np.bool_)
         wanted[np.asarray(indices, dtype=np.intp) + 1] = True
-        return self._searcher.find(image.y, image.u, image.v, wanted, AREA_MIN)
+        return self._searcher.find(image.y, image.u, image.v, wanted, area_min)
 
 
 def merits(blobs: NDArray[np.float64], chroma: ChromaModel, shape: tuple[int, int]) -> NDArray[np.float64]:

@@ -30,6 +30,8 @@ WARMTH_SIGMA = 0.35  # how far lights are from the light of the calibration
 HUE_SIGMA_DEG = 3.0  # how well a paint's hue is known
 HUE_CAP_DEG = 15.0  # a marker that is further off is not itself, and counts no more than this
 INFORMATION_LEAST = 50.0  # 1 / variance of a warmth that is worth as much as the last known one
+INFORMATION_SURE = 300.0  # the same of a warmth known to 0.06
+SWITCHED = 0.12  # of warmth in one frame: no lamp drifts so fast
 MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
 
 RGB_FROM_YCC = np.array([[1.0, 0.0, 1.402], [1.0, -0.344136, -0.714136], [1.0, 1.772, 0.0]])
@@ -83,14 +85,16 @@ class Light:
     def read(self, indices: list[int], colours: Array, steady: float = 0.0) -> float:
         """Read the light from the paint of the markers `indices`, (N, 3) Y, Cb, Cr as the camera shows them.
 
-        `steady`, 0 to 1: how much the last known light counts; it also counts as far as the colours tell nothing.
-        Returns by how much the warmth changed.
+        `steady`, 0 to 1: how much the last known light counts; it also counts as far as the colours tell nothing. It
+        does not count when they plainly tell of a lamp that was switched. Returns by how much the warmth changed.
         """
         strong = np.hypot(colours[:, 1], colours[:, 2]) >= MAGNITUDE_MIN
         if not strong.any():
             return 0.0
         hues = np.degrees(np.arctan2(colours[strong, 2], colours[strong, 1]))
         fitted, information = fit_warmth(hues, self._hues[np.asarray(indices)[strong]], self._grid)
+        if abs(fitted - self.warmth) >= SWITCHED and information >= INFORMATION_SURE:
+            steady = 0.0
         change = (1.0 - steady) * information / (information + INFORMATION_LEAST) * (fitted - self.warmth)
         self.warmth += change
         return abs(change)

@@ -18,6 +18,7 @@ HUE_SIGMA_DEG = 6.0  # what a guess half a step beside the light leaves
 COMPACT = 0.5  # of the bounding box: a marker fills as much
 MARKERS_LEAST = 3  # that must be recognised for another light to be believed
 ADVANTAGE = 1.0  # markers more than in the last known light
+AREA_MIN = 3  # pixels of every other chroma row and column, which are enough to guess by
 ALL_THERE = 0.75  # of the greatest score: no other light can be much better
 
 
@@ -28,6 +29,7 @@ def guess_light(image: YuvImage, light: Light, gate: ColourGate, markers: Marker
     """
     if len(markers.markers) < MARKERS_LEAST:
         return False
+    image = _every_other(image)
     present = light.warmth
     scores = _scores(light.balanced(image), gate, markers)
     if scores.sum() >= ALL_THERE * len(markers.markers):
@@ -42,9 +44,16 @@ def guess_light(image: YuvImage, light: Light, gate: ColourGate, markers: Marker
     return best != present
 
 
+def _every_other(image: YuvImage) -> YuvImage:
+    """Every other row and column of the chroma planes, with the luma that belongs to them."""
+    rows, columns = (np.arange(0, size, 2)[:, None] for size in image.u.shape)
+    luma = image.y[np.ix_((2 * rows + (0, 1)).ravel(), (2 * columns + (0, 1)).ravel())]
+    return YuvImage(luma, np.ascontiguousarray(image.u[::2, ::2]), np.ascontiguousarray(image.v[::2, ::2]))
+
+
 def _scores(image: YuvImage, gate: ColourGate, markers: MarkerSet) -> NDArray[np.float64]:
     """(M,) 0..1: how well each marker's best blob has its hue, as far as it is compact."""
-    blobs = gate.blobs(image, range(len(markers.markers)))
+    blobs = gate.blobs(image, range(len(markers.markers)), AREA_MIN)
     box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)
     compact = np.minimum(blobs[:, AREA] / (COMPACT * box), 1.0)
     hues = np.arctan2(blobs[:, SUM_V], blobs[:, SUM_U])
