@@ -15,7 +15,7 @@ LOOK_NS = 95_000_000  # the status comes every 100 ms
 JUDGE_NS = 2_000_000_000
 
 UNCALIBRATED = Advice("info", "Distances are estimates: the rig finds them from disparity, without a calibration. Put "
-                              "the cameras together with a board (Calibrate menu) for exact ones.")
+                              "the cameras together with a board (Calibrate menu) for exact ones.", "stereo")
 
 
 class HealthWatch:
@@ -41,7 +41,8 @@ class HealthWatch:
             self._look(state, tracker)
         if now_ns - self._judged_ns >= JUDGE_NS:
             self._judged_ns = now_ns
-            self._advice = [Advice("error" if found.finding.grade is Grade.POOR else "warning", found.finding.sentence)
+            self._advice = [Advice("error" if found.finding.grade is Grade.POOR else "warning", found.finding.sentence,
+                                   found.mender)
                             for found in self._monitor.findings()]
         return [*self._advice, *self._always]
 

@@ -28,10 +28,12 @@ class NodeStatus:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """One sentence for the operator: what is wrong, where, and what to do."""
+    """One sentence for the operator: what is wrong, where, and what to do. `mender` names the calibration that
+    mends it, as of ``rhot calibrate``; empty for none."""
 
     level: Literal["info", "warning", "error"]
     text: str
+    mender: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from rhot_app.ui.settings import Settings
 from rhot_app.ui.theme import scheme_named
 from rhot_app.ui.voice import look_of, notices_of
 from rhot_app.ui.welcome import WelcomePage
-from rhot_app.ui.wizards.catalogue import WIZARDS
+from rhot_app.ui.wizards.catalogue import OPEN_WIZARD, WIZARDS, wizard_named
 from rhot_app.ui.wizards.launcher import Launcher
 
 TICK_MS = 16
@@ -205,7 +205,10 @@ class MainWindow(QMainWindow):
 
     def _act(self, key: str) -> None:
         """The button of a sentence."""
-        if key == SHOW_FOLDER:
+        wizard = wizard_named(key.removeprefix(OPEN_WIZARD)) if key.startswith(OPEN_WIZARD) else None
+        if wizard is not None:
+            self.wizards.open(wizard)
+        elif key == SHOW_FOLDER:
             self.recordings.show_folder()
         else:
             self.controller.act(key)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rhot_app.engine.status import Advice
 from rhot_app.ui.backend.session import TwinPace
 from rhot_app.ui.controller import RESTART_ENGINE, RESTART_TWIN, Controller
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look
+from rhot_app.ui.wizards.catalogue import OPEN_WIZARD, wizard_named
 
 
 def look_of(controller: Controller) -> Look:
@@ -41,12 +43,20 @@ def _lasting_notices(controller: Controller) -> list[Notice]:
         notices.append(Notice("info", "This engine was started outside the app; closing the app lets it run on."))
     status = controller.live.status
     if status is not None and not controller.engine_gone:
-        notices += [Notice(advice.level, advice.text) for advice in status.advice]
+        notices += [_advice_notice(advice) for advice in status.advice]
         if status.log_path:
             notices.append(Notice("info", f"Recording to {status.log_path} ({bytes_text(status.log_bytes)})."))
     if controller.twin_pace is not None and controller.running:
         notices.append(_pace_notice(controller.twin_pace))
     return notices
+
+
+def _advice_notice(advice: Advice) -> Notice:
+    """The engine's sentence, with the wizard that mends it as a button."""
+    wizard = wizard_named(advice.mender)
+    if wizard is None:
+        return Notice(advice.level, advice.text)
+    return Notice(advice.level, advice.text, f"{wizard.title} …", f"{OPEN_WIZARD}{wizard.module}")
 
 
 def _pace_notice(pace: TwinPace) -> Notice:

@@ -17,6 +17,7 @@ from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.panels.empty_state import EmptyState
+from rhot_app.ui.tag import paint_tag
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -123,7 +124,7 @@ class CameraView(QWidget):
         if self.named:
             self._paint_names(painter, places, target.size())
         else:
-            self._paint_tag(painter, QPointF(6, 6), self.name, bold=True)
+            paint_tag(painter, QPointF(6, 6), self.name, bold=True)
         painter.translate(-target.topLeft())
         if self._image.isNull():
             painter.setPen(QColor(self._scheme.muted))
@@ -150,19 +151,7 @@ class CameraView(QWidget):
             for anchor, box in zip(anchors, boxes, strict=True):
                 painter.drawLine(QPointF(*anchor), QPointF(*box.nearest(anchor)))
         for mark, box in zip(self._marks, boxes, strict=True):
-            self._paint_tag(painter, QPointF(box.x, box.y), mark.name)
-
-    def _paint_tag(self, painter: QPainter, corner: QPointF, text: str, *, bold: bool = False) -> None:
-        font = painter.font()
-        font.setBold(bold)
-        painter.setFont(font)
-        metrics = QFontMetricsF(font)
-        box = QRectF(corner.x(), corner.y(), metrics.horizontalAdvance(text) + 8, metrics.height() + 2)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(0, 0, 0, 150))
-        painter.drawRoundedRect(box, 3, 3)
-        painter.setPen(QColor("#ffffff"))
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+            paint_tag(painter, QPointF(box.x, box.y), mark.name)
 
 
 class CameraPanel(QWidget):

@@ -30,6 +30,9 @@ class Wizard:
         return plan
 
 
+OPEN_WIZARD = "wizard "
+"""A notice's key that opens the wizard whose module it names."""
+
 WIZARDS: tuple[Wizard, ...] = (
     Wizard("camera", "Set the cameras", "Exposure, gains, white balance: what each camera is told, tried out live.",
            "camera settings"),
@@ -47,3 +50,8 @@ WIZARDS: tuple[Wizard, ...] = (
     Wizard("filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
            "filter tuning"),
 )
+
+
+def wizard_named(module: str) -> Wizard | None:
+    """The wizard of that module; None when there is none."""
+    return next((wizard for wizard in WIZARDS if wizard.module == module), None)

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF
+from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
 
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.tag import paint_tag
 from rhot_app.ui.wizards.models.drawing import Array, Cells, Dots, Layer, Line, Mark, Overlay, Tag
 
 _CELL_ALPHA = 60
@@ -55,20 +56,6 @@ def paint_overlay(painter: QPainter, overlay: Overlay, place: Place, scheme: Sch
     for mark in overlay:
         _paint(painter, mark, place, scheme)
     painter.restore()
-
-
-def paint_tag(painter: QPainter, corner: QPointF, text: str, *, bold: bool = False) -> None:
-    """A word on a dark ground."""
-    font = painter.font()
-    font.setBold(bold)
-    painter.setFont(font)
-    metrics = QFontMetricsF(font)
-    box = QRectF(corner.x(), corner.y(), metrics.horizontalAdvance(text) + 8, metrics.height() + 2)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(0, 0, 0, 150))
-    painter.drawRoundedRect(box, 3, 3)
-    painter.setPen(QColor("#ffffff"))
-    painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
 
 def _paint(painter: QPainter, mark: Mark, place: Place, scheme: Scheme) -> None:

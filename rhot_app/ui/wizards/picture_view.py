@@ -10,10 +10,11 @@ from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPen, QResizeEv
 from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.tag import paint_tag
 from rhot_app.ui.wizards.feed import LiveFeed, Picture
 from rhot_app.ui.wizards.models.drawing import Overlay
 from rhot_app.ui.wizards.models.step import StepView
-from rhot_app.ui.wizards.picture_painter import Place, fit, paint_overlay, paint_tag
+from rhot_app.ui.wizards.picture_painter import Place, fit, paint_overlay
 
 FLASH_S = 0.25
 """How long the frame lights up when a picture was kept: long enough to be seen from two metres."""

@@ -15,10 +15,11 @@ from wizard_hands import Hands
 from wizard_rig import FakeRigAsker
 
 from rhot_app import rig_history
+from rhot_app.engine.status import Advice
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui import actions, main_window
 from rhot_app.ui.backend.session import Opened
-from rhot_app.ui.wizards import launcher
+from rhot_app.ui.wizards import catalogue, launcher
 from rhot_app.ui.wizards.catalogue import Wizard
 from rhot_app.ui.wizards.models.rig_rows import rig_rows
 
@@ -93,6 +94,17 @@ def test_a_wizard_that_cannot_open_says_why(bench):
     bench.window.actions_.wizards[0].trigger()
     bench.until(lambda: "The engine does not answer." in bench.window.advice.texts)
     assert bench.window.wizards.wizard is None
+
+
+def test_a_stale_calibration_offers_the_wizard_that_mends_it(bench, monkeypatch):
+    monkeypatch.setattr(catalogue, "WIZARDS", SAMPLE)
+    bench.backend.engine.advice = (Advice("warning", "The cameras' rays miss each other.", "sample"),)
+    bench.until(lambda: bench.window.advice.texts == ["The cameras' rays miss each other."])
+    button = next(button for _, _, _, button in bench.window.advice._lines if button.isVisible())
+    assert button.text() == "Sample …"
+    bench.click(button)
+    bench.until(lambda: bench.window.wizards.wizard is not None)
+    assert bench.window.wizards.wizard.plan.title == "Sample"
 
 
 def test_closing_the_app_ends_an_open_wizard_without_a_question(bench):
