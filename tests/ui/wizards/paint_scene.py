@@ -13,7 +13,7 @@ from rhot_node.markers import MarkerSet, load_markers
 
 BESIDE = (-14.0, 0.0)  # the second camera sees everything there
 STEPS = 12
-_MOVE_PX = 9.0  # from picture to picture: another place for every marker
+_MOVE_PX = 9.0  # down from picture to picture, and as much to and fro: another place for every marker
 
 
 class PaintScene:
@@ -27,7 +27,7 @@ class PaintScene:
 
     @staticmethod
     def _shift(node_id: int, step: int) -> tuple[float, float]:
-        return (BESIDE[0] if node_id == 2 else 0.0), _MOVE_PX * step
+        return (BESIDE[0] if node_id == 2 else 0.0) + _MOVE_PX * (step % 2), _MOVE_PX * step
 
     def draw(self, node_id: int, t_s: float) -> np.ndarray:
         """The picture of a node at a time."""

@@ -80,7 +80,7 @@ def test_from_clicks_to_a_rig_and_nodes_with_the_new_colours(hands, scene):
     click_at(hands, "right", x - 14.0 - 4, y + 40, to=(x - 14.0 + 4, y + 60))
     assert len(hands.window.step.gathering.skin) >= 40
     scene.moving = True
-    hands.until(lambda: hands.window.step.view().done, timeout_s=100.0)
+    hands.until(lambda: hands.window.step.view().done, timeout_s=40.0)
     page = hands.window.page
     assert [page.list.item(row, 1).text() for row in range(7)] == [*PAINTS, SKIN]
     assert int(page.list.item(0, 2).text()) >= 10
