@@ -80,13 +80,23 @@ class GuideViewer(QDialog):
         outer.addLayout(layout)
         QShortcut(QKeySequence("F1"), self, self.close)
 
-    def open_page(self, name: str) -> None:
-        """Show a page and bring the viewer to the front."""
+    def open_page(self, name: str, section: str = "") -> None:
+        """Show a page, from the heading `section` on if there is one, and bring the viewer to the front."""
         names = [page for page, _ in PAGES]
         self.list.setCurrentRow(names.index(name) if name in names else 0)
         self.show()
         self.raise_()
         self.activateWindow()
+        self._scroll_to(section)
+
+    def _scroll_to(self, section: str) -> None:
+        document = self.browser.document()
+        block = document.begin()
+        while block.isValid():
+            if block.blockFormat().headingLevel() and block.text() == section:
+                self.browser.verticalScrollBar().setValue(round(document.documentLayout().blockBoundingRect(block).top()))
+                return
+            block = block.next()
 
     @property
     def page(self) -> str:

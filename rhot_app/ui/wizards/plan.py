@@ -32,7 +32,8 @@ class Kit:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A wizard ready to be shown: its pages in order, the last one an `AcceptPage`. `guide` is its page in the guide;
+    """A wizard ready to be shown: its pages in order, the last one an `AcceptPage`. `guide` is its page in the guide,
+    where a section has the wizard's title;
     `solver` a module that the solving process should import in good time; `put_back` undoes in a worker what the wizard
     has tried out, when it is closed without being used."""
 

@@ -220,10 +220,10 @@ class WizardWindow(QDialog):
             self._page_changed()
 
     def open_guide(self) -> None:
-        """This wizard's page of the guide, beside it."""
+        """This wizard's section of the guide, beside it."""
         if self._guide is None:
             self._guide = GuideViewer(self)
-        self._guide.open_page(self.plan.guide)
+        self._guide.open_page(self.plan.guide, self.plan.title)
 
     # -- the end ---------------------------------------------------------------------------------------------------
 

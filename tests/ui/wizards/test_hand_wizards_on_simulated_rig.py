@@ -45,10 +45,17 @@ def test_the_time_of_the_cameras_is_found(simulated_rig, open_on_rig):
     simulated_rig.use(msgspec.structs.replace(truth, nodes=(truth.nodes[0], late)))
     simulated_rig.stage.show(HandShow("wave"))
     hands = open_on_rig("time")
-    recorded(hands, 15.0)
+    hands.window.page.movement.seconds = 15.0
+    hands.key(Qt.Key.Key_Space)
+    hands.until(lambda: hands.window.page.movement.phase == "recording")
+    hands.run(4.0)
+    hands.keep("time-wave")
+    hands.until(lambda: hands.window.page.movement.phase == "recorded", 45.0)
     hands.next()
     solved(hands)
+    hands.keep("time-result")
     hands.next()
+    hands.keep("time-accept", 8)
     use(hands)
     assert simulated_rig.saved.nodes[1].time_offset_s == pytest.approx(0.0, abs=0.003)
 
@@ -66,9 +73,12 @@ def test_depth_is_found_without_a_board(simulated_rig, open_on_rig):
             if len(page.distances.rows) == number:
                 break
         assert len(page.distances.rows) == number, hands.window.frame.hint.text()
+    hands.keep("depth-measure")
     hands.next()
     hands.until(lambda: hands.window.frame.verdict.verdict is not None)
+    hands.keep("depth-law")
     hands.next()
+    hands.keep("depth-accept", 8)
     use(hands)
     left, right = simulated_rig.truth.nodes
     baseline_m = float(np.linalg.norm(np.subtract(right.pose.translation_m, left.pose.translation_m)))

@@ -15,7 +15,9 @@ from wizard_rig import FakeMemory, FakeRigAsker
 
 from rhot_app import rig_history
 from rhot_app.project import load_rig, save_rig
+from rhot_app.ui.guide import page_path
 from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.catalogue import WIZARDS
 from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.window import WizardWindow
 
@@ -164,11 +166,19 @@ def test_a_failure_to_save_is_said_and_changes_nothing(open_wizard, asker):
     assert load_rig(hands.path).name == "test bench" and hands.window.step.usable
 
 
+def test_every_wizard_has_its_section_in_the_guide():
+    headings = [line.removeprefix("## ") for line in page_path("calibration").read_text().splitlines()]
+    assert [heading for heading in headings if heading in {wizard.title for wizard in WIZARDS}] == [
+        wizard.title for wizard in WIZARDS], "in the order of the menu"
+
+
 def test_f1_opens_the_guide_beside_the_wizard(open_wizard):
     hands = open_wizard()
     hands.key(Qt.Key.Key_F1)
     hands.until(lambda: hands.window._guide is not None and hands.window._guide.isVisible())
     assert hands.window._guide.page == "calibration"
+    hands.window._guide.open_page("calibration", "Put the cameras together")
+    assert hands.window._guide.browser.verticalScrollBar().value() > 500
     hands.window._guide.close()
 
 
