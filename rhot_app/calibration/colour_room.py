@@ -14,7 +14,7 @@ from rhot_node.detect.colour import Colours, colours_of
 from rhot_node.detect.gate import ColourGate, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.search import AREA, SUM_X, SUM_Y
-from rhot_node.detect.whereabouts import Whereabouts, whereabouts
+from rhot_node.detect.whereabouts import Whereabouts, middle_of
 from rhot_node.markers import MarkerSet
 
 HUE_STEP_DEG = 5
@@ -125,8 +125,8 @@ def _rival(gate: ColourGate, markers: MarkerSet, index: int, name: str, view: Vi
 def _hand(view: View, worn: list[str]) -> Whereabouts | None:
     """Where the hand is, by the worn markers that are known in the picture."""
     regions = [region for name, region in view.paint.items() if name in worn]
-    places = [np.argwhere(region.sample).mean(axis=0)[::-1] for region in regions]
-    return whereabouts(np.array(places), np.array([region.area for region in regions]))
+    middles = [np.argwhere(region.sample).mean(axis=0) for region in regions]
+    return middle_of([(x, y, region.area) for (y, x), region in zip(middles, regions, strict=True)])
 
 
 def _hue_bins() -> NDArray[np.uint8]:

@@ -15,11 +15,11 @@ from rhot_node.detect.gate import ColourGate, Labels, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
 from rhot_node.detect.light import DEAD_ZONE, SWITCHED, Light
-from rhot_node.detect.light_guess import guess_light
+from rhot_node.detect.light_guess import MARKERS_LEAST, guess_light
 from rhot_node.detect.outline import INTERIOR, OUTSIDE
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
 from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, Track, lost_observation
-from rhot_node.detect.whereabouts import Whereabouts, whereabouts
+from rhot_node.detect.whereabouts import Whereabouts, middle_of
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
@@ -32,7 +32,7 @@ NOISE_MIN = 0.5  # quantisation alone leaves 0.3
 NOISE_GAIN = 0.1
 SUDDENLY = 2  # markers fewer in plain view than in the last frame: was a lamp switched?
 GUESS_EVERY = 20  # frames without all markers in plain view until the light is guessed anew
-STEADY = 0.7  # of the light is that of the last frame
+STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
@@ -125,6 +125,8 @@ class FastDetector:
     def _read_light(self, seen: tuple[MarkerObservation, ...], steady: float) -> float:
         """Take the light from the markers that are plainly seen; returns by how much its warmth changed."""
         plain = self._plainly(seen)
+        if len(plain) < MARKERS_LEAST:
+            steady = STEADY_FEW  # things of a marker's colour must not tell the light
         return self._light.read(plain, self._paint[plain], steady)
 
     def _find(self, camera_image: YuvImage) -> tuple[MarkerObservation, ...]:
@@ -235,12 +237,12 @@ class FastDetector:
             if self._markers[index].role is not None and own.any():
                 blob = blobs[own][int(np.argmax(worth[own]))]
                 worn.append((blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA]))
-        return _middle(worn)
+        return middle_of(worn)
 
     def _strays(self, found: dict[int, MarkerObservation]) -> list[int]:
         """Tracked worn markers that no hand can wear together with the others."""
         worn = [index for index in found if self._markers[index].role is not None]
-        hand = _middle([(self._tracks[index].x, self._tracks[index].y, self._tracks[index].area) for index in worn])
+        hand = middle_of([(self._tracks[index].x, self._tracks[index].y, self._tracks[index].area) for index in worn])
         if hand is None:
             return []
         return [index for index in worn if hand.beyond(self._tracks[index].x, self._tracks[index].y)]
@@ -270,9 +272,3 @@ class FastDetector:
         request[m.LEVEL_REF] = (blob[SUM_U] * direction[0] + blob[SUM_V] * direction[1]) / area
         request[m.IS_BAND] = self._markers[index].shape == "band"
         return request
-
-
-def _middle(worn: list[tuple[float, float, float]]) -> Whereabouts | None:
-    """Of worn markers (x, y, area)."""
-    places = np.array(worn).reshape(-1, 3)
-    return whereabouts(places[:, :2], places[:, 2])

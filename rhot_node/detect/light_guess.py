@@ -10,16 +10,19 @@ from numpy.typing import NDArray
 from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.light import WARMTH_MOST, Light
-from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, X_MAX, X_MIN, Y_MAX, Y_MIN
+from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
+from rhot_node.detect.whereabouts import middle_of
 from rhot_node.markers import MarkerSet
 
 GUESSES = np.arange(-6, 7) * (WARMTH_MOST / 6.5)
 HUE_SIGMA_DEG = 6.0  # what a guess half a step beside the light leaves
 COMPACT = 0.5  # of the bounding box: a marker fills as much
+RECOGNISED = 0.25  # score of a marker
 MARKERS_LEAST = 3  # that must be recognised for another light to be believed
 ADVANTAGE = 1.0  # markers more than in the last known light
 AREA_MIN = 3  # pixels of every other chroma row and column, which are enough to guess by
-ALL_THERE = 0.75  # of the greatest score: no other light can be much better
+SIZE_SIGMA = 1.2  # of the logarithm of areas: a wrist band is 6 times as large as a fingertip
+ALL_THERE = 0.6  # of the greatest score: no other light can be much better
 
 
 def guess_light(image: YuvImage, light: Light, gate: ColourGate, markers: MarkerSet) -> bool:
@@ -38,7 +41,7 @@ def guess_light(image: YuvImage, light: Light, gate: ColourGate, markers: Marker
     for guess in GUESSES:
         light.warmth = float(guess)
         scores = _scores(light.balanced(image), gate, markers)
-        if scores.sum() > best_score and np.count_nonzero(scores > 0.3) >= MARKERS_LEAST:
+        if scores.sum() > best_score and np.count_nonzero(scores > RECOGNISED) >= MARKERS_LEAST:
             best, best_score = light.warmth, float(scores.sum())
     light.warmth = best
     return best != present
@@ -52,15 +55,26 @@ def _every_other(image: YuvImage) -> YuvImage:
 
 
 def _scores(image: YuvImage, gate: ColourGate, markers: MarkerSet) -> NDArray[np.float64]:
-    """(M,) 0..1: how well each marker's best blob has its hue, as far as it is compact."""
+    """(M,) 0..1: how well each marker's best blob has its hue, as far as it is compact and near the others."""
     blobs = gate.blobs(image, range(len(markers.markers)), AREA_MIN)
     box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)
     compact = np.minimum(blobs[:, AREA] / (COMPACT * box), 1.0)
     hues = np.arctan2(blobs[:, SUM_V], blobs[:, SUM_U])
-    scores = np.zeros(len(markers.markers))
+    scores, worn, places = np.zeros(len(markers.markers)), [], []
     for index, marker in enumerate(markers.markers):
         own = blobs[:, LABEL] == index + 1
         if own.any():
             away = np.degrees(np.remainder(hues[own] - marker.chroma.hue_rad + math.pi, 2.0 * math.pi) - math.pi)
-            scores[index] = np.max(compact[own] * np.exp(-0.5 * (away / HUE_SIGMA_DEG) ** 2))
+            merit = compact[own] * np.exp(-0.5 * (away / HUE_SIGMA_DEG) ** 2)
+            best = int(np.argmax(merit))
+            scores[index] = merit[best]
+            if marker.role is not None:
+                blob = blobs[own][best]
+                worn.append(index)
+                places.append((blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA]))
+    middle = middle_of(places)
+    if middle is not None:
+        x, y, area = np.array(places).T
+        alike = np.exp(-0.5 * (np.log(area / middle.side**2) / SIZE_SIGMA) ** 2)
+        scores[worn] *= middle.nearness(x, y) * alike
     return scores

@@ -5,6 +5,7 @@ All coordinates are chroma pixels.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,9 +37,9 @@ class Whereabouts:
         return bool(np.hypot(x - self.x, y - self.y) > BEYOND * self.side)
 
 
-def whereabouts(places: Array, areas: Array) -> Whereabouts | None:
-    """Of markers at `places` (N, 2) with `areas` (N,); None for less than MARKERS_LEAST. Few wrong ones do no harm."""
-    if len(places) < MARKERS_LEAST:
+def middle_of(markers: Sequence[tuple[float, float, float]]) -> Whereabouts | None:
+    """Of markers (x, y, area); None for less than MARKERS_LEAST. A few wrong ones do no harm."""
+    if len(markers) < MARKERS_LEAST:
         return None
-    x, y = np.median(places, axis=0)
-    return Whereabouts(float(x), float(y), float(np.median(np.sqrt(areas))))
+    x, y, area = np.median(np.array(markers), axis=0)
+    return Whereabouts(float(x), float(y), float(np.sqrt(area)))

@@ -7,7 +7,7 @@ import pytest
 from marker_rendering import Canvas, disc
 
 from rhot_node.detect.fast import FastDetector
-from rhot_node.detect.whereabouts import FAR, whereabouts
+from rhot_node.detect.whereabouts import FAR, middle_of
 from rhot_node.files import resource_path
 from rhot_node.markers import Marker, MarkerSet, load_markers
 
@@ -50,12 +50,13 @@ def test_markers_that_no_hand_wears_may_be_anywhere() -> None:
 
 
 def test_the_middle_and_the_size_bear_a_few_wrong_markers() -> None:
-    places = np.array([(100.0, 100.0), (110.0, 100.0), (105.0, 95.0), (104.0, 108.0), (900.0, 20.0)])
-    hand = whereabouts(places, np.array([50.0, 49.0, 64.0, 50.0, 4000.0]))
+    markers = [
+        (100.0, 100.0, 50.0), (110.0, 100.0, 49.0), (105.0, 95.0, 64.0), (104.0, 108.0, 50.0), (900.0, 20.0, 4e3)]
+    hand = middle_of(markers)
     assert hand is not None
     assert (hand.x, hand.y) == (105.0, 100.0)
     assert hand.side == pytest.approx(7.07, abs=0.01)
     near, far = hand.nearness(np.array([105.0, 900.0]), np.array([110.0, 20.0]))
     assert near > 0.9 and far == FAR
     assert hand.beyond(900.0, 20.0) and not hand.beyond(105.0, 160.0)
-    assert whereabouts(places[:2], np.ones(2)) is None
+    assert middle_of(markers[:2]) is None
