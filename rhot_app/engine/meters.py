@@ -13,6 +13,9 @@ from rhot_app.tracking.state import LATENCY_STAGES
 WINDOW = 600
 """States over which latency is summarised: five seconds at 120 Hz."""
 
+LEAST_S = 0.25
+"""Events of a shorter time come in a burst, as after a start, and tell no rate."""
+
 
 class RateMeter:
     """Events per second over the last second. One thread writes, another may read."""
@@ -33,7 +36,8 @@ class RateMeter:
         # Intervals, not events: a window cut between two events would else flicker by one.
         since_last = now_ns - recent[-1]
         span = recent[-1] - recent[0]
-        return (len(recent) - 1) / (1e-9 * (span + max(0, since_last - span // (len(recent) - 1))))
+        seconds = 1e-9 * (span + max(0, since_last - span // (len(recent) - 1)))
+        return (len(recent) - 1) / max(seconds, LEAST_S)
 
 
 class LatencyMeter:
