@@ -16,7 +16,14 @@ import numpy as np
 
 from rhot_app.calibration.board import Chessboard
 from rhot_app.calibration.corners import detect
+from rhot_app.calibration.filter_simulation import OFF, Footage, simulate
+from rhot_app.calibration.hand_bundle_model import POSE, Poses, linearise
+from rhot_app.calibration.hand_shape import HandUnknowns
+from rhot_app.calibration.marker_places import PALM, MarkerPlace
 from rhot_app.engine.warm_up import warm_up as rehearse_tracker
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.anatomy import load_hand
+from rhot_app.hand.skeleton import ANGLES
 from rhot_app.project import Rig, load_rig
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.simulator.shot import make_renderer, make_shot
@@ -54,8 +61,22 @@ def warm_boards(_rig: Rig) -> None:
     detect(np.pad(np.kron(squares, np.ones((24, 24))).astype(np.uint8), 48, constant_values=230), board, thorough=False)
 
 
+def warm_calibrations(rig: Rig) -> None:
+    """Compile what bones and filters are calibrated with."""
+    hand = load_hand(resource_path("hands", "right.json"))
+    unknowns = HandUnknowns(hand, (MarkerPlace("index", 1, 2, painted=True), MarkerPlace("back", PALM, PALM)))
+    still = Poses(np.eye(4)[None], np.zeros((1, len(ANGLES))))
+    linearise(unknowns, unknowns.prior.mean, still.moved(np.zeros((1, POSE))))
+    models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+    footage = Footage(np.arange(3.0), np.full((3, len(models), 1, 2), 100.0),
+                      np.array([model.intrinsics for model in models]),
+                      np.array([model.camera_from_world[:3] for model in models]),
+                      np.array([model.intrinsics[:2] for model in models]))
+    simulate(footage, np.array([OFF]), np.array([OFF]))
+
+
 STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker, "twin": warm_twin,
-                                           "boards": warm_boards}
+                                           "boards": warm_boards, "calibrations": warm_calibrations}
 
 
 def warm(name: str) -> str:
