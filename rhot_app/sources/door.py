@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from rhot_app.project import Rig, RigNode
 from rhot_app.sources.clock import NodeClockModel
-from rhot_app.sources.sequence import SequenceWindow, Verdict
 from rhot_app.sources.text_frames import TextReader
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import decode
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import Observations
+from rhot_node.wire.sequence import SequenceWindow, Verdict
 
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""

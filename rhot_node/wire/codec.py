@@ -20,6 +20,7 @@ from rhot_node.wire.messages import (
     StartEntry,
     Stop,
 )
+from rhot_node.wire.seal import TAG_LENGTH, Seal
 
 MAGIC = b"RHOT"
 VERSION = 1
@@ -37,6 +38,8 @@ TIME_MAX_NS = 1 << 62  # the difference of two times must fit 64 bits
 FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
 
 _HEADER = Struct("<4sBBHIQI")
+_FLAGS_AT = 6  # offset of the header's flags
+_TAGGED = FLAG_TAGGED.to_bytes(2, "little")
 _OBSERVATIONS = Struct("<qqIIIHHIIB3s")
 _MARKER = Struct("<HHfffffff")
 _CLOCK_REQUEST = Struct("<q")
@@ -44,55 +47,106 @@ _CLOCK_REPLY = Struct("<qqqIB3s")
 _START = Struct("<B3s")
 _START_ENTRY = Struct("<IHHq")
 
+Datagram = bytes | bytearray | memoryview
+
 _ZEROS = b"\0\0\0"
 _LOST = int(MarkerFlag.LOST)
 _STATES = {int(state): state for state in NodeState}
 
 
-def encode(message: Message) -> bytes:
-    """The datagram that says `message`.
+def encode(message: Message, seal: Seal | None = None) -> bytes:
+    """The datagram that says `message`, tagged by `seal` if there is one.
 
     Raises WireError 'range' when a value does not fit its field. It does not check plausibility: `decode` does.
     """
     try:
-        match message:
-            case Observations():
-                return _encode_observations(message)
-            case ClockRequest():
-                return (_header(TYPE_CLOCK_REQUEST, message.node_id, message.session, message.sequence)
-                        + _CLOCK_REQUEST.pack(message.t1_master_ns))
-            case ClockReply():
-                return (_header(TYPE_CLOCK_REPLY, message.node_id, message.session, message.sequence)
-                        + _CLOCK_REPLY.pack(message.t1_master_ns, message.t2_node_ns, message.t3_node_ns,
-                                            message.boot_id, message.state, _ZEROS))
-            case Start():
-                return _encode_start(message)
-            case Stop():
-                return _header(TYPE_STOP, 0, message.session, message.sequence)
+        plain = _encode(message)
     except (struct_error, OverflowError) as exc:
         raise WireError("range", f"{type(message).__name__}: {exc}") from exc
+    if seal is None:
+        return plain
+    covered = b"".join((plain[:_FLAGS_AT], _TAGGED, plain[_FLAGS_AT + len(_TAGGED):]))
+    return covered + seal.tag(covered)
 
 
-def decode(data: bytes | bytearray | memoryview) -> Message:
-    """The message of one datagram. Raises WireError, and nothing else, whatever the bytes are.
+def decode(data: Datagram) -> Message:
+    """The message of one untagged datagram. Raises WireError, and nothing else, whatever the bytes are.
 
-    Reasons: length, magic, version, tag, flags, type, header, reserved, count, index, time, size, marker, range.
+    Reasons: length, magic, version, flags, tag (there is one, but no key), type, header, reserved, count, index, time,
+    size, marker, range.
     """
+    if is_tagged(data):
+        raise WireError("tag", "tagged, but no key is known")
+    return _decode_body(data, memoryview(data)[_HEADER.size:])
+
+
+def decode_sealed(data: Datagram, seal: Seal) -> Message:
+    """The message of one datagram that `seal` tagged. Nothing behind the flags is looked at before the tag is verified.
+
+    Raises WireError like `decode`; 'untagged' without a tag, 'tag' when it is another key's or the bytes were changed.
+    """
+    if not is_tagged(data):
+        raise WireError("untagged", "no tag where one is required")
+    if not seal.verifies(data):
+        raise WireError("tag", "the tag is not that of this key and these bytes")
+    return _decode_body(data, memoryview(data)[_HEADER.size:-TAG_LENGTH])
+
+
+def decode_verified(data: Datagram) -> Message:
+    """The message of one datagram whose tag, if any, was verified before: by the caller, or when it was recorded.
+
+    Raises WireError like `decode`; never for what comes straight from a network.
+    """
+    body = memoryview(data)[_HEADER.size:]
+    return _decode_body(data, body[:-TAG_LENGTH] if is_tagged(data) else body)
+
+
+def node_of(data: Datagram) -> int:
+    """The node that a datagram claims to be of, to find the key to verify it with. Raises WireError 'length'."""
     if len(data) < _HEADER.size:
         raise WireError("length", f"{len(data)} bytes, a header has {_HEADER.size}")
-    magic, version, kind, flags, node_id, session, sequence = _HEADER.unpack_from(data)
+    return int(_HEADER.unpack_from(data)[4])
+
+
+def is_tagged(data: Datagram) -> bool:
+    """Whether the datagram has a tag and room for it. Raises WireError when it is none of ours."""
+    if len(data) < _HEADER.size:
+        raise WireError("length", f"{len(data)} bytes, a header has {_HEADER.size}")
+    magic, version, _, flags, _, _, _ = _HEADER.unpack_from(data)
     if magic != MAGIC:
         raise WireError("magic", repr(magic))
     if version != VERSION:
         raise WireError("version", f"{version}, this program speaks {VERSION}")
     if flags & ~FLAG_TAGGED:
         raise WireError("flags", f"unknown header flags {flags:#06x}")
-    if flags & FLAG_TAGGED:
-        raise WireError("tag", "tagged, but no key is known")
+    if flags and len(data) < _HEADER.size + TAG_LENGTH:
+        raise WireError("length", f"{len(data)} bytes, header and tag have {_HEADER.size + TAG_LENGTH}")
+    return bool(flags)
+
+
+def _decode_body(data: Datagram, payload: memoryview) -> Message:
+    _, _, kind, _, node_id, session, sequence = _HEADER.unpack_from(data)
     decoder = _DECODERS.get(kind)
     if decoder is None:
         raise WireError("type", str(kind))
-    return decoder(memoryview(data)[_HEADER.size:], node_id, session, sequence)
+    return decoder(payload, node_id, session, sequence)
+
+
+def _encode(message: Message) -> bytes:
+    match message:
+        case Observations():
+            return _encode_observations(message)
+        case ClockRequest():
+            return (_header(TYPE_CLOCK_REQUEST, message.node_id, message.session, message.sequence)
+                    + _CLOCK_REQUEST.pack(message.t1_master_ns))
+        case ClockReply():
+            return (_header(TYPE_CLOCK_REPLY, message.node_id, message.session, message.sequence)
+                    + _CLOCK_REPLY.pack(message.t1_master_ns, message.t2_node_ns, message.t3_node_ns,
+                                        message.boot_id, message.state, _ZEROS))
+        case Start():
+            return _encode_start(message)
+        case Stop():
+            return _header(TYPE_STOP, 0, message.session, message.sequence)
 
 
 def _header(kind: int, node_id: int, session: int, sequence: int) -> bytes:

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 import msgspec
 
-TAG_LENGTH = 16  # bytes reserved for an authentication tag at the end of a datagram
-
 
 class NodeState(enum.IntEnum):
     """Life of a node: it starts, is ready, streams between start and stop, and says so when something broke."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import random
+import re
 import struct
 import timeit
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from wire_samples import RHOT6_CHECKSUM, SAMPLES, SESSION, SIX, found, lost, observations
+from wire_samples import RHOT6_CHECKSUM, SAMPLES, SESSION, SIX, TAGGED, found, lost, observations
 
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import decode, encode
@@ -61,13 +62,17 @@ def test_golden_packets_byte_for_byte(name: str) -> None:
 
 
 def test_every_golden_packet_has_its_sample() -> None:
-    assert {path.stem for path in PACKETS.glob("*.bin")} == set(SAMPLES)
+    assert {path.stem for path in PACKETS.glob("*.bin")} == {*SAMPLES, *TAGGED}
 
 
 def test_the_document_shows_the_golden_packet() -> None:
     text = (Path(__file__).parents[2] / "docs" / "wire.md").read_text()
-    shown = "".join(line[7:55].replace(" ", "") for line in text.splitlines() if line[:4].isdigit() and line[4] == " ")
-    assert bytes.fromhex(shown) == packet("observations_two")
+    dumps = {name: section.split("```")[1] for name, section in re.findall(
+        r"`tests/packets/(\w+)\.bin`:\n\n(```\n.*?```)", text, re.DOTALL)}
+    assert set(dumps) == {"observations_two", "tagged_stop"}
+    for name, dump in dumps.items():
+        shown = "".join(line[7:55].replace(" ", "") for line in dump.splitlines() if line[:4].isdigit())
+        assert bytes.fromhex(shown) == packet(name)
 
 
 Fault = tuple[int, str, tuple[float | bytes], str]

@@ -59,3 +59,7 @@ SAMPLES: dict[str, Message] = {
     "stop": Stop(SESSION, 5),
     "stop_any": Stop(0, 6),
 }
+
+KEY = bytes(range(32))
+TAGGED: dict[str, Message] = {f"tagged_{name}": SAMPLES[name] for name in (
+    "observations_six", "observations_none", "clock_request", "clock_reply_streaming", "start_two", "stop")}

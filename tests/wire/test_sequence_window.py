@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhot_app.sources.sequence import SequenceWindow, Verdict
+from rhot_node.wire.sequence import SequenceWindow, Verdict
 
 
 def feed(window: SequenceWindow, sequence: int) -> Verdict:
