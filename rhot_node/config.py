@@ -35,6 +35,10 @@ class CameraSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     red_gain: Gain | None = None
     blue_gain: Gain | None = None
     row_time_us: Annotated[float, Meta(ge=0, le=1000)] = 0.0  # for cameras that cannot tell; 0: all rows at once
+    preset: Literal["wide", "fast", "global"] | None = None  # of a Pi camera's sensor; None: the sensor's first
+    timestamp_marks: Literal["readout", "exposure"] = "readout"  # what a Pi camera's SensorTimestamp is the start of
+    timestamp_offset_us: Annotated[float, Meta(ge=-100_000, le=100_000)] = 0.0  # added to it, as calibrated
+    sync: Literal["off", "server", "client"] = "off"  # frames of several Pis at the same time
 
     @property
     def exposure_ns(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from rhot_node.detect.image import YuvImage
 
@@ -49,6 +49,15 @@ class Rewindable(Protocol):
 
     def rewind(self) -> None:
         """Go before the first frame; frame numbers and times go on, as if the recording were longer."""
+        ...
+
+
+@runtime_checkable
+class Reporting(Protocol):
+    """A camera that can tell more of itself than its frames do."""
+
+    def report(self) -> dict[str, Any]:
+        """What it really does, as JSON values for the control channel. Any thread may ask."""
         ...
 
 

@@ -15,6 +15,7 @@ from rhot_node.config import CameraSettings
 from rhot_node.errors import CameraError
 
 SPEC_HELP = """camera specs:
+  pi, pi:1, ...         the Raspberry Pi's camera, or its second one, through picamera2
   0, 1, ...             the webcam /dev/video0, /dev/video1, ...
   /dev/videoN           a webcam by its device
   FILE or FOLDER        a video file, an image, or a folder of images in the order of their names; a video plays at its
@@ -26,6 +27,9 @@ SPEC_HELP = """camera specs:
 
 def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera:
     """Open what `spec` names (see SPEC_HELP). Raises CameraError saying what is wrong and what to do."""
+    if match := re.fullmatch(r"pi(?::(\d))?", spec):
+        from rhot_node.capture.pi_camera import PiCamera
+        return PiCamera(int(match[1] or 0), settings, clock)
     if re.fullmatch(r"\d{1,3}", spec):
         return Webcam(f"/dev/video{spec}", settings, clock)
     if spec.startswith("/dev/"):

@@ -28,14 +28,18 @@ class YuvImage:
         return self.y.shape[1], self.y.shape[0]
 
 
-def from_i420(buffer: Plane, width: int, height: int) -> YuvImage:
-    """View a packed I420 buffer (Y, then U, then V; 1.5 * width * height bytes) as an image, without a copy."""
+def from_i420(buffer: Plane, width: int, height: int, stride: int | None = None) -> YuvImage:
+    """View an I420 buffer (Y, then U, then V) as an image, without a copy.
+
+    `stride`: bytes from luma row to luma row, even, where rows are padded; those of chroma are half as far apart.
+    """
+    stride = width if stride is None else stride
     flat = buffer.reshape(-1)
-    luma, chroma = width * height, width * height // 4
+    luma, chroma = stride * height, stride * height // 4
     return YuvImage(
-        flat[:luma].reshape(height, width),
-        flat[luma:luma + chroma].reshape(height // 2, width // 2),
-        flat[luma + chroma:luma + 2 * chroma].reshape(height // 2, width // 2),
+        flat[:luma].reshape(height, stride)[:, :width],
+        flat[luma:luma + chroma].reshape(height // 2, stride // 2)[:, :width // 2],
+        flat[luma + chroma:luma + 2 * chroma].reshape(height // 2, stride // 2)[:, :width // 2],
     )
 
 

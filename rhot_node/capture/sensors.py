@@ -1,0 +1,110 @@
+"""Sensors of Pi cameras: their modes by name, and when each image row was exposed. Pure.
+
+The numbers are those of the kernel's drivers. Rate and row time are taken from the limits that the camera states when
+it is open, because drivers have changed the pixel clock of the same mode (103 or 206 frames/s of the IMX219's 640x480).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rhot_node.errors import CameraError
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """One mode of one sensor. `rate_hz` is the highest; `blank_rows` the fewest rows' time between two frames;
+    `lens` (sensor px over the full width, horizontal view angle in degrees) of the module's own lens, None where the
+    lens is bought separately."""
+
+    name: str
+    sensor: str
+    size: tuple[int, int]
+    rate_hz: float
+    blank_rows: int
+    rolling: bool
+    lens: tuple[int, float] | None
+
+    @property
+    def title(self) -> str:
+        """For messages."""
+        return f"preset {self.name} ({self.sensor}, {self.size[0]} x {self.size[1]} px)"
+
+
+_IMX219_LENS = (3280, 62.2)
+PRESETS = (
+    Preset("wide", "imx219", (1640, 1232), 41.85, 32, True, _IMX219_LENS),
+    Preset("fast", "imx219", (640, 480), 206.65, 32, True, _IMX219_LENS),  # the middle 1280 x 960, binned
+    Preset("global", "imx296", (1456, 1088), 60.38, 30, False, None),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A part of the sensor, in its full-resolution pixels."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True)
+class Readout:
+    """`row_time_ns` from image row to image row; `first_row_ns` from the sensor mode's first row to the image's;
+    `view_angle_deg` of the image's width, None when the lens is unknown."""
+
+    row_time_ns: int
+    first_row_ns: int
+    view_angle_deg: float | None
+
+
+def choose_preset(sensor: str, wanted: str | None) -> Preset | None:
+    """The preset of this name for this sensor; without a name the sensor's first, None for an unknown sensor.
+
+    Raises CameraError when the sensor has no such preset.
+    """
+    own = [preset for preset in PRESETS if sensor.startswith(preset.sensor)]  # imx296_mono is an imx296
+    if wanted is None:
+        return own[0] if own else None
+    for preset in own:
+        if preset.name == wanted:
+            return preset
+    known = ", ".join(f'"{preset.name}"' for preset in own) or "none"
+    raise CameraError(f"camera.preset is \"{wanted}\", but this camera's sensor is an {sensor}, which has: {known}. "
+                      "Change preset in the node's settings, or set it to null.")
+
+
+def read_out(preset: Preset | None, frame_min_us: float, limits: Box, crop: Box, size: tuple[int, int],
+             row_time_ns: int) -> Readout:
+    """When and where the sensor reads the rows of an image of `size` (width, height).
+
+    `frame_min_us`: the mode's shortest frame, which has its rows and `blank_rows`; `limits`: what the mode can show;
+    `crop`: what the image shows of it; `row_time_ns`: as set by hand, 0 for not.
+    """
+    if preset is None:
+        return Readout(row_time_ns, 0, None)
+    angle = None
+    if preset.lens is not None:
+        full_width, full_angle = preset.lens
+        half = math.tan(math.radians(0.5 * full_angle)) * crop.width / full_width
+        angle = 2.0 * math.degrees(math.atan(half))
+    if not preset.rolling:
+        return Readout(row_time_ns, 0, angle)
+    mode_rows = preset.size[1]
+    line_ns = 1000.0 * frame_min_us / (mode_rows + preset.blank_rows)
+    scale = mode_rows / limits.height  # rows of the mode per row of the full resolution
+    step = crop.height * scale / size[1]  # rows of the mode per row of the image, which is their mean
+    first = (crop.y - limits.y) * scale + 0.5 * (step - 1.0)
+    return Readout(row_time_ns or round(line_ns * step), round(line_ns * first), angle)
+
+
+def mid_exposure_ns(timestamp_ns: int, exposure_ns: int, readout: Readout, marks: str, offset_ns: int) -> int:
+    """Mid-exposure of image row 0 by a SensorTimestamp, on its clock.
+
+    `marks` "readout": the stamp is taken when the sensor begins to send, which is when the mode's first row has been
+    exposed; "exposure": when that row's exposure begins. `offset_ns` corrects what remains, as calibrated.
+    """
+    half = exposure_ns // 2
+    return timestamp_ns + offset_ns + readout.first_row_ns + (half if marks == "exposure" else -half)
