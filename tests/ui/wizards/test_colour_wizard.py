@@ -47,7 +47,8 @@ def hands(themed, scene, tmp_path):
     kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), settings)
     hands = Hands(WizardWindow(make_plan(kit), kit))
     hands.path, hands.asker = path, asker
-    hands.until(lambda: hands.window.step._sights)
+    hands.until(lambda: set(hands.window.step._sights) == {"left", "right"}
+                and all(view.shown is not None for view in hands.window.frame.wall.views.values()))
     yield hands
     hands.window.end().wait(5.0)
     hands.window.deleteLater()

@@ -24,11 +24,14 @@ def use(hands):
     hands.until(lambda: hands.window.frame.next_button.text() == "Close", 40.0)
 
 
-def recorded(hands, seconds):
-    """Record a movement with Space, for so long."""
+def recorded(hands, seconds, picture):
+    """Record a movement with Space, for so long; take a picture meanwhile."""
     movement = hands.window.page.movement
     movement.seconds = seconds
     hands.key(Qt.Key.Key_Space)
+    hands.until(lambda: movement.phase == "recording")
+    hands.run(0.6 * seconds)
+    hands.keep(picture)
     hands.until(lambda: movement.phase == "recorded", seconds + 30.0)
 
 
@@ -45,12 +48,7 @@ def test_the_time_of_the_cameras_is_found(simulated_rig, open_on_rig):
     simulated_rig.use(msgspec.structs.replace(truth, nodes=(truth.nodes[0], late)))
     simulated_rig.stage.show(HandShow("wave"))
     hands = open_on_rig("time")
-    hands.window.page.movement.seconds = 15.0
-    hands.key(Qt.Key.Key_Space)
-    hands.until(lambda: hands.window.page.movement.phase == "recording")
-    hands.run(4.0)
-    hands.keep("time-wave")
-    hands.until(lambda: hands.window.page.movement.phase == "recorded", 45.0)
+    recorded(hands, 15.0, "time-wave")
     hands.next()
     solved(hands)
     hands.keep("time-result")
@@ -113,11 +111,16 @@ def test_colours_are_learnt(simulated_rig, open_on_rig):
     click_marker(hands, "left", (seen["wrist"][0], seen["wrist"][1] + 40.0))
     simulated_rig.stage.show(HandShow("grasp"))
     hands.until(lambda: step.view().may_go_on, 90.0)
+    hands.keep("colours-pick")
     hands.next()
     solved(hands)
+    hands.run(1.0)
+    hands.keep("colours-mask")
     hands.next()
     solved(hands)
+    hands.keep("colours-apart")
     hands.next()
+    hands.keep("colours-accept", 10)
     use(hands)
     saved = simulated_rig.saved.markers
     for name in ("left", "right"):
@@ -133,11 +136,18 @@ def test_colours_are_learnt(simulated_rig, open_on_rig):
 def test_bones_are_measured(simulated_rig, open_on_rig):
     simulated_rig.stage.show(HandShow("sweep"))
     hands = open_on_rig("bones")
+    for bone, length_mm in (("index.proximal", 44.0), ("index.medial", 25.5)):
+        hands.window.page.boxes[bone].setValue(length_mm)
+    hands.keep("bones-entry", 10)
+    for _ in range(2):
+        hands.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     hands.next()
-    recorded(hands, 25.0)
+    recorded(hands, 25.0, "bones-movement")
     hands.next()
     solved(hands)
+    hands.keep("bones-hand", 12)
     hands.next()
+    hands.keep("bones-accept", 8)
     use(hands)
     true, found = (rig.hand.fingers["index"] for rig in (simulated_rig.truth, simulated_rig.saved))
     assert sum(found.bones_mm) == pytest.approx(sum(true.bones_mm), rel=0.1)
@@ -148,13 +158,15 @@ def test_filters_are_tuned(simulated_rig, open_on_rig):
     simulated_rig.use(msgspec.structs.replace(simulated_rig.truth, filters=FilterSettings(pixel=lazy, position=lazy)))
     simulated_rig.stage.show(HandShow("still"))
     hands = open_on_rig("filters")
-    recorded(hands, 12.0)
+    recorded(hands, 12.0, "filters-still")
     hands.next()
     simulated_rig.stage.show(HandShow("wave"))
-    recorded(hands, 20.0)
+    recorded(hands, 20.0, "filters-fast")
     hands.next()
     solved(hands)
+    hands.keep("filters-result")
     hands.next()
+    hands.keep("filters-accept", 8)
     use(hands)
     saved = simulated_rig.saved.filters
     assert saved.position.min_cutoff_hz > 0.05 and saved.position.beta > 0.0, "a fast hand is followed"
