@@ -1,0 +1,106 @@
+"""What a machine's values mean for a node: one function per thing, from values to a `Check`. Pure but for `Machine`."""
+
+from __future__ import annotations
+
+from rhot_node.health.check import Check
+from rhot_node.health.machine import Machine, Throttled
+
+HOT_C = 75.0
+TOO_HOT_C = 80.0  # here the firmware begins to slow the processor down
+MEMORY_LOW = 150 << 20  # bytes; a node takes up to 250 MB when it starts anew
+MEMORY_OUT = 50 << 20
+RECEIVE_BUFFER_MIN = 128 << 10  # bytes; a node is sent a few datagrams per second
+POWER_REMEDY = ("Use the board's own power supply (5.1 V; 3 A, for a Pi 5 5 A) with its own cable, and take other USB "
+                "devices off.")
+COOL_REMEDY = "Give it a heat sink or a fan and free air; a closed case needs a fan."
+NOW = Throttled.UNDER_VOLTAGE | Throttled.CAPPED | Throttled.THROTTLED | Throttled.HOT
+
+
+def check_power(flags: Throttled | None) -> Check:
+    """Under-voltage: now, or since the machine was switched on."""
+    if flags is None:
+        return Check("power", "ok", "This machine does not tell whether its power supply is strong enough.")
+    if flags & Throttled.UNDER_VOLTAGE:
+        return Check("power", "error", "Its supply voltage is too low now (below 4.63 V): it is slowed down and may "
+                     "stop or damage its SD card.", POWER_REMEDY)
+    if flags & Throttled.UNDER_VOLTAGE_BEFORE:
+        return Check("power", "warning", "Its supply voltage was too low at least once since it was switched on.",
+                     POWER_REMEDY)
+    return Check("power", "ok", "The supply voltage has been high enough since it was switched on.")
+
+
+def check_heat(temperature_c: float | None, flags: Throttled | None) -> Check:
+    """Temperature, and whether the firmware slows the processor down because of it."""
+    flags = flags or Throttled(0)
+    told = "" if temperature_c is None else f" at {temperature_c:.0f} °C"
+    slowed = flags & (Throttled.THROTTLED | Throttled.HOT) and not flags & Throttled.UNDER_VOLTAGE
+    if slowed or (temperature_c or 0.0) >= TOO_HOT_C:
+        return Check("heat", "error", f"Its processor is too hot{told} and is slowed down: frames come late.",
+                     COOL_REMEDY)
+    if (temperature_c or 0.0) >= HOT_C:
+        return Check("heat", "warning", f"Its processor is hot{told}; at {TOO_HOT_C:.0f} °C it is slowed down.",
+                     COOL_REMEDY)
+    if flags & Throttled.HOT_BEFORE:
+        return Check("heat", "warning", f"Its processor{told} was slowed down by heat since it was switched on.",
+                     COOL_REMEDY)
+    return Check("heat", "ok", f"The processor is cool enough{told}." if told else "It does not tell its temperature.")
+
+
+def check_memory(available_bytes: int | None) -> Check:
+    """Memory that is left."""
+    if available_bytes is None:
+        return Check("memory", "ok", "It does not tell how much memory is free.")
+    text = f"{available_bytes / (1 << 20):.0f} MB of memory are free"
+    if available_bytes < MEMORY_LOW:
+        return Check("memory", "error" if available_bytes < MEMORY_OUT else "warning", f"Only {text}.",
+                     "End other programs, or use the Lite system without a desktop.")
+    return Check("memory", "ok", f"{text}.")
+
+
+def check_memory_limit(limits: bool) -> Check:
+    """Whether the service's memory limit means anything."""
+    if limits:
+        return Check("memory_limit", "ok", "The kernel holds services to their memory limits.")
+    return Check("memory_limit", "warning", "The kernel does not hold the service to its memory limit.",
+                 "Add `cgroup_enable=memory` to the line in /boot/firmware/cmdline.txt and restart.")
+
+
+def check_clock(synchronised: bool | None, source: str | None) -> Check:
+    """The clocks. A node's times are of the monotonic clock, which no time service sets."""
+    if source == "jiffies":
+        return Check("clock", "error", "The kernel counts time by its timer's ticks, 4 to 10 ms apart, for want of a "
+                     "better clock.", "Use the system's own kernel for this board.")
+    wall = {True: "follows the network's", False: "does not follow the network's",
+            None: "may or may not follow the network's"}[synchronised]
+    return Check("clock", "ok", f"The wall clock {wall}; that does not matter: a node's times are of the monotonic "
+                 "clock, which is never set. (Only the camera setting `sync` needs wall clocks that agree.)")
+
+
+def check_speed(governor: str | None) -> Check:
+    """The processor's frequency."""
+    if governor == "powersave":
+        return Check("speed", "warning", "The processor is held at its lowest frequency.",
+                     "Set it free: `echo ondemand | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor`.")
+    return Check("speed", "ok", f"The processor's frequency is governed by {governor or 'something untold'}.")
+
+
+def check_network(machine: Machine) -> list[Check]:
+    """Whether datagrams get out on time."""
+    interfaces = machine.interfaces()
+    if not interfaces:
+        return [Check("network", "error", "No network interface is up.", "Plug in a network cable.")]
+    names = ", ".join(f"{interface.name} ({'wireless' if interface.wireless else 'cable'})" for interface in interfaces)
+    found = [Check("network", "ok", f"Up: {names}.")]
+    if all(interface.wireless for interface in interfaces):
+        found = [Check("network", "warning", f"Only wireless is up: {names}; frames will come late and get lost at "
+                       "times.", "Use a cable.")]
+    for interface in interfaces:
+        if interface.power_save:
+            found.append(Check("power_save", "warning", f"{interface.name} sleeps between packets, which delays them "
+                               "by up to 0.1 s.", f"Switch it off: `sudo iw dev {interface.name} set power_save off` "
+                               "(for good: docs/pi.md)."))
+    buffer = machine.receive_buffer_max()
+    if buffer is not None and buffer < RECEIVE_BUFFER_MIN:
+        found.append(Check("receive_buffer", "warning", f"Sockets may buffer {buffer // 1024} KiB only.",
+                           "Allow more: `sudo sysctl -w net.core.rmem_max=212992`."))
+    return found
