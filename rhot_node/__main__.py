@@ -23,6 +23,8 @@ from rhot_node.errors import NodeError
 if TYPE_CHECKING:
     from rhot_node.config import NodeSettings
     from rhot_node.detect.detector import Detector
+    from rhot_node.pairing_offer import OfferFile
+    from rhot_node.trust import NodeTrust
 
 PR_SET_PDEATHSIG = 1
 ENDING_HELP = """When ready it prints one line of JSON on standard output, with its real ports. It ends with code 0
@@ -66,6 +68,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if arguments[:1] == ["detect"]:
             return _detect(arguments[1:])
+        if arguments[:1] in (["pair"], ["unpair"]):
+            return _change_trust(arguments[0], arguments[1:])
         return _serve(_parse(arguments))
     except NodeError as exc:
         print(f"rhot-node: {exc}", file=sys.stderr)
@@ -89,12 +93,20 @@ def _detect(arguments: list[str]) -> int:
     return detect_command.run(parser.parse_args(arguments))
 
 
+def _change_trust(name: str, arguments: list[str]) -> int:
+    from rhot_node import trust_command
+    parser = argparse.ArgumentParser(prog=f"rhot-node {name}", description=trust_command.SUMMARIES[name])
+    trust_command.add_arguments(parser)
+    return trust_command.run(name, parser.parse_args(arguments))
+
+
 def _parse(arguments: list[str]) -> argparse.Namespace:
     from rhot_node.capture.open import SPEC_HELP
     parser = argparse.ArgumentParser(
         prog="rhot-node", formatter_class=argparse.RawDescriptionHelpFormatter,
         description="A camera node: finds the markers in every frame and streams them to the master by UDP.\n"
-                    "rhot-node detect --help: find markers in files instead.",
+                    "rhot-node detect --help: find markers in files instead.\n"
+                    "rhot-node pair --help, rhot-node unpair --help: who may use this node.",
         epilog=f"{SPEC_HELP}\n\n{ENDING_HELP}")
     parser.add_argument("--settings", type=Path, required=True, metavar="FILE",
                         help="settings of this node (JSON, see docs/node.md)")
@@ -123,29 +135,53 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     from rhot_node.control import ControlServer
     from rhot_node.daemon import NodeDaemon
     from rhot_node.link import UdpLink
+    from rhot_node.link_keys import LinkKeys
+    from rhot_node.pairing_offer import OfferFile, offer_path
+    from rhot_node.reception import Reception
     from rhot_node.requests import Responder, SettingsStore
 
     clock = settings.clock.clock(time.monotonic_ns())
     store = SettingsStore(options.settings, settings)
+    offers = OfferFile(offer_path(options.settings))
+    trust = _trust(options.settings, settings, offers)
+    keys = None if trust is None else LinkKeys()
     daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), make_detector,
                         camera_takes_settings=takes_settings(options.camera), loop=options.loop)
     with contextlib.ExitStack() as stack:
         stack.callback(daemon.close)
-        link = UdpLink(settings, clock, daemon.sessions, secrets.randbits(32), lambda: daemon.state)
+        link = UdpLink(settings, clock, daemon.sessions, secrets.randbits(32), lambda: daemon.state, keys)
         stack.callback(link.close)
-        control = ControlServer(settings)
+        control = ControlServer(settings, trust)
         stack.callback(control.close)
+        ports = {"udp_port": link.port, "control_port": control.control_port, "preview_port": control.preview_port,
+                 "pairing_port": control.pairing_port}
         link.start()
-        daemon.prepare()
         control.start(Responder(store, daemon.sessions, control.pictures, clock, daemon.report,
-                                lambda: {**daemon.count(), **link.count()}))
+                                lambda: {**daemon.count(), **link.count(), "strangers": control.refused}, keys),
+                      Reception(trust, offers, lambda: {**daemon.introduce(), **ports}))
+        daemon.prepare()
         gc.freeze()
         width, height = daemon.size
-        print(json.dumps({"event": "ready", "node_id": settings.node_id, "name": settings.name,
-                          "udp_port": link.port, "control_port": control.control_port,
-                          "preview_port": control.preview_port, "width": width, "height": height}), flush=True)
+        print(json.dumps({"event": "ready", "node_id": settings.node_id, "name": settings.name, **ports,
+                          "width": width, "height": height}), flush=True)
         while daemon.step(link, control.pictures) and not end.due():
             pass
+
+
+def _trust(path: Path, settings: NodeSettings, offers: OfferFile) -> NodeTrust | None:
+    """Whom the node trusts, and a word about it on the console; None when it is open. Raises TrustError."""
+    from rhot_node.trust import NodeTrust, keys_path
+    from rhot_node.trust_command import invitation
+    log = logging.getLogger(__name__)
+    if settings.trust == "open":
+        log.warning('this node is open ("trust" in its settings): whoever reaches it may see its pictures and steer it')
+        return None
+    trust = NodeTrust(keys_path(path))
+    if trust.masters:
+        log.info("paired with %s", ", ".join(repr(master.name) for master in trust.masters))
+    else:
+        log.warning("not paired yet\n%s", invitation(settings, offers.current() or offers.renew()))
+    return trust
 
 
 def make_detector(settings: NodeSettings) -> Detector:

@@ -77,17 +77,23 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     camera: CameraSettings = CameraSettings()
     preview_hz: Annotated[float, Meta(gt=0, le=30)] = 4.0
     clock: ClockSettings = ClockSettings()
+    pairing_port: Port = 47803
+    trust: Literal["paired", "open"] = "open"  # open: whoever reaches the node may do everything with it
     format: Literal["rhot-node"] = FORMAT
     version: Literal[1] = VERSION
 
     def __post_init__(self) -> None:
-        if self.control_port and self.control_port == self.preview_port:
-            raise ValueError(f"control_port and preview_port are both {self.control_port}; each needs its own")
+        used: dict[int, str] = {}
+        for field in ("control_port", "preview_port", "pairing_port"):
+            port = getattr(self, field)
+            if port and used.setdefault(port, field) != field:
+                raise ValueError(f"{used[port]} and {field} are both {port}; each needs its own")
         if self.udp_port and self.udp_port == self.broadcast_port:
             raise ValueError(f"udp_port and broadcast_port are both {self.udp_port}; each needs its own")
 
 
-RESTART_FIELDS = ("node_id", "bind_address", "udp_port", "control_port", "preview_port", "broadcast_port", "clock")
+RESTART_FIELDS = ("node_id", "bind_address", "udp_port", "control_port", "preview_port", "pairing_port",
+                  "broadcast_port", "trust", "clock")
 """Settings that a running daemon cannot change."""
 
 

@@ -32,8 +32,8 @@ MakeDetector = Callable[[NodeSettings], Detector]
 class ObservationSender(Protocol):
     """Where observations go; the UDP link or a fake."""
 
-    def send(self, observations: Observations, address: tuple[str, int]) -> bool:
-        """False when they could not be sent."""
+    def send(self, observations: Observations, stream: Stream) -> bool:
+        """Send them where the stream goes; False when they could not be sent."""
         ...
 
 
@@ -98,6 +98,10 @@ class NodeDaemon:
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
                 "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns()}
 
+    def introduce(self) -> dict[str, Any]:
+        """What anybody may know, paired or not."""
+        return {"node_id": self._settings.node_id, "name": self._settings.name, "state": self.state.name.lower()}
+
     def count(self) -> dict[str, Any]:
         """Counters, for the control channel."""
         return dataclasses.asdict(self.counters)
@@ -153,7 +157,7 @@ class NodeDaemon:
             frame.exposure_ns, frame.row_time_ns, width, height, frame.number & U32_MAX,
             self._settings.markers.checksum, markers)
         self._sequence = (self._sequence + 1) & U32_MAX
-        if sender.send(observations, stream.address):
+        if sender.send(observations, stream):
             self.counters.sent += 1
         else:
             self.counters.not_sent += 1

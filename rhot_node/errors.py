@@ -17,6 +17,10 @@ class LinkError(NodeError):
     """A network port cannot be opened or an address is not usable."""
 
 
+class TrustError(NodeError):
+    """A key file is missing, open to others or broken, or a pairing was refused."""
+
+
 class WireError(NodeError):
     """A datagram is not one of ours. `reason` is a short key for counting, such as 'magic' or 'length'."""
 

@@ -15,9 +15,11 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError, WireError
 from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
-from rhot_node.session import Sessions
+from rhot_node.link_keys import LinkKeys
+from rhot_node.session import Sessions, Stream
 from rhot_node.wire.codec import decode, encode
-from rhot_node.wire.messages import ClockReply, ClockRequest, NodeState, Observations, Start, Stop
+from rhot_node.wire.messages import ClockReply, ClockRequest, Message, NodeState, Observations, Start, Stop
+from rhot_node.wire.seal import Seal
 
 log = logging.getLogger(__name__)
 
@@ -29,8 +31,9 @@ class UdpLink:
     """One socket on `udp_port`, one on `broadcast_port`. `step` handles what has come; `start` runs it in a thread."""
 
     def __init__(self, settings: NodeSettings, clock: NodeClock, sessions: Sessions, boot_id: int,
-                 state: Callable[[], NodeState]) -> None:
-        """Open the ports; raises LinkError. `state` tells what a clock reply says of the node; any thread calls it."""
+                 state: Callable[[], NodeState], keys: LinkKeys | None) -> None:
+        """Open the ports; raises LinkError. `state` tells what a clock reply says of the node; any thread calls it.
+        Only datagrams that a link of `keys` has tagged are taken; with None the node is open, and all are."""
         self.dropped: Counter[str] = Counter()  # datagrams not acted upon, by reason
         self.clock_requests = 0
         self._node_id = settings.node_id
@@ -38,6 +41,7 @@ class UdpLink:
         self._sessions = sessions
         self._boot_id = boot_id
         self._state = state
+        self._keys = keys
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._socket = _open(settings.bind_address, settings.udp_port, "udp_port", shared=False)
@@ -55,12 +59,12 @@ class UdpLink:
         for number in self._sockets:
             self._poll.register(number, select.POLLIN)
 
-    def send(self, observations: Observations, address: tuple[str, int]) -> bool:
+    def send(self, observations: Observations, stream: Stream) -> bool:
         """Send one frame's observations; False when the network refused them, which costs that frame only."""
         try:
-            self._socket.sendto(encode(observations), address)
+            self._socket.sendto(encode(observations, stream.seal), stream.address)
         except (OSError, WireError) as exc:
-            log.debug("observations to %s port %d: %s", *address, exc)
+            log.debug("observations to %s port %d: %s", *stream.address, exc)
             return False
         return True
 
@@ -100,22 +104,29 @@ class UdpLink:
 
     def _take(self, data: bytes, sender: tuple[str, int], t_receive_host_ns: int) -> None:
         try:
-            message = decode(data)
+            message, seal = self._open(data)
         except WireError as exc:
             self.dropped[exc.reason] += 1
             return
         match message:
             case ClockRequest():
-                self._answer(message, sender, t_receive_host_ns)
+                self._answer(message, sender, t_receive_host_ns, seal)
             case Start():
-                self._take_start(message, sender[0])
+                self._take_start(message, sender[0], seal)
             case Stop():
                 if not self._sessions.stop(message.session):
                     self.dropped["stop_of_nothing"] += 1
             case _:
                 self.dropped["kind"] += 1
 
-    def _answer(self, request: ClockRequest, sender: tuple[str, int], t_receive_host_ns: int) -> None:
+    def _open(self, data: bytes) -> tuple[Message, Seal | None]:
+        if self._keys is None:
+            return decode(data), None
+        message, link = self._keys.open(data)
+        return message, link.seal
+
+    def _answer(self, request: ClockRequest, sender: tuple[str, int], t_receive_host_ns: int,
+                seal: Seal | None) -> None:
         if request.node_id != self._node_id:
             self.dropped["foreign_node"] += 1
             return
@@ -126,17 +137,17 @@ class UdpLink:
         reply = ClockReply(self._node_id, stream.session if stream else 0, request.sequence, request.t1_master_ns,
                            t2, max(t2, self._clock.now_ns()), self._boot_id, self._state())
         try:
-            self._socket.sendto(encode(reply), sender)
+            self._socket.sendto(encode(reply, seal), sender)
         except OSError as exc:
             log.debug("clock reply to %s port %d: %s", *sender, exc)
 
-    def _take_start(self, message: Start, sender: str) -> None:
+    def _take_start(self, message: Start, sender: str, seal: Seal | None) -> None:
         entry = next((entry for entry in message.entries if entry.node_id == self._node_id), None)
         if entry is None:
             self.dropped["foreign_node"] += 1
             return
         verdict = self._sessions.start(message.session, (sender, entry.data_port), entry.t_start_node_ns,
-                                       now_node_ns=self._clock.now_ns(), now_s=time.monotonic())
+                                       now_node_ns=self._clock.now_ns(), now_s=time.monotonic(), seal=seal)
         if verdict != "started":
             self.dropped[f"start_{verdict}"] += 1
 

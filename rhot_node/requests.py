@@ -18,7 +18,8 @@ from msgspec import Meta
 
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, changed_settings, needs_restart, save_settings
-from rhot_node.errors import NodeError
+from rhot_node.errors import NodeError, SettingsError
+from rhot_node.link_keys import LinkKeys
 from rhot_node.pictures import PictureBox, StillFormat, encode_still
 from rhot_node.session import Sessions
 
@@ -65,6 +66,13 @@ class StartRequest(_Request, frozen=True, tag="start"):
     host: str
     port: Annotated[int, Meta(ge=1, le=65535)]
     t_start_node_ns: int = 0
+    link: str = ""  # whose key tags the observations; needed unless the node is open
+
+
+class LinkRequest(_Request, frozen=True, tag="link"):
+    """The key of this master's datagrams; that of the link `name` as long as the node knows it."""
+
+    name: str = ""
 
 
 class StopRequest(_Request, frozen=True, tag="stop"):
@@ -74,7 +82,7 @@ class StopRequest(_Request, frozen=True, tag="stop"):
 
 
 Request = (StateRequest | CountersRequest | SettingsRequest | SetSettingsRequest | StillRequest | StartRequest
-           | StopRequest)
+           | LinkRequest | StopRequest)
 
 _decoder = msgspec.json.Decoder(Request)
 
@@ -108,20 +116,23 @@ class Responder:
     """Answers requests. `state` and `counters` report on the daemon from any thread."""
 
     def __init__(self, store: SettingsStore, sessions: Sessions, pictures: PictureBox, clock: NodeClock,
-                 state: Report, counters: Report) -> None:
+                 state: Report, counters: Report, keys: LinkKeys | None) -> None:
+        """`keys` None: the node is open, and no datagram is tagged."""
         self._store = store
         self._sessions = sessions
         self._pictures = pictures
         self._clock = clock
         self._state = state
         self._counters = counters
+        self._keys = keys
 
-    def answer(self, parts: list[bytes]) -> list[bytes]:
-        """The reply's message parts to a request's. Never raises."""
+    def answer(self, parts: list[bytes], master: str) -> list[bytes]:
+        """The reply's message parts to a request's of the master with this public key (empty: the node is open). Never
+        raises."""
         try:
             if len(parts) != 1:
                 raise NodeError(f"a request is one JSON document in one message part, not {len(parts)} parts.")
-            reply, attachment = self._perform(_decoder.decode(parts[0]))
+            reply, attachment = self._perform(_decoder.decode(parts[0]), master)
         except (msgspec.DecodeError, NodeError) as exc:
             reply, attachment = {"ok": False, "error": str(exc)}, b""
         except OSError as exc:
@@ -133,7 +144,7 @@ class Responder:
         encoded = msgspec.json.encode(reply)
         return [encoded, attachment] if attachment else [encoded]
 
-    def _perform(self, request: Request) -> tuple[dict[str, Any], bytes]:
+    def _perform(self, request: Request, master: str) -> tuple[dict[str, Any], bytes]:
         match request:
             case StateRequest():
                 return {"ok": True, **self._state()}, b""
@@ -142,13 +153,32 @@ class Responder:
             case SettingsRequest():
                 return {"ok": True, "settings": self._store.current}, b""
             case SetSettingsRequest():
-                return {"ok": True, "restart": self._store.change(request.settings, save=request.save)}, b""
+                return self._set_settings(request), b""
             case StillRequest():
                 return self._take_still(request.format)
             case StartRequest():
-                return self._start(request), b""
+                return self._start(request, master), b""
+            case LinkRequest():
+                return self._link(request, master), b""
             case StopRequest():
                 return {"ok": True, "stopped": self._sessions.stop(request.session)}, b""
+
+    def revoke(self, admits: Callable[[str], bool]) -> None:
+        """The masters have changed: forget the keys of those that are not admitted any more, and stop streaming."""
+        if self._keys is not None:
+            self._keys.forget(admits)
+            self._sessions.stop(0)
+
+    def _set_settings(self, request: SetSettingsRequest) -> dict[str, Any]:
+        if request.settings.get("trust", self._store.current.trust) != self._store.current.trust:
+            raise SettingsError("trust is changed only in the settings file, on the node itself.")
+        return {"ok": True, "restart": self._store.change(request.settings, save=request.save)}
+
+    def _link(self, request: LinkRequest, master: str) -> dict[str, Any]:
+        if self._keys is None:
+            raise NodeError("this node is open to everybody; its datagrams have no key.")
+        link = self._keys.grant(master, request.name)
+        return {"ok": True, "name": link.name, "key": link.key.hex()}
 
     def _take_still(self, kind: StillFormat) -> tuple[dict[str, Any], bytes]:
         picture = self._pictures.next_still(STILL_S)
@@ -158,15 +188,19 @@ class Responder:
         return {"ok": True, "format": kind, "width": still.width, "height": still.height,
                 "number": picture.number, "t_node_ns": picture.t_node_ns}, still.data
 
-    def _start(self, request: StartRequest) -> dict[str, Any]:
+    def _start(self, request: StartRequest, master: str) -> dict[str, Any]:
         if request.session >= 1 << 64:
             raise NodeError(f"session {request.session} does not fit 64 bits.")
         try:
             host = str(ipaddress.IPv4Address(request.host))
         except ValueError as exc:
             raise NodeError(f"host {request.host!r} is not an IPv4 address such as 192.168.1.10.") from exc
+        link = None if self._keys is None else self._keys.find(master, request.link)
+        if self._keys is not None and link is None:
+            raise NodeError(f"there is no link {request.link!r} of yours; ask for one with the request \"link\".")
         verdict = self._sessions.start(request.session, (host, request.port), request.t_start_node_ns,
-                                       now_node_ns=self._clock.now_ns(), now_s=time.monotonic())
+                                       now_node_ns=self._clock.now_ns(), now_s=time.monotonic(),
+                                       seal=None if link is None else link.seal)
         if verdict == "stale":
             raise NodeError(f"session {request.session} is over; every start needs a new session number.")
         return {"ok": True, "verdict": verdict}

@@ -6,6 +6,8 @@ import logging
 import threading
 from dataclasses import dataclass
 
+from rhot_node.wire.seal import Seal
+
 log = logging.getLogger(__name__)
 
 MASTER_SILENCE_S = 5.0
@@ -19,11 +21,13 @@ ENDED_MAX = 4096  # sessions remembered as over
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """One session: where the observations go, and the first instant to send (node clock, 0: at once)."""
+    """One session: where the observations go, the first instant to send (node clock, 0: at once), and what tags them
+    (None: nothing, the node is open)."""
 
     session: int
     address: tuple[str, int]
     t_start_node_ns: int
+    seal: Seal | None = None
 
 
 class Sessions:
@@ -41,7 +45,7 @@ class Sessions:
         return self._current
 
     def start(self, session: int, address: tuple[str, int], t_start_node_ns: int, *, now_node_ns: int,
-              now_s: float) -> str:
+              now_s: float, seal: Seal | None = None) -> str:
         """Take up `session`. Returns 'started'; 'repeated' when it is the current one; 'stale' when it is over."""
         if t_start_node_ns - now_node_ns > START_AHEAD_MAX_NS:
             log.warning("session %d was to start %.1f s ahead, by another clock; it starts at once", session,
@@ -56,7 +60,7 @@ class Sessions:
                 return "repeated"
             if old is not None:
                 self._end(old.session)
-            self._current = Stream(session, address, t_start_node_ns)
+            self._current = Stream(session, address, t_start_node_ns, seal)
             self._heard_s = now_s
         log.info("session %d started: streaming to %s port %d", session, *address)
         return "started"

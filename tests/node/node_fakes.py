@@ -11,6 +11,7 @@ from rhot_node.capture.camera import EndOfRecording, Frame
 from rhot_node.clock import NodeClock
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import CameraError
+from rhot_node.session import Stream
 from rhot_node.wire.messages import MarkerObservation, Observations
 
 SIZE = (64, 48)
@@ -78,8 +79,8 @@ class FakeSender:
         self.works = works
         self.sent: list[tuple[Observations, tuple[str, int]]] = []
 
-    def send(self, observations: Observations, address: tuple[str, int]) -> bool:
-        self.sent.append((observations, address))
+    def send(self, observations: Observations, stream: Stream) -> bool:
+        self.sent.append((observations, stream.address))
         return self.works
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 import zmq
@@ -23,7 +24,9 @@ from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import LinkError
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
+from rhot_node.pairing_offer import OfferFile
 from rhot_node.pictures import PictureBox
+from rhot_node.reception import Reception
 from rhot_node.requests import Responder, SettingsStore
 from rhot_node.session import Sessions
 
@@ -40,13 +43,14 @@ class Served:
 
     def __init__(self, folder: Path) -> None:
         settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")), "127.0.0.1", 0, 0, 0,
-                                None, preview_hz=20.0)
+                                None, preview_hz=20.0, pairing_port=0, trust="open")
         self.store = SettingsStore(folder / "node.json", settings)
         save_settings(self.store.path, settings)
         self.sessions = Sessions()
-        self.server = ControlServer(settings)
+        self.server = ControlServer(settings, None)
         self.server.start(Responder(self.store, self.sessions, self.server.pictures, NodeClock(),
-                                    lambda: {"state": "ready"}, lambda: {"frames": 12}))
+                                    lambda: {"state": "ready"}, lambda: {"frames": 12}, None),
+                          Reception(None, OfferFile(folder / "offer.json"), lambda: {"name": "left"}))
         self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.client = self.context.socket(zmq.REQ)
         self.client.connect(f"tcp://127.0.0.1:{self.server.control_port}")
@@ -223,11 +227,26 @@ def test_previews_keep_their_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 39 <= len(woken) <= 41
 
 
-@pytest.mark.parametrize("setting", ["control_port", "preview_port"])
+@pytest.mark.parametrize("setting", ["control_port", "preview_port", "pairing_port"])
 def test_a_taken_port_is_named_with_its_setting(served: Served, setting: str) -> None:
     port = getattr(served.server, setting)
-    settings = NodeSettings(4, "right", served.store.current.markers, "127.0.0.1", 0, 0, 0, None)
-    taken = {"control_port": NodeSettings(4, "right", settings.markers, "127.0.0.1", 0, port, 0, None),
-             "preview_port": NodeSettings(4, "right", settings.markers, "127.0.0.1", 0, 0, port, None)}[setting]
+    free = NodeSettings(4, "right", served.store.current.markers, "127.0.0.1", 0, 0, 0, None, pairing_port=0)
     with pytest.raises(LinkError, match=f"{setting}: TCP port {port}"):
-        ControlServer(taken)
+        ControlServer(msgspec.structs.replace(free, **{setting: port}), None)
+
+
+def test_an_open_node_says_so_and_has_no_keys(served: Served) -> None:
+    answer = served.ask(request="link")
+    assert not answer["ok"] and "open to everybody" in answer["error"]
+    stranger = served.context.socket(zmq.REQ)
+    stranger.rcvtimeo = 3000
+    stranger.connect(f"tcp://127.0.0.1:{served.server.pairing_port}")
+    stranger.send(b'{"request": "hello"}')
+    assert json.loads(stranger.recv()) == {"ok": True, "name": "left", "trust": "open"}
+    stranger.close(linger=0)
+
+
+def test_trust_is_not_changed_from_afar(served: Served) -> None:
+    answer = served.ask(request="set_settings", settings={"trust": "paired"})
+    assert not answer["ok"] and "settings file" in answer["error"]
+    assert served.ask(request="set_settings", settings={"trust": "open", "preview_hz": 3.0})["ok"]

@@ -14,7 +14,7 @@ from rhot_node.errors import LinkError
 from rhot_node.files import resource_path
 from rhot_node.link import UdpLink
 from rhot_node.markers import load_markers
-from rhot_node.session import Sessions
+from rhot_node.session import Sessions, Stream
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (
     ClockReply,
@@ -39,7 +39,7 @@ def make_link() -> Iterator[MakeLink]:
              bind_address: str = "127.0.0.1") -> UdpLink:
         settings = NodeSettings(node_id, "left", load_markers(resource_path("markers", "rhot6.json")), bind_address,
                                 udp_port, 0, 0, broadcast_port)
-        links.append(UdpLink(settings, CLOCK, Sessions(), 0xB007, lambda: NodeState.READY))
+        links.append(UdpLink(settings, CLOCK, Sessions(), 0xB007, lambda: NodeState.READY, None))
         return links[-1]
 
     yield make
@@ -117,15 +117,15 @@ def test_two_nodes_of_one_machine_hear_one_broadcast(make_link: MakeLink, master
 
 def test_observations_arrive(make_link: MakeLink, master: socket.socket) -> None:
     observations = Observations(3, 77, 0, 10, 20, 5, 4, 3, 640, 480, 9, 1, ())
-    assert make_link().send(observations, master.getsockname())
+    assert make_link().send(observations, Stream(77, master.getsockname(), 0))
     assert decode(master.recv(2048)) == observations
 
 
 def test_what_cannot_be_sent_costs_one_frame_only(make_link: MakeLink) -> None:
     link = make_link()
     observations = Observations(3, 77, 0, 10, 20, 5, 4, 3, 640, 480, 9, 1, ())
-    assert not link.send(observations, ("255.255.255.255", 9))  # needs SO_BROADCAST
-    assert not link.send(Observations(-3, 77, 0, 10, 20, 5, 4, 3, 640, 480, 9, 1, ()), ("127.0.0.1", 9))
+    assert not link.send(observations, Stream(77, ("255.255.255.255", 9), 0))  # needs SO_BROADCAST
+    assert not link.send(Observations(-3, 77, 0, 10, 20, 5, 4, 3, 640, 480, 9, 1, ()), Stream(77, ("127.0.0.1", 9), 0))
 
 
 def test_everything_else_is_counted_by_reason(make_link: MakeLink, master: socket.socket) -> None:

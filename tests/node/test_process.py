@@ -62,7 +62,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def write_settings(folder: Path, **changes: Any) -> Path:
     values: dict[str, Any] = {
         "node_id": 3, "name": "left", "markers": MARKERS, "bind_address": "127.0.0.1", "udp_port": 0,
-        "control_port": 0, "preview_port": 0, "broadcast_port": None,
+        "control_port": 0, "preview_port": 0, "pairing_port": 0, "broadcast_port": None, "trust": "open",
         "camera": CameraSettings(width=SIZE[0], height=SIZE[1], fps=40), "clock": ClockSettings(OFFSET_S, 20.0)}
     path = folder / "left.json"
     save_settings(path, NodeSettings(**{**values, **changes}))

@@ -1,0 +1,46 @@
+"""``rhot-node pair`` and ``rhot-node unpair``: on the node itself, beside the running daemon or without it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rhot_node.config import NodeSettings, load_settings
+from rhot_node.errors import TrustError
+from rhot_node.pairing import show_code
+from rhot_node.pairing_offer import TRIES, VALID_S, Offer, OfferFile, offer_path
+from rhot_node.private_files import remove_private
+from rhot_node.trust import keys_path
+
+SUMMARIES = {
+    "pair": "Show a fresh one-time code to pair a master with; the code before it is void.",
+    "unpair": "Forget every master and the node's own keys, as when it was shipped. A running node does so at once.",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of both commands."""
+    parser.add_argument("--settings", type=Path, required=True, metavar="FILE",
+                        help="settings of this node (JSON, see docs/node.md); the keys lie beside it")
+
+
+def run(name: str, args: argparse.Namespace) -> int:
+    """Run the command `name`; raises SettingsError, TrustError."""
+    settings = load_settings(args.settings)
+    if name == "pair":
+        if settings.trust == "open":
+            raise TrustError(f'{args.settings}: "trust" is "open", so there is nothing to pair; change it to "paired" '
+                             "and restart the node.")
+        print(invitation(settings, OfferFile(offer_path(args.settings)).renew()))
+        return 0
+    OfferFile(offer_path(args.settings)).close()
+    known = remove_private(keys_path(args.settings))
+    print(f"{settings.name} forgets its masters and its keys." if known else f"{settings.name} had no keys.")
+    return 0
+
+
+def invitation(settings: NodeSettings, offer: Offer) -> str:
+    """What people read on the console."""
+    return (f"Pairing code of node {settings.name}:  {show_code(offer.code)}\n"
+            f"Enter it in the app (Rig, Connect nodes) or after `rhot pair ADDRESS`. Valid for {VALID_S // 60} "
+            f"minutes, {TRIES} tries and one master.")
