@@ -5,6 +5,14 @@ import numpy as np
 import pytest
 
 from rhot_node.detect import search as s
+from rhot_node.detect.labels import acquisition_table
+from rhot_node.detect.light import balance, balance_matrix
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+
+RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
+ANY_LUMA = np.tile(np.array([0, 255], dtype=np.uint8), (6, 1))
+ALL = np.array([False] + 6 * [True])
 
 
 def oracle(labels: np.ndarray, u: np.ndarray, v: np.ndarray, area_min: int) -> list[tuple[float, ...]]:
@@ -67,3 +75,58 @@ def test_more_runs_than_the_buffer_holds_end_the_search_quietly() -> None:
     blobs = s.Searcher(table, limits).find(luma, u, v, np.array([False, True]), 4)
     assert blobs.shape[0] == 200
     assert blobs[:, s.AREA].sum() == 200 * (s.RUNS_MAX // 200)
+
+
+def colourful_picture(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Patches of every chroma there is, hard ones and soft ones, in planes whose rows are whole words."""
+    rng = np.random.default_rng(seed)
+    planes = [cv2.resize(rng.integers(0, 256, (12, 20)).astype(np.uint8), (160, 120), interpolation=how)
+              for how in (cv2.INTER_NEAREST, cv2.INTER_CUBIC)]
+    luma = cv2.resize(rng.integers(0, 256, (12, 20)).astype(np.uint8), (320, 240))
+    return luma, np.ascontiguousarray(planes[seed % 2]), np.ascontiguousarray(planes[1])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_passing_over_dull_words_loses_no_pixel(seed: int) -> None:
+    luma, u, v = colourful_picture(seed)
+    table = acquisition_table(RHOT6)
+    blobs = s.Searcher(table, ANY_LUMA).find(luma, u, v, ALL, 1)
+    assert len(blobs) > 5
+    assert sorted(map(tuple, blobs.tolist())) == oracle(table[u, v], u, v, 1)
+
+
+def test_the_dull_box_holds_grey_and_skin_and_nobodys_colour() -> None:
+    table = acquisition_table(RHOT6)
+    u_min, u_max, v_min, v_max = s.dull_box(table)
+    assert not table[u_min:u_max + 1, v_min:v_max + 1].any()
+    assert u_min <= 128 - 20 and v_max >= 128 + 24
+    assert u_max >= 133 and v_min <= 123
+    everything = np.ones((256, 256), dtype=np.uint8)
+    u_min, u_max, _, _ = s.dull_box(everything)
+    assert u_min > u_max
+
+
+def test_every_other_row_stands_for_its_neighbour() -> None:
+    table = np.zeros((256, 256), dtype=np.uint8)
+    table[200, :], table[60, :] = 1, 2
+    u, v = np.full((80, 96), 128, dtype=np.uint8), np.full((80, 96), 128, dtype=np.uint8)
+    for x, y, radius, level in ((20, 20, 5, 200), (60, 31, 11, 60), (25, 61, 8, 60)):
+        cv2.circle(u, (x, y), radius, level, -1)
+    luma = np.full((160, 192), 90, dtype=np.uint8)
+    searcher = s.Searcher(table, ANY_LUMA)
+    whole, half = (searcher.find(luma, u, v, ALL, 6, step=step).copy() for step in (1, 2))
+    assert len(whole) == len(half) == 3
+    for blob, same in zip(whole, half, strict=True):
+        assert same[s.LABEL] == blob[s.LABEL]
+        assert same[s.AREA] == pytest.approx(blob[s.AREA], rel=0.1)
+        np.testing.assert_allclose(same[s.SUM_X:s.SUM_U] / same[s.AREA], blob[s.SUM_X:s.SUM_U] / blob[s.AREA], atol=0.6)
+        np.testing.assert_allclose(same[s.X_MIN:], blob[s.X_MIN:], atol=1)
+
+
+def test_another_light_is_mended_pixel_by_pixel() -> None:
+    luma, u, v = colourful_picture(1)
+    matrix, out_u, out_v = balance_matrix(0.4), np.empty_like(u), np.empty_like(v)
+    balance(luma, u, v, matrix, out_u, out_v)
+    searcher = s.Searcher(acquisition_table(RHOT6), ANY_LUMA)
+    expected = searcher.find(luma, out_u, out_v, ALL, 4).copy()
+    np.testing.assert_array_equal(searcher.find(luma, u, v, ALL, 4, balance=matrix), expected)
