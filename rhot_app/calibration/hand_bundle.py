@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.hand_bundle_model import POSE, Linearised, Poses, expected, linearise
-from rhot_app.calibration.hand_shape import HandUnknowns
+from rhot_app.calibration.hand_shape import BONE_COUNT, HandUnknowns
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.kinematics import TWIST
 from rhot_app.hand.limits import natural_pose
@@ -35,17 +35,18 @@ LIMIT_MARGIN = np.radians(10.0)
 
 _STILL = 1e-3  # the step that makes the hand less than this more likely (logarithm) was the last
 _DAMPING_MAX = 1e8
+_INNER_STEPS = 3  # of the poses for each of the shape
+_DIAGONAL = np.arange(POSE)
 
 
 @dataclass(frozen=True, slots=True)
 class Weights:
     """How much the terms count: `noise_m` standard deviation of a marker per axis; all instants together as
-    `independent` ones, the natural pose in `habits` of them; `free_shape` False moves the poses only."""
+    `independent` ones, the natural pose in `habits` of them."""
 
     noise_m: float
     independent: float
     habits: float = HABITS
-    free_shape: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,17 @@ class HandBundle:
     covariance: Array
     cost: float
     steps: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Reduced:
+    """Normal equations of the shape once the poses are eliminated: `matrix` (G, G), `right` (G,); then an instant's
+    pose moves by `alone` (F, 27) less `coupled` (F, 27, G) times the shape's step."""
+
+    matrix: Array
+    right: Array
+    alone: Array
+    coupled: Array
 
 
 class HandAdjustment:
@@ -76,15 +88,18 @@ class HandAdjustment:
         self._habit_part = min(1.0, weights.habits / count)
 
     def run(self, vector: Array, poses: Poses, steps: int, *, progress: Progress = silent) -> HandBundle:
-        """Descend from a first guess. Raises CalibrationError when the sights do not hold the hand at all."""
+        """Descend from a first guess. Raises CalibrationError when the sights do not hold the hand at all.
+
+        Every trial of a shape lets each instant find its own pose first: one stretched finger, whose joints hardly
+        show, would else hold up the shape for all.
+        """
         cost, damping, taken = self._cost(vector, poses), 1e-3, 0
         for taken in range(1, steps + 1):
             progress("fitting the hand", (taken - 1) / steps)
-            system = self._system(vector, poses)
+            reduced = self._reduce(vector, poses)
             accepted = False
             while damping < _DAMPING_MAX:
-                shape_step, pose_steps = self._solve(*system, damping)
-                trial_vector, trial_poses = vector + shape_step, poses.moved(pose_steps)
+                trial_vector, trial_poses = self._try(reduced, damping, vector, poses)
                 trial = self._cost(trial_vector, trial_poses)
                 if trial <= cost:
                     accepted = True
@@ -97,29 +112,83 @@ class HandAdjustment:
             if gain < _STILL:
                 break
         residuals = self._seen - expected(self._unknowns, vector, poses)
-        return HandBundle(vector, poses, residuals, self._covariance(vector, poses), cost, taken)
+        covariance = np.linalg.inv(self._reduce(vector, poses).matrix)
+        return HandBundle(vector, poses, residuals, np.asarray(covariance), cost, taken)
+
+    def settle(self, vector: Array, poses: Poses, steps: int) -> Poses:
+        """The poses after so many steps of their own, each instant with its own damping, while the shape stays."""
+        damping = np.full(len(self._seen), 1e-4)
+        costs = self._instant_costs(vector, poses)
+        for _ in range(steps):
+            matrix, right = self._pose_system(vector, poses, linearise(self._unknowns, vector, poses, per_shape=False))
+            matrix[:, _DIAGONAL, _DIAGONAL] *= 1.0 + damping[:, None]
+            trial = poses.moved(_solve(matrix, right[..., None])[..., 0])
+            trial_costs = self._instant_costs(vector, trial)
+            better = trial_costs <= costs
+            gain = float((costs - trial_costs)[better].sum())
+            poses, costs = trial.where(better, poses), np.where(better, trial_costs, costs)
+            damping = np.where(better, 0.1 * damping, np.maximum(10.0 * damping, 1e-2))
+            if gain < _STILL and better.all():
+                break
+        return poses
+
+    def _try(self, reduced: _Reduced, damping: float, vector: Array, poses: Poses) -> tuple[Array, Poses]:
+        """The hand after one damped step."""
+        matrix = reduced.matrix.copy()
+        matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
+        shape_step = _solve(matrix, reduced.right)
+        moved = poses.moved(reduced.alone - reduced.coupled @ shape_step)
+        vector = vector + shape_step
+        if not _possible(vector):
+            return vector, poses
+        better = self._instant_costs(vector, moved) <= self._instant_costs(vector, poses)
+        return vector, self.settle(vector, moved.where(better, poses), _INNER_STEPS)
 
     def _cost(self, vector: Array, poses: Poses) -> float:
-        if not np.isfinite(vector).all() or (vector[:15] <= 1e-3).any():
+        if not _possible(vector):
             return np.inf
+        change = vector - self._unknowns.prior.mean
+        return float(self._instant_costs(vector, poses).sum() + 0.5 * change @ self._prior_information @ change)
+
+    def _instant_costs(self, vector: Array, poses: Poses) -> Array:
+        """(F,) what each instant adds to the cost."""
         distance = np.linalg.norm(self._seen - expected(self._unknowns, vector, poses), axis=2) / self._weights.noise_m
-        distance = distance[np.isfinite(distance)]
-        loss = np.where(distance <= HUBER, distance ** 2, HUBER * (2.0 * distance - HUBER)).sum()
+        loss = np.nansum(np.where(distance <= HUBER, distance ** 2, HUBER * (2.0 * distance - HUBER)), axis=1)
         past = self._past_limits(poses.angles)[0]
         off = poses.angles - self._natural.mean
-        habits = np.einsum("fi,ij,fj->", off, self._natural.information, off) + (past ** 2).sum()
-        change = vector - self._unknowns.prior.mean
-        return 0.5 * float(self._data_part * loss + self._habit_part * habits
-                           + change @ self._prior_information @ change)
+        habits = ((off @ self._natural.information) * off).sum(axis=1) + (past ** 2).sum(axis=1)
+        return np.asarray(0.5 * (self._data_part * loss + self._habit_part * habits))
 
     def _past_limits(self, angles: Array) -> tuple[Array, Array]:
         """How far angles (F, 21) are past their limits, in standard deviations, signed; and where they are."""
         past = (np.maximum(angles - self._limits[:, 1], 0.0) + np.minimum(angles - self._limits[:, 0], 0.0)) / LIMIT_SD
         return past, past != 0.0
 
-    def _system(self, vector: Array, poses: Poses) -> tuple[Array, Array, Array, Array, Array]:
-        """Normal equations: per pose (F, 27, 27), between (F, 27, G), shape (G, G), and both right sides."""
-        at: Linearised = linearise(self._unknowns, vector, poses)
+    def _reduce(self, vector: Array, poses: Poses) -> _Reduced:
+        """The normal equations of the shape."""
+        at = linearise(self._unknowns, vector, poses)
+        root, gap, per_pose = self._weighed(at)
+        per_shape = (root[..., None, None] * at.per_shape).reshape(*gap.shape, -1)
+        pose_matrix, pose_right = self._pose_system(vector, poses, at)
+        between = per_pose.transpose(0, 2, 1) @ per_shape
+        solved = _solve(pose_matrix, np.concatenate([between, pose_right[..., None]], axis=2))
+        alone, coupled = solved[..., -1], solved[..., :-1]
+        flat, tied = per_shape.reshape(-1, self._unknowns.size), between.reshape(-1, self._unknowns.size)
+        matrix = flat.T @ flat + self._prior_information - tied.T @ coupled.reshape(tied.shape)
+        change = vector - self._unknowns.prior.mean
+        right = flat.T @ gap.ravel() - self._prior_information @ change - tied.T @ alone.ravel()
+        return _Reduced(np.asarray(matrix), np.asarray(right), alone, coupled)
+
+    def _pose_system(self, vector: Array, poses: Poses, at: Linearised) -> tuple[Array, Array]:
+        """Normal equations of each pose by itself, (F, 27, 27) and (F, 27)."""
+        _, gap, per_pose = self._weighed(at)
+        turned = per_pose.transpose(0, 2, 1)
+        matrix, right = turned @ per_pose, (turned @ gap[..., None])[..., 0]
+        self._add_habits(poses.angles, matrix, right)
+        return matrix, right
+
+    def _weighed(self, at: Linearised) -> tuple[Array, Array, Array]:
+        """Roots of the weights (F, M), and weighed by them: gaps (F, 3 M) and their change per pose (F, 3 M, 27)."""
         gap = self._seen - at.points
         seen = np.isfinite(gap[..., 0])
         gap = np.where(seen[..., None], gap, 0.0)
@@ -127,17 +196,8 @@ class HandAdjustment:
         weight = np.where(seen, self._data_part * np.minimum(1.0, HUBER / np.maximum(distance, 1e-12)), 0.0)
         root = np.sqrt(weight) / self._weights.noise_m
         count = len(gap)
-        gap = (root[..., None] * gap).reshape(count, -1)
-        per_pose = (root[..., None, None] * at.per_pose).reshape(count, -1, POSE)
-        per_shape = (root[..., None, None] * at.per_shape).reshape(count, gap.shape[1], -1)
-        turned = per_pose.transpose(0, 2, 1)
-        pose_matrix, between = turned @ per_pose, turned @ per_shape
-        pose_right = (turned @ gap[..., None])[..., 0]
-        self._add_habits(poses.angles, pose_matrix, pose_right)
-        flat = per_shape.reshape(-1, self._unknowns.size)
-        shape_matrix = flat.T @ flat + self._prior_information
-        shape_right = flat.T @ gap.ravel() - self._prior_information @ (vector - self._unknowns.prior.mean)
-        return pose_matrix, between, shape_matrix, pose_right, shape_right
+        return (root, (root[..., None] * gap).reshape(count, -1),
+                (root[..., None, None] * at.per_pose).reshape(count, -1, POSE))
 
     def _add_habits(self, angles: Array, matrix: Array, right: Array) -> None:
         part, information = self._habit_part, self._natural.information
@@ -147,26 +207,13 @@ class HandAdjustment:
         matrix[:, np.arange(TWIST), np.arange(TWIST)] += 1e-3
         right[:, TWIST:] -= part * ((angles - self._natural.mean) @ information + past / LIMIT_SD)
 
-    def _solve(self, pose_matrix: Array, between: Array, shape_matrix: Array, pose_right: Array, shape_right: Array,
-               damping: float) -> tuple[Array, Array]:
-        diagonal = np.arange(POSE)
-        damped = pose_matrix.copy()
-        damped[:, diagonal, diagonal] *= 1.0 + damping
-        try:
-            solved = np.linalg.solve(damped, np.concatenate([between, pose_right[..., None]], axis=2))
-            if not self._weights.free_shape:
-                return np.zeros(self._unknowns.size), solved[..., -1]
-            flat = between.reshape(-1, self._unknowns.size)
-            reduced = shape_matrix - flat.T @ solved[..., :-1].reshape(flat.shape)
-            right = shape_right - flat.T @ solved[..., -1].ravel()
-            reduced[np.diag_indices_from(reduced)] *= 1.0 + damping
-            shape_step = np.asarray(np.linalg.solve(reduced, right), dtype=np.float64)
-        except np.linalg.LinAlgError as exc:
-            raise CalibrationError("the markers do not hold the hand: too few are seen at the same time.") from exc
-        return shape_step, np.asarray(solved[..., -1] - solved[..., :-1] @ shape_step)
 
-    def _covariance(self, vector: Array, poses: Poses) -> Array:
-        pose_matrix, between, shape_matrix, *_ = self._system(vector, poses)
-        flat = between.reshape(-1, self._unknowns.size)
-        reduced = shape_matrix - flat.T @ np.linalg.solve(pose_matrix, between).reshape(flat.shape)
-        return np.asarray(np.linalg.inv(reduced))
+def _possible(vector: Array) -> bool:
+    return bool(np.isfinite(vector).all() and (vector[:BONE_COUNT] > 1e-3).all())
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+    except np.linalg.LinAlgError as exc:
+        raise CalibrationError("the markers do not hold the hand: too few are seen at the same time.") from exc

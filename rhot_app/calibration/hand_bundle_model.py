@@ -40,10 +40,16 @@ class Poses:
         """Some of the poses."""
         return Poses(self.world[chosen], self.angles[chosen])
 
+    def where(self, chosen: NDArray[np.bool_], others: Poses) -> Poses:
+        """These poses where `chosen` (F,), the others' elsewhere."""
+        return Poses(np.where(chosen[:, None, None], self.world, others.world),
+                     np.where(chosen[:, None], self.angles, others.angles))
+
 
 @dataclass(frozen=True, slots=True)
 class Linearised:
-    """`points` (F, M, 3) m, and their change per pose (F, M, 3, 27) and per shape (F, M, 3, G)."""
+    """`points` (F, M, 3) m, and their change per pose (F, M, 3, 27) and per shape (F, M, 3, G), empty when not asked
+    for."""
 
     points: Array
     per_pose: Array
@@ -60,8 +66,8 @@ def expected(unknowns: HandUnknowns, vector: Array, poses: Poses) -> Array:
     return points
 
 
-def linearise(unknowns: HandUnknowns, vector: Array, poses: Poses) -> Linearised:
-    """The markers and their derivatives."""
+def linearise(unknowns: HandUnknowns, vector: Array, poses: Poses, *, per_shape: bool = True) -> Linearised:
+    """The markers and their derivatives; those by the shape, which take longest, only if `per_shape`."""
     dh = _table(unknowns, vector)
     count, places = len(poses.angles), unknowns.places
     frames = np.empty((count, len(dh.parent), 3, 4))
@@ -69,8 +75,10 @@ def linearise(unknowns: HandUnknowns, vector: Array, poses: Poses) -> Linearised
     per_pose = np.empty((count, len(places), 3, POSE))
     _forward_all(dh, poses.world, poses.angles, frames, points)
     _slide(unknowns, vector, poses, frames, points)
-    _jacobian_all(dh, poses.world, frames, points, per_pose)  # that a bending joint also slides the skin is left out
-    return Linearised(points, per_pose, _per_shape(unknowns, vector, poses, frames, points))
+    _jacobian_all(dh, poses.world, frames, points, per_pose)
+    _add_sliding(unknowns, vector, poses, frames, per_pose)
+    return Linearised(points, per_pose, _per_shape(unknowns, vector, poses, frames, points) if per_shape
+                      else np.empty((*points.shape, 0)))
 
 
 def in_segments(unknowns: HandUnknowns, vector: Array, poses: Poses, offsets: Array) -> Array:
@@ -113,12 +121,27 @@ def _slide(unknowns: HandUnknowns, vector: Array, poses: Poses, frames: Array, p
         points[:, m] += _slide_slopes(unknowns, m, poses, frames) @ vector[first:first + 2]
 
 
+def _add_sliding(unknowns: HandUnknowns, vector: Array, poses: Poses, frames: Array, per_pose: Array) -> None:
+    """Add to the change per pose (F, M, 3, 27) that a joint which bends slides the skin besides turning it."""
+    for k, m in enumerate(unknowns.sliding):
+        first = unknowns.slides + 2 * k
+        along, joints = _slide_course(unknowns, m, frames)
+        amount = vector[first:first + 2] * np.cos(poses.angles[:, joints])
+        for joint, moved in zip(joints, amount.T, strict=True):
+            per_pose[:, m, :, TWIST + joint] += moved[:, None] * along
+
+
 def _slide_slopes(unknowns: HandUnknowns, marker: int, poses: Poses, frames: Array) -> Array:
     """(F, 3, 2): the bone's direction times the sines of the flexions at its beginning and its end."""
+    along, joints = _slide_course(unknowns, marker, frames)
+    return np.asarray(along[:, :, None] * np.sin(poses.angles[:, joints])[:, None, :])
+
+
+def _slide_course(unknowns: HandUnknowns, marker: int, frames: Array) -> tuple[Array, list[int]]:
+    """The direction (F, 3) of a marker's bone, along which it slides, and the flexions at both its ends."""
     place = unknowns.places[marker]
     along = frames[:, unknowns.bone_rows[place.finger, place.segment], :, 0]
-    joints = FLEXIONS[place.finger][place.segment:place.segment + 2]
-    return np.asarray(along[:, :, None] * np.sin(poses.angles[:, list(joints)])[:, None, :])
+    return np.asarray(along), list(FLEXIONS[place.finger][place.segment:place.segment + 2])
 
 
 def segment_axes(finger: int, segment: int) -> Array:

@@ -81,8 +81,8 @@ def _begin(unknowns: HandUnknowns, seen: Array, steps: int) -> HandBundle:
     few = HandAdjustment(unknowns, seen[best], Weights(_START_NOISE_M, len(best), len(best)))
     begun = few.run(unknowns.prior.mean, poses.of(best), steps)
     poses = lay_palm_on(unknowns, begun.vector, seen, poses)
-    every = HandAdjustment(unknowns, seen, Weights(_START_NOISE_M, len(seen), len(seen), free_shape=False))
-    return every.run(begun.vector, poses, steps)
+    every = HandAdjustment(unknowns, seen, Weights(_START_NOISE_M, len(seen), len(seen)))
+    return every.run(begun.vector, every.settle(begun.vector, poses, steps), 0)
 
 
 def _believe(unknowns: HandUnknowns, seen: Array, start: HandBundle, smoothed: SmoothTracks,

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-WINDOW_S = 0.15
-"""A hand that shows its joints changes its course more slowly than this."""
+WINDOW_S = 0.1
+"""A parabola follows a finger for so long: on motion capture of a hand that takes hold of things it is off by 0.02 mm
+in the median, with half as much again 0.04 mm, which is more than the longer window takes from the noise."""
 
 _ORDER = 2
 _LEAST_SAMPLES = 5  # in a window: fewer do not average anything

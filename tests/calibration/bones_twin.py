@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
+from scipy.special import erf
 
 from rhot_app.calibration import hand_prior
 from rhot_app.calibration.hand_bundle_model import Poses, expected
@@ -78,17 +79,21 @@ def free_movement(hand: HandAnatomy, seconds: float, rate_hz: float, seed: int) 
     low, high = model.limits.T
     angles = np.empty((len(times), len(ANGLES)))
 
+    def saturated(values: np.ndarray) -> np.ndarray:
+        """0..1, resting near both ends, and smooth as hands are."""
+        return 0.5 + 0.5 * erf(values)
+
     def wave(slowest: float = 0.15, fastest: float = 0.6) -> np.ndarray:
         parts = [np.sin(2 * np.pi * rng.uniform(slowest, fastest) * times + rng.uniform(0, 2 * np.pi))
                  for _ in range(2)]
-        return 0.5 + 0.5 * np.clip(sum(parts) / 1.5, -1, 1)  # 0..1, resting at both ends now and then
+        return saturated(0.9 * sum(parts))
 
     fist = wave()
     for k, name in enumerate(ANGLES):
         if name.endswith("dip_flexion"):
             angles[:, k] = 2.0 / 3.0 * angles[:, k - 1] + np.radians(8.0) * (wave() - 0.5)
         elif name.endswith("flexion"):
-            closing = np.clip(1.5 * (0.6 * fist + 0.4 * wave()) - 0.25, 0.0, 1.0)  # stays stretched, stays closed
+            closing = saturated(4.0 * (0.6 * fist + 0.4 * wave() - 0.5))
             angles[:, k] = 0.95 * high[k] * closing if low[k] > -0.2 else low[k] + (high[k] - low[k]) * wave()
         else:
             angles[:, k] = 0.7 * (low[k] + (high[k] - low[k]) * wave())
