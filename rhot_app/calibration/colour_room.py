@@ -105,17 +105,14 @@ def room_colours(views: Sequence[View], name: str) -> RoomColours:
 
 def _rival(gate: ColourGate, markers: MarkerSet, index: int, name: str, view: View, picture: int,
            room: Mask) -> Rival | None:
-    chroma = markers.markers[index].chroma
+    marker, shape = markers.markers[index], view.image.u.shape
     blobs = gate.blobs(only(view.image, room), [index]).copy()
     if not len(blobs):
         return None
-    own = gate.blobs(only(view.image, view.paint[name].whole), [index])
-    shape = view.image.u.shape
-    best_own = float(np.max(merits(own, chroma, shape), initial=0.0)) or view.paint[name].area
-    worth = merits(blobs, chroma, shape)
     hand = _hand(view, [marker.id for marker in markers.markers if marker.role is not None])
-    if hand is not None and markers.markers[index].role is not None:
-        worth = worth * hand.nearness(blobs[:, SUM_X] / blobs[:, AREA], blobs[:, SUM_Y] / blobs[:, AREA])
+    worth = merits(blobs, marker, shape, hand)
+    best_own = float(np.max(merits(gate.blobs(only(view.image, view.paint[name].whole), [index]), marker, shape, hand),
+                            initial=0.0)) or (view.paint[name].area if hand is None else 1.0)
     best = blobs[int(np.argmax(worth))]
     return Rival(name, picture, x=2.0 * float(best[SUM_X] / best[AREA]) + 0.5,
                  y=2.0 * float(best[SUM_Y] / best[AREA]) + 0.5, area_px=4.0 * float(best[AREA]),

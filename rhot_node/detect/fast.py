@@ -35,6 +35,7 @@ GUESS_EVERY = 20  # frames without all markers in plain view until the light is 
 STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
+HAND_PASSES = 2  # of finding the hand by its likeliest markers, and those by the hand
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
 
 
@@ -135,7 +136,8 @@ class FastDetector:
         found: dict[int, MarkerObservation] = {}
         lost = []
         for index, track in enumerate(self._tracks):
-            if track.alive and self._measure(image, index, track.request(self._request)):
+            if track.alive and self._measure(image, index, track.request(self._request)) \
+                    and not track.is_litter(self._row.tolist()):
                 found[index] = self._observe(index, MarkerFlag(0))
             else:
                 lost.append(index)
@@ -203,14 +205,11 @@ class FastDetector:
     def _acquire(self, image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
         """Search the whole frame for the lost markers and state each as found or lost."""
         blobs = self._gate.blobs(image, lost).copy()
-        worth = self._worth(blobs)
-        hand = self._whereabouts(lost, blobs, worth)
+        own = {index: blobs[blobs[:, LABEL] == index + 1] for index in lost}
+        worth = self._worth(own)
         for index in lost:
             track = self._tracks[index]
-            own = blobs[:, LABEL] == index + 1
-            if hand is not None and self._markers[index].role is not None:
-                worth[own] *= hand.nearness(blobs[own, SUM_X] / blobs[own, AREA], blobs[own, SUM_Y] / blobs[own, AREA])
-            ranked, flags = self._rank(index, blobs[own], worth[own])
+            ranked, flags = self._rank(index, own[index], worth[index])
             for blob in ranked[:CANDIDATES]:
                 if self._measure(image, index, self._blob_request(index, blob)):
                     self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
@@ -220,22 +219,21 @@ class FastDetector:
                 track.lose()
                 found[index] = lost_observation(index)
 
-    def _worth(self, blobs: Blobs) -> NDArray[np.float64]:
-        """(N,) merit of every blob as the marker whose colour it has."""
-        worth = np.zeros(len(blobs))
-        for index, marker in enumerate(self._markers):
-            own = blobs[:, LABEL] == index + 1
-            worth[own] = merits(blobs[own], marker.chroma, self._scratch.mask.shape)
-        return worth
+    def _worth(self, own: dict[int, Blobs]) -> dict[int, NDArray[np.float64]]:
+        """(N,) merit of every blob of each lost marker: by themselves at first, then by where that puts the hand."""
+        shape, hand = self._scratch.mask.shape, None
+        for _ in range(HAND_PASSES):
+            worth = {index: merits(blobs, self._markers[index], shape, hand) for index, blobs in own.items()}
+            hand = self._whereabouts(own, worth)
+        return {index: merits(blobs, self._markers[index], shape, hand) for index, blobs in own.items()}
 
-    def _whereabouts(self, lost: list[int], blobs: Blobs, worth: NDArray[np.float64]) -> Whereabouts | None:
+    def _whereabouts(self, own: dict[int, Blobs], worth: dict[int, NDArray[np.float64]]) -> Whereabouts | None:
         """Where the hand is: by the worn markers that are tracked, and by the likeliest blob of each lost one."""
         worn = [(track.x, track.y, track.area) for index, track in enumerate(self._tracks)
-                if index not in lost and self._markers[index].role is not None]
-        for index in lost:
-            own = blobs[:, LABEL] == index + 1
-            if self._markers[index].role is not None and own.any():
-                blob = blobs[own][int(np.argmax(worth[own]))]
+                if index not in own and self._markers[index].role is not None]
+        for index, blobs in own.items():
+            if self._markers[index].role is not None and len(blobs):
+                blob = blobs[int(np.argmax(worth[index]))]
                 worn.append((blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA]))
         return middle_of(worn)
 

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import Table, acquisition_table
-from rhot_node.detect.search import AREA, SUM_U, SUM_V, X_MAX, X_MIN, Y_MAX, Y_MIN, Searcher, label_at
-from rhot_node.markers import ChromaModel, MarkerSet
+from rhot_node.detect.search import AREA, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN, Searcher, label_at
+from rhot_node.detect.whereabouts import Whereabouts
+from rhot_node.markers import Marker, MarkerSet
 
 AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
 
@@ -50,18 +51,26 @@ class ColourGate:
         return self._searcher.find(image.y, image.u, image.v, wanted, area_min)
 
 
-def merits(blobs: NDArray[np.float64], chroma: ChromaModel, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """(N,) how likely each blob is the marker: its area, as far as compact, of the marker's hue, not cut by the border.
+def merits(blobs: NDArray[np.float64], marker: Marker, shape: tuple[int, int],
+           hand: Whereabouts | None = None) -> NDArray[np.float64]:
+    """(N,) how likely each blob is the marker: as far as it is compact, of the marker's hue, not cut by the border.
 
-    `shape`: (H/2, W/2) of the chroma planes. A search without any memory takes the blob with the most.
+    A worn marker is where the `hand` is and of the size that the others are; where that is not known, and for free
+    markers, the larger blob is the likelier. `shape`: (H/2, W/2) of the chroma planes. A search without any memory
+    takes the blob with the most.
     """
+    chroma, area = marker.chroma, blobs[:, AREA]
     box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)
     away = np.angle(np.exp(1j * (np.arctan2(blobs[:, SUM_V], blobs[:, SUM_U]) - chroma.hue_rad)))
     match = np.exp(-(away / math.radians(chroma.hue_tolerance_deg)) ** 2)
     height, width = shape
     cut = ((blobs[:, X_MIN] == 0) | (blobs[:, Y_MIN] == 0)
            | (blobs[:, X_MAX] == width - 1) | (blobs[:, Y_MAX] == height - 1))
-    return np.asarray(blobs[:, AREA] ** 2 / box * match * np.where(cut, 0.5, 1.0))
+    fitting = area / box * match * np.where(cut, 0.5, 1.0)
+    if hand is None or marker.role is None:
+        return np.asarray(fitting * area)
+    near = hand.nearness(blobs[:, SUM_X] / area, blobs[:, SUM_Y] / area)
+    return np.asarray(fitting * near * hand.likeness(area, marker.shape))
 
 
 @njit(cache=True)

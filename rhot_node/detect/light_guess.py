@@ -21,7 +21,6 @@ RECOGNISED = 0.25  # score of a marker
 MARKERS_LEAST = 3  # that must be recognised for another light to be believed
 ADVANTAGE = 1.0  # markers more than in the last known light
 AREA_MIN = 3  # pixels of every other chroma row and column, which are enough to guess by
-SIZE_SIGMA = 1.2  # of the logarithm of areas: a wrist band is 6 times as large as a fingertip
 ALL_THERE = 0.6  # of the greatest score: no other light can be much better
 
 
@@ -75,6 +74,6 @@ def _scores(image: YuvImage, gate: ColourGate, markers: MarkerSet) -> NDArray[np
     middle = middle_of(places)
     if middle is not None:
         x, y, area = np.array(places).T
-        alike = np.exp(-0.5 * (np.log(area / middle.side**2) / SIZE_SIGMA) ** 2)
+        alike = [float(middle.likeness(area[k], markers.markers[index].shape)) for k, index in enumerate(worn)]
         scores[worn] *= middle.nearness(x, y) * alike
     return scores

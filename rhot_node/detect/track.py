@@ -23,6 +23,8 @@ HIDDEN_DECAY = 0.99  # per frame: what looks hidden for long is believed to be t
 PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
 STEADY_AREA = 0.04  # relative change against the expectation beyond which the covariance covers what hiding,
 # uncovering or joining that much would do
+LITTER_AREA, LITTER_LEVEL = 0.25, 0.75  # of what is expected: less of both at once is no paint
+SLIVER_AREA = 0.15  # of the expected area: too little to be believed without the gate of a search
 JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
 FLOOR_VARIANCE = 4e-4  # px^2: sampling and shading leave about 0.02 px
@@ -85,6 +87,14 @@ class Track:
         away = math.hypot(x - self.x - hold * self.vx, y - self.y - hold * self.vy) / reach
         size = math.log(area / self.area) / (0.35 + 0.02 * gap)
         return away * away + size * size
+
+    def is_litter(self, row: Row) -> bool:
+        """Whether a measured row may be of specks that lie where the marker was, so that a search should decide.
+
+        What hides a marker leaves some of it in its colour, and shade leaves it its size.
+        """
+        pale = row[m.LEVEL] < LITTER_LEVEL * self.level
+        return row[p.AREA] < LITTER_AREA * self.area and (pale or row[p.AREA] < SLIVER_AREA * self.area)
 
     def lose(self) -> None:
         """Not in this frame."""
