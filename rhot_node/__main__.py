@@ -1,4 +1,4 @@
-"""The ``rhot-node`` command: the daemon, or ``rhot-node detect`` on files."""
+"""The ``rhot-node`` command: the daemon; the other commands stand in commands.py."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from rhot_node.commands import COMMANDS, HELP, run_command
 from rhot_node.errors import NodeError
 
 if TYPE_CHECKING:
@@ -66,10 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         _hide_scipy()
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        if arguments[:1] == ["detect"]:
-            return _detect(arguments[1:])
-        if arguments[:1] in (["pair"], ["unpair"]):
-            return _change_trust(arguments[0], arguments[1:])
+        if arguments and arguments[0] in COMMANDS:
+            return run_command(arguments[0], arguments[1:])
         return _serve(_parse(arguments))
     except NodeError as exc:
         print(f"rhot-node: {exc}", file=sys.stderr)
@@ -84,29 +83,12 @@ def _hide_scipy() -> None:
     sys.modules["scipy"] = None  # type: ignore[assignment]
 
 
-def _detect(arguments: list[str]) -> int:
-    from rhot_node import detect_command
-    parser = argparse.ArgumentParser(
-        prog="rhot-node detect", formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Find the markers in an image, a folder of images or a video, frame by frame.")
-    detect_command.add_arguments(parser)
-    return detect_command.run(parser.parse_args(arguments))
-
-
-def _change_trust(name: str, arguments: list[str]) -> int:
-    from rhot_node import trust_command
-    parser = argparse.ArgumentParser(prog=f"rhot-node {name}", description=trust_command.SUMMARIES[name])
-    trust_command.add_arguments(parser)
-    return trust_command.run(name, parser.parse_args(arguments))
-
-
 def _parse(arguments: list[str]) -> argparse.Namespace:
     from rhot_node.capture.open import SPEC_HELP
     parser = argparse.ArgumentParser(
         prog="rhot-node", formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="A camera node: finds the markers in every frame and streams them to the master by UDP.\n"
-                    "rhot-node detect --help: find markers in files instead.\n"
-                    "rhot-node pair --help, rhot-node unpair --help: who may use this node.",
+        description="A camera node: finds the markers in every frame and streams them to the master by UDP.\n\n"
+                    f"{HELP}",
         epilog=f"{SPEC_HELP}\n\n{ENDING_HELP}")
     parser.add_argument("--settings", type=Path, required=True, metavar="FILE",
                         help="settings of this node (JSON, see docs/node.md)")
@@ -134,11 +116,14 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     from rhot_node.capture.open import open_camera, takes_settings
     from rhot_node.control import ControlServer
     from rhot_node.daemon import NodeDaemon
+    from rhot_node.health.machine import Machine
+    from rhot_node.health.monitor import HealthMonitor
     from rhot_node.link import UdpLink
     from rhot_node.link_keys import LinkKeys
     from rhot_node.pairing_offer import OfferFile, offer_path
     from rhot_node.reception import Reception
     from rhot_node.requests import Responder, SettingsStore
+    from rhot_node.service.notify import ServiceManager
 
     clock = settings.clock.clock(time.monotonic_ns())
     store = SettingsStore(options.settings, settings)
@@ -146,13 +131,16 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     trust = _trust(options.settings, settings, offers)
     keys = None if trust is None else LinkKeys()
     daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), make_detector,
-                        camera_takes_settings=takes_settings(options.camera), loop=options.loop)
+                        camera_takes_settings=takes_settings(options.camera), loop=options.loop,
+                        troubles=HealthMonitor(Machine()).troubles)
+    manager = ServiceManager()
     with contextlib.ExitStack() as stack:
         stack.callback(daemon.close)
         link = UdpLink(settings, clock, daemon.sessions, secrets.randbits(32), lambda: daemon.state, keys)
         stack.callback(link.close)
         control = ControlServer(settings, trust)
         stack.callback(control.close)
+        stack.callback(manager.stopping)
         ports = {"udp_port": link.port, "control_port": control.control_port, "preview_port": control.preview_port,
                  "pairing_port": control.pairing_port}
         link.start()
@@ -164,8 +152,9 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
         width, height = daemon.size
         print(json.dumps({"event": "ready", "node_id": settings.node_id, "name": settings.name, **ports,
                           "width": width, "height": height}), flush=True)
+        manager.ready(f"node {settings.name}, {width} x {height} px")
         while daemon.step(link, control.pictures) and not end.due():
-            pass
+            manager.alive()
 
 
 def _trust(path: Path, settings: NodeSettings, offers: OfferFile) -> NodeTrust | None:

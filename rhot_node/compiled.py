@@ -35,11 +35,10 @@ def use_own_cache() -> None:
     """Point numba at the folder of the present sources, unless the environment names one. Call before numba loads."""
     if VARIABLE in os.environ:
         return
-    root = Path(__file__).parent.parent
     try:
         from platformdirs import user_cache_path
         base = user_cache_path("rhot") / "numba"
-        folder = base / sources_hash([root / name for name in _PACKAGES if (root / name).is_dir()])
+        folder = base / _present_hash()
         if not folder.is_dir():
             folder.mkdir(parents=True)
             _forget_old(base)
@@ -59,10 +58,20 @@ def is_cold() -> bool:
     return VARIABLE not in os.environ or not (is_complete() or any(Path(os.environ[VARIABLE]).rglob("*.nbi")))
 
 
+def is_compiled_in(cache: Path) -> bool:
+    """Whether the cache of a user or service (what XDG_CACHE_HOME names) has any code of the present sources."""
+    return any((cache / "rhot" / "numba" / _present_hash()).rglob("*.nbi"))
+
+
 def mark_complete() -> None:
     """Note that everything has been compiled for the present sources. Raises OSError."""
     if VARIABLE in os.environ:
         (Path(os.environ[VARIABLE]) / _COMPLETE).touch()
+
+
+def _present_hash() -> str:
+    root = Path(__file__).parent.parent
+    return sources_hash([root / name for name in _PACKAGES if (root / name).is_dir()])
 
 
 def _forget_old(base: Path) -> None:

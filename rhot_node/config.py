@@ -76,9 +76,11 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     detector: Literal["fast", "reference"] = "fast"
     camera: CameraSettings = CameraSettings()
     preview_hz: Annotated[float, Meta(gt=0, le=30)] = 4.0
+    late_frames: Literal["send", "drop"] = "send"  # frames whose processing took longer than the budget (RHOT 7.2)
+    budget_ms: Annotated[float, Meta(gt=0, le=10_000)] | None = None  # None: as long as a frame lasts
     clock: ClockSettings = ClockSettings()
     pairing_port: Port = 47803
-    trust: Literal["paired", "open"] = "open"  # open: whoever reaches the node may do everything with it
+    trust: Literal["paired", "open"] = "paired"  # open: whoever reaches the node may do everything with it
     format: Literal["rhot-node"] = FORMAT
     version: Literal[1] = VERSION
 

@@ -9,11 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Rewindable
+from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting, Rewindable
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.detector import Detector
 from rhot_node.errors import CameraError
+from rhot_node.health.check import Check
 from rhot_node.pictures import PictureBox
 from rhot_node.requests import SettingsStore
 from rhot_node.session import Sessions, Stream
@@ -43,7 +44,8 @@ class Counters:
 
     frames: int = 0
     skipped_frames: int = 0  # gaps in the camera's numbers
-    over_budget: int = 0  # frames whose processing took longer than a frame lasts
+    over_budget: int = 0  # frames whose processing took longer than the budget
+    late_dropped: int = 0  # of these, those that were not sent because of it
     sent: int = 0
     not_sent: int = 0  # refused by the network
     faults: int = 0
@@ -54,8 +56,10 @@ class NodeDaemon:
     and `count` may be asked by any."""
 
     def __init__(self, store: SettingsStore, clock: NodeClock, open_camera: OpenCamera, make_detector: MakeDetector,
-                 *, camera_takes_settings: bool = True, loop: bool = False) -> None:
-        """`loop`: a recording that ends begins again. Nothing is opened before `prepare`."""
+                 *, camera_takes_settings: bool = True, loop: bool = False,
+                 troubles: Callable[[], list[Check]] = list) -> None:
+        """`loop`: a recording that ends begins again. `troubles`: what is wrong with the machine; called by whoever
+        asks for a report. Nothing is opened before `prepare`."""
         self.sessions = Sessions()
         self.counters = Counters()
         self._store = store
@@ -65,6 +69,7 @@ class NodeDaemon:
         self._make_detector = make_detector
         self._camera_takes_settings = camera_takes_settings
         self._loop = loop
+        self._troubles = troubles
         self._camera: Camera | None = None
         self._detector: Detector | None = None
         self._prepared = False
@@ -92,11 +97,12 @@ class NodeDaemon:
 
     def report(self) -> dict[str, Any]:
         """State, for the control channel."""
-        stream = self.sessions.current
+        stream, camera = self.sessions.current, self._camera
         return {"node_id": self._settings.node_id, "name": self._settings.name, "state": self.state.name.lower(),
                 "message": self._message, "session": stream.session if stream else 0,
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
-                "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns()}
+                "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns(),
+                "camera": camera.report() if isinstance(camera, Reporting) else {}, "health": self._troubles()}
 
     def introduce(self) -> dict[str, Any]:
         """What anybody may know, paired or not."""
@@ -138,10 +144,13 @@ class NodeDaemon:
         if frame is None:
             return True
         markers = self._detector.detect(frame.image)
+        late = self._count_frame(frame)
         stream = self.sessions.current
         if stream is not None and frame.t_node_ns >= stream.t_start_node_ns:
-            self._send(frame, markers, stream, sender)
-        self._count_frame(frame)
+            if late and self._settings.late_frames == "drop":
+                self.counters.late_dropped += 1
+            else:
+                self._send(frame, markers, stream, sender)
         pictures.offer(frame)
         return True
 
@@ -162,15 +171,20 @@ class NodeDaemon:
         else:
             self.counters.not_sent += 1
 
-    def _count_frame(self, frame: Frame) -> None:
+    def _count_frame(self, frame: Frame) -> bool:
+        """Count the frame; says whether its processing took longer than the budget."""
         self.counters.frames += 1
+        budget_ms = self._settings.budget_ms
+        budget_ns = None if budget_ms is None else round(1e6 * budget_ms)
         if self._last_frame is not None:
             step = frame.number - self._last_frame[0]
-            budget_ns = (frame.t_node_ns - self._last_frame[1]) // max(step, 1)
             self.counters.skipped_frames += max(step - 1, 0)
-            if self._clock.now_ns() - frame.t_available_node_ns > budget_ns:
-                self.counters.over_budget += 1
+            if budget_ns is None:
+                budget_ns = (frame.t_node_ns - self._last_frame[1]) // max(step, 1)
         self._last_frame = frame.number, frame.t_node_ns
+        late = budget_ns is not None and self._clock.now_ns() - frame.t_available_node_ns > budget_ns
+        self.counters.over_budget += late
+        return late
 
     def _open(self) -> None:
         self._last_frame = None

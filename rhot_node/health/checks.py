@@ -81,7 +81,8 @@ def check_speed(governor: str | None) -> Check:
     if governor == "powersave":
         return Check("speed", "warning", "The processor is held at its lowest frequency.",
                      "Set it free: `echo ondemand | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor`.")
-    return Check("speed", "ok", f"The processor's frequency is governed by {governor or 'something untold'}.")
+    return Check("speed", "ok", f"The processor's frequency is chosen by {governor}." if governor else
+                 "It does not tell how its processor's frequency is chosen.")
 
 
 def check_network(machine: Machine) -> list[Check]:

@@ -37,7 +37,10 @@ OPTIONS: dict[str, tuple[str, ...]] = {
         "--left", "--right", "--camera", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
         "--left-intrinsics", "--right-intrinsics", "--intrinsics", "--refine-intrinsics", "--baseline-mm", "--ruler-mm",
         "--ruler", "--table-image", "--rig-from", "--out", "--json"),
-    "rhot-node": ("--settings", "--camera", "detect"),
+    "rhot-node": ("--settings", "--camera", "detect", "doctor", "install"),
+    "rhot-node doctor": ("--settings", "--json"),
+    "rhot-node install": ("--node-id", "--name", "--settings", "--camera", "--user", "--dry-run"),
+    "rhot-node uninstall": ("--user",),
     "rhot-node detect": ("--markers", "--detector", "--all", "--json"),
 }
 

@@ -35,7 +35,7 @@ def test_the_hash_follows_compiled_sources_only(package: Path) -> None:
 def start(cache: Path, **more: str) -> str:
     environment = {key: value for key, value in os.environ.items() if key != VARIABLE}
     environment |= {"XDG_CACHE_HOME": str(cache), **more}
-    code = f"import os, rhot_app; print(os.environ.get({VARIABLE!r}, ''))"
+    code = f"import os, rhot_node; print(os.environ.get({VARIABLE!r}, ''))"
     return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True,
                           check=True).stdout.strip()
 

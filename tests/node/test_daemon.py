@@ -16,6 +16,7 @@ from rhot_node.config import NodeSettings, save_settings
 from rhot_node.daemon import NodeDaemon
 from rhot_node.errors import CameraError
 from rhot_node.files import resource_path
+from rhot_node.health.check import Check
 from rhot_node.markers import load_markers
 from rhot_node.pictures import PictureBox
 from rhot_node.requests import SettingsStore
@@ -235,3 +236,29 @@ def test_a_recording_is_not_opened_again_for_camera_settings(tmp_path: Path) -> 
     assert len(node.cameras) == 1 and not node.cameras[0].closed
 
 
+
+
+@pytest.mark.parametrize(("changes", "sent", "dropped"), [
+    ({}, [0, 1, 2], 0), ({"late_frames": "drop"}, [0], 2), ({"late_frames": "drop", "budget_ms": 1.0}, [], 3),
+    ({"late_frames": "drop", "budget_ms": 9000.0}, [0, 1, 2], 0)])
+def test_late_frames_are_sent_or_dropped_as_set(tmp_path: Path, changes: dict[str, object], sent: list[int],
+                                                dropped: int) -> None:
+    node = Node(tmp_path, range(9), period_ns=100_000, detector_s=0.002)
+    node.store.change(changes)
+    node.daemon.prepare()
+    node.start()
+    node.step(3)
+    assert [o.frame_number for o, _ in node.sender.sent] == sent
+    assert [o.sequence for o, _ in node.sender.sent] == list(range(len(sent))), "what is dropped is not lost"
+    assert node.daemon.counters.late_dropped == dropped
+
+
+def test_the_report_tells_of_the_camera_and_of_the_machine(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(9))
+    trouble = Check("heat", "error", "It is too hot.", "Cool it.")
+    node.daemon = NodeDaemon(node.store, node.clock, node._open, node._make_detector, troubles=lambda: [trouble])
+    assert node.daemon.report()["camera"] == {}
+    node.daemon.prepare()
+    node.cameras[0].report = lambda: {"sensor": "imx219"}  # type: ignore[attr-defined]
+    assert node.daemon.report()["camera"] == {"sensor": "imx219"}
+    assert node.daemon.report()["health"] == [trouble]

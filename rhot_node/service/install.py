@@ -1,0 +1,151 @@
+"""Putting the node's service in place and taking it away again, on a host that is passed in."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rhot_node.config import NodeSettings, changed_settings, load_settings, save_settings
+from rhot_node.errors import NodeError
+from rhot_node.files import resource_path, write_atomically
+from rhot_node.markers import load_markers
+from rhot_node.service.unit import NAME, START_S, STATE_FOLDER, USER, Service, unit_text
+
+SETTINGS = STATE_FOLDER / "node.json"
+UNIT_FOLDER = Path("/etc/systemd/system")
+PRIVATE_HOMES = ("/home", "/root")
+
+
+def run_command(command: Sequence[str]) -> str | None:
+    """Run `command`; None when it succeeds, else what it complained of."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=START_S + 60)
+    except (OSError, subprocess.TimeoutExpired) as exc:
+        return str(exc)
+    return None if done.returncode == 0 else (done.stderr or done.stdout).strip()
+
+
+@dataclass(frozen=True)
+class Host:
+    """The machine to install on."""
+
+    root: Path = Path("/")
+    run: Callable[[Sequence[str]], str | None] = run_command
+    is_root: bool = field(default_factory=lambda: os.geteuid() == 0)
+    home: Path = field(default_factory=Path.home)
+    prefix: Path = field(default_factory=lambda: Path(sys.prefix))
+    python: Path = field(default_factory=lambda: Path(sys.executable))
+
+    def at(self, path: Path) -> Path:
+        """Where `path` lies below the root."""
+        return self.root / path.relative_to("/")
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What to install. `settings` is a file to take over; else a new one gets `node_id` and `name`."""
+
+    camera: str = "pi"
+    settings: Path | None = None
+    node_id: int | None = None
+    name: str | None = None
+    user: bool = False
+
+
+def service_for(wish: Wish, host: Host) -> Service:
+    """The service that `wish` asks for on `host`."""
+    settings = host.home / ".config" / "rhot-node" / "node.json" if wish.user else SETTINGS
+    return Service(host.python, settings, wish.camera, wish.user)
+
+
+def install(wish: Wish, host: Host, say: Callable[[str], None]) -> None:
+    """Write settings and unit, start the service and wait until the node is ready. May be repeated, to change the
+    camera or after an update. Raises NodeError saying what to do; what is already in place then stays."""
+    service = service_for(wish, host)
+    settings = service.settings if wish.user else host.at(service.settings)
+    if not wish.user:
+        _check_system(host)
+    new = _new_settings(wish, settings)
+    if not wish.user and host.run(["id", "-u", USER]) is not None:
+        _do(host, "useradd", "--system", "--user-group", "--no-create-home", "--home-dir", str(STATE_FOLDER),
+            "--shell", "/usr/sbin/nologin", "--groups", "video", USER)
+        say(f"made the user {USER}, who may use cameras and owns nothing else")
+    if new is not None:
+        settings.parent.mkdir(parents=True, exist_ok=True)
+        save_settings(settings, new)
+        say(f"wrote {settings}: node {new.node_id}, {new.name!r}")
+    if not wish.user:
+        _do(host, "chown", "-R", f"{USER}:{USER}", str(STATE_FOLDER))
+    unit = _unit_path(wish.user, host)
+    unit.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(unit, unit_text(service).encode())
+    say(f"wrote {unit}")
+    _systemctl(host, wish.user, "daemon-reload")
+    _systemctl(host, wish.user, "enable", NAME)
+    say("starting the node; the first time its code is compiled, which takes one to five minutes")
+    failure = host.run(["systemctl", *(["--user"] if wish.user else []), "restart", NAME])
+    if failure is not None:
+        raise NodeError(f"the service is installed, but the node did not get ready ({failure}). Its own words: "
+                        f"`journalctl {'--user ' if wish.user else ''}-u {NAME} -n 30`; then `rhot-node doctor`.")
+    say("the node is ready, and will be after every start of this machine")
+
+
+def uninstall(user: bool, host: Host, say: Callable[[str], None]) -> None:
+    """Stop the service and remove its unit; settings and keys stay. Raises NodeError when there is none."""
+    unit = _unit_path(user, host)
+    if not unit.exists():
+        raise NodeError(f"{unit}: no such service, so there is nothing to remove"
+                        f"{'' if user else ' (a service of one user: rhot-node uninstall --user)'}.")
+    if not user and not host.is_root:
+        raise NodeError(f"only root may remove a system service: sudo {host.python} -m rhot_node uninstall")
+    _systemctl(host, user, "disable", "--now", NAME)
+    unit.unlink()
+    _systemctl(host, user, "daemon-reload")
+    say(f"removed {unit}")
+    if user:
+        say(f"settings and keys stay in {host.home / '.config' / 'rhot-node'}")
+    else:
+        say(f"settings and keys stay; to remove them too: sudo rm -r {STATE_FOLDER} /var/cache/{STATE_FOLDER.name} && "
+            f"sudo userdel {USER}")
+
+
+def _check_system(host: Host) -> None:
+    if not host.is_root:
+        raise NodeError(f"only root may install a system service: sudo {host.python} -m rhot_node install ... (or "
+                        "--user for a service of your own, or --dry-run to see what would be written)")
+    for home in PRIVATE_HOMES:
+        if host.prefix.is_relative_to(home):
+            raise NodeError(f"this environment lies in {host.prefix}, which the service's user may not read. Install "
+                            "RHOT in /opt/rhot (docs/pi.md), or use --user.")
+
+
+def _new_settings(wish: Wish, target: Path) -> NodeSettings | None:
+    """Settings to write; None when the ones in place stay."""
+    if wish.settings is not None:
+        return load_settings(wish.settings)
+    if target.exists():
+        load_settings(target)
+        return None
+    if wish.node_id is None or wish.name is None:
+        raise NodeError("a new node needs --node-id and --name, as in the rig file (such as --node-id 1 --name left), "
+                        "or --settings FILE to take over.")
+    markers = load_markers(resource_path("markers", "rhot6.json"))
+    return changed_settings(NodeSettings(1, "node", markers), {"node_id": wish.node_id, "name": wish.name})
+
+
+def _unit_path(user: bool, host: Host) -> Path:
+    return host.home / ".config" / "systemd" / "user" / NAME if user else host.at(UNIT_FOLDER) / NAME
+
+
+def _systemctl(host: Host, user: bool, *words: str) -> None:
+    _do(host, "systemctl", *(["--user"] if user else []), *words)
+
+
+def _do(host: Host, *command: str) -> None:
+    failure = host.run(command)
+    if failure is not None:
+        raise NodeError(f"`{' '.join(command)}` failed: {failure}")

@@ -1,0 +1,54 @@
+"""A Pi gets what the node needs and nothing else: the constraints for both systems, and pip's own word for aarch64."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[2]
+SYSTEMS = ("bookworm", "trixie")
+MASTERS_ONLY = {"scipy", "pyside6-essentials", "pyqtgraph", "pyopengl"}
+
+
+def node_dependencies() -> dict[str, Requirement]:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    return {requirement.name: requirement for requirement in map(Requirement, project["dependencies"])}
+
+
+def pinned(system: str) -> dict[str, str]:
+    text = (ROOT / "requirements" / f"node-{system}.txt").read_text()
+    return dict(re.findall(r"^([a-z0-9-]+)==(\S+)$", text, re.MULTILINE))
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_every_dependency_of_the_node_is_constrained_to_a_version_it_allows(system: str) -> None:
+    pins = pinned(system)
+    for name, requirement in node_dependencies().items():
+        assert name in pins, f"{name} is missing in requirements/node-{system}.txt; renew it (CONTRIBUTING.md)"
+        assert requirement.specifier.contains(pins[name]), f"{requirement}, but {system} has {pins[name]}"
+    assert not MASTERS_ONLY & set(pins)
+
+
+def test_bookworms_numpy_is_that_of_its_picamera2() -> None:
+    assert pinned("bookworm")["numpy"].startswith("1.")
+
+
+@pytest.mark.skipif(os.environ.get("RHOT_NETWORK") != "1", reason="asks the package index: only with RHOT_NETWORK=1")
+def test_pip_finds_all_of_it_for_a_pi() -> None:
+    done = subprocess.run([str(ROOT / ".ci" / "node-resolve")], capture_output=True, text=True, timeout=120,
+                          check=False, env=os.environ | {"PYTHON": sys.executable})
+    if re.search(r"Connection|Temporary failure|timed out", done.stderr):
+        pytest.skip("the package index is not reachable")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert [line.split(",")[0] for line in lines] == list(SYSTEMS)
+    for system, line in zip(SYSTEMS, lines, strict=True):
+        found = dict(item.split(" ") for item in line.split(": ")[1].split(", "))
+        assert found == pinned(system), "the constraints name exactly what is installed"
