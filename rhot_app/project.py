@@ -24,6 +24,7 @@ NotNegative = Annotated[float, Meta(ge=0)]
 Port = Annotated[int, Meta(ge=0, le=65535)]
 Pixels = Annotated[int, Meta(ge=16, le=16384)]
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
+PublicKey = Annotated[str, Meta(pattern=r"^([0-9a-f]{64})?$")]
 
 
 class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,6 +65,13 @@ class RigNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     data_port: Port = 0  # the master's: observations; 0 takes any free port and tells the node
     text_datagrams: bool = False  # accept the thesis's text datagrams on data_port (untrusted)
     time_offset_s: float = 0.0  # calibrated correction added to this camera's times
+    pairing_port: Port = 47803  # the node's: who it is, pairing
+    public_key: PublicKey = ""  # the node's; empty: the node is not paired, and what it says is untrusted
+
+    def __post_init__(self) -> None:
+        if self.text_datagrams and self.public_key:
+            raise ValueError(f"node {self.name} has a public_key and text_datagrams; text cannot be trusted, so take "
+                             "one of them away")
 
 
 class Broadcast(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -123,7 +131,8 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         fields: tuple[tuple[str, list[int | str]], ...] = (
             ("node_id", [node.node_id for node in self.nodes]), ("name", [node.name for node in self.nodes]),
-            ("data_port", [node.data_port for node in self.nodes if node.data_port]))
+            ("data_port", [node.data_port for node in self.nodes if node.data_port]),
+            ("public_key", [node.public_key for node in self.nodes if node.public_key]))
         for what, values in fields:
             doubled = [value for value in values if values.count(value) > 1]
             if doubled:

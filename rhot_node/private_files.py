@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import stat
 from pathlib import Path
 
@@ -49,6 +50,22 @@ def write_private(path: Path, data: bytes) -> None:
         write_atomically(path, data, private=True)
     except OSError as exc:
         raise TrustError(f"{path}: cannot be written ({exc.strerror}).") from exc
+
+
+def create_private(path: Path, data: bytes) -> bool:
+    """Write `data` as `write_private` does unless `path` is there already; returns whether it was written. Of several
+    programs that do so at once, one does. Raises TrustError."""
+    fresh = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+    write_private(fresh, data)
+    try:
+        os.link(fresh, path)  # unlike a rename, never over what is there
+    except FileExistsError:
+        return False
+    except OSError as exc:
+        raise TrustError(f"{path}: cannot be written ({exc.strerror}).") from exc
+    finally:
+        fresh.unlink()
+    return True
 
 
 def remove_private(path: Path) -> bool:

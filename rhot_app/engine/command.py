@@ -6,6 +6,7 @@ What tracks is imported when it runs, so that ``--help`` is there at once.
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import logging
 import os
@@ -34,12 +35,15 @@ def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the engine until SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.serve import serving
+    from rhot_app.keys import load_master_keys
     from rhot_app.project import load_rig
     from rhot_app.sources.udp_nodes import UdpNodes
 
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
     rig = load_rig(args.rig)
-    with serving(rig, args.rig.absolute(), UdpNodes, args.directory) as serve:
+    own = load_master_keys().own
+    source = functools.partial(UdpNodes, own=own)
+    with serving(rig, args.rig.absolute(), source, args.directory, own) as serve:
         if args.log is not None:
             serve.engine.record(args.log.absolute())
         if args.start:

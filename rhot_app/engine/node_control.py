@@ -18,6 +18,7 @@ from rhot_app.engine.commands import Answer, Arguments, refusal
 from rhot_app.engine.status import EngineStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
+from rhot_node.keys import KeyPair, connect_with
 
 TIMEOUT_S = 2.7
 """A still may take two seconds on a node whose camera has just stopped; a client waits for three."""
@@ -59,8 +60,10 @@ class NodeControl:
 
     commands = frozenset({"node", "still"})
 
-    def __init__(self, context: _Context) -> None:
+    def __init__(self, context: _Context, own: KeyPair | None = None) -> None:
+        """`own`: the master's keys; without them, as in a replay, paired nodes are not spoken to."""
         self._context = context
+        self._own = own
         self._peers: dict[int, _Peer] = {}
         self._rig: Rig | None = None
         self._preview = False
@@ -71,17 +74,18 @@ class NodeControl:
         if rig is self._rig:
             return
         self._rig = rig
-        wanted = {node.node_id: node for node in rig.nodes if not node.text_datagrams}
+        wanted = {node.node_id: node for node in rig.nodes
+                  if not node.text_datagrams and (self._own is not None or not node.public_key)}
         for node_id in [*self._peers]:
             node = wanted.get(node_id)
-            if node is None or _endpoints(node) != _endpoints(self._peers[node_id].node):
+            if node is None or _reached(node) != _reached(self._peers[node_id].node):
                 _close(self._peers.pop(node_id))
             else:
                 self._peers[node_id].node = node
         for node_id, node in wanted.items():
             if node_id not in self._peers:
                 try:
-                    self._peers[node_id] = _Peer(node, _connect(self._context, zmq.DEALER, _endpoints(node)[0]))
+                    self._peers[node_id] = _Peer(node, self._connect(zmq.DEALER, node, _endpoints(node)[0]))
                 except zmq.ZMQError as exc:  # the node is tracked all the same; only its settings are out of reach
                     log.warning("node %s: %s is no address to connect to (%s)", node.name, _endpoints(node)[0], exc)
         self.set_preview(self._preview)
@@ -113,7 +117,8 @@ class NodeControl:
                 del peer.asked[asked.number]
                 if asked.client is not None:
                     error = EngineError(f"node {peer.node.name} does not answer on its control channel "
-                                        f"{_endpoints(peer.node)[0]}; is rhot-node running there?")
+                                        f"{_endpoints(peer.node)[0]}; is rhot-node running "
+                                        "there, and is it paired with this computer?")
                     done.append((asked.client, (refusal(error), None)))
         return done
 
@@ -122,7 +127,7 @@ class NodeControl:
         self._preview = on
         for peer in self._peers.values():
             if on and peer.previews is None:
-                peer.previews = _connect(self._context, zmq.SUB, _endpoints(peer.node)[1])
+                peer.previews = self._connect(zmq.SUB, peer.node, _endpoints(peer.node)[1])
                 peer.previews.setsockopt(zmq.SUBSCRIBE, b"")
             elif not on and peer.previews is not None:
                 peer.previews.close()
@@ -164,6 +169,24 @@ class NodeControl:
         """Close all sockets. May be called twice."""
         while self._peers:
             _close(self._peers.popitem()[1])
+
+    def _connect(self, kind: int, node: RigNode, endpoint: str) -> zmq.Socket[bytes]:
+        """A socket towards one node, encrypted if it is paired."""
+        socket = self._context.socket(kind)
+        socket.setsockopt(zmq.LINGER, 0)
+        socket.setsockopt(zmq.RECONNECT_IVL, 100)
+        socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
+        socket.setsockopt(zmq.RCVHWM, 8)
+        if kind == zmq.DEALER:
+            socket.setsockopt(zmq.IMMEDIATE, 1)
+        if node.public_key and self._own is not None:
+            connect_with(socket, self._own, node.public_key)
+        try:
+            socket.connect(endpoint)
+        except zmq.ZMQError:
+            socket.close()
+            raise
+        return socket
 
     def _put(self, peer: _Peer, client: bytes | None, command: str, request: dict[str, Any]) -> None:
         asked = _Asked(next(self._numbers), client, command, msgspec.json.encode(request),
@@ -226,21 +249,9 @@ def _endpoints(node: RigNode) -> tuple[str, str]:
     return f"tcp://{node.address}:{node.control_port}", f"tcp://{node.address}:{node.preview_port}"
 
 
-def _connect(context: _Context, kind: int, endpoint: str) -> zmq.Socket[bytes]:
-    """A socket towards one node."""
-    socket = context.socket(kind)
-    socket.setsockopt(zmq.LINGER, 0)
-    socket.setsockopt(zmq.RECONNECT_IVL, 100)
-    socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
-    socket.setsockopt(zmq.RCVHWM, 8)
-    if kind == zmq.DEALER:
-        socket.setsockopt(zmq.IMMEDIATE, 1)
-    try:
-        socket.connect(endpoint)
-    except zmq.ZMQError:
-        socket.close()
-        raise
-    return socket
+def _reached(node: RigNode) -> tuple[str, ...]:
+    """How a node is reached; when it changes, the connections begin anew."""
+    return (*_endpoints(node), node.public_key)
 
 
 def _close(peer: _Peer) -> None:

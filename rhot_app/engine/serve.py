@@ -20,6 +20,7 @@ from rhot_app.engine.server import Server, StatePublisher
 from rhot_app.project import Rig
 from rhot_app.sources.realtime import share_interpreter
 from rhot_app.tracking.make import make_tracker
+from rhot_node.keys import KeyPair
 
 _COLLECT_S = 5.0
 
@@ -36,8 +37,8 @@ class Serving:
 
 @contextlib.contextmanager
 def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
-            directory: Path | None) -> Iterator[Serving]:
-    """An engine in its directory, warmed up, frames passing; the caller runs the server.
+            directory: Path | None, own: KeyPair | None = None) -> Iterator[Serving]:
+    """An engine in its directory, warmed up, frames passing; the caller runs the server. `own`: the master's keys.
 
     Raises EngineError when another engine holds the directory, SourceError when a port is taken.
     """
@@ -48,7 +49,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
         stack.callback(lock.release)
         stack.callback(context.destroy, 0)
         publish = StatePublisher(context, place)
-        nodes = NodeControl(context)
+        nodes = NodeControl(context, own)
         engine = Engine(rig, rig_path, make_source, make_tracker, publish, nodes.message, GarbageMan())
         stack.callback(engine.close)
         server = Server(context, place, engine, nodes)

@@ -24,6 +24,8 @@ class NodeStatus:
     clock_bound_s: float | None
     clock_round_trip_s: float | None
     message: str = ""  # the node's own words when in fault, or why it is silent
+    paired: bool = False  # only what is tagged by the node's key is believed
+    turned_away: bool = False  # the node is there, but does not know this master
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,7 +48,9 @@ def run_trial(frames: Path, scene: Scene, seconds: float, work: Path, *, loss: f
     """
     start_file = work / "start"
     cameras = [f"yuv:{frames / name}?start={start_file}" for name in scene.names]
-    settings = [node_settings(scene, index, detector=detector) for index in range(len(cameras))]
+    # The lossy network rewrites start messages, which no paired node would stand for.
+    trust: Literal["paired", "open"] = "open" if loss > 0.0 else "paired"
+    settings = [node_settings(scene, index, detector=detector, trust=trust) for index in range(len(cameras))]
     engine_directory = work / "engine"
     with contextlib.ExitStack() as stack:
         nodes = stack.enter_context(TwinNodes(work / "nodes", settings, cameras))
@@ -73,7 +75,7 @@ def _lossy(stack: contextlib.ExitStack, index: int, port: NodePorts, loss: float
     proxy = UdpProxy(index + 1, port.udp_port, Impairment(loss=loss), seed=seed)
     stack.callback(proxy.close)
     proxy.start()
-    return NodePorts(proxy.command_port, port.control_port, port.preview_port)
+    return NodePorts(proxy.command_port, port.control_port, port.preview_port, port.pairing_port)
 
 
 def _wait_streaming(client: EngineClient) -> None:

@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import IO
 
 from rhot_app.errors import SimulatorError
+from rhot_app.keys import load_master_keys
 from rhot_node.config import NodeSettings, save_settings
+from rhot_node.trust import keys_path, pair_beforehand
 
 READY_TIMEOUT_S = 90.0
 """The first start of all compiles the detector; later ones take about two seconds."""
@@ -26,11 +28,13 @@ _END_TIMEOUT_S = 3.0
 
 @dataclass(frozen=True, slots=True)
 class NodePorts:
-    """The ports that a daemon said it listens on."""
+    """The ports that a daemon said it listens on, and its public key if it is paired with this master."""
 
     udp_port: int
     control_port: int
     preview_port: int
+    pairing_port: int = 0
+    public_key: str = ""
 
 
 class TwinNode:
@@ -40,11 +44,14 @@ class TwinNode:
     """
 
     def __init__(self, directory: Path, settings: NodeSettings, camera: str) -> None:
-        """Start the daemon; `wait_ready` tells when it can be used. Raises SimulatorError, OSError."""
+        """Start the daemon, paired with this master unless it is open; `wait_ready` tells when it can be used. Raises
+        SimulatorError, TrustError, OSError."""
         self.name = settings.name
         self._settings_path = settings_path(directory, settings.name)
         self._log_path = directory / f"{settings.name}.log"
         save_settings(self._settings_path, settings)
+        self._public_key = "" if settings.trust == "open" else pair_beforehand(
+            keys_path(self._settings_path), load_master_keys().me)
         with self._log_path.open("ab") as log:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "rhot_node", "--settings", str(self._settings_path), "--camera", camera,
@@ -77,7 +84,8 @@ class TwinNode:
                 raise SimulatorError(f"the simulated node {self.name} did not become ready: {self._last_words()}")
             try:
                 ready = json.loads(line)
-                self._ports = NodePorts(ready["udp_port"], ready["control_port"], ready["preview_port"])
+                self._ports = NodePorts(ready["udp_port"], ready["control_port"], ready["preview_port"],
+                                        ready["pairing_port"], self._public_key)
             except (ValueError, KeyError) as exc:
                 raise SimulatorError(f"the simulated node {self.name} said {line!r} instead of its ports.") from exc
         return self._ports

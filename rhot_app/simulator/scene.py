@@ -159,14 +159,15 @@ def make_scene(settings: TwinSettings, seed: int) -> Scene:
 
 
 def node_settings(scene: Scene, index: int, *, detector: Literal["fast", "reference"] = "fast",
-                  ports: NodePorts | None = None) -> NodeSettings:
+                  ports: NodePorts | None = None,
+                  trust: Literal["paired", "open"] = "paired") -> NodeSettings:
     """What the daemon of one camera is told; without `ports` it takes any free ones. Loopback only, no broadcast."""
     preset, controls = scene.preset, scene.settings.controls
     chosen = ports or NodePorts(0, 0, 0)
     return NodeSettings(
         node_id=index + 1, name=scene.names[index], markers=scene.markers, bind_address="127.0.0.1",
         udp_port=chosen.udp_port, control_port=chosen.control_port, preview_port=chosen.preview_port,
-        broadcast_port=None, detector=detector,
+        pairing_port=chosen.pairing_port, broadcast_port=None, trust=trust, detector=detector,
         camera=CameraSettings(width=preset.width, height=preset.height, fps=preset.fps,
                               exposure_us=1e3 * scene.settings.exposure_ms, row_time_us=preset.row_time_us,
                               **msgspec.structs.asdict(controls)),
@@ -178,6 +179,7 @@ def build_rig(scene: Scene, ports: tuple[NodePorts, ...]) -> Rig:
     nodes = tuple(
         RigNode(node_id=index + 1, name=name, intrinsics=scene.intrinsics, pose=scene.poses[index],
                 udp_port=ports[index].udp_port, control_port=ports[index].control_port,
-                preview_port=ports[index].preview_port)
+                preview_port=ports[index].preview_port, pairing_port=ports[index].pairing_port,
+                public_key=ports[index].public_key)
         for index, name in enumerate(scene.names))
     return Rig(name="simulated", nodes=nodes, markers=scene.markers, hand=scene.hand)

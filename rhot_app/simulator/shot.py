@@ -92,12 +92,13 @@ def camera_seed(scene: Scene, index: int) -> int:
 
 
 def save_shot(shot: Shot, folder: Path) -> None:
-    """Write ``shot.json``, the rig file and the settings of its nodes. Raises OSError."""
+    """Write ``shot.json``, the rig file and the settings of its nodes: on this machine only, and open, because the folder
+    may be given to others and no key should be. Raises OSError."""
     scene = shot.scene
     firsts = [FIRST_PORT + 10 * index for index in range(len(scene.names))]
-    ports = tuple(NodePorts(first, first + 1, first + 2) for first in firsts)
+    ports = tuple(NodePorts(first, first + 1, first + 2, first + 3) for first in firsts)
     for index, name in enumerate(scene.names):
-        save_settings(folder / f"{name}.json", node_settings(scene, index, ports=ports[index]))
+        save_settings(folder / f"{name}.json", node_settings(scene, index, ports=ports[index], trust="open"))
     save_rig(folder / RIG_NAME, build_rig(scene, ports))
     write_document(folder / SHOT_NAME, ShotFile(shot.act.name, shot.seconds, scene.seed, sorted(shot.hidden),
                                                 scene.settings, shot.show))

@@ -33,7 +33,8 @@ class Supervisor:
             with contextlib.suppress(SettingsError):
                 kept = load_settings(settings_path(self._directory, name))
                 settings = msgspec.structs.replace(kept, udp_port=ports.udp_port, control_port=ports.control_port,
-                                                   preview_port=ports.preview_port)
+                                                   preview_port=ports.preview_port,
+                                                   pairing_port=ports.pairing_port)
         return TwinNode(self._directory, settings, f"stream:{socket_path(self._directory, name)}")
 
     def ports(self, deadline_s: float) -> list[NodePorts] | None:

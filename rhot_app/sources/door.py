@@ -6,11 +6,11 @@ No sockets and no threads. Nothing in a datagram raises past `NodeDoor.admit`.
 from __future__ import annotations
 
 from rhot_app.project import Rig, RigNode
+from rhot_app.sources.admission import ANYBODY
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.text_frames import TextReader
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import decode
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import Observations
 from rhot_node.wire.sequence import SequenceWindow, Verdict
@@ -30,6 +30,7 @@ class NodeDoor:
     def __init__(self, rig: Rig, camera: int, clock: NodeClockModel) -> None:
         """`camera` is the node's index in the rig."""
         self.clock = clock
+        self.admission = ANYBODY
         self.sequence = SequenceWindow()
         self.received = 0  # datagrams of any kind
         self.accepted = 0
@@ -90,7 +91,7 @@ class NodeDoor:
         return self._text.read(data, t_receive_ns)
 
     def _verify(self, data: bytes, t_receive_ns: int) -> Verified | str:
-        message = decode(data)
+        message = self.admission.open(data)
         if not isinstance(message, Observations):
             return "kind"
         reason = self._objection(message)

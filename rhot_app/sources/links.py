@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import ipaddress
 import logging
 import secrets
@@ -10,16 +11,18 @@ import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable
 
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind
+from rhot_app.sources.key_exchange import KeyExchange
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.tap import Tap
 from rhot_node.errors import WireError
 from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
-from rhot_node.wire.codec import decode, encode
-from rhot_node.wire.messages import ClockReply, Start, StartEntry, Stop
+from rhot_node.keys import KeyPair
+from rhot_node.wire.codec import encode, node_of
+from rhot_node.wire.messages import ClockReply, Message, Start, StartEntry, Stop
 
 REQUEST_NS = 100_000_000
 """Each node is asked for its time ten times a second."""
@@ -44,8 +47,10 @@ def new_session() -> int:
 class NodeLinks:
     """Talks to all nodes of a rig. `step` waits for answers and sends what is due; `start_thread` runs it."""
 
-    def __init__(self, rig: Rig, links: list[NodeLink], data_ports: list[int]) -> None:
-        """`links` and `data_ports` in the order of the rig's nodes. Text nodes are not spoken to."""
+    def __init__(self, rig: Rig, links: list[NodeLink], data_ports: list[int], own: KeyPair | None) -> None:
+        """`links` and `data_ports` in the order of the rig's nodes; `own`: the master's keys, None when no node is
+        paired. Text nodes are not spoken to. Raises SourceError."""
+        self._keys = KeyExchange(links, own)
         self._tap: Tap | None = None
         self._recent: deque[tuple[RecordKind, int, int, bytes]] = deque(maxlen=RECENT * len(links))
         self.broadcast_failure = ""
@@ -66,28 +71,19 @@ class NodeLinks:
         self._thread = threading.Thread(target=self._run, name="links", daemon=True)
 
     def start(self, session: int) -> None:
-        """Tell every node to stream `session`, by broadcast (RHOT 7.1) and each at its own address."""
+        """Tell every node to stream `session`."""
         with self._lock:
             now_ns = time.monotonic_ns()
-            datagram = self._encode_start(session, self._entries.values())
-            self._note(RecordKind.START, 0, now_ns, datagram)
-            self._send_broadcast(datagram)
             for link in self._links.values():
                 link.want(session, now_ns)
-                self._send(link, datagram)
+            self._tell(RecordKind.START, functools.partial(self._start, session), now_ns)
 
     def stop(self) -> None:
         """Tell every node to stop what it streams for us, twice, because nobody asks again."""
         with self._lock:
             now_ns = time.monotonic_ns()
             for session in {link.wanted for link in self._links.values() if link.wanted}:
-                self._sequence += 1
-                datagram = encode(Stop(session, self._sequence))
-                self._note(RecordKind.STOP, 0, now_ns, datagram)
-                for _ in range(2):
-                    self._send_broadcast(datagram)
-                    for link in self._links.values():
-                        self._send(link, datagram)
+                self._tell(RecordKind.STOP, functools.partial(self._stop, session), now_ns, times=2)
             for link in self._links.values():
                 link.want(0, now_ns)
 
@@ -98,7 +94,7 @@ class NodeLinks:
             if tap is not None:
                 for node_id, link in self._links.items():
                     if link.wanted:
-                        datagram = self._encode_start(link.wanted, [self._entries[node_id]])
+                        datagram = encode(self._start(link.wanted, [self._entries[node_id]]))
                         tap.put(RecordKind.START, node_id, time.monotonic_ns(), datagram)
                 for record in list(self._recent):
                     tap.put(*record)
@@ -116,11 +112,12 @@ class NodeLinks:
         except OSError as exc:  # an unreachable host answers with an ICMP error on some systems
             log.debug("command socket: %s", exc)
         now_ns = time.monotonic_ns()
+        self._keys.step(now_ns)
         with self._lock:
             for node_id, link in self._links.items():
                 if link.wants_start(now_ns):
                     self._start_again(link, now_ns)
-                if now_ns >= self._due_ns[node_id]:
+                if now_ns >= self._due_ns[node_id] and link.can_be_told:
                     self._ask(link, now_ns)
 
     def start_thread(self) -> None:
@@ -138,6 +135,7 @@ class NodeLinks:
         self._ending.set()
         if self._thread.is_alive():
             self._thread.join()
+        self._keys.close()
         self._socket.close()
 
     def _run(self) -> None:
@@ -148,11 +146,11 @@ class NodeLinks:
         data, ancillary, _, _ = self._socket.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE, flags)
         t_receive_ns, _ = self._kernel_time.receive_time_ns(ancillary)
         try:
-            reply = decode(data)
+            link = self._links.get(node_of(data))
+            reply = None if link is None else link.door.admission.open(data)
         except WireError as exc:
             log.debug("command socket: %s", exc)
             return
-        link = self._links.get(reply.node_id) if isinstance(reply, ClockReply) else None
         if link is not None and isinstance(reply, ClockReply):
             self._note(RecordKind.CLOCK_REPLY, reply.node_id, t_receive_ns, data)
             link.take_reply(reply, t_receive_ns)
@@ -161,7 +159,7 @@ class NodeLinks:
         known = link.clock.estimate_at(now_ns) is not None or link.silent(now_ns)
         self._due_ns[link.node.node_id] = now_ns + (REQUEST_NS if known else EAGER_NS)
         t1_ns = time.monotonic_ns()
-        datagram = encode(link.request(t1_ns))
+        datagram = link.encode(link.request(t1_ns))
         self._send(link, datagram)
         self._note(RecordKind.CLOCK_REQUEST, link.node.node_id, t1_ns, datagram)
 
@@ -169,14 +167,37 @@ class NodeLinks:
         """A node that starts anew or was without us for long takes no old session up: it gets one of its own."""
         session = new_session()
         log.info("node %s is started again, session %d", link.node.name, session)
-        datagram = self._encode_start(session, [self._entries[link.node.node_id]])
+        datagram = link.encode(self._start(session, [self._entries[link.node.node_id]]))
         self._note(RecordKind.START, link.node.node_id, now_ns, datagram)
         link.want(session, now_ns)
         self._send(link, datagram)
 
-    def _encode_start(self, session: int, entries: Iterable[StartEntry]) -> bytes:
+    def _tell(self, kind: RecordKind, message: Callable[[list[StartEntry]], Message], now_ns: int,
+              times: int = 1) -> None:
+        """Tell open nodes by broadcast (RHOT 7.1) and each at its own address; tell each paired node with its own key,
+        which no broadcast could have. A paired node without a key is told when it has one and says that it is ready."""
+        open_links = [link for link in self._links.values() if not link.paired]
+        if open_links:
+            datagram = encode(message([self._entries[link.node.node_id] for link in open_links]))
+            self._note(kind, 0, now_ns, datagram)
+            for _ in range(times):
+                self._send_broadcast(datagram)
+                for link in open_links:
+                    self._send(link, datagram)
+        for node_id, link in self._links.items():
+            if link.paired and link.can_be_told:
+                datagram = link.encode(message([self._entries[node_id]]))
+                self._note(kind, node_id, now_ns, datagram)
+                for _ in range(times):
+                    self._send(link, datagram)
+
+    def _start(self, session: int, entries: list[StartEntry]) -> Start:
         self._sequence += 1
-        return encode(Start(session, self._sequence, tuple(entries)))
+        return Start(session, self._sequence, tuple(entries))
+
+    def _stop(self, session: int, _entries: list[StartEntry]) -> Stop:
+        self._sequence += 1
+        return Stop(session, self._sequence)
 
     def _send(self, link: NodeLink, datagram: bytes) -> None:
         address = self._addresses.get(link.node.node_id)

@@ -6,15 +6,21 @@ No sockets. Live links and replayed logs feed the same object.
 from __future__ import annotations
 
 from rhot_app.project import Rig
+from rhot_app.sources.admission import NOBODY_YET, holder_of
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.door import NodeDoor
-from rhot_node.wire.messages import ClockReply, ClockRequest, NodeState
+from rhot_node.wire.codec import encode
+from rhot_node.wire.messages import ClockReply, ClockRequest, Message, NodeState
+from rhot_node.wire.seal import Seal
 
 SILENT_NS = 700_000_000
 """A node that neither answers nor sends for so long is called silent."""
 
 RESTART_NS = 250_000_000
 """A start is repeated no sooner than this: the node needs a moment to say that it streams."""
+
+UNANSWERED_NS = 300_000_000
+"""A paired node that has answered no clock request for so long may have forgotten our key: it is asked for it."""
 
 PENDING_MAX = 64  # requests that may still be answered
 
@@ -32,6 +38,10 @@ class NodeLink:
         self.wanted = 0  # the session we told it to stream; 0: none
         self.clock_changes = 0  # boots and steps: what the tracker knows of this node's times is void
         self.unexpected_replies = 0
+        self.turned_away = False  # the node lets no encrypted connection of ours in: it does not know us
+        self.key_name = ""  # of the link whose key we have
+        self._seal: Seal | None = None
+        self._key_is_new = False  # what the node streams is tagged with another
         self._boot_id: int | None = None
         self._sequence = 0
         self._pending: dict[int, int] = {}
@@ -39,6 +49,32 @@ class NodeLink:
         self._last_start_ns: int | None = None
         self._ready_since_ns: int | None = None
         self._was_ours = False
+        if self.paired:
+            self.door.admission = NOBODY_YET
+
+    @property
+    def paired(self) -> bool:
+        """Whether only tagged datagrams go to and come from the node."""
+        return bool(self.node.public_key)
+
+    @property
+    def can_be_told(self) -> bool:
+        """Whether what we say to the node can have the tag that it needs."""
+        return not self.paired or self._seal is not None
+
+    def encode(self, message: Message) -> bytes:
+        """The datagram that says `message` to the node, with a tag when it needs one."""
+        return encode(message, self._seal)
+
+    def wants_key(self, now_ns: int) -> bool:
+        """Whether the node should be asked for the key of our datagrams, or whether it still knows it."""
+        return self._seal is None or now_ns - (self._last_reply_ns or 0) > UNANSWERED_NS
+
+    def use_key(self, name: str, key: bytes) -> None:
+        """Tag what we say with `key` and believe only what is tagged with it, from now on."""
+        if name != self.key_name:
+            self.key_name, self._seal, self._key_is_new = name, Seal(key), True
+            self.door.admission = holder_of(self._seal)
 
     def request(self, t1_master_ns: int) -> ClockRequest:
         """The next clock request, to be sent now; it tells the node which session its master runs."""
@@ -77,7 +113,7 @@ class NodeLink:
     def want(self, session: int, now_ns: int) -> None:
         """We are telling the node to stream `session` now (0: nothing), and admit only that."""
         self.wanted = session
-        self._was_ours = False
+        self._was_ours = self._key_is_new = False
         self._last_start_ns = now_ns
         self.door.expect_session(session)
 
@@ -90,7 +126,7 @@ class NodeLink:
             return False
         if self._last_start_ns is not None and now_ns - self._last_start_ns < RESTART_NS:
             return False
-        return self.state is NodeState.READY or (self.streams_elsewhere and not self._was_ours)
+        return self.state is NodeState.READY or self._key_is_new or (self.streams_elsewhere and not self._was_ours)
 
     @property
     def streams_elsewhere(self) -> bool:

@@ -33,7 +33,7 @@ SO_RCVBUFFORCE = 33
 _WAIT = struct.pack("@ll", 0, 200_000)  # a blocked read returns after 0.2 s to see whether it shall end
 
 DatagramTap = Callable[[int, bytes], None]
-"""``tap(t_receive_ns, data)``: sees every datagram before it is judged."""
+"""``tap(t_receive_ns, data)``: sees every genuine datagram before it is judged."""
 
 Deliver = Callable[[list[CameraObservations]], None]
 """Takes verified frames of one camera, oldest first, in the thread that received them. May take as long as a state."""
@@ -100,7 +100,7 @@ class NodeReceiver:
                 claim_interpreter()
                 t_receive_ns, now_ns = self._kernel_time.receive_time_ns(ancillary)
                 count, flags = count + 1, socket.MSG_DONTWAIT
-                if self.tap is not None:
+                if self.tap is not None and self.door.admission.genuine(data):  # a stranger fills no disk
                     self.tap(t_receive_ns, data)
                 frame = self.door.verify(data, t_receive_ns)
                 if frame is not None:

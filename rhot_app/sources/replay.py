@@ -11,12 +11,12 @@ from pathlib import Path
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
+from rhot_app.sources.admission import RECORDED
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
 from rhot_app.sources.tap import Tap
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import decode
 from rhot_node.wire.messages import ClockReply, ClockRequest, Start
 
 
@@ -30,6 +30,7 @@ class LogDoor:
         self.starts = 0
         self._by_id = {link.node.node_id: link for link in self.links}
         for link in self.links:
+            link.door.admission = RECORDED
             if link.node.text_datagrams:
                 link.door.expect_session(1)
 
@@ -59,7 +60,7 @@ class LogDoor:
 
     def _feed_command(self, record: Record) -> None:
         try:
-            message = decode(record.data)
+            message = RECORDED.open(record.data)
         except WireError:
             return
         if isinstance(message, Start):

@@ -11,6 +11,7 @@ from rhot_app.sources.links import NodeLinks
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import DatagramTap, Deliver, NodeReceiver, open_data_socket
 from rhot_app.sources.tap import Tap
+from rhot_node.keys import KeyPair
 
 
 class UdpNodes:
@@ -18,8 +19,9 @@ class UdpNodes:
 
     live = True
 
-    def __init__(self, rig: Rig) -> None:
-        """Open all ports. Raises SourceError when one is taken; nothing stays open then."""
+    def __init__(self, rig: Rig, own: KeyPair | None = None) -> None:
+        """Open all ports; `own`: the master's keys, which paired nodes ask for. Raises SourceError when a port is taken
+        or keys are missing; nothing stays open then."""
         self.links = tuple(NodeLink(rig, camera) for camera in range(len(rig.nodes)))
         self._starts = 0
         with contextlib.ExitStack() as stack:
@@ -29,7 +31,8 @@ class UdpNodes:
                 stack.callback(sockets[-1].close)
             self.receivers = tuple(NodeReceiver(sock, link.door, link.node.name)
                                    for sock, link in zip(sockets, self.links, strict=True))
-            self._commands = NodeLinks(rig, list(self.links), [receiver.port for receiver in self.receivers])
+            self._commands = NodeLinks(rig, list(self.links), [receiver.port for receiver in self.receivers],
+                                       own)
             stack.pop_all()
         for receiver in self.receivers:
             receiver.start()

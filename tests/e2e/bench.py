@@ -18,11 +18,13 @@ import msgspec
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.status import NodeStatus
 from rhot_app.hand.anatomy import load_hand
+from rhot_app.keys import load_master_keys
 from rhot_app.project import Broadcast, CameraPose, Intrinsics, Rig, RigNode, save_rig
 from rhot_app.tracking.state import HandState
 from rhot_node.config import ClockSettings, NodeSettings, save_settings
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
+from rhot_node.trust import keys_path, pair_beforehand
 
 BASELINE_M = 0.075
 WIDTH, HEIGHT, FPS = 640, 480, 40.0
@@ -34,14 +36,16 @@ TEST_S = 300.0  # of a whole test, when it comes to that
 
 @dataclass
 class Bench:
-    """The folder of one test, its rig, and the processes that the test has started."""
+    """The folder of one test, its rig of paired nodes, and the processes that the test has started."""
 
     folder: Path
     processes: list[subprocess.Popen[bytes]] = field(default_factory=list)
     rig: Rig = field(init=False)
 
     def __post_init__(self) -> None:
-        self.rig = make_rig(free_ports(9))
+        rig = make_rig(free_ports(11))
+        keys = [pair_beforehand(keys_path(self.settings_path(node)), load_master_keys().me) for node in rig.nodes]
+        self.rig = with_keys(rig, keys)
         self.save()
 
     @property
@@ -61,7 +65,7 @@ class Bench:
             save_settings(self.settings_path(node), NodeSettings(
                 node_id=node.node_id, name=node.name, markers=self.rig.markers, bind_address="127.0.0.1",
                 udp_port=node.udp_port, control_port=node.control_port, preview_port=node.preview_port,
-                broadcast_port=None, clock=clock))
+                pairing_port=node.pairing_port, broadcast_port=None, clock=clock))
 
     def settings_path(self, node: RigNode) -> Path:
         """The settings file of a node."""
@@ -70,7 +74,7 @@ class Bench:
     def allow_text(self) -> None:
         """Let every node of the rig speak the thesis's text datagrams."""
         self.rig = msgspec.structs.replace(self.rig, nodes=tuple(
-            msgspec.structs.replace(node, text_datagrams=True) for node in self.rig.nodes))
+            msgspec.structs.replace(node, text_datagrams=True, public_key="") for node in self.rig.nodes))
         self.save()
 
     def start_node(self, index: int, camera: str) -> subprocess.Popen[bytes]:
@@ -125,15 +129,22 @@ def ends(process: subprocess.Popen[bytes], timeout_s: float) -> bool:
 
 
 def make_rig(ports: Sequence[int]) -> Rig:
-    """Two cameras 75 mm apart on this machine; the rig frame is the left one. `ports`: nine free ones."""
+    """Two cameras 75 mm apart on this machine; the rig frame is the left one. `ports`: eleven free ones."""
     nodes = tuple(RigNode(
         node_id=index + 1, name=name, intrinsics=Intrinsics(WIDTH, HEIGHT, FOCAL_PX, FOCAL_PX, 319.5, 239.5),
         pose=CameraPose(translation_m=(BASELINE_M * index, 0.0, 0.0)), udp_port=ports[4 * index],
-        control_port=ports[4 * index + 1], preview_port=ports[4 * index + 2], data_port=ports[4 * index + 3])
+        control_port=ports[4 * index + 1], preview_port=ports[4 * index + 2], data_port=ports[4 * index + 3],
+        pairing_port=ports[9 + index])
         for index, name in enumerate(("left", "right")))
     return Rig(name="bench", nodes=nodes, markers=load_markers(resource_path("markers", "rhot6.json")),
                hand=load_hand(resource_path("hands", "right.json")),
                broadcast=Broadcast("127.255.255.255", ports[8]))
+
+
+def with_keys(rig: Rig, keys: Sequence[str]) -> Rig:
+    """The rig with a public key for each node."""
+    return msgspec.structs.replace(rig, nodes=tuple(
+        msgspec.structs.replace(node, public_key=key) for node, key in zip(rig.nodes, keys, strict=True)))
 
 
 def free_ports(count: int) -> list[int]:

@@ -1,0 +1,120 @@
+"""Asks paired nodes, over their encrypted control channels, for the keys of our datagrams: when we begin, and whenever
+one falls silent, because a node that was restarted has forgotten its keys."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import msgspec
+import zmq
+from zmq.utils.monitor import recv_monitor_message
+
+from rhot_app.errors import SourceError
+from rhot_app.sources.node_link import NodeLink
+from rhot_node.keys import HexKey, KeyPair, connect_with
+
+ASK_NS = 250_000_000
+"""A node is not asked more often than this."""
+
+_RECONNECT_MS = 100
+_REFUSED = zmq.EVENT_HANDSHAKE_FAILED_AUTH | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
+
+log = logging.getLogger(__name__)
+
+
+class _Granted(msgspec.Struct):
+    """The node's answer."""
+
+    ok: bool
+    name: str = ""
+    key: HexKey | None = None
+    error: str = ""
+
+
+@dataclass(slots=True)
+class _Peer:
+    link: NodeLink
+    socket: zmq.Socket[bytes]
+    monitor: zmq.Socket[bytes]
+    asked_ns: int = 0
+
+
+class KeyExchange:
+    """One encrypted connection per paired node. `step` never waits; one thread."""
+
+    def __init__(self, links: Sequence[NodeLink], own: KeyPair | None) -> None:
+        """`own`: the master's keys. Raises SourceError when a node is paired and there are none, or when an address
+        cannot be connected to."""
+        self._peers: list[_Peer] = []
+        paired = [link for link in links if link.paired]
+        if paired and own is None:
+            raise SourceError(f"node {paired[0].node.name} is paired, but this program has no keys to speak to it.")
+        self._context: zmq.Context[zmq.Socket[bytes]] | None = zmq.Context() if paired else None
+        for link in paired:
+            self._connect(link, own)
+
+    def step(self, now_ns: int) -> None:
+        """Take the keys that have come; ask the nodes whose turn it is."""
+        for peer in self._peers:
+            self._look(peer)
+            if now_ns - peer.asked_ns >= ASK_NS and peer.link.wants_key(now_ns):
+                peer.asked_ns = now_ns
+                question = msgspec.json.encode({"request": "link", "name": peer.link.key_name})
+                try:
+                    peer.socket.send_multipart([b"", question], zmq.DONTWAIT)
+                except zmq.Again:  # no connection: nothing is queued for a node that is not there
+                    continue
+
+    def close(self) -> None:
+        """Close all connections. May be called twice."""
+        for peer in self._peers:
+            peer.socket.disable_monitor()
+        self._peers = []
+        if self._context is not None:
+            self._context.destroy(linger=0)
+            self._context = None
+
+    def _look(self, peer: _Peer) -> None:
+        try:
+            while True:
+                recv_monitor_message(peer.monitor, zmq.DONTWAIT)
+                peer.link.turned_away = True
+        except zmq.Again:
+            pass
+        try:
+            while True:
+                self._take(peer.link, peer.socket.recv_multipart(zmq.DONTWAIT)[-1])
+        except zmq.Again:
+            pass
+
+    @staticmethod
+    def _take(link: NodeLink, data: bytes) -> None:
+        try:
+            granted = msgspec.json.decode(data, type=_Granted)
+        except msgspec.MsgspecError as exc:
+            log.warning("node %s gave no key but something that cannot be read (%s)", link.node.name, exc)
+            return
+        link.turned_away = not granted.ok
+        if granted.ok and granted.key is not None:
+            link.use_key(granted.name, bytes.fromhex(granted.key))
+        else:
+            log.warning("node %s gave no key: %s", link.node.name, granted.error)
+
+    def _connect(self, link: NodeLink, own: KeyPair | None) -> None:
+        assert self._context is not None and own is not None
+        node = link.node
+        socket = self._context.socket(zmq.DEALER)
+        socket.linger = 0
+        socket.setsockopt(zmq.IMMEDIATE, 1)
+        socket.setsockopt(zmq.RECONNECT_IVL, _RECONNECT_MS)
+        connect_with(socket, own, node.public_key)
+        monitor = socket.get_monitor_socket(_REFUSED)
+        try:
+            socket.connect(f"tcp://{node.address}:{node.control_port}")
+        except zmq.ZMQError as exc:
+            self.close()
+            raise SourceError(f"node {node.name}: {node.address}:{node.control_port} is no address to connect to "
+                              f"({exc.strerror}).") from exc
+        self._peers.append(_Peer(link, socket, monitor))
