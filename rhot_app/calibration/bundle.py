@@ -35,13 +35,15 @@ _RAYLEIGH_MEDIAN = 1.1774100225154747  # median distance of a 2-D Gaussian, in s
 class Bundle:
     """The adjusted `state` and what is left.
 
-    `residuals` (M, 2) px, seen minus expected; `noise_px` the standard deviation of a corner per axis, and `determined`
-    how many unknowns were taken from the corners to get it (fewer than all where something is known beforehand);
+    `residuals` (M, 2) px, seen minus expected, and Huber's `weights` (M,); `noise_px` the standard deviation of a
+    corner per axis, and `determined` how many unknowns were taken from the corners to get it (fewer than all where
+    something is known beforehand);
     `layout` of the unknowns and their `covariance` (size, size), already times noise squared; `steps` taken.
     """
 
     state: BundleState
     residuals: Array
+    weights: Array
     noise_px: float
     determined: float
     layout: Layout
@@ -76,7 +78,8 @@ def adjust(start: BundleState, seen: Observations, lenses: Sequence[LensFreedom]
     known, _ = layout.prior(state)
     determined = layout.size - float(np.sum((known @ covariance) * known.toarray()))  # the rest is known beforehand
     spread = _spread(off, weights, determined)
-    return Bundle(state, off, spread, determined, layout, _covariance(state, seen, layout, weights, spread), taken)
+    return Bundle(state, off, weights, spread, determined, layout,
+                  _covariance(state, seen, layout, weights, spread), taken)
 
 
 def _descend(state: BundleState, seen: Observations, layout: Layout, noise: float, progress: Progress,

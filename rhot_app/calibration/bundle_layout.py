@@ -43,13 +43,6 @@ class LensFreedom:
         return cls(basis, mean, np.full(LENS, np.inf) if std is None else std)
 
 
-    def without(self, parameter: int) -> LensFreedom:
-        """The same, but one of the nine parameters stays as it is."""
-        std = self.prior_std.copy()
-        std[parameter] = np.inf
-        return LensFreedom(self.basis[:, self.basis[parameter] == 0.0], self.prior_mean, std)
-
-
 @dataclass(frozen=True, slots=True)
 class BoardFreedom:
     """How far the board's `count` corners may be from where they were drawn: standard deviations (3,) m along its x, y

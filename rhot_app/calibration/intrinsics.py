@@ -46,7 +46,8 @@ class IntrinsicsReport:
 
     `lens` (9,): fx, fy, cx, cy, k1, k2, p1, p2, k3 for pictures of `size` (width, height), and its `covariance` (9, 9)
     with poses and board errors marginalised. `rms_px` over all corners. `undetermined` names the coefficients that the
-    views leave open; `errors` what the uncertainty means in millimetres at the working distance.
+    views leave open; `errors` what the uncertainty means in millimetres at the working distance; `disagreement` of the
+    views, 1 where independent corner errors explain all: it is in all standard deviations.
     """
 
     board: Board
@@ -61,6 +62,7 @@ class IntrinsicsReport:
     undetermined: tuple[str, ...]
     board_errors: BoardErrors | None
     errors: ExpectedErrors
+    disagreement: float
     verdict: Verdict
 
     @property
@@ -107,15 +109,15 @@ def _report(fit: LensFit, views: Sequence[BoardView], board: Board, dropped: tup
         lens=fit.lens, std=np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), size=size, rms_px=rms,
         views=len(used), misfits=len(fit.dropped), coverage=coverage, pattern_px=field.pattern_px,
         tilt_rad=tilt_spread(fit.bundle.state.world_from_board), undetermined=fit.undetermined,
-        blind=blind_share(fit.lens, size), errors=errors, board=board, board_errors=fit.board_errors,
-        blur_px=float(np.nanmedian([view.blur_px for view in used] + [0.0])),
+        disagreement=fit.disagreement, blind=blind_share(fit.lens, size), errors=errors, board=board,
+        board_errors=fit.board_errors, blur_px=float(np.nanmedian([view.blur_px for view in used] + [0.0])),
         square_px=float(np.median([view.square_px for view in used])))
     summary = f"rms {rms:.2f} px over {len(used)} views, f {fit.lens[0]:.1f} px."
     return IntrinsicsReport(
         board, fit.lens, fit.covariance, size, rms,
         tuple(ViewFit(view.source, float(off), len(view.ids), view.blur_px, view.square_px)
               for view, off in zip(used, fit.view_rms, strict=True)),
-        dropped, field, coverage, fit.undetermined, fit.board_errors, errors,
+        dropped, field, coverage, fit.undetermined, fit.board_errors, errors, fit.disagreement,
         judge(summary, [*noticed, *check(figures)]))
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board import Board
 from rhot_app.calibration.board_errors import BoardErrors
 from rhot_app.calibration.coverage import Coverage
+from rhot_app.calibration.disagreement import in_words
 from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M, ExpectedErrors
 from rhot_app.calibration.verdict import Finding, Grade
 
@@ -33,6 +34,7 @@ class Figures:
     pattern_px: float
     tilt_rad: float
     undetermined: tuple[str, ...]
+    disagreement: float
     blind: float
     errors: ExpectedErrors
     board: Board
@@ -121,7 +123,8 @@ def _certainty(f: Figures) -> Iterator[Finding]:
     if grade:
         yield Finding("expected_error", grade, f"By the lens alone a point at {WORKING_DISTANCE_M:.1f} m may be off by "
                       f"{typical:.1f} mm, in the picture's corners by {worst:.1f} mm (SD; 1 and 5 mm are good).",
-                      "The views determine the lens too loosely, most where no view reaches.", MORE_VIEWS)
+                      "The views determine the lens too loosely, most where none reaches."
+                      f" {in_words(f.disagreement)}".rstrip(), MORE_VIEWS)
 
 
 def _plausible(f: Figures) -> Iterator[Finding]:

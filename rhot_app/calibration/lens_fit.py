@@ -21,6 +21,7 @@ from rhot_app.calibration.bundle import Bundle, adjust
 from rhot_app.calibration.bundle_layout import LensFreedom
 from rhot_app.calibration.bundle_model import LENS, BundleState, Observations
 from rhot_app.calibration.corners import BoardView
+from rhot_app.calibration.disagreement import disagreement
 from rhot_app.calibration.lens_search import find_lens
 from rhot_app.calibration.lens_start import loose_prior
 from rhot_app.calibration.misfits import MOST_DROPPED, misfit_limit
@@ -42,7 +43,8 @@ class LensFit:
     """The adjusted lens.
 
     `bundle` of one camera and the corners `seen` in it; `kept` indices of the views in it, in its order; `dropped`
-    index -> rms px of those left out; `board_errors` if any were found.
+    index -> rms px of those left out; `board_errors` if any were found; `disagreement` of the views, 1 where
+    independent corner errors explain all.
     """
 
     bundle: Bundle
@@ -50,6 +52,7 @@ class LensFit:
     kept: tuple[int, ...]
     dropped: dict[int, float]
     board_errors: BoardErrors | None
+    disagreement: float
 
     @property
     def lens(self) -> Array:
@@ -58,15 +61,13 @@ class LensFit:
 
     @property
     def covariance(self) -> Array:
-        """(9, 9) of the lens, poses and board errors marginalised."""
-        basis = self.bundle.layout.lenses[0].basis
-        at = self.bundle.layout.lens(0)
-        return basis @ self.bundle.covariance[at, at] @ basis.T
+        """(9, 9) of the lens, poses and board errors marginalised; the views' disagreement is in it."""
+        return self._by_corners * self.disagreement**2
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Distortion coefficients that these views leave open: they stay near zero, where they most often are."""
-        std = np.sqrt(np.diag(self.covariance))
+        std = np.sqrt(np.diag(self._by_corners))
         known = self.bundle.layout.lenses[0].prior_std
         return tuple(name for place, name in enumerate(PARAMETERS) if place >= 4
                      and std[place] > _OPEN * known[place])
@@ -75,6 +76,13 @@ class LensFit:
     def view_rms(self) -> Array:
         """(K,) px, rms distance of each kept view's corners from where they are expected."""
         return _view_rms(self.bundle, self.seen)
+
+    @property
+    def _by_corners(self) -> Array:
+        """(9, 9), the covariance by independent errors of the corners alone."""
+        basis = self.bundle.layout.lenses[0].basis
+        at = self.bundle.layout.lens(0)
+        return np.asarray(basis @ self.bundle.covariance[at, at] @ basis.T)
 
 
 def fit_lens(views: Sequence[BoardView], board: Board, *, square_pixels: bool = False, name: str = "camera",
@@ -89,13 +97,13 @@ def fit_lens(views: Sequence[BoardView], board: Board, *, square_pixels: bool = 
             break
         dropped |= strange
         kept = [index for index in kept if index not in dropped]
-    plain = LensFit(bundle, seen, tuple(kept), dropped, None)
+    plain = LensFit(bundle, seen, tuple(kept), dropped, None, disagreement(bundle, seen))
     if plain.covariance[0, 0] > (_LOOSE * plain.lens[0]) ** 2:
         return plain  # what leaves the lens open says nothing about the board
     freedom = _freedom(bundle.state.lenses[0], views[0].size, square_pixels)
     bundle, errors = find_board_errors(bundle, seen, [freedom], board.count, board.square_m,
                                        progress=within(progress, 0.3, 0.95))
-    return LensFit(bundle, seen, tuple(kept), dropped, errors)
+    return LensFit(bundle, seen, tuple(kept), dropped, errors, disagreement(bundle, seen))
 
 
 def _plain_fit(views: Sequence[BoardView], kept: Sequence[int], board: Board, square_pixels: bool, name: str,

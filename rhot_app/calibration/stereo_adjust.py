@@ -1,4 +1,4 @@
-"""The adjustment of a whole rig: without shots that do not fit, with the board's own shape, with no needless k3."""
+"""The adjustment of a whole rig: without the shots that do not fit, and with the board's own shape."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rhot_app.calibration.bundle import Bundle, adjust
 from rhot_app.calibration.bundle_layout import LensFreedom
 from rhot_app.calibration.bundle_model import BundleState, Observations
 from rhot_app.calibration.corners import BoardView
-from rhot_app.calibration.lens_start import K3, LensStart
+from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.misfits import MOST_DROPPED, misfit_limit, tilt_spread
 from rhot_app.calibration.stereo_start import PlacedShot
 from rhot_app.calibration.stereo_views import Dropped, SharedViews
@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 FEWEST_SHOTS = 3
 ALIKE_RAD = float(np.radians(10.0))
 """Boards whose normals are all within this angle tell focal length from distance badly, and not their own shape."""
-
-_SIGNIFICANT = 2.0  # standard deviations: a k3 nearer to zero is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +51,7 @@ class StereoSolution:
 def adjust_rig(views: SharedViews, lenses: Sequence[LensStart], posed: Sequence[Sequence[PosedView | None]],
                start: Array, boards: list[PlacedShot], dropped: list[Dropped], *, refine: bool,
                progress: Progress) -> StereoSolution:
-    """Adjust, drop what does not fit, adjust again; then find the board's own errors and leave out what is not needed.
+    """Adjust, drop what does not fit, adjust again; then find the board's own errors.
 
     `start` (C, 4, 4) m camera_from_world; `boards` where the board was in each shot. Raises CalibrationError when too
     few shots are left.
@@ -80,30 +78,15 @@ def adjust_rig(views: SharedViews, lenses: Sequence[LensStart], posed: Sequence[
 
 
 def _settled(solution: StereoSolution, freedom: list[LensFreedom], progress: Progress) -> StereoSolution:
-    """With the board's own errors, and without the k3 of lenses that do not need one."""
+    """With the board's own errors, where these views can tell them."""
     kept = any(lens.basis.shape[1] == 0 for lens in freedom)
     if kept or tilt_spread(solution.bundle.state.world_from_board) < ALIKE_RAD:
         return solution  # what is wrong with a lens that may not change, or with views all alike, would bend the board
     board, seen = solution.board, solution.seen
     progress("finding the board's own errors", 0.5)
     bundle, errors = find_board_errors(solution.bundle, seen, freedom, board.count, board.square_m,
-                                       progress=within(progress, 0.5, 0.85))
-    needless = [camera for camera in range(len(freedom)) if _needless_k3(bundle, camera)]
-    if needless:
-        lenses = bundle.state.lenses.copy()
-        for camera in needless:
-            lenses[camera, K3] = 0.0
-            freedom[camera] = freedom[camera].without(K3)
-        bundle = adjust(replace(bundle.state, lenses=lenses), seen, freedom,
-                        board_errors=None if errors is None else errors.freedom, progress=within(progress, 0.85, 0.95))
+                                       progress=within(progress, 0.5, 0.95))
     return replace(solution, bundle=bundle, board_errors=errors)
-
-
-def _needless_k3(bundle: Bundle, camera: int) -> bool:
-    basis = bundle.layout.lenses[camera].basis
-    at = bundle.layout.lens(camera)
-    variance = basis[K3] @ bundle.covariance[at, at] @ basis[K3]
-    return bool(variance > 0.0 and abs(bundle.state.lenses[camera, K3]) < _SIGNIFICANT * np.sqrt(variance))
 
 
 def _used_views(views: SharedViews, posed: Sequence[Sequence[PosedView | None]], boards: Sequence[PlacedShot],

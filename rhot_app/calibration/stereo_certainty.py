@@ -1,8 +1,9 @@
 """How certain a solved rig is: standard deviations of its parameters, and what they do to a point in space.
 
-From the covariance of the bundle adjustment: the inverse of its normal equations at the corners' own spread. That is
-exact for independent Gaussian corner errors. Errors that corners share - a bent board, a lens that the model does not
-describe - are not in it. Given lenses that are not refined add their own standard deviations, when these are known.
+From the covariance of the bundle adjustment: the inverse of its normal equations at the corners' own spread, which is
+exact for independent Gaussian corner errors, times how much more the shots disagree than such errors explain
+(`disagreement`). Errors that all shots share are not in it: another size of the squares, a lens that the model does not
+describe. Given lenses that are not refined add their own standard deviations, when these are known.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.bundle import Bundle
 from rhot_app.calibration.bundle_layout import Layout, LensFreedom
 from rhot_app.calibration.bundle_model import LENS, POSE, BundleState, Observations, linearise, residuals
+from rhot_app.calibration.disagreement import disagreement
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.stereo_points import locate
 from rhot_app.geometry.transforms import exp_so3, log_so3
@@ -29,9 +31,11 @@ _TURN = 1e-6  # rad
 @dataclass(frozen=True, slots=True)
 class Certainty:
     """Covariance over all cameras: `factor` (C * 15, K), whose product with its transpose is the covariance of each
-    camera's lens (9) and pose (6: rotation and translation of camera_from_world), camera by camera."""
+    camera's lens (9) and pose (6: rotation and translation of camera_from_world), camera by camera. In it is how much
+    the shots disagree, `disagreement` times what independent corner errors explain."""
 
     factor: Array
+    disagreement: float
 
     def lens_std(self, camera: int) -> Array:
         """(9,) standard deviations of a lens."""
@@ -58,7 +62,8 @@ def certainty(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -
     layout = bundle.layout
     count = layout.board_at
     values, vectors = np.linalg.eigh(bundle.covariance[:count, :count])
-    own = vectors * np.sqrt(np.maximum(values, 0.0))
+    apart = disagreement(bundle, seen)
+    own = vectors * np.sqrt(np.maximum(values, 0.0)) * apart
     considered, given = _of_given_lenses(bundle, seen, lenses)
     columns = np.hstack([own, considered[:count]])
     rows = []
@@ -66,7 +71,7 @@ def certainty(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -
         of_given = np.hstack([np.zeros((LENS, own.shape[1])), given[camera * LENS:(camera + 1) * LENS]])
         rows.append(freedom.basis @ columns[layout.lens(camera)] + of_given)
         rows.append(columns[layout.camera(camera)] if camera else np.zeros((POSE, columns.shape[1])))
-    return Certainty(np.vstack(rows))
+    return Certainty(np.vstack(rows), apart)
 
 
 def _of_given_lenses(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -> tuple[Array, Array]:

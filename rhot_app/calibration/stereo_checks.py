@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rhot_app.calibration.disagreement import in_words
 from rhot_app.calibration.stereo_adjust import ALIKE_RAD
 from rhot_app.calibration.stereo_lens_checks import LensEvidence
 from rhot_app.calibration.stereo_report import WORKING_DISTANCE_M, StereoFigures
@@ -131,8 +132,9 @@ def _error(figures: StereoFigures) -> Finding | None:
                   f"alone (good: below {_FAIR_ERROR_M * 1e3:.0f} mm).")
     return Finding(
         "uncertain", Grade.POOR if error >= _POOR_ERROR_M else Grade.FAIR, figure,
-        "Too few or too similar pictures, or cameras that hardly look at the same place.",
-        "Take more pictures of the board where hands will be, tilted to all sides.")
+        in_words(figures.disagreement) or "Too few or too similar pictures, or cameras that hardly look at the same "
+        "place.",
+        "Take more pictures of a stiff board that is laid against something, where hands will be, tilted to all sides.")
 
 
 def _left_and_right(figures: StereoFigures) -> tuple[str, str, float] | None:

@@ -76,7 +76,8 @@ class ShotFigures:
 class StereoFigures:
     """All figures of a solved rig. `distances_px` (M,) of all corners; `error_m` expected in space at
     `WORKING_DISTANCE_M`: by the calibration, and by `MARKER_NOISE_PX` in the pictures. `tilt_rad` the largest angle
-    between two boards; `board_errors` how far the board is from its drawing, None when the pictures show nothing."""
+    between two boards; `disagreement` of the shots, 1 where independent corner errors explain all: it is in all
+    standard deviations; `board_errors` how far the board is from its drawing, None when the pictures show nothing."""
 
     state: BundleState
     board: Board
@@ -88,6 +89,7 @@ class StereoFigures:
     squares: Squares
     error_m: tuple[float, float]
     tilt_rad: float
+    disagreement: float
     board_errors: BoardErrors | None = None
     ruler: RulerResult | None = None
 
@@ -134,7 +136,7 @@ def figures_of(solution: StereoSolution, lenses: Sequence[LensStart], names: Seq
         state, solution.board, cameras, tuple(pairs), shots, _rms(distances), bundle.noise_px,
         measure_squares(solution.views, solution.board, state, bundle.noise_px),
         expected_error(state, sure, WORKING_DISTANCE_M, MARKER_NOISE_PX), tilt_spread(state.world_from_board),
-        solution.board_errors)
+        sure.disagreement, solution.board_errors)
 
 
 def _rms(distances: Array) -> float:

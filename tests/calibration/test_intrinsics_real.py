@@ -7,7 +7,6 @@ import pytest
 from stereo_pictures import BOARD, NUMBERS, needs_pictures, views_of
 
 from rhot_app.calibration.intrinsics import IntrinsicsReport, solve
-from rhot_app.calibration.verdict import Grade
 
 pytestmark = needs_pictures
 
@@ -30,9 +29,18 @@ def test_the_left_camera_is_as_published(left: IntrinsicsReport) -> None:
 
 def test_it_is_better_than_published(left: IntrinsicsReport) -> None:
     assert left.rms_px < 0.09
-    assert left.std[0] < 0.3 and left.std[2:4].max() < 0.4
-    assert left.verdict.grade is Grade.GOOD
-    assert left.errors.typical_m < 0.6e-3
+    assert left.std[0] < 0.6 and left.std[2:4].max() < 0.7
+    assert left.verdict.acceptable
+    assert left.errors.typical_m < 1.0e-3
+
+
+def test_halves_of_the_views_agree_within_what_is_stated() -> None:
+    """The scatter of the corners alone would put them 3 to 4 standard deviations apart."""
+    views = [view for view in views_of("left") if view is not None]
+    first, second = solve(views[:7], BOARD), solve(views[7:], BOARD)
+    apart = (first.lens - second.lens) / np.hypot(first.std, second.std)
+    assert np.sqrt(np.mean(apart**2)) < 2.0
+    assert min(first.disagreement, second.disagreement) > 1.5
 
 
 def test_two_cameras_find_the_same_board() -> None:

@@ -66,6 +66,7 @@ def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
         "rms_px": report.rms_px, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy,
         "distortion": list(lens.distortion), "size": list(report.size),
         "std": dict(zip(PARAMETERS, map(float, report.std), strict=True)),
+        "disagreement": report.disagreement,
         "undetermined": list(report.undetermined),
         "views_used": len(report.views),
         "views_rejected": [{"name": each.name, "reason": each.reason, "code": each.code} for each in report.dropped],
@@ -81,16 +82,20 @@ def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
 
 def lines_of(report: IntrinsicsReport) -> list[str]:
     """The figures for people."""
+    from rhot_app.calibration.disagreement import what_is_stated
     from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M
     from rhot_app.calibration.lens_fit import PARAMETERS
 
     lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
     lines += [f"{name:<4}{value:12.4f} +- {std:.4f}" + (" px" if place < 4 else "")
               for place, (name, value, std) in enumerate(zip(PARAMETERS, report.lens, report.std, strict=True))]
-    lines.append("coverage: " + ", ".join(f"{name} {100 * value:.0f} %" for name, value in report.coverage.bars.items())
-                 + f", {100 * report.coverage.share:.0f} % of the picture")
-    lines.append(f"expected error at {WORKING_DISTANCE_M:g} m: {1e3 * report.errors.typical_m:.2f} mm, in the corners "
-                 f"{1e3 * report.errors.worst_m:.2f} mm (SD, by the lens alone)")
+    lines.append(what_is_stated(report.disagreement))
+    cover = report.coverage
+    lines.append(f"coverage, of what is needed: across {100 * cover.x:.0f} %, up and down {100 * cover.y:.0f} %, "
+                 f"nearness {100 * cover.size:.0f} %, tilt {100 * cover.skew:.0f} %; corners in "
+                 f"{100 * cover.share:.0f} % of the picture (55 % and more are good)")
+    lines.append(f"by the lens alone, a point {WORKING_DISTANCE_M:g} m away is {1e3 * report.errors.typical_m:.2f} mm "
+                 f"off (SD), in the picture's corners, where few views reach, {1e3 * report.errors.worst_m:.2f} mm")
     worst = sorted(report.views, key=lambda view: -view.rms_px)[:3]
     lines.append("worst views: " + ", ".join(f"{view.source} {view.rms_px:.2f} px" for view in worst))
     return lines

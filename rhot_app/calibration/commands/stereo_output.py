@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
+from rhot_app.calibration.disagreement import what_is_stated
 from rhot_app.calibration.stereo_report import MARKER_NOISE_PX, WORKING_DISTANCE_M, PairFigures, StereoReport
 from rhot_app.calibration.world_frame import WorldFrame
 
@@ -30,7 +31,9 @@ def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
             "in_plane": figures.board_errors.in_plane_m * 1e3, "across": figures.board_errors.across_m * 1e3},
         "expected_error_mm": {"distance_m": WORKING_DISTANCE_M, "by_calibration": _number(by_rig * 1e3),
                               "marker_noise_px": MARKER_NOISE_PX, "by_marker_noise": _number(by_noise * 1e3)},
-        "std_method": "inverse of the bundle adjustment's normal equations at the corners' own spread",
+        "std_method": "inverse of the bundle adjustment's normal equations at the corners' own spread, times the "
+        "disagreement of the shots",
+        "disagreement": figures.disagreement,
         "cameras": [_camera(report, i) for i in range(len(figures.cameras))], "pairs": pairs,
         "views_used": len(figures.shots), "views_rejected": rejected,
         "shots": [{"name": shot.name, "rms_px": [_number(rms) for rms in shot.rms_px]} for shot in figures.shots],
@@ -56,6 +59,7 @@ def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
         shift, shift_std = _listed(pair.translation_m * 1e3), _listed(pair.translation_std_m * 1e3)
         lines.append(f"{pair.first} to {pair.second}: {pair.baseline_m * 1e3:.2f} mm; T ({shift}) +- ({shift_std}) mm, "
                      f"R ({_listed(pair.rotation_rad, 4)}) rad, epipolar {pair.epipolar_px:.2f} px")
+    lines.append(what_is_stated(figures.disagreement))
     squares = figures.squares
     lines.append(f"squares as the cameras see them: {squares.mean_m * 1e3:.3f} +- {squares.std_m * 1e3:.3f} mm, board "
                  f"flat to {squares.flatness_m * 1e3:.2f} mm")
