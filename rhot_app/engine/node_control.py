@@ -15,7 +15,8 @@ import msgspec
 import zmq
 
 from rhot_app.engine.commands import Answer, Arguments, refusal
-from rhot_app.engine.status import EngineStatus, Preview
+from rhot_app.engine.node_health import health_advice
+from rhot_app.engine.status import Advice, EngineStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
 from rhot_node.keys import KeyPair, connect_with
@@ -24,6 +25,7 @@ TIMEOUT_S = 2.7
 """A still may take two seconds on a node whose camera has just stopped; a client waits for three."""
 
 _FAULT_PERIOD_S = 1.0
+_HEALTH_PERIOD_S = 3.0
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +54,8 @@ class _Peer:
     previews: zmq.Socket[bytes] | None = None
     asked: dict[int, _Asked] = field(default_factory=dict)
     message: str = ""
-    fault_asked_s: float = -1e9
+    health: tuple[Advice, ...] = ()
+    asked_s: float = -1e9
 
 
 class NodeControl:
@@ -110,7 +113,9 @@ class NodeControl:
             self._send_waiting(peer)
             for asked, answer, attachment in _receive(peer):
                 if asked.client is None:
-                    peer.message = str(answer.get("answer", {}).get("message", ""))
+                    state = answer.get("answer", {})
+                    peer.message = str(state.get("message", ""))
+                    peer.health = health_advice(peer.node.name, state)
                 else:
                     done.append((asked.client, (answer, attachment)))
             for asked in [asked for asked in peer.asked.values() if now_s > asked.deadline_s]:
@@ -147,8 +152,9 @@ class NodeControl:
                     found.append(preview)
         return found
 
-    def ask_for_faults(self, status: EngineStatus) -> None:
-        """Ask nodes in fault for their own words, once a second; forget those of nodes that are well."""
+    def ask_for_states(self, status: EngineStatus) -> None:
+        """Ask nodes for their own words: of a fault once a second, of their machines' health every few seconds. What
+        is over is forgotten."""
         now_s = time.monotonic()
         for node in status.nodes:
             peer = self._peers.get(node.node_id)
@@ -156,9 +162,15 @@ class NodeControl:
                 continue
             if node.state != "fault":
                 peer.message = ""
-            elif now_s - peer.fault_asked_s > _FAULT_PERIOD_S:
-                peer.fault_asked_s = now_s
+            if node.state == "silent":
+                peer.health = ()
+            elif now_s - peer.asked_s > (_FAULT_PERIOD_S if node.state == "fault" else _HEALTH_PERIOD_S):
+                peer.asked_s = now_s
                 self._put(peer, None, "node", {"request": "state"})
+
+    def advice(self) -> tuple[Advice, ...]:
+        """What the nodes' machines lack, for the operator."""
+        return tuple(advice for peer in self._peers.values() for advice in peer.health)
 
     def message(self, node_id: int) -> str:
         """What the node says about its fault; empty when it has none or did not say yet."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from typing import Literal
 
 from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice
 from rhot_app.engine.health_watch import HealthWatch
+from rhot_app.engine.node_health import most_urgent_first
 from rhot_app.engine.node_meter import NodeMeter
 from rhot_app.engine.pipeline import Pipeline
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus
@@ -45,7 +45,7 @@ class Observer:
 
     def status(self, rig_path: str, session: int, running: bool, recorder: Recorder | None,
                message: NodeMessage, extra: list[Advice]) -> EngineStatus:
-        """The engine's status now; `extra` advice comes first."""
+        """The engine's status now, with the `extra` advice."""
         now_ns = time.monotonic_ns()
         for meter in self._meters:
             meter.sample(now_ns)
@@ -56,7 +56,7 @@ class Observer:
             t_master_ns=now_ns, pid=os.getpid(), session=session, running=running,
             condition=self._condition(running, nodes, now_ns).value, rig_name=self.rig.name, rig_path=rig_path,
             state_rate_hz=self._pipeline.states.rate_hz(now_ns), nodes=nodes,
-            advice=(*extra, *self._advice(nodes, running, now_ns)), latency=self._latency,
+            advice=most_urgent_first((*extra, *self._advice(nodes, running, now_ns))), latency=self._latency,
             log_path="" if recorder is None else str(recorder.path),
             log_bytes=0 if recorder is None else recorder.bytes_written)
 
@@ -80,9 +80,8 @@ class Observer:
             found += self._health.advice(self._pipeline.last_state, self._pipeline.work.tracker, now_ns)
         if self._pipeline.failure:
             found.append(Advice("error", self._pipeline.failure))
-        order: tuple[Literal["error", "warning", "info"], ...] = ("error", "warning", "info")
         notices = [Advice("info", text) for text in self._source.notices()]
-        return sorted([*found, *nowhere, *notices], key=lambda advice: order.index(advice.level))
+        return [*found, *nowhere, *notices]
 
     def _facts(self, camera: int, status: NodeStatus, now_ns: int) -> NodeFacts:
         meter = self._meters[camera]

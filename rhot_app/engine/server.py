@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -14,6 +15,7 @@ from rhot_app.engine.commands import Answer, Commands, parse, refusal
 from rhot_app.engine.core import Engine
 from rhot_app.engine.directory import EngineDirectory
 from rhot_app.engine.node_control import NodeControl
+from rhot_app.engine.node_health import most_urgent_first
 from rhot_app.errors import EngineError
 
 STATUS_NS = 100_000_000
@@ -72,7 +74,8 @@ class Server:
         if now_ns >= self._status_due_ns:
             self._status_due_ns = now_ns + STATUS_NS
             status = self._engine.status()
-            self._nodes.ask_for_faults(status)
+            self._nodes.ask_for_states(status)
+            status = replace(status, advice=most_urgent_first((*status.advice, *self._nodes.advice())))
             self._publish(TOPIC_STATUS, encode(status))
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:

@@ -58,7 +58,8 @@ class ControlPeer:
             kind = request.get("format", "png")
             return [f'{{"ok": true, "width": 640, "format": "{kind}"}}'.encode(), b"\x89PNG"]
         if request["request"] == "state":
-            return [b'{"ok": true, "state": "fault", "message": "the camera is gone: plug it in."}']
+            return [b'{"ok": true, "state": "fault", "message": "the camera is gone: plug it in.", "health": '
+                    b'[{"code": "heat", "level": "error", "text": "Its processor is too hot."}]}']
         return [b'{"ok": false, "error": "no such request."}']
 
     def close(self) -> None:
@@ -235,6 +236,23 @@ def test_a_nodes_own_words_reach_the_status(rig: Rig, client: EngineClient) -> N
     node.close()
     assert status.nodes[0].state == "fault"
     assert any("Node left: the camera is gone" in advice.text for advice in status.advice)
+
+
+def test_a_hot_node_is_told_until_it_is_silent(rig: Rig, client: EngineClient) -> None:
+    def told(wanted: bool) -> bool:
+        deadline = time.monotonic() + 5.0
+        while time.monotonic() < deadline:
+            status = collect(client, EngineStatus)
+            assert isinstance(status, EngineStatus)
+            if wanted == any("Node left: its processor is too hot." in advice.text for advice in status.advice):
+                return True
+        return False
+
+    node = SyntheticNode(rig, 0, state=NodeState.READY)
+    node.start()
+    assert told(True)
+    node.close()
+    assert told(False), "a node that is gone says nothing any more"
 
 
 def test_a_vanished_engine_is_noticed(rig: Rig, tmp_path: Path) -> None:
