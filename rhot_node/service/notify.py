@@ -44,5 +44,5 @@ class ServiceManager:
 
     def _say(self, text: str) -> None:
         if self._socket is not None:
-            with contextlib.suppress(OSError):  # a manager that went away must not end the node
-                self._socket.sendto(text.encode(), self._address)
+            with contextlib.suppress(OSError):  # a manager that went away or is busy must not hold the node up
+                self._socket.sendto(text.encode(), socket.MSG_DONTWAIT, self._address)
