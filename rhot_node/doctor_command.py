@@ -12,7 +12,7 @@ from rhot_node.capture.pi_camera import CameraStack, load_stack
 from rhot_node.capture.sensors import PRESETS
 from rhot_node.compiled import is_compiled_in
 from rhot_node.config import NodeSettings, load_settings
-from rhot_node.errors import CameraError, NodeError
+from rhot_node.errors import CameraError, NodeError, TrustError
 from rhot_node.health.check import LEVELS, Check, worst
 from rhot_node.health.checks import (
     check_clock,
@@ -100,17 +100,14 @@ def check_settings(machine: Machine, path: Path | None) -> list[Check]:
     """The settings file, and whom the node trusts."""
     if path is None:
         path = machine.root / (STATE_FOLDER / "node.json").relative_to("/")
-        try:
-            if not path.exists():
-                return []
-        except PermissionError:
-            return [Check("settings", "ok", f"{path} is the service's own.", "To look at it too, be root (sudo).")]
+        if not path.exists():
+            return []
     try:
         settings = load_settings(path)
-        return [Check("settings", "ok", f"{path}: node {settings.node_id}, {settings.name}."),
-                _check_trust(path, settings)]
     except NodeError as exc:
         return [Check("settings", "error", f"{exc}")]
+    return [Check("settings", "ok", f"{path}: node {settings.node_id}, {settings.name}."),
+            _check_trust(path, settings)]
 
 
 def check_service(machine: Machine) -> list[Check]:
@@ -137,7 +134,11 @@ def _check_trust(path: Path, settings: NodeSettings) -> Check:
                      'Set "trust" to "paired", restart the node, and pair it.')
     if not keys_path(path).exists():
         return Check("pairing", "warning", "The node is not paired with a master yet.", pair)
-    masters = NodeTrust(keys_path(path)).masters
+    try:
+        masters = NodeTrust(keys_path(path)).masters
+    except TrustError as exc:
+        return Check("pairing", "warning", f"{exc}", "A service's keys are its own: "
+                     "`sudo -u rhot-node /opt/rhot/bin/rhot-node doctor`.")
     if not masters:
         return Check("pairing", "warning", "The node is not paired with a master yet.", pair)
     return Check("pairing", "ok", f"Paired with {', '.join(master.name for master in masters)}.")

@@ -60,7 +60,6 @@ User={USER}
 Group={USER}
 SupplementaryGroups=video
 StateDirectory={STATE_FOLDER.name}
-StateDirectoryMode=0750
 CacheDirectory={STATE_FOLDER.name}
 Environment=XDG_CACHE_HOME=/var/cache/{STATE_FOLDER.name}
 UMask=0077

@@ -102,6 +102,8 @@ def test_settings_and_pairing(tmp_path: Path, settings: Path) -> None:
     assert not keys_path(settings).exists(), "looking must not draw keys"
     NodeTrust(keys_path(settings))
     assert "rhot-node pair" in check_settings(pi, settings)[1].remedy
+    keys_path(settings).chmod(0o644)
+    assert check_settings(pi, settings)[1].level == "warning", "keys that others may read"
     opened = json.loads(settings.read_text()) | {"trust": "open"}
     settings.write_text(json.dumps(opened))
     assert "open" in check_settings(pi, settings)[1].text
