@@ -29,7 +29,6 @@ def unit_text(service: Service) -> str:
     return f"""\
 [Unit]
 Description=RHOT camera node
-Documentation=man:systemd.service(5)
 After=network-online.target
 Wants=network-online.target
 StartLimitIntervalSec=0
