@@ -9,6 +9,7 @@ from rhot_app.project import Rig, RigNode
 from rhot_app.sources.admission import ANYBODY
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.text_frames import TextReader
+from rhot_app.sources.travel_times import TravelTimes
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.errors import WireError
 from rhot_node.wire.marker_table import MarkerTable
@@ -37,6 +38,7 @@ class NodeDoor:
         self.dropped: dict[str, int] = {}
         self.image_size: tuple[int, int] | None = None  # of the last refused frame of another size
         self.last_t_receive_ns = 0  # of the last accepted one
+        self._travel = TravelTimes()
         self._session = 0
         self.configure(rig, camera)
 
@@ -50,6 +52,11 @@ class NodeDoor:
         self._size = (node.intrinsics.width, node.intrinsics.height)
         self._time_offset_ns = round(1e9 * node.time_offset_s)
         self._text = TextReader(camera, self._count, self._size, self._time_offset_ns) if node.text_datagrams else None
+
+    @property
+    def clock_in_doubt(self) -> bool:
+        """Whether datagrams are dropped until another clock exchange has been made."""
+        return self._travel.in_doubt
 
     def expect_session(self, session: int) -> None:
         """Admit only datagrams of `session` from now on (0: none), counted from a new first number."""
@@ -105,6 +112,8 @@ class NodeDoor:
         bound_s = estimate.bound_s(t_receive_ns)
         if not self._plausible(t_row0_ns, t_send_ns, t_receive_ns, bound_s):
             return "time"
+        if not self._travel.believed(t_receive_ns - t_send_ns, t_receive_ns, estimate):
+            return "clock_in_doubt"
         self.sequence.take(message.sequence)
         return message, t_row0_ns, t_send_ns, t_receive_ns, bound_s
 

@@ -28,7 +28,7 @@ REQUEST_NS = 100_000_000
 """Each node is asked for its time ten times a second."""
 
 EAGER_NS = 25_000_000
-"""... and four times as often until its clock is known, so that it can be used soon after it appears."""
+"""... and four times as often while its clock is not known or in doubt, so that nothing has to wait for it."""
 
 RECENT = 40
 """Requests and replies per node that are kept for a recording that begins later: two seconds."""
@@ -117,7 +117,8 @@ class NodeLinks:
             for node_id, link in self._links.items():
                 if link.wants_start(now_ns):
                     self._start_again(link, now_ns)
-                if now_ns >= self._due_ns[node_id] and link.can_be_told:
+                wait_ns = EAGER_NS - REQUEST_NS if link.door.clock_in_doubt else 0
+                if now_ns >= self._due_ns[node_id] + wait_ns and link.can_be_told:
                     self._ask(link, now_ns)
 
     def start_thread(self) -> None:

@@ -121,6 +121,43 @@ def test_nothing_raises_whatever_the_bytes(rig: Rig, door: NodeDoor) -> None:
     assert door.received == 3000 == door.accepted + sum(door.dropped.values())
 
 
+def exchanged(model: NodeClockModel, clock: NodeClock, t1_ns: int) -> None:
+    t2 = clock.from_host_ns(t1_ns + 100_000)
+    model.add(t1_ns, t2, t2, t1_ns + 200_000, 1)
+
+
+def streamed(rig: Rig, door: NodeDoor, clock: NodeClock, begin_ns: int, count: int,
+             travel_ns: int = 200_000) -> list[int]:
+    """Errors, ns, of the times of the frames that are admitted, 100 a second; an exchange after every tenth."""
+    errors = []
+    for k in range(count):
+        now = begin_ns + k * 10_000_000
+        frame = door.admit(encode(message(rig, sequence=begin_ns // 10_000_000 + k - NOW_NS // 10_000_000,
+                                          t_frame_node_ns=clock.from_host_ns(now - travel_ns - 9_000_000),
+                                          t_send_node_ns=clock.from_host_ns(now - travel_ns))), now)
+        if frame is not None:
+            errors.append(frame.t_row0_master_ns - (now - travel_ns - 9_000_000))
+        if k % 10 == 9:
+            exchanged(door.clock, clock, now + 3_000_000)
+    return errors
+
+
+@pytest.mark.parametrize("step_ns", [-40_000_000, -3_000_000, -1_800_000, 1_800_000, 40_000_000, 10**12])
+def test_a_clock_that_is_set_gives_no_frame_a_wrong_time(rig: Rig, door: NodeDoor, step_ns: int) -> None:
+    assert len(streamed(rig, door, NODE_CLOCK, NOW_NS, 20)) == 20
+    stepped = NodeClock(NODE_CLOCK.offset_ns + step_ns, 30.0, 0)
+    errors = streamed(rig, door, stepped, NOW_NS + 200_000_000, 100)
+    assert max(map(abs, errors)) < 300_000, "no time is wrong"
+    assert len(errors) >= 50, "and all is well again within half a second"
+
+
+def test_a_network_that_becomes_slow_is_believed_after_an_exchange(rig: Rig, door: NodeDoor) -> None:
+    assert len(streamed(rig, door, NODE_CLOCK, NOW_NS, 20)) == 20
+    assert len(streamed(rig, door, NODE_CLOCK, NOW_NS + 200_000_000, 50, 8_000_000)) == 40
+    assert len(streamed(rig, door, NODE_CLOCK, NOW_NS + 700_000_000, 50, 2_000_000)) == 50
+    assert door.dropped == {"clock_in_doubt": 10}
+
+
 def test_calibrated_time_offset_is_added(rig: Rig) -> None:
     node = msgspec.structs.replace(rig.nodes[1], time_offset_s=0.0035)
     shifted = msgspec.structs.replace(rig, nodes=(rig.nodes[0], node))
