@@ -25,8 +25,12 @@ Array = NDArray[np.float64]
 _NOTABLE = 1.5  # times; less comes by chance with a dozen shots
 
 
-def disagreement(bundle: Bundle, seen: Observations) -> float:
-    """What standard deviations of lenses and cameras have to be multiplied by, 1 or more."""
+def disagreement(bundle: Bundle, seen: Observations, common: Array | None = None) -> float:
+    """What standard deviations of lenses and cameras have to be multiplied by, 1 or more.
+
+    `common` (2M, K) px: how far errors that are stated elsewhere, of lenses that were kept, move the corners, one
+    column per standard deviation. What they do to single shots is expected.
+    """
     layout = bundle.layout
     reported = layout.board_at  # lenses and cameras stand first
     if not reported or bundle.noise_px < LEAST_NOISE_PX:
@@ -37,13 +41,18 @@ def disagreement(bundle: Bundle, seen: Observations) -> float:
     metric = moved_by @ np.linalg.solve(certainty[:reported, :reported], moved_by.T)
     jacobian = layout.jacobian(linearise(bundle.state, seen))
     scaled = np.repeat(np.sqrt(bundle.weights), 2) / bundle.noise_px
-    found, expected = 0.0, 0.0
+    off = np.column_stack([bundle.residuals.ravel(), *(() if common is None else common.T)])
+    witnesses = []
     for shot in range(len(bundle.state.world_from_board)):
         rows = np.flatnonzero(np.repeat(seen.shot == shot, 2))
-        pull, information = _witness(jacobian[rows], bundle.residuals.ravel()[rows], scaled[rows], shared,
-                                     layout.board(shot))
-        found += float(pull @ metric @ pull)
+        witnesses.append(_witness(jacobian[rows], off[rows], scaled[rows], shared, layout.board(shot)))
+    answer = certainty @ np.sum([pulls[:, 1:] for pulls, _ in witnesses], axis=0)  # of the unknowns to common errors
+    found, expected = 0.0, 0.0
+    for pulls, information in witnesses:
+        found += float(pulls[:, 0] @ metric @ pulls[:, 0])
         expected += float(np.sum(metric * (information - information @ certainty @ information)))
+        left = pulls[:, 1:] - information @ answer
+        expected += float(np.sum(left * (metric @ left)))
     return float(np.sqrt(max(1.0, found / expected))) if expected > 0.0 else 1.0
 
 
@@ -61,10 +70,10 @@ def what_is_stated(times: float) -> str:
     return "+- is one standard deviation" + (more if times >= _NOTABLE else "")
 
 
-def _witness(jacobian: Any, residuals: Array, scaled: Array, shared: NDArray[np.intp],
-             board: slice) -> tuple[Array, Array]:
-    """One shot's pull at the shared unknowns (K,) and its information on them (K, K), the board's pose eliminated."""
+def _witness(jacobian: Any, off: Array, scaled: Array, shared: NDArray[np.intp], board: slice) -> tuple[Array, Array]:
+    """The pulls of a shot's `off` (2M, L) px at the K shared unknowns (K, L), and its information on them (K, K), the
+    board's pose eliminated."""
     by_shared = jacobian[:, shared].toarray() * scaled[:, None]
     free, _ = np.linalg.qr(jacobian[:, board].toarray() * scaled[:, None])
     by_shared -= free @ (free.T @ by_shared)
-    return by_shared.T @ (residuals * scaled), by_shared.T @ by_shared
+    return by_shared.T @ (off * scaled[:, None]), by_shared.T @ by_shared

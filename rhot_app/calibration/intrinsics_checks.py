@@ -124,7 +124,8 @@ def _certainty(f: Figures) -> Iterator[Finding]:
         yield Finding("expected_error", grade, f"By the lens alone a point at {WORKING_DISTANCE_M:.1f} m may be off by "
                       f"{typical:.1f} mm, in the picture's corners by {worst:.1f} mm (SD; 1 and 5 mm are good).",
                       "The views determine the lens too loosely, most where none reaches."
-                      f" {in_words(f.disagreement)}".rstrip(), MORE_VIEWS)
+                      f" {in_words(f.disagreement)}".rstrip(), f"Lay a stiff board against something. {MORE_VIEWS}"
+                      if in_words(f.disagreement) else MORE_VIEWS)
 
 
 def _plausible(f: Figures) -> Iterator[Finding]:

@@ -58,13 +58,19 @@ class Certainty:
 
 
 def certainty(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -> Certainty:
-    """The certainty of a bundle whose lenses began as `lenses`."""
+    """The certainty of a bundle whose lenses began as `lenses`.
+
+    The unknowns follow the errors of kept lenses as the normal equations say: consider analysis (Bierman 1977).
+    """
     layout = bundle.layout
     count = layout.board_at
     values, vectors = np.linalg.eigh(bundle.covariance[:count, :count])
-    apart = disagreement(bundle, seen)
+    given = _given_errors(bundle, lenses)
+    shared = _in_pictures(bundle, seen, given)
+    apart = disagreement(bundle, seen, shared)
     own = vectors * np.sqrt(np.maximum(values, 0.0)) * apart
-    considered, given = _of_given_lenses(bundle, seen, lenses)
+    considered = -bundle.covariance @ (bundle.layout.jacobian(linearise(bundle.state, seen)).T @ shared
+                                       / max(bundle.noise_px, 1e-12) ** 2)
     columns = np.hstack([own, considered[:count]])
     rows = []
     for camera, freedom in enumerate(layout.lenses):
@@ -74,26 +80,22 @@ def certainty(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -
     return Certainty(np.vstack(rows), apart)
 
 
-def _of_given_lenses(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -> tuple[Array, Array]:
-    """What the uncertainty of lenses that were kept does to the unknowns (size, K), and itself (9C, K).
-
-    Consider analysis (Bierman 1977): the unknowns follow a change of a kept parameter as the normal equations say.
-    """
+def _given_errors(bundle: Bundle, lenses: Sequence[LensStart]) -> Array:
+    """(9C, K), one column of one standard deviation for each parameter of a lens that was kept, where it is known."""
     std = np.zeros(LENS * len(lenses))
     for camera, lens in enumerate(lenses):
         if bundle.layout.lenses[camera].basis.shape[1] == 0 and lens.std is not None:
             std[camera * LENS:(camera + 1) * LENS] = lens.std
-    kept = np.flatnonzero(std)
-    given = np.zeros((len(std), len(kept)))
-    given[kept, np.arange(len(kept))] = std[kept]
-    if not len(kept):
-        return np.zeros((bundle.layout.size, 0)), given
-    line = linearise(bundle.state, seen)
-    every = Layout([LensFreedom.free([True] * LENS, lens.lens) for lens in lenses], len(bundle.state.world_from_board),
-                   seen)
-    by_lens = every.jacobian(line)[:, :every.camera_at]
-    scaled = bundle.layout.jacobian(line).T @ (by_lens @ given) / max(bundle.noise_px, 1e-12) ** 2
-    return -bundle.covariance @ scaled, given
+    return np.diag(std)[:, std > 0.0]
+
+
+def _in_pictures(bundle: Bundle, seen: Observations, given: Array) -> Array:
+    """(2M, K) px, how far such errors of kept lenses move the corners."""
+    if not given.shape[1]:
+        return np.zeros((2 * len(seen), 0))
+    every = Layout([LensFreedom.free([True] * LENS, lens) for lens in bundle.state.lenses],
+                   len(bundle.state.world_from_board), seen)
+    return np.asarray(every.jacobian(linearise(bundle.state, seen))[:, :every.camera_at] @ given)
 
 
 def expected_error(state: BundleState, sure: Certainty, distance_m: float, noise_px: float) -> tuple[float, float]:

@@ -32,7 +32,7 @@ _BEYOND_NOISE = 2.0  # times what the noise of the corners explains
 
 def fit_findings(figures: StereoFigures, *, lenses_from_views: bool) -> list[Finding]:
     """How well the corners fit, how much they say, and what comes out in space."""
-    found = [_rms(figures), _squares(figures), _error(figures), _board(figures)]
+    found: list[Finding | None] = []
     if len(figures.shots) < _GOOD_SHOTS:
         found.append(Finding("few_views", Grade.FAIR, f"Only {len(figures.shots)} shots were used.",
                              remedy="Take 15, with the board near and far, tilted, and in all corners."))
@@ -43,6 +43,7 @@ def fit_findings(figures: StereoFigures, *, lenses_from_views: bool) -> list[Fin
             "between any two.",
             "Focal length and distance then look the same to the cameras.",
             "Tilt the board by 30 degrees to either side, up and down, and move it near and far."))
+    found += [_rms(figures), _squares(figures), _error(figures), _board(figures)]
     return [each for each in found if each is not None]
 
 

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 _CLEARLY = 1.15  # another lens leaves this many times less error
 _MOSTLY = 0.7  # of the views
-_SUSPECT_PX = 0.3  # below this a given lens is good enough whatever a free one would do
+_SUSPECT_PX = 0.15  # below this a given lens is good enough whatever a free one would do
 _BETTER = 0.7  # a free lens leaves less than this share of the given one's error
 
 
@@ -58,21 +58,43 @@ def lens_evidence(solution: StereoSolution, lenses: Sequence[LensStart | None]) 
 
 
 def mismatch_finding(solution: StereoSolution, lenses: Sequence[LensStart]) -> Finding | None:
-    """Whether lenses estimated afresh from these pictures fit far better than the given ones."""
+    """Whether lenses estimated afresh from these pictures fit far better than the given ones, and whose those are."""
     fixed = [lens for lens, freedom in zip(lenses, solution.bundle.layout.lenses, strict=True)
              if freedom.basis.shape[1] == 0]
     rms = _rms(solution.bundle.residuals)
     if not fixed or rms < _SUSPECT_PX:
         return None
     free = [LensStart(lens.lens, lens.size, None, "views").freedom(refine=True) for lens in lenses]
-    better = _rms(adjust(solution.bundle.state, solution.seen, free).residuals)
+    fresh = adjust(solution.bundle.state, solution.seen, free)
+    better = _rms(fresh.residuals)
     if better > _BETTER * rms:
         return None
-    return Finding(
+    return _of_another_camera(solution, lenses, fresh.state.lenses) or Finding(
         "lens", Grade.POOR if rms > 1.0 else Grade.FAIR,
         f"With the given intrinsics the corners are {rms:.2f} px off, with fresh ones {better:.2f} px.",
         "The intrinsics are of another camera, another focus or zoom, another picture size or mode.",
         "Calibrate the intrinsics of this camera again, or leave them out and let these pictures find them.")
+
+
+def _of_another_camera(solution: StereoSolution, lenses: Sequence[LensStart], fresh: Array) -> Finding | None:
+    """Whether a kept lens fits another camera's pictures as that one's own does; `fresh` (C, 9) fit each camera's."""
+    views = [[those[camera] for those in solution.views] for camera in range(len(lenses))]
+    own = [_rms(_errors(seen, solution.board, lens)[:, None]) for seen, lens in zip(views, fresh, strict=True)]
+    for camera, freedom in enumerate(solution.bundle.layout.lenses):
+        if freedom.basis.shape[1]:
+            continue
+        here, *there = (_rms(_errors(views[i], solution.board, lenses[camera].lens)[:, None]) / own[i]
+                        for i in (camera, *(other for other in range(len(lenses)) if other != camera)))
+        others = [name for name in solution.cameras if name != solution.cameras[camera]]
+        if here > _CLEARLY and min(there) < _CLEARLY:
+            name, other = solution.cameras[camera], others[int(np.argmin(there))]
+            return Finding(
+                "lenses_swapped", Grade.POOR,
+                f"The intrinsics given for {name} fit the pictures of {other}; in those of {name} they leave "
+                f"{here:.1f} times the error of its own lens.",
+                f"The file is that of {other}, or the pictures of {name} are.",
+                f"Give the file of {name}, or none: these pictures find the lens, too.")
+    return None
 
 
 def _fits_better(views: Sequence[BoardView | None], board: Board, lens: LensStart, other: LensStart) -> bool:

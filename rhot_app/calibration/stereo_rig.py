@@ -21,6 +21,10 @@ from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
 Array = NDArray[np.float64]
 
 
+ARRANGED = frozenset({"swapped", "swapped_or_mirrored", "mirrored"})
+"""Findings that say why right stands on the left: the first of them is enough."""
+
+
 def require_nodes(rig: Rig, cameras: Sequence[str]) -> None:
     """Raise CalibrationError unless the rig has a node of every camera's name."""
     known = [node.name for node in rig.nodes]
@@ -80,7 +84,9 @@ def rig_findings(rig: Rig, cameras: Sequence[str]) -> list[Finding]:
 
 def rig_verdict(report: StereoReport, rig: Rig, frame: WorldFrame | None = None) -> Verdict:
     """The verdict on writing `rig`: the calibration's, the rig's own checks, and the world frame's; each thing once."""
-    found = [*report.verdict.findings, *rig_findings(rig, report.cameras)]
+    found = list(report.verdict.findings)
+    named = report.verdict.codes & ARRANGED
+    found += [each for each in rig_findings(rig, report.cameras) if not (named and each.code in ARRANGED)]
     found += frame.verdict.findings if frame is not None else ()
     return judge(report.summary, list({finding.figure: finding for finding in found}.values()))
 

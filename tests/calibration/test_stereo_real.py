@@ -104,6 +104,14 @@ def test_swapped_intrinsics_are_named(known: list[LensStart]) -> None:
     assert not report.verdict.acceptable
 
 
+def test_the_lens_of_the_other_camera_is_named(known: list[LensStart]) -> None:
+    """One file of two, and a lens that differs by 15 px of centre alone: two poses nearly make up for it."""
+    report = calibrate(shared(views_of("left"), views_of("right"), most=FEW), [known[1], rough()[1]])
+    (finding,) = [each for each in report.verdict.findings if each.code == "lenses_swapped"]
+    assert "given for left fit the pictures of right" in finding.figure
+    assert not report.verdict.acceptable
+
+
 def test_intrinsics_of_another_camera_are_noticed(known: list[LensStart]) -> None:
     strange = [replace(lens, lens=lens.lens * np.array([1.1, 1.1, 1, 1, 1, 1, 1, 1, 1])) for lens in known]
     report = calibrate(shared(views_of("left"), views_of("right"), most=FEW), strange)
