@@ -13,6 +13,10 @@ class SourceError(RhotError):
     """A port is taken or a node cannot be reached."""
 
 
+class PairingError(RhotError):
+    """A node could not be paired: nobody answers, the code is wrong, or somebody stands between."""
+
+
 class RecordingError(RhotError):
     """A log cannot be read or written."""
 

@@ -10,6 +10,7 @@ from rhot_node.errors import TrustError
 from rhot_node.pairing import show_code
 from rhot_node.pairing_offer import TRIES, VALID_S, Offer, OfferFile, offer_path
 from rhot_node.private_files import remove_private
+from rhot_node.service.install import SETTINGS
 from rhot_node.trust import keys_path
 
 SUMMARIES = {
@@ -20,8 +21,10 @@ SUMMARIES = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of both commands."""
-    parser.add_argument("--settings", type=Path, required=True, metavar="FILE",
-                        help="settings of this node (JSON, see docs/node.md); the keys lie beside it")
+    installed = SETTINGS if SETTINGS.exists() else None
+    parser.add_argument("--settings", type=Path, required=installed is None, default=installed, metavar="FILE",
+                        help="settings of this node (JSON, see docs/node.md); the keys lie beside it. Default: those of "
+                             f"the installed service, {SETTINGS}")
 
 
 def run(name: str, args: argparse.Namespace) -> int:

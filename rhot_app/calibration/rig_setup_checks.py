@@ -69,7 +69,7 @@ def link_findings(rig: Rig) -> list[Finding]:
     """Ports that two nodes share, ports that need rights, and time offsets that cannot be."""
     found, used = [], dict[tuple[str, int, bool], str]()
     for node in rig.nodes:
-        for what in ("udp_port", "control_port", "preview_port"):
+        for what in ("udp_port", "control_port", "preview_port", "pairing_port"):
             port = getattr(node, what)
             place, label = (node.address, port, what == "udp_port"), f"{node.name}'s {what}"
             if place in used:

@@ -25,7 +25,10 @@ _REFUSALS = {
                         "If this does not end, restart the node."),
     "foreign_node": ("warning", "Another node sends to the port of {name}; check the node ids and data ports."),
     "version": ("error", "Node {name} speaks another version of the wire; install the same version here and there."),
-    "tag": ("error", "Node {name} signs its datagrams, but this master does not know its key; pair them."),
+    "tag": ("warning", "Datagrams that are not tagged with the key of node {name} are refused at its port: somebody sends "
+                       "in its place."),
+    "untagged": ("warning", "Datagrams without a tag are refused at the port of node {name}: somebody sends in its "
+                            "place, or the node was made open after it was paired."),
     "jump": ("warning", "Node {name} jumped in its sequence numbers; if this does not end, restart the node."),
     "kernel_overflow": ("warning", "The kernel drops datagrams of node {name}: this computer is too busy to read "
                                    "them. Close other programs, or allow a larger buffer with "
@@ -80,9 +83,15 @@ def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
         return [Advice("info", f"Node {name}: text datagrams arrive, but tracking is not started: press Start.")]
     if status.state == "silent" and status.text_datagrams:
         return [Advice("info", f"Node {name}: no text datagrams come in; send them to its data port.")]
+    if status.turned_away:
+        return [Advice("error", f"Node {name} at {facts.address} does not know this computer: it was reset, or never "
+                                f"paired with it. Pair it: `rhot-node pair` on the node, `rhot pair {name} --rig FILE` "
+                                "here.")]
     if status.state == "silent":
         return [Advice("error", f"Node {name} does not answer at {facts.address}:{facts.udp_port}. Is it switched on, "
-                                "is rhot-node running there, and does the rig name the right address?")]
+                                "is rhot-node running there, and does the rig name the right address?"
+                                + ("" if status.paired else " The rig has no key for it: if it waits to be paired, run "
+                                                            "`rhot-node pair` there and `rhot pair` here."))]
     if status.state == "fault":
         return [Advice("error", f"Node {name}: {status.message or 'it reports a fault; look at its log.'}")]
     if running and status.state == "ready" and facts.not_started_s > 1.0:
@@ -94,6 +103,9 @@ def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     if status.text_datagrams:
         return [Advice("info", f"Node {name} sends text datagrams: untrusted, without times, so fast movements are "
                                "less exact.")]
+    if not status.paired:
+        return [Advice("info", f"Node {name} is open, and what it says is untrusted: anybody on the network may steer "
+                               'it or speak in its place. To change that, set its "trust" to "paired" and pair it.')]
     return []
 
 

@@ -1,4 +1,4 @@
-"""Connect two nodes: enter their addresses, ask whether they are there, and write a first rig file for them."""
+"""Connect two nodes: enter their addresses, ask whether they are there, pair with them, and write a first rig file."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ from PySide6.QtWidgets import (
 
 from rhot_app.errors import RhotError
 from rhot_app.project import save_rig
-from rhot_app.ui.backend.ping import NodeAddress, NodeAnswer, ask_nodes, first_rig
+from rhot_app.sources.pairing import PAIRING_PORT, NodeAddress
+from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig, pair_node
 from rhot_app.ui.job import Job
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.pair_dialog import PairDialog
 from rhot_app.ui.shapes import ShapeMark
 
-CONTROL_PORT = 47801
 SIDES = ("left", "right")
 
 
@@ -49,18 +50,18 @@ class NodesDialog(QDialog):
         self.ports: list[QSpinBox] = []
         self._marks: list[ShapeMark] = []
         self.replies: list[QLabel] = []
+        self.pair_buttons: list[QPushButton] = []
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(8)
-        for column, head in enumerate(("camera", "address or host name", "control port", "", "answer")):
+        for column, head in enumerate(("camera", "address or host name", "port", "", "answer", "")):
             label = QLabel(head)
             label.setProperty("muted", True)
             grid.addWidget(label, 0, column)
         for row, side in enumerate(SIDES, start=1):
             self._add_row(grid, row, side)
         grid.setColumnStretch(4, 1)
-        default = QLabel(f"The control port is {CONTROL_PORT} unless the node's settings file says otherwise "
-                         "(control_port).")
+        default = QLabel(f"The port is {PAIRING_PORT} unless the node's settings file says otherwise (pairing_port).")
         default.setWordWrap(True)
         default.setProperty("muted", True)
         self.ask_button = QPushButton("Ask the nodes")
@@ -70,7 +71,7 @@ class NodesDialog(QDialog):
         self.ask_button.clicked.connect(self.ask)
         self.save_button = QPushButton("Write a rig file and open it …")
         self.save_button.setEnabled(False)
-        self.save_button.setToolTip("Possible once both nodes have answered.")
+        self.save_button.setToolTip("Possible once both nodes have answered and are paired with this computer.")
         self.save_button.clicked.connect(self._choose_file)
         cancel = QPushButton("Cancel")
         cancel.clicked.connect(self.reject)
@@ -89,7 +90,7 @@ class NodesDialog(QDialog):
         layout.addWidget(default)
         layout.addWidget(self.verdict)
         layout.addLayout(buttons)
-        self.resize(760, 320)
+        self.resize(820, 340)
 
     def _add_row(self, grid: QGridLayout, row: int, side: str) -> None:
         host, port, mark, reply = QLineEdit(), QSpinBox(), ShapeMark(14), QLabel("not asked yet")
@@ -100,14 +101,19 @@ class NodesDialog(QDialog):
         port.setRange(1, 65535)
         port.setMinimumHeight(30)
         port.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
-        port.setValue(CONTROL_PORT)
-        port.setToolTip("Where the node takes orders. The default is right unless its settings file says otherwise.")
-        port.setAccessibleName(f"Control port of the {side} node")
+        port.setValue(PAIRING_PORT)
+        port.setToolTip("Where the node says who it is. The default is right unless its settings file says otherwise.")
+        port.setAccessibleName(f"Pairing port of the {side} node")
         port.valueChanged.connect(self._forget_answers)
         reply.setWordWrap(True)
         reply.setProperty("muted", True)
         mark.set_shape("square", self._scheme.neutral)
-        for column, widget in enumerate((QLabel(side), host, port, mark, reply)):
+        pair = QPushButton("Pair …")
+        pair.setEnabled(False)
+        pair.setToolTip("Possible once the node has answered and is not paired with this computer.")
+        pair.clicked.connect(lambda: self.pair(row - 1))
+        self.pair_buttons.append(pair)
+        for column, widget in enumerate((QLabel(side), host, port, mark, reply, pair)):
             grid.addWidget(widget, row, column)
         self.hosts.append(host)
         self.ports.append(port)
@@ -117,6 +123,8 @@ class NodesDialog(QDialog):
     def _forget_answers(self) -> None:
         self._answers = []
         self.save_button.setEnabled(False)
+        for button in self.pair_buttons:
+            button.setEnabled(False)
         self.ask_button.setEnabled(self._job is None and all(host.text().strip() for host in self.hosts))
 
     def addresses(self) -> list[NodeAddress]:
@@ -139,17 +147,22 @@ class NodesDialog(QDialog):
         self._job = None
         self.ask_button.setEnabled(True)
         self._answers = answers
-        for answer, mark, reply in zip(answers, self._marks, self.replies, strict=True):
-            if answer.found:
-                mark.set_shape("disc", self._scheme.good)
-                reply.setText(f"{answer.name} (id {answer.node_id}) answers; it is {answer.state}.")
-            else:
-                mark.set_shape("cross", self._scheme.bad)
-                reply.setText(answer.error)
-        both = all(answer.found for answer in answers)
+        for answer, mark, reply, button in zip(answers, self._marks, self.replies, self.pair_buttons, strict=True):
+            shape, colour = ("disc", self._scheme.good) if answer.usable else (
+                ("ring", self._scheme.accent) if answer.found else ("cross", self._scheme.bad))
+            mark.set_shape(shape, colour)
+            reply.setText(answer.text)
+            button.setEnabled(answer.found and not answer.usable)
+        both = all(answer.usable for answer in answers)
         self.save_button.setEnabled(both)
         self.verdict.setText("Both nodes answer. The new rig starts with textbook lenses and a 75 mm baseline: "
                              "calibrate before you trust millimetres." if both else "")
+
+    def pair(self, row: int) -> None:
+        """Pair with the node of a row, then ask both again."""
+        answer = self._answers[row]
+        if answer.who is not None and PairDialog(answer.who.name, answer.address, pair_node, self).exec():
+            self.ask()
 
     def _show_error(self, sentence: str) -> None:
         self._job = None

@@ -9,7 +9,7 @@ from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import NodeStatus
 
 IDS = ("thumb", "index", "wrist")
-STATUS = NodeStatus(1, "left", "streaming", False, 100.0, 1000, 0, {}, 1.0, 1e-4, 2e-4)
+STATUS = NodeStatus(1, "left", "streaming", False, 100.0, 1000, 0, {}, 1.0, 1e-4, 2e-4, paired=True)
 WELL = NodeFacts(STATUS, Recent(200, 0, {}, 0), "10.0.0.5", 47800, (640, 480), None, 4 << 20, 4 << 20,
                  (0.0, 0.0, 0.0), False, 0.0)
 
@@ -25,6 +25,11 @@ def test_a_well_node_needs_no_words() -> None:
 
 @pytest.mark.parametrize(("facts", "words"), [
     (replace(WELL, status=replace(STATUS, state="silent")), ["left", "10.0.0.5:47800", "rhot-node"]),
+    (replace(WELL, status=replace(STATUS, state="silent", paired=False)), ["no key for it", "`rhot pair`"]),
+    (replace(WELL, status=replace(STATUS, state="silent", turned_away=True)), ["does not know this computer", "pair"]),
+    (replace(WELL, status=replace(STATUS, paired=False)), ["left is open", "untrusted"]),
+    (replace(WELL, recent=Recent(100, 0, {"tag": 9}, 0)), ["not tagged with the key of node left"]),
+    (replace(WELL, recent=Recent(100, 0, {"untagged": 9}, 0)), ["without a tag"]),
     (replace(WELL, status=replace(STATUS, state="fault", message="no camera: plug it in.")), ["no camera: plug it"]),
     (replace(WELL, status=replace(STATUS, state="ready"), not_started_s=2.0), ["press Stop and Start"]),
     (replace(WELL, streams_elsewhere=True), ["another master"]),

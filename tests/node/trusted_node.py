@@ -50,8 +50,9 @@ class TrustedNode:
         self.server = ControlServer(settings, self.trust)
         store = SettingsStore(folder / "left.json", settings)
         save_settings(store.path, settings)
-        self.server.start(Responder(store, self.sessions, self.server.pictures, NodeClock(), lambda: {"state": "ready"},
-                                    lambda: {}, self.keys), Reception(self.trust, self.offers, lambda: ABOUT))
+        self.responder = Responder(store, self.sessions, self.server.pictures, NodeClock(),
+                                          lambda: {"state": "ready"}, lambda: {}, self.keys)
+        self.server.start(self.responder, Reception(self.trust, self.offers, lambda: ABOUT))
         self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
 
     def admit(self) -> KeyPair:

@@ -16,9 +16,11 @@ from typing import Any
 import pytest
 import zmq
 
+from rhot_app.keys import load_master_keys
 from rhot_app.project import load_rig
 from rhot_app.simulator.remote import TwinRemote
 from rhot_app.simulator.shows import BoardShow
+from rhot_node.keys import connect_with
 
 READY_S = 90.0
 
@@ -43,7 +45,9 @@ def ask_node(rig_path: Path, request: dict[str, Any]) -> dict[str, Any]:
     try:
         requests = context.socket(zmq.REQ)
         requests.linger = 0
-        requests.connect(f"tcp://127.0.0.1:{load_rig(rig_path).nodes[0].control_port}")
+        node = load_rig(rig_path).nodes[0]
+        connect_with(requests, load_master_keys().own, node.public_key)
+        requests.connect(f"tcp://127.0.0.1:{node.control_port}")
         requests.send_json(request)
         assert requests.poll(10_000), "the node gives no answer"
         answer: dict[str, Any] = json.loads(requests.recv_multipart()[0])

@@ -1,108 +1,84 @@
-"""Ask nodes at given addresses whether they are there, and make a first rig of those that answer."""
+"""Ask nodes at given addresses who they are, and make a first rig of those that answer."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import msgspec
-import zmq
 
 from rhot_app.errors import SourceError
+from rhot_app.keys import load_master_keys
 from rhot_app.project import Rig, RigNode, load_rig
+from rhot_app.sources.pairing import TIMEOUT_S, Introduction, NodeAddress, ask_who, pair
 from rhot_node.files import resource_path
-
-PING_TIMEOUT_S = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class NodeAddress:
-    """Where to ask."""
-
-    host: str
-    control_port: int
 
 
 @dataclass(frozen=True, slots=True)
 class NodeAnswer:
-    """What a node said about itself; `error` is a sentence when it did not answer."""
+    """Who a node said it is; `error` is a sentence when it did not answer. `paired`: with this computer."""
 
     address: NodeAddress
-    node_id: int = 0
-    name: str = ""
-    state: str = ""
+    who: Introduction | None = None
+    paired: bool = False
     error: str = ""
 
     @property
     def found(self) -> bool:
         """Whether a node answered."""
-        return not self.error
+        return self.who is not None
+
+    @property
+    def usable(self) -> bool:
+        """Whether the node will do what this computer says."""
+        return self.who is not None and (self.paired or self.who.trust == "open")
+
+    @property
+    def text(self) -> str:
+        """The answer in a sentence or two."""
+        if self.who is None:
+            return self.error
+        begin = f"{self.who.name} (id {self.who.node_id}) answers; it is {self.who.state}."
+        if self.paired:
+            return f"{begin} Paired with this computer."
+        if self.who.trust == "open":
+            return f"{begin} Open: anybody on the network may see its pictures and steer it."
+        return f"{begin} Not paired with this computer: press Pair."
 
 
-def ask_nodes(addresses: list[NodeAddress], timeout_s: float = PING_TIMEOUT_S) -> list[NodeAnswer]:
-    """Ask every address at once; returns after the last answer or `timeout_s`. Waits, so call it in a worker."""
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    poller = zmq.Poller()
-    sockets: list[zmq.Socket[bytes]] = []
-    answers: list[NodeAnswer | None] = []
-    try:
-        for address in addresses:
-            socket = context.socket(zmq.REQ)
-            socket.setsockopt(zmq.LINGER, 0)
-            sockets.append(socket)
-            answers.append(_send_question(socket, address))
-            if answers[-1] is None:
-                poller.register(socket, zmq.POLLIN)
-        remaining = timeout_s
-        while any(answer is None for answer in answers) and remaining > 0:
-            ready = dict(poller.poll(50))
-            remaining -= 0.05 if not ready else 0.0
-            for k, socket in enumerate(sockets):
-                if socket in ready:
-                    answers[k] = _read_answer(addresses[k], socket.recv_multipart()[0])
-                    poller.unregister(socket)
-    finally:
-        context.destroy(0)
-    silence = f"nothing answered within {timeout_s:g} s. Is rhot-node running there, and the address right?"
-    return [answer if answer is not None else NodeAnswer(address, error=f"{address.host}: {silence}")
-            for address, answer in zip(addresses, answers, strict=True)]
+def ask_nodes(addresses: list[NodeAddress], timeout_s: float = TIMEOUT_S) -> list[NodeAnswer]:
+    """Ask every address at once; returns after the last answer or `timeout_s`. Waits, so call it in a worker. Raises
+    TrustError when this computer's keys cannot be read."""
+    keys = load_master_keys()
+    return [NodeAnswer(address, error=who) if isinstance(who, str)
+            else NodeAnswer(address, who, keys.knows(who.public_key))
+            for address, who in zip(addresses, ask_who(addresses, timeout_s), strict=True)]
 
 
-def _send_question(socket: zmq.Socket[bytes], address: NodeAddress) -> NodeAnswer | None:
-    try:
-        socket.connect(f"tcp://{address.host}:{address.control_port}")
-        socket.send(b'{"request": "state"}')
-    except zmq.ZMQError as exc:
-        return NodeAnswer(address, error=f"{address.host!r} is not an address that can be asked ({exc}).")
-    return None
-
-
-def _read_answer(address: NodeAddress, data: bytes) -> NodeAnswer:
-    try:
-        fields = msgspec.json.decode(data, type=dict[str, object])
-        node_id, name, state = fields["node_id"], fields["name"], fields["state"]
-    except (msgspec.MsgspecError, KeyError):
-        return NodeAnswer(address, error=f"{address.host}: something answered that is not a node of this system.")
-    if not isinstance(node_id, int):
-        return NodeAnswer(address, error=f"{address.host}: the node's id is not a number.")
-    return NodeAnswer(address, node_id, str(name), str(state))
+def pair_node(address: NodeAddress, code: str) -> str:
+    """Pair with a node by its code; returns its name. Waits. Raises PairingError, TrustError."""
+    return pair(address, code, load_master_keys()).name
 
 
 def first_rig(answers: list[NodeAnswer]) -> Rig:
     """The shipped rig for two Pis with the two nodes that answered in place of its own, left one first.
 
     Lenses and positions are the shipped rig's until a calibration replaces them. Raises SourceError when there are
-    not two, or when both have the same id or name.
+    not two that this computer may use, or when both have the same id.
     """
-    found = [answer for answer in answers if answer.found]
-    if len(found) != 2:
-        raise SourceError("A rig needs two nodes that answer.")
-    if found[0].node_id == found[1].node_id:
-        raise SourceError(f"Both nodes have the id {found[0].node_id}; give one another node_id in its settings file.")
+    usable = [answer for answer in answers if answer.usable]
+    if len(usable) != 2:
+        raise SourceError("A rig needs two nodes that answer and are paired with this computer.")
+    ids = [answer.who.node_id for answer in usable if answer.who is not None]
+    if ids[0] == ids[1]:
+        raise SourceError(f"Both nodes have the id {ids[0]}; give one another node_id in its settings file.")
     template = load_rig(resource_path("rigs", "two_pis.json"))
-    nodes = tuple(_with_address(node, answer) for node, answer in zip(template.nodes, found, strict=True))
+    nodes = tuple(_with_address(node, answer) for node, answer in zip(template.nodes, usable, strict=True))
     return msgspec.structs.replace(template, nodes=nodes)
 
 
 def _with_address(node: RigNode, answer: NodeAnswer) -> RigNode:
-    return msgspec.structs.replace(node, node_id=answer.node_id, address=answer.address.host,
-                                   control_port=answer.address.control_port)
+    who = answer.who
+    assert who is not None  # it is usable
+    return msgspec.structs.replace(
+        node, node_id=who.node_id, address=answer.address.host, udp_port=who.udp_port, control_port=who.control_port,
+        preview_port=who.preview_port, pairing_port=answer.address.pairing_port, public_key=who.public_key)

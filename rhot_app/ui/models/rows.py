@@ -37,8 +37,15 @@ def node_row(node: NodeStatus) -> NodeRow:
     return NodeRow(
         name=node.name, look=look, rate=f"{node.rate_hz:.0f} /s" if node.rate_hz > 0 else DASH, losses=losses,
         clock=clock_text(node), message=node.message,
-        tooltip=tooltip + ("\nSends the thesis's text datagrams: untrusted." if node.text_datagrams else ""),
+        tooltip=tooltip + trust_text(node),
     )
+
+
+def trust_text(node: NodeStatus) -> str:
+    """A line about a node whose word cannot be trusted; nothing about one that is paired."""
+    if node.text_datagrams:
+        return "\nSends the thesis's text datagrams: untrusted."
+    return "" if node.paired else "\nNot paired: untrusted; anybody on the network may steer it or speak in its place."
 
 
 def clock_text(node: NodeStatus) -> str:

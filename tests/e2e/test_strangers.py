@@ -1,0 +1,182 @@
+"""An unpaired program on the same network, against real nodes and a real engine that track: it sees no picture, changes
+no setting, stops no node, and moves no marker."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zmq
+from bench import START_S, TEST_S, Bench, node_status, wait_until
+from scene import Scene
+
+from rhot_app.engine.client import EngineClient
+from rhot_app.tracking.state import Knowledge
+from rhot_node.clock import NodeClock
+from rhot_node.keys import KeyPair, connect_with, new_key_pair
+from rhot_node.wire.codec import encode
+from rhot_node.wire.messages import ClockRequest, MarkerObservation, Message, Observations, Start, StartEntry, Stop
+from rhot_node.wire.seal import Seal
+
+SILENCE_S = 0.4  # a master is answered within milliseconds
+
+pytestmark = pytest.mark.timeout(TEST_S)
+
+
+@dataclass
+class Attack:
+    """Nodes, engine and client as they track, and what a stranger needs. He knows everything that is no secret:
+    addresses, ports, public keys, ids, and the session, which he can read in the datagrams."""
+
+    bench: Bench
+    client: EngineClient
+    context: zmq.Context[zmq.Socket[bytes]]
+    udp: socket.socket
+
+    def tracks(self) -> bool:
+        """Whether both nodes stream and a state describes the last moment."""
+        state = self.client.state
+        both = [status for name in ("left", "right") if (status := node_status(self.client, name)) is not None]
+        return (len(both) == 2 and all(status.state == "streaming" and status.rate_hz > 20.0 for status in both)
+                and state is not None and time.monotonic_ns() - state.t_master_ns < 300_000_000)
+
+    def dropped(self) -> dict[str, int]:
+        """What the engine has refused of the left node's port."""
+        self.client.poll(0.15)
+        status = node_status(self.client, "left")
+        assert status is not None
+        return status.dropped
+
+    def connect(self, kind: int, port: int, own: KeyPair | None) -> zmq.Socket[bytes]:
+        """A connection to the left node."""
+        sock = self.context.socket(kind)
+        sock.linger = 0
+        if own is not None:
+            connect_with(sock, own, self.bench.rig.nodes[0].public_key)
+        sock.connect(f"tcp://127.0.0.1:{port}")
+        return sock
+
+    def answers(self, **request: Any) -> list[bytes]:
+        """Every answer of the left node to a request, through all of its doors."""
+        node = self.bench.rig.nodes[0]
+        socks = [self.connect(zmq.REQ, port, own) for port in (node.control_port, node.pairing_port)
+                 for own in (None, new_key_pair())]
+        for sock in socks:
+            sock.send_json(request)
+        found: list[bytes] = []
+        end = time.monotonic() + SILENCE_S
+        while time.monotonic() < end:
+            found += [part for sock in socks if sock.poll(20) for part in sock.recv_multipart()]
+        return found
+
+    def say(self, message: Message) -> None:
+        """A datagram to both nodes, without a tag and with somebody's."""
+        for node in self.bench.rig.nodes:
+            for seal in (None, Seal(bytes(32))):
+                self.udp.sendto(encode(message, seal), ("127.0.0.1", node.udp_port))
+
+
+@pytest.fixture(scope="module")
+def attack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Attack]:
+    """One start of everything for all tests, because none may leave a trace."""
+    bench = Bench(tmp_path_factory.mktemp("strangers"))
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    scene = Scene(bench.rig)
+    for node in bench.rig.nodes:
+        scene.record(bench.folder / f"{node.name}.yuv", node, 0.5)
+    try:
+        with EngineClient(bench.sockets) as client, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+            udp.bind(("127.0.0.1", 0))
+            udp.settimeout(SILENCE_S)
+            bench.start_engine("--start")
+            for index, node in enumerate(bench.rig.nodes):
+                bench.start_node(index, f"yuv:{bench.folder / node.name}.yuv")
+            attack = Attack(bench, client, context, udp)
+            wait_until(client, attack.tracks, START_S, "states from both nodes")
+            yield attack
+    finally:
+        context.destroy(linger=0)
+        bench.clear()
+
+
+def test_it_reads_no_picture(attack: Attack) -> None:
+    node = attack.bench.rig.nodes[0]
+    viewers = [attack.connect(zmq.SUB, node.preview_port, own) for own in (None, new_key_pair())]
+    for viewer in viewers:
+        viewer.subscribe(b"")
+    answers = [json.loads(part) for part in attack.answers(request="still")]
+    assert [answer["ok"] for answer in answers] == [False], "the reception refuses, the other doors stay shut"
+    assert not any(viewer.poll(100) for viewer in viewers)
+    answer = attack.client.command("still", node_id=node.node_id)
+    assert answer["png"].startswith(b"\x89PNG"), "the engine gets one"
+
+
+def test_it_changes_no_setting(attack: Attack) -> None:
+    path: Path = attack.bench.settings_path(attack.bench.rig.nodes[0])
+    before = path.read_bytes()
+    answers = attack.answers(request="set_settings", settings={"name": "mine", "trust": "open"})
+    assert not any(json.loads(part)["ok"] for part in answers)
+    assert path.read_bytes() == before
+    settings = attack.client.command("node", node_id=1, request={"request": "settings"})["answer"]["settings"]
+    assert (settings["name"], settings["trust"]) == ("left", "paired")
+
+
+def test_it_stops_no_node_and_takes_none_over(attack: Attack) -> None:
+    status = attack.client.status
+    assert status is not None
+    port = attack.udp.getsockname()[1]
+    for session in (0, status.session):
+        attack.say(Stop(session, 2**31))
+    attack.say(Start(status.session + 2, 2**31, (StartEntry(1, port, 0), StartEntry(2, port, 0))))
+    attack.say(ClockRequest(1, 0, 2**31, 1))
+    with pytest.raises(TimeoutError):
+        attack.udp.recv(2048)
+    answers = attack.answers(request="stop") + attack.answers(request="start", session=9, host="127.0.0.1", port=port)
+    assert not any(json.loads(part)["ok"] for part in answers)
+    wait_until(attack.client, attack.tracks, 1.0, "everything goes on")
+    counters = attack.client.command("node", node_id=1, request={"request": "counters"})["answer"]["counters"]
+    assert counters["dropped"]["untagged"] >= 4 and counters["dropped"]["tag"] >= 4 and counters["strangers"] >= 2
+    assert attack.client.status is not None and attack.client.status.session == status.session
+
+
+def test_it_moves_no_marker(attack: Attack) -> None:
+    client, rig = attack.client, attack.bench.rig
+    wait_until(client, attack.tracks, 2.0, "states from both nodes")
+    status, node = client.status, node_status(client, "left")
+    assert status is not None and node is not None and node.clock_offset_s is not None and client.state is not None
+    clock = NodeClock(round(1e9 * node.clock_offset_s))
+    before, refused = client.state.marker_positions.copy(), sum(attack.dropped().values())
+    markers = tuple(MarkerObservation(k, 20.0 + 90 * k, 400.0, 16.0, 1e-4, 0.0, 1e-4, 1.0) for k in range(6))
+    states = []
+    for k in range(100):
+        now_ns = clock.now_ns()
+        forged = Observations(1, status.session, 10**4 + k, now_ns - 10**6, now_ns, 10**6, 10**6, 0, 640, 480, k,
+                              rig.markers.checksum, markers)
+        for seal in (None, Seal(bytes(32))):
+            attack.udp.sendto(encode(forged, seal), ("127.0.0.1", rig.nodes[0].data_port))
+        states += [state for state in client.poll(0.005) if hasattr(state, "marker_positions")]
+    assert len(states) > 10
+    for state in states:
+        measured = state.marker_knowledge == Knowledge.MEASURED
+        np.testing.assert_allclose(state.marker_positions[measured], before[measured], atol=0.004)
+    wait_until(client, lambda: sum(attack.dropped().values()) >= refused + 200, 2.0, "all forgeries are counted")
+    dropped = attack.dropped()
+    assert (dropped["untagged"], dropped["tag"]) == (100, 100) and sum(dropped.values()) == refused + 200
+
+
+def test_it_pairs_with_nobody_without_a_code(attack: Attack) -> None:
+    node = attack.bench.rig.nodes[0]
+    own = new_key_pair()
+    door = attack.connect(zmq.REQ, node.pairing_port, None)
+    door.send_json({"request": "pair", "master_key": own.public_key, "master_name": "nobody", "master_nonce": "00" * 16,
+                    "proof": "00" * 32})
+    answer = json.loads(door.recv())
+    assert not answer["ok"] and "offers no code" in answer["error"]
+    assert own.public_key not in (attack.bench.folder / "left.keys.json").read_text()
