@@ -12,7 +12,7 @@ from typing import Any
 
 from rhot_node.clock import NodeClock
 
-WANTED = frozenset({"SensorTimestamp", "ExposureTime", "ScalerCrop", "SyncReady", "SyncTimer"})
+WANTED = frozenset({"SensorTimestamp", "ExposureTime", "ScalerCrop", "SyncReady"})
 
 
 @dataclass(frozen=True, slots=True)
