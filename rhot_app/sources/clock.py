@@ -3,8 +3,10 @@
 One exchange: the master sends at t1, the node receives at t2 and answers at t3, the master receives at t4. Then
 offset = ((t2 - t1) + (t3 - t4)) / 2 and delay = (t4 - t1) - (t3 - t2), and by causality alone the true offset
 (node minus master) is within delay / 2 of that, however unequal the two ways were. The interval grows by the drift
-allowance while it ages. The true offset lies in every interval, so in their intersection; the estimate is the
-minimum-delay sample carried forward by the measured drift and held inside that intersection.
+allowance while it ages. The true offset lies in every interval, so in their intersection. The interval's ends are
+t2 - t1 and t3 - t4: each way is judged by its own quickest datagrams, and the estimate is the middle of the
+intersection once all are carried forward by the measured drift. That is the most likely offset where delays are a fixed
+part and an exponential one, the same both ways (Jeske 2005), and far better than the single exchange of least delay.
 """
 
 from __future__ import annotations
@@ -153,8 +155,9 @@ def _estimate(window: deque[Exchange], history: deque[Exchange], now_ns: int) ->
     drift = _measure_drift(history)
     allowance = DRIFT_WANDER if drift is not None else DRIFT_ALLOWANCE
     rate = drift or 0.0
-    best = min(window, key=lambda sample: sample.half_width_ns(now_ns, allowance))
-    offset = best.offset_ns + rate * (now_ns - best.t_master_ns)
+    carried = [(sample.offset_ns + rate * (now_ns - sample.t_master_ns), sample.half_width_ns(now_ns, allowance))
+               for sample in window]
+    offset = 0.5 * (max(at - half for at, half in carried) + min(at + half for at, half in carried))
     low = max(sample.offset_ns - sample.half_width_ns(now_ns) for sample in window)
     high = min(sample.offset_ns + sample.half_width_ns(now_ns) for sample in window)
     offset = min(max(offset, low), high) if low <= high else 0.5 * (low + high)
