@@ -7,8 +7,11 @@ of the range may become any other.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,8 +41,24 @@ class Lamp:
 
 
 SAME = Lamp()
-LAMPS = tuple(Lamp(warmth, brightness) for warmth in (-0.54, -0.27, 0.0, 0.27, 0.54) for brightness in (0.8, 1.0, 1.2))
+WARMTH_SPAN, WARMTH_STEP = 0.54, 0.27
+LAMPS = tuple(Lamp(WARMTH_STEP * step, brightness) for step in (-2, -1, 0, 1, 2) for brightness in (0.8, 1.0, 1.2))
 """+-20 % of light, and every change between 3000 and 6500 K."""
+
+
+def chances(lamps: Sequence[Lamp]) -> NDArray[np.float64]:
+    """(N,) how often each of the lamps comes, 1 in all, when any two of 3000 to 6500 K meet.
+
+    The lamp of the calibration and the one of tomorrow are both even over the range in mired, so their difference is
+    triangular: the whole range is between them only if one is its one end and the other its other. `lamps` are
+    WARMTH_STEP apart; those of one warmth share.
+    """
+    warmths = np.array([lamp.warmth for lamp in lamps])
+    edges = np.clip(np.abs(warmths)[:, None] + (-0.5 * WARMTH_STEP, 0.5 * WARMTH_STEP), -WARMTH_SPAN, WARMTH_SPAN)
+    within = np.sign(edges) * (1.0 - (1.0 - np.abs(edges) / WARMTH_SPAN) ** 2)
+    shared = np.array([np.count_nonzero(np.isclose(warmths, warmth)) for warmth in warmths])
+    share = (within[:, 1] - within[:, 0]) / shared
+    return np.asarray(share / share.sum())
 
 
 def kelvin_of(warmth: float) -> float:
@@ -63,13 +82,14 @@ def balanced(colours: Colours, warmth: float) -> Colours:
 def relit_image(image: YuvImage, lamp: Lamp) -> YuvImage:
     """The picture by another lamp. Luma keeps the contrast that it has inside every chroma pixel."""
     height, width = image.u.shape
-    luma = image.y.astype(np.float32)
-    mean = luma.reshape(height, 2, width, 2).mean(axis=(1, 3))
-    colours = np.stack([mean, image.u - np.float32(128.0), image.v - np.float32(128.0)], axis=2).reshape(-1, 3)
-    lit = relit(colours, lamp).reshape(height, width, 3)
-    factor = np.repeat(np.repeat(lit[:, :, 0] / np.maximum(mean, 1.0), 2, axis=0), 2, axis=1)
-    return YuvImage(_bytes(luma * factor), _bytes(lit[:, :, 1] + 128.0), _bytes(lit[:, :, 2] + 128.0))
+    mean = cv2.resize(image.y, (width, height), interpolation=cv2.INTER_AREA).astype(np.float32)
+    colours = cv2.merge([mean, image.u - np.float32(128.0), image.v - np.float32(128.0)])
+    rgb = cv2.transform(colours, lamp.gains[:, None] * RGB_FROM_YCC)
+    lit = cv2.transform(np.clip(rgb, 0.0, 255.0, out=rgb), YCC_FROM_RGB)
+    factor = cv2.resize(lit[:, :, 0] / np.maximum(mean, 1.0), image.size, interpolation=cv2.INTER_NEAREST)
+    luma = cv2.multiply(image.y, factor, dtype=cv2.CV_8U)
+    return YuvImage(_bytes(luma), _bytes(lit[:, :, 1] + 128.0), _bytes(lit[:, :, 2] + 128.0))
 
 
-def _bytes(plane: NDArray[np.float32]) -> Plane:
+def _bytes(plane: NDArray[Any]) -> Plane:
     return np.clip(np.rint(plane), 0.0, 255.0).astype(np.uint8)

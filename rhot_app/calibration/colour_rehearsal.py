@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from rhot_app.calibration.colour_light import LAMPS, SAME, Lamp, relit_image
+import numpy as np
+
+from rhot_app.calibration.colour_light import LAMPS, SAME, Lamp, chances, relit_image
 from rhot_app.calibration.colour_samples import View
 from rhot_app.calibration.paint_region import PaintRegion
 from rhot_app.progress import Progress, silent
@@ -16,7 +19,8 @@ from rhot_node.wire.messages import MarkerObservation
 
 VIEWS_MOST = 4
 LAMPS_TRIED = (SAME, *(lamp for lamp in LAMPS if lamp.brightness != 1.0))
-GROWN, SHRUNK = 2.2, 0.3  # of the marker's area: something else belongs to it, most of it is gone
+CHANCES = chances(LAMPS_TRIED)
+GROWN, SHRUNK = 2.2, 0.3  # of the marker's and its sample's area: something else belongs to it, most of it is gone
 
 Outcome = Literal["lost", "elsewhere", "joined"]
 
@@ -35,8 +39,17 @@ class Failure:
     tracked: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Rehearsal:
+    """`failures`: everything that failed. `lost`, per marker: in what share of all pictures it is not found where it
+    is, by the lamps that may come, each as often as it may; of searching and tracking the worse one."""
+
+    failures: tuple[Failure, ...]
+    lost: tuple[float, ...]
+
+
 def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
-             progress: Progress = silent) -> tuple[Failure, ...]:
+             progress: Progress = silent) -> Rehearsal:
     """Show the pictures by all lamps as unrelated stills and once again as the next frame; tell what fails.
 
     Only markers that are known in a picture are judged there. `names`: of the markers, in the order of the set.
@@ -56,7 +69,18 @@ def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
                         outcome = _outcome(mark, view.paint[name])
                         if outcome is not None:
                             failures.append(Failure(name, picture, lamp, outcome, tracked))
-    return tuple(failures)
+    shown = [sum(name in view.paint for _, view in chosen) for name in names]
+    return Rehearsal(tuple(failures), tuple(_lost(name, count, failures)
+                                            for name, count in zip(names, shown, strict=True)))
+
+
+def _lost(name: str, shown: int, failures: Sequence[Failure]) -> float:
+    """The share of a marker's `shown` pictures, over all lamps, in which it failed."""
+    worse = 0.0
+    for tracked in (False, True):
+        own = [LAMPS_TRIED.index(one.lamp) for one in failures if one.marker == name and one.tracked == tracked]
+        worse = max(worse, float(CHANCES[own].sum()) / max(shown, 1))
+    return worse
 
 
 def _outcome(seen: MarkerObservation, region: PaintRegion) -> Outcome | None:
@@ -64,9 +88,9 @@ def _outcome(seen: MarkerObservation, region: PaintRegion) -> Outcome | None:
         return "lost"
     height, width = region.whole.shape
     column, row = min(max(int(seen.x) // 2, 0), width - 1), min(max(int(seen.y) // 2, 0), height - 1)
-    ratio = 0.7854 * (0.5 * seen.diameter) ** 2 / region.area
+    area = math.pi * (0.25 * seen.diameter) ** 2
     if not region.whole[row, column]:
-        return "joined" if ratio > GROWN else "elsewhere"
-    if ratio > GROWN:
+        return "joined" if area > GROWN * region.area else "elsewhere"
+    if area > GROWN * region.area:
         return "joined"
-    return "lost" if ratio < SHRUNK else None
+    return "lost" if area < SHRUNK * np.count_nonzero(region.sample) else None

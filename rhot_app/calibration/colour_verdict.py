@@ -9,17 +9,18 @@ import numpy as np
 from rhot_app.calibration.colour_light import SAME, Lamp
 from rhot_app.calibration.colour_model import COVERAGE
 from rhot_app.calibration.colour_names import name_of_hue
-from rhot_app.calibration.colour_rehearsal import Failure
+from rhot_app.calibration.colour_rehearsal import Rehearsal
 from rhot_app.calibration.colour_room import RoomReport
 from rhot_app.calibration.colour_samples import PaintSamples
 from rhot_app.calibration.separability import SKIN, Separability
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
-from rhot_node.detect.fast import AS_PLAUSIBLE
 from rhot_node.detect.light import RGB_FROM_YCC
 from rhot_node.markers import ChromaModel
 
-OVERLAP = 0.05  # of a colour taken for a marker: more than specks, which the detector leaves out
+OVERLAP = 0.1  # of a colour taken for a marker, over all lamps: less are specks, which the detector leaves out
 SAME_COLOUR = 0.35  # of one marker taken for another: only chance tells them apart
+LOST = 0.1  # of the pictures, over all lamps: more is not only by lamps at the end of the range
+RIVAL = 0.7  # of the marker's own merit: a thing that is about as good a marker
 PALE = 28.0  # grey levels of chroma: less drowns in noise when a hand is in shade
 BURNT, BURNT_SHARE = 253.0, 0.1  # a channel that is cut off falsifies the hue
 DARK, DIM = 25.0, 60.0  # grey levels of luma: too dark; so dark that light helps
@@ -27,13 +28,14 @@ FAIR, GOOD, POOR = Grade.FAIR, Grade.GOOD, Grade.POOR
 
 
 def judge_report(samples: Sequence[PaintSamples], models: Sequence[ChromaModel], separability: Separability,
-                 room: RoomReport, failures: Sequence[Failure], free: Sequence[str], runs_on: set[str]) -> Verdict:
+                 room: RoomReport, rehearsal: Rehearsal, free: Sequence[str], runs_on: set[str]) -> Verdict:
     """All findings on a calibration, worst first, and a sentence that sums up."""
     other_paint = f"Use another paint for one of them: {_or(free[:3])} would be free here." if free else \
         "Use fewer markers, or a plainer background: no hue is left free here."
+    joined = {one.name for one, lost in zip(samples, rehearsal.lost, strict=True) if lost >= LOST} & runs_on
     findings = [
-        *_pairs(separability, other_paint), *_skin(separability, free, runs_on), *_rivals(samples, room, free),
-        *_lamps(samples, failures, separability), *_paints(samples, models),
+        *_pairs(separability, other_paint), *_skin(separability, free, joined), *_rivals(samples, room, free),
+        *_lamps(samples, rehearsal, separability), *_paints(samples, models),
     ]
     worst = separability.sentences[0] if separability.sentences else "no two colours overlap"
     names = ", ".join(_with_paint(one.name, model) for one, model in zip(samples, models, strict=True))
@@ -53,7 +55,7 @@ def _pairs(separability: Separability, remedy: str) -> Iterator[Finding]:
                               remedy)
 
 
-def _skin(separability: Separability, free: Sequence[str], runs_on: set[str]) -> Iterator[Finding]:
+def _skin(separability: Separability, free: Sequence[str], joined: set[str]) -> Iterator[Finding]:
     remedy = "Put a grey border of some 3 mm round the marker, so that no skin adjoins it"
     remedy += f", or use another paint: {_or(free[:3])} would be free here." if free else "."
     for name in separability.names:
@@ -61,28 +63,27 @@ def _skin(separability: Separability, free: Sequence[str], runs_on: set[str]) ->
         if share >= OVERLAP:
             yield Finding("skin", FAIR, f"{name} and skin overlap by {100 * share:.0f} %.",
                           "In some light skin has this colour: the marker's place will jump onto the hand.", remedy)
-        elif name in runs_on:
+        elif name in joined:
             yield Finding("runs-on", FAIR, f"The colour of {name} goes on beyond what a marker can be.",
                           "What surrounds the marker has nearly its colour.", remedy)
 
 
 def _rivals(samples: Sequence[PaintSamples], room: RoomReport, free: Sequence[str]) -> Iterator[Finding]:
     for one, rival in zip(samples, room.rivals, strict=True):
-        if rival is None or rival.merit < AS_PLAUSIBLE:
+        if rival is None or rival.merit < RIVAL:
             continue
         where = f"at {rival.x:.0f}, {rival.y:.0f} in picture {rival.picture + 1}"
         figure = f"Something {where} has the colour of {one.name}: {rival.area_px:.0f} px², the marker has " \
                  f"{4.0 * one.area:.0f} px²."
         cause = "A search that has lost the marker will find that instead." if rival.merit >= 1.0 else \
-            "When the marker is farther away or half hidden, that will be found instead."
+            "When the marker is turned or half hidden, that will be found instead."
         paint = f", or use another paint: {_or(free[:3])} would be free here" if free else ""
         yield Finding("room", FAIR, figure, cause, f"Take it away or cover it, choose a plainer background{paint}.")
 
 
-def _lamps(samples: Sequence[PaintSamples], failures: Sequence[Failure],
-           separability: Separability) -> Iterator[Finding]:
-    for one, coverage in zip(samples, separability.coverage, strict=True):
-        own = [failure for failure in failures if failure.marker == one.name]
+def _lamps(samples: Sequence[PaintSamples], rehearsal: Rehearsal, separability: Separability) -> Iterator[Finding]:
+    for one, lost, coverage in zip(samples, rehearsal.lost, separability.coverage, strict=True):
+        own = [failure for failure in rehearsal.failures if failure.marker == one.name]
         now = [failure for failure in own if failure.lamp == SAME]
         if now:
             what = {"lost": "not found", "elsewhere": "found in another place", "joined": "found together with what "
@@ -90,9 +91,10 @@ def _lamps(samples: Sequence[PaintSamples], failures: Sequence[Failure],
             yield Finding("fails", FAIR, f"{one.name} is {what} in picture {now[0].picture + 1} itself.",
                           "Other things in the picture have its colour, or the sample was not of the marker.",
                           "Draw the box over the marker alone; if that does not help, use another paint.")
-        elif own:
-            worst = max(own, key=lambda failure: (abs(failure.lamp.warmth), failure.lamp.brightness))
-            yield Finding("lamp", FAIR, f"{one.name} would be lost or misplaced by {_in_words(worst.lamp)}.",
+        elif lost >= LOST:
+            usual = min(own, key=lambda failure: abs(failure.lamp.warmth))
+            yield Finding("lamp", FAIR, f"{one.name} would be lost or misplaced in {100 * lost:.0f} % of the pictures "
+                          f"when lamps change, such as by {_in_words(usual.lamp)}.",
                           "Its colour then looks like another, or is too bright for the camera.",
                           "Shorten the exposure; keep the lamps as they are, or learn again when they change.")
         elif coverage < COVERAGE:
@@ -114,9 +116,6 @@ def _paints(samples: Sequence[PaintSamples], models: Sequence[ChromaModel]) -> I
             yield Finding("pale", FAIR, figure, "It is hard to tell from grey in shade.",
                           "Give more light, a longer exposure or more gain." if luma < DIM else
                           "Use a more saturated paint, or raise the camera's saturation.")
-    if samples and max(one.frames for one in samples) == 1:
-        yield Finding("one-picture", GOOD, "Every colour was learnt from one picture.", "",
-                      "Samples of the marker in other places and at other angles make the model safer.")
 
 
 def _with_paint(name: str, model: ChromaModel) -> str:

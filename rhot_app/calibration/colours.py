@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.colour_light import SAME
 from rhot_app.calibration.colour_model import Obstacles, range_of_samples, solve_models
 from rhot_app.calibration.colour_names import free_paints
-from rhot_app.calibration.colour_rehearsal import Failure, rehearse
+from rhot_app.calibration.colour_rehearsal import Rehearsal, rehearse
 from rhot_app.calibration.colour_room import RoomReport, room_colours, survey_room
 from rhot_app.calibration.colour_samples import PaintSamples, View
 from rhot_app.calibration.colour_verdict import judge_report
@@ -35,8 +35,8 @@ class ColourReport:
     """What a calibration of colours found.
 
     `markers`: the set to be used, base markers without samples left as they were. `names`: the markers with samples, in
-    the set's order, which `samples`, `separability` and `room` follow. `failures`: what the detector lost in the
-    pictures, also relit. `free`: paints that the markers and the room leave free.
+    the set's order, which `samples`, `separability` and `room` follow. `rehearsal`: what the detector loses in
+    the pictures, also relit. `free`: paints that the markers and the room leave free.
     """
 
     markers: MarkerSet
@@ -44,7 +44,7 @@ class ColourReport:
     samples: tuple[PaintSamples, ...]
     separability: Separability
     room: RoomReport
-    failures: tuple[Failure, ...]
+    rehearsal: Rehearsal
     free: tuple[str, ...]
     verdict: Verdict
 
@@ -56,8 +56,9 @@ class ColourReport:
                 "id": one.name, "role": chosen[one.name].role, "chroma": msgspec.to_builtins(chosen[one.name].chroma),
                 "range": msgspec.to_builtins(chosen[one.name].range), "display_rgb": list(one.rgb),
                 "samples": len(one.colours), "pictures": one.frames, "area_px": round(4.0 * one.area, 1),
-                "coverage_percent": round(100.0 * covered, 2)}
-                for one, covered in zip(self.samples, self.separability.coverage, strict=True)],
+                "coverage_percent": round(100.0 * covered, 2), "lost_percent": round(100.0 * lost, 1)}
+                for one, covered, lost in zip(self.samples, self.separability.coverage, self.rehearsal.lost,
+                                              strict=True)],
             "separability": {
                 "rows": list(self.names), "columns": [*self.names, *self.separability.others],
                 "percent": np.round(100.0 * self.separability.matrix, 2).tolist(),
@@ -72,7 +73,7 @@ class ColourReport:
                     for name, rival in zip(self.names, self.room.rivals, strict=True)}},
             "failures": [{"marker": one.marker, "picture": one.picture + 1, "outcome": one.outcome,
                           "warmth": one.lamp.warmth, "brightness": one.lamp.brightness, "tracked": one.tracked,
-                          "same_lamp": one.lamp == SAME} for one in self.failures],
+                          "same_lamp": one.lamp == SAME} for one in self.rehearsal.failures],
             "free_paints": list(self.free),
         }
 
@@ -101,13 +102,13 @@ def solve_colours(samples: Sequence[PaintSamples], views: Sequence[View], *, ski
     progress("comparing the colours", 0.1)
     separability = judge_colours(sampled, ordered, skin, [room.colours for room in rooms])
     room = survey_room(sampled, names, views)
-    failures = rehearse(sampled, names, views, lambda text, share: progress(text, 0.3 + 0.7 * share))
+    rehearsal = rehearse(sampled, names, views, lambda text, share: progress(text, 0.3 + 0.7 * share))
     free = free_paints([np.degrees(model.hue_rad) for model in models], room.hue_px)
     runs_on = {name for view in views for name, region in view.paint.items() if region.runs_on}
     markers = sampled if base is None else MarkerSet(
         markers=tuple(learnt.get(marker.id, marker) for marker in base.markers), name=base.name)
-    verdict = judge_report(ordered, models, separability, room, failures, free, runs_on)
-    return ColourReport(markers, names, tuple(ordered), separability, room, failures, free, verdict)
+    verdict = judge_report(ordered, models, separability, room, rehearsal, free, runs_on)
+    return ColourReport(markers, names, tuple(ordered), separability, room, rehearsal, free, verdict)
 
 
 def _in_order(samples: Sequence[PaintSamples], base: MarkerSet | None) -> list[PaintSamples]:

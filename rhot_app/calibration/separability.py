@@ -1,5 +1,7 @@
 """How far the colours can be told apart: what share of one the detector takes for the other, by its own tables.
 
+Lamps count as often as they may come: skin that a lamp at the end of the range turns orange is seldom mistaken.
+
 Two decisions count. The search of the whole picture asks hue, magnitude and luma; what passes there can steal a
 marker's name. The window of a tracked marker asks hue and half of the marker's level; what passes there and adjoins the
 marker joins it.
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.colour_light import LAMPS, Lamp, balanced, relit
+from rhot_app.calibration.colour_light import LAMPS, Lamp, balanced, chances, relit
 from rhot_app.calibration.colour_model import WINDOW_LEVEL, typical
 from rhot_app.calibration.colour_samples import PaintSamples
 from rhot_node.detect.colour import Colours
@@ -22,14 +24,16 @@ from rhot_node.detect.labels import directions, sector_table
 from rhot_node.markers import MarkerSet
 
 SKIN, ROOM = "skin", "room"
+CHANCES = chances(LAMPS)
 PIXELS = 3000  # of each colour that are tried by every lamp
 
 
 @dataclass(frozen=True, slots=True)
 class Overlap:
-    """`share` 0..1 of `other` (a marker, skin or the room) that is taken for `marker` by the lamp where that is worst.
+    """`share` 0..1 of `other` (a marker, skin or the room) that is taken for `marker`, over all lamps that may come.
 
-    `window`: whether the window of a tracked marker takes it; otherwise the search of the whole picture does.
+    `window`: whether the window of a tracked marker takes it; otherwise the search of the whole picture does. `lamp`:
+    by which that is worst.
     """
 
     marker: str
@@ -43,7 +47,8 @@ class Overlap:
 class Separability:
     """All pairs. `coverage`: per marker, what share of its own paint passes by the lamp where that is least.
 
-    `matrix` (M, M + others): share of the column's colour that is taken for the row's marker; the diagonal is coverage.
+    `matrix` (M, M + others): share of the column's colour that is taken for the row's marker, over all lamps; the
+    diagonal is coverage.
     """
 
     names: tuple[str, ...]
@@ -115,32 +120,28 @@ def judge_colours(markers: MarkerSet, samples: Sequence[PaintSamples], skin: Col
     names = tuple(one.name for one in samples)
     others = ((SKIN,) if len(skin) else ()) + ((ROOM,) if any(len(room) for room in rooms) else ())
     touching = [*zip(names, paints, strict=True), *([(SKIN, skin)] if len(skin) else [])]
-    worst: dict[tuple[str, str], Overlap] = {}
-    coverage = np.ones(len(names))
-    for lamp in LAMPS:
-        for other, colours in touching:
-            searched, tracked = judge.shares(colours, lamp)
-            for k, marker in enumerate(names):
-                if marker == other:
-                    coverage[k] = min(coverage[k], searched[k])
-                else:
-                    _note(worst, Overlap(marker, other, *_larger(searched[k], tracked[k]), lamp))
-        for k, (marker, room) in enumerate(zip(names, rooms, strict=True) if ROOM in others else ()):
-            searched, _ = judge.shares(room, lamp)  # nothing of the room adjoins a marker for long
-            _note(worst, Overlap(marker, ROOM, float(searched[k]), False, lamp))
-    matrix = np.array([[coverage[row] if row == column else worst[marker, other].share
-                        for column, other in enumerate((*names, *others))] for row, marker in enumerate(names)])
-    return Separability(names, others, matrix, tuple(worst.values()))
+    searched, tracked = np.zeros((2, len(LAMPS), len(names), len(names) + len(others)))
+    for row, lamp in enumerate(LAMPS):
+        for column, (_, colours) in enumerate(touching):
+            searched[row, :, column], tracked[row, :, column] = judge.shares(colours, lamp)
+        for k, room in enumerate(rooms if ROOM in others else ()):  # nothing of the room adjoins a marker for long
+            searched[row, k, -1] = judge.shares(room, lamp)[0][k]
+    coverage = np.diagonal(searched, axis1=1, axis2=2).min(axis=0)
+    overlaps = tuple(_overlap(marker, other, searched[:, k, column], tracked[:, k, column])
+                     for k, marker in enumerate(names) for column, other in enumerate((*names, *others))
+                     if marker != other)
+    shares = {(one.marker, one.other): one.share for one in overlaps}
+    matrix = np.array([[shares.get((marker, other), coverage[k]) for other in (*names, *others)]
+                       for k, marker in enumerate(names)])
+    return Separability(names, others, matrix, overlaps)
 
 
-def _note(worst: dict[tuple[str, str], Overlap], one: Overlap) -> None:
-    key = one.marker, one.other
-    if key not in worst or one.share > worst[key].share:
-        worst[key] = one
-
-
-def _larger(searched: float, tracked: float) -> tuple[float, bool]:
-    return float(max(searched, tracked)), bool(tracked > searched)
+def _overlap(marker: str, other: str, searched: NDArray[np.float64], tracked: NDArray[np.float64]) -> Overlap:
+    """`searched`, `tracked` (L,): what the search and the window take, by each of LAMPS."""
+    by_search, by_window = float(CHANCES @ searched), float(CHANCES @ tracked)
+    window = by_window > by_search
+    worst = int(np.argmax(tracked if window else searched))
+    return Overlap(marker, other, max(by_search, by_window), window, LAMPS[worst])
 
 
 def _byte(chroma: NDArray[np.float32]) -> NDArray[np.intp]:

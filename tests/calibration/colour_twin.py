@@ -22,22 +22,24 @@ from rhot_node.detect.colour import box_mask, colours_of
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_i420
 from rhot_node.markers import Marker, MarkerSet
-from rhot_node.wire.messages import MarkerObservation
 
 LEARNT_KELVIN = 4300.0
 SEEN = 0.5  # of a marker's area that must be in view for a person to see it as what it is
-AWAY = 0.5  # diameters from its place: another thing
+AWAY = 1.0  # of its radius from its place: another thing, or it and another
+JOINED = 4.0  # radii that it is wide: it and another; a fingertip's paint is 2.7
+RADIUS_M = 8e-3  # of a fingertip
 WOOD_RGB = (142.0, 104.0, 70.0)
 SKIN = SKIN_RGB
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture, and of every marker its visible part and where its centre is, (M, 2) px."""
+    """A picture, and of every marker its visible part, where its centre is, (M, 2) px, and its radius, (M,) px."""
 
     image: YuvImage
     visible: np.ndarray
     places: np.ndarray
+    radii: np.ndarray
     palm: tuple[float, float]
 
 
@@ -72,15 +74,19 @@ class HandScene:
             pose = self.source.sample(np.array([time_s + 0.5 * self._readout_s]))
             joints, centres = body.joints_and_markers(*pose)
             places = self._camera.project(centres[0])
+            radii_m = np.array([1e-3 * marker.radius_mm if marker.radius_mm else RADIUS_M
+                                for marker in self.markers.markers])
+            depths_m = centres[0] @ self._camera.camera_from_world[2, :3] + self._camera.camera_from_world[2, 3]
+            radii = radii_m * self._camera.intrinsics[0] / depths_m
             wrist, knuckle = self._camera.project(joints[0, [0, 9]])
             palm = 0.35 * wrist + 0.65 * knuckle
-            yield Frame(from_i420(data.copy(), preset.width, preset.height), visible.copy(), places,
+            yield Frame(from_i420(data.copy(), preset.width, preset.height), visible.copy(), places, radii,
                         (float(palm[0]), float(palm[1])))
 
 
-def calibrate(scene: HandScene, times_s: np.ndarray, half: int = 4) -> ColourReport:
+def calibrate(scene: HandScene, times_s: np.ndarray, kelvin: float = LEARNT_KELVIN, half: int = 4) -> ColourReport:
     """Learn the colours as a person would: a box on every marker, one on the palm, then the hand moves."""
-    first, *others = scene.frames(times_s)
+    first, *others = scene.frames(times_s, kelvin)
     collector = ColourSamples()
     for name, (x, y), part in zip(scene.markers.ids, first.places, first.visible, strict=True):
         if part > SEEN:
@@ -102,7 +108,8 @@ class Tally:
 
     @property
     def failed(self) -> np.ndarray:
-        """(M,) share of the pictures with the marker in view in which it was not found where it is."""
+        """(M,) share of the pictures with the marker in view in which it was not found where and as large as
+        it is."""
         return (self.lost + self.misplaced) / np.maximum(self.visible, 1)
 
 
@@ -113,16 +120,14 @@ def tally(markers: MarkerSet, frames: list[Frame], stills: bool) -> Tally:
     for frame in frames:
         if stills:
             detector.reset()
-        for seen, part, place in zip(detector.detect(frame.image), frame.visible, frame.places, strict=True):
+        for seen, part, place, radius in zip(detector.detect(frame.image), frame.visible, frame.places, frame.radii,
+                                             strict=True):
             if part > SEEN:
                 result.visible[seen.index] += 1
                 result.lost[seen.index] += not seen.found
-                result.misplaced[seen.index] += seen.found and _away(seen, place) > AWAY
+                away = math.dist((seen.x, seen.y), place)
+                result.misplaced[seen.index] += seen.found and (away > AWAY * radius or seen.diameter > JOINED * radius)
     return result
-
-
-def _away(seen: MarkerObservation, place: np.ndarray) -> float:
-    return math.hypot(seen.x - place[0], seen.y - place[1]) / max(seen.diameter, 12.0)
 
 
 def repainted(markers: MarkerSet, name: str, towards: tuple[float, float, float], share: float) -> MarkerSet:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 
+import msgspec
 import numpy as np
 import pytest
 from colour_scenes import PAINTS, RADIUS, SKIN, WOOD, box, picture, place
@@ -23,7 +24,7 @@ from rhot_node.detect.image import YuvImage
 from rhot_node.detect.light import gains_of
 from rhot_node.detect.reference import ReferenceDetector
 from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
+from rhot_node.markers import MarkerSet, load_markers
 
 RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 
@@ -100,16 +101,25 @@ def test_a_paint_like_skin_is_warned_of_with_the_figure_and_what_to_do() -> None
 
 
 def test_a_thing_in_the_room_of_the_same_colour_is_named_with_its_place() -> None:
-    clutter = [(291.0, 30.0, 24.0, PAINTS["middle"])]
+    clutter = [(150.0, 50.0, 11.0, PAINTS["middle"])]
     report = calibrate(picture(clutter=clutter, background=(60, 62, 66)))
     (finding,) = [one for one in report.verdict.findings if one.code == "room"]
     rival = report.room.rivals[report.names.index("middle")]
-    assert rival is not None and rival.merit > 1.0
-    assert math.hypot(rival.x - 291, rival.y - 30) < 3.0
-    assert rival.area_px == pytest.approx(math.pi * 24**2, rel=0.1)
+    assert rival is not None and rival.merit > 0.7
+    assert math.hypot(rival.x - 150, rival.y - 50) < 3.0
+    assert rival.area_px == pytest.approx(math.pi * 11**2, rel=0.15)
     assert "middle" in finding.figure
     green = round((math.degrees(RHOT6.markers[2].chroma.hue_rad) + 180) / 5)
-    assert report.room.hue_px[green - 1:green + 1].sum() == pytest.approx(math.pi * 12**2, rel=0.15)
+    assert report.room.hue_px[green - 1:green + 1].sum() == pytest.approx(math.pi * 5.5**2, rel=0.25)
+
+
+def test_a_large_thing_across_the_room_is_no_rival_of_a_worn_marker_and_of_a_free_one_it_is() -> None:
+    image = picture(clutter=[(291.0, 200.0, 30.0, PAINTS["middle"])], background=(60, 62, 66))
+    assert "room" not in calibrate(image).verdict.codes
+    free = MarkerSet(markers=tuple(msgspec.structs.replace(marker, role=None) for marker in RHOT6.markers))
+    report = calibrate(image, base=free)
+    assert "room" in report.verdict.codes
+    assert max(rival.merit for rival in report.room.rivals if rival is not None) > 1.0
 
 
 def test_a_dull_thing_of_the_same_hue_is_kept_out_by_the_magnitude() -> None:

@@ -42,8 +42,8 @@ class ApartPage(Page):
         self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.table.setAccessibleName("Which colour is taken for which")
-        caption = QLabel("How much of each column's colour is taken for the marker of the row, in %, by the lamp where "
-                         "that is worst; a marker of its own colour where that is least")
+        caption = QLabel("How much of each column's colour is taken for the marker of the row, in %, over all lamps "
+                         "that may come; of a marker's own colour by the lamp where that is least")
         caption.setWordWrap(True)
         self.centre = QWidget()
         column = QVBoxLayout(self.centre)
