@@ -147,6 +147,17 @@ def test_a_mistake_is_a_sentence(pictures: Path, arguments: tuple[str, ...], mes
     assert message in capsys.readouterr().err
 
 
+def test_a_folder_that_is_not_there_is_named_before_the_work(tmp_path: Path,
+                                                             capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "no" / "rig.json"
+    for kind in (["stereo", "--left", "a*", "--right", "b*", "--board", "9x6", "--square-mm", "30"],
+                 ["intrinsics", "--images", "a*", "--board", "9x6", "--square-mm", "30"],
+                 ["depth", "--table", "t.csv", "--rig", "r.json"]):
+        assert main(["calibrate", *kind, "--out", str(out)]) == 2
+        assert f"there is no folder {out.parent}" in capsys.readouterr().err
+    assert not out.parent.exists()
+
+
 def test_a_camera_that_the_rig_does_not_have_is_named(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--camera", f"a={pictures}/left*", "--camera", f"b={pictures}/right*"]
     assert main(["calibrate", "stereo", *arguments, *BOARD]) == 2

@@ -108,7 +108,7 @@ def test_the_command_writes_and_refuses(tmp_path: Path, capsys: pytest.CaptureFi
             (["chessboard", "--square-mm", "30", "--out", str(tmp_path / "b.svg")], "does not fit on A4"),
             (["chessboard", "--paper", "B7", "--out", str(tmp_path / "b.svg")], "no paper 'B7'"),
             (["charuco", "--dictionary", "DICT_X", "--out", str(tmp_path / "b.svg")], "no marker dictionary"),
-            (["chessboard", "--out", str(tmp_path / "no" / "b.svg")], "cannot be written")):
+            (["chessboard", "--out", str(tmp_path / "no" / "b.doc")], "there is no folder")):
         assert main(["target", *arguments]) == 2
         assert sentence in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["board.pdf"]

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
 
 if TYPE_CHECKING:
     import numpy as np
@@ -43,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.out is not None and args.rig is None:
         raise CalibrationError("--out writes a rig, so --rig must say which one.")
+    require_folder(args.out)
     rig = None if args.rig is None else load_rig(args.rig)
     if rig is not None and len(rig.nodes) != 2:
         raise CalibrationError(f"{args.rig}: disparity needs two cameras, the rig has {len(rig.nodes)}.")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.board_arguments import add_board_arguments, board_of
-from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
 
 if TYPE_CHECKING:
     from rhot_app.calibration.intrinsics import IntrinsicsReport
@@ -35,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.progress import ProgressLine, within
     from rhot_app.rig_history import accept
 
+    require_folder(args.out)
     board = board_of(args)
     rig = _rig(args)
     files = list(dict.fromkeys(path for pattern in args.images for path in matching_files(pattern)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 from rhot_app.calibration.verdict import Verdict
@@ -13,6 +14,14 @@ from rhot_app.calibration.verdict import Verdict
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
     """``--json``, the same everywhere."""
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+
+
+def require_folder(out: Path | None) -> None:
+    """Raise CalibrationError unless the folder of a file that is to be written is there: before the work, not after."""
+    from rhot_app.errors import CalibrationError
+
+    if out is not None and not out.parent.is_dir():
+        raise CalibrationError(f"{out}: there is no folder {out.parent}. Make it first, or name another place.")
 
 
 def tell(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json: bool) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.calibration.commands.board_arguments import add_board_arguments, board_of
-from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
 from rhot_app.calibration.commands.stereo_arguments import (
     files_of,
     known_lengths,
@@ -65,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.progress import ProgressLine
     from rhot_app.rig_history import accept
 
+    require_folder(args.out)
     files = files_of(args)
     base = _base_rig(args)
     require_nodes(base, list(files))

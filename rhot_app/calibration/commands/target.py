@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from rhot_app.calibration.commands.output import require_folder
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot target``."""
@@ -27,6 +29,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.errors import CalibrationError
     from rhot_node.files import write_atomically
 
+    require_folder(args.out)
     suffix = args.out.suffix.lower()
     if suffix not in (".pdf", ".svg"):
         raise CalibrationError(f"{args.out}: the file's name must end in .pdf or .svg.")
