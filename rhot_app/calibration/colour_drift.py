@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,6 +108,16 @@ class LightDrift:
         margin = min(1.0 - abs(hue) / chroma.hue_tolerance_deg, (magnitude - chroma.magnitude_min) / room, 1.0)
         light = (max(now[0], 1.0) / max(float(self._learnt[index, 0]), 1.0)) ** GAMMA
         return MarkerDrift(self._markers.ids[index], hue, max(margin, 0.0), light, float(luma), len(self._seen[index]))
+
+
+def drift_findings(reports: Mapping[str, DriftReport]) -> tuple[Finding, ...]:
+    """What the camera that sees most drift says, by camera; usable at worst: the colours are right for their light."""
+    drifted = {camera: report for camera, report in reports.items() if report.verdict.grade is not Grade.GOOD}
+    if not drifted:
+        return ()
+    camera, worst = max(drifted.items(), key=lambda one: (one[1].verdict.grade.rank, abs(one[1].warmth)))
+    return tuple(replace(finding, grade=Grade.FAIR, figure=f"Camera {camera}: {finding.figure}")
+                 for finding in worst.verdict.findings)
 
 
 def _judge(warmth: float, light: float, drifts: Sequence[MarkerDrift]) -> Verdict:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -81,3 +82,8 @@ def judge(summary: str, findings: list[Finding]) -> Verdict:
     grade = Verdict("", ordered).grade
     opening = {Grade.GOOD: "Good", Grade.FAIR: "Usable, not good", Grade.POOR: "Not usable"}[grade]
     return Verdict(f"{opening}: {summary}", ordered)
+
+
+def judged_anew(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
+    """The verdict with more findings: what was seen after it was reached."""
+    return judge(verdict.sentence.partition(": ")[2], [*verdict.findings, *findings]) if findings else verdict

@@ -18,7 +18,7 @@ def make_plan(kit: Kit) -> Plan:
     picks = PickStep(kit.rig.markers, cameras)
     bounds = BoundsStep(picks)
     apart = ApartStep(bounds)
-    accept = AcceptStep(lambda: propose(apart.report, kit.rig, kit.rig_path, kit.node_settings),
+    accept = AcceptStep(lambda: propose(apart.judged, kit.rig, kit.rig_path, kit.node_settings),
                         "Pick the markers' colours first.")
     pages = (PickPage(picks, kit.scheme), BoundsPage(bounds, kit.scheme), ApartPage(apart, kit.scheme),
              AcceptPage(accept, kit.scheme))

@@ -175,7 +175,7 @@ def test_alike_paints_are_said_to_be_alike(hands, scene):
     from rhot_app.calibration.colour_gathering import ColourGathering
     from rhot_app.calibration.colours import solve_colours
 
-    alike = {**PAINTS, "little": (30, 150, 200)}
+    alike = {**PAINTS, "little": (26, 163, 204)}
     gathering = ColourGathering(("left",))
     for name in PAINTS:
         gathering.pick(name, "left", picture(alike), PaintScene.where(name))

@@ -8,7 +8,7 @@ import msgspec
 
 from rhot_app.calibration.colours import ColourReport, solve_colours
 from rhot_app.ui.wizards.models.camera_settings import Control
-from rhot_app.ui.wizards.models.colour_mask import MaskMaker, Sights, mask_overlay
+from rhot_app.ui.wizards.models.colour_mask import MaskMaker, Sights, drift_of, mask_overlay
 from rhot_app.ui.wizards.models.colour_pick import PickStep, Show
 from rhot_app.ui.wizards.models.step import Pictures, Step, StepView, Task
 from rhot_node.markers import ChromaModel, MarkerSet
@@ -141,9 +141,11 @@ class BoundsStep(Step):
         overlays = {} if self.show == "none" else {
             name: mask_overlay(sight, self.markers, chosen) for name, sight in self._sights.items()}
         found = [sight.seen[self.markers.ids.index(self.chosen)].found for sight in self._sights.values()]
-        return StepView("The mask must fit the markers.", done=True,
-                        hint=f"{self.chosen} is found by {sum(found)} of {len(found)} cameras." if found else "",
-                        overlays=overlays)
+        hint = f"{self.chosen} is found by {sum(found)} of {len(found)} cameras." if found else ""
+        drift = drift_of(self._sights)
+        if drift:
+            hint = f"Since the colours were picked: {drift[0].sentence}"
+        return StepView("The mask must fit the markers.", done=True, hint=hint, overlays=overlays)
 
 
 def learning(picks: PickStep, given: dict[str, ChromaModel], title: str) -> Task:

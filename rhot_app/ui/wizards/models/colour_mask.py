@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.colour_drift import DriftReport, LightDrift, drift_findings
+from rhot_app.calibration.verdict import Finding
 from rhot_app.ui.wizards.models.drawing import Dots, Layer, Overlay, Tag
 from rhot_app.ui.wizards.models.step import Pictures
 from rhot_node.detect.fast import FastDetector
@@ -20,11 +22,13 @@ _FAINT = 70  # alpha of a marker's colour where it was not asked for
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sight:
-    """One camera's picture as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none."""
+    """One camera's picture as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none; `drift`:
+    how the light of the last pictures stands to the one that the marker set was learnt in."""
 
     image: YuvImage
     labels: NDArray[np.uint8]
     seen: tuple[MarkerObservation, ...]
+    drift: DriftReport
 
 
 Sights = dict[str, Sight]
@@ -36,18 +40,26 @@ class MaskMaker:
     def __init__(self) -> None:
         self._markers: MarkerSet | None = None
         self._detectors: dict[str, FastDetector] = {}
+        self._drifts: dict[str, LightDrift] = {}
 
     def look(self, pictures: Pictures, markers: MarkerSet) -> Sights:
         """What every camera's detector finds with `markers`."""
         if markers is not self._markers:
-            self._markers, self._detectors = markers, {}
+            self._markers, self._detectors, self._drifts = markers, {}, {}
         sights = {}
         for name, picture in pictures.items():
             detector = self._detectors.setdefault(name, FastDetector(markers))
             image = from_bgr(picture.bgr)
             seen = detector.detect(image)
-            sights[name] = Sight(image, detector.labels(image), seen)
+            drift = self._drifts.setdefault(name, LightDrift(markers, detector))
+            drift.update(image, seen)
+            sights[name] = Sight(image, detector.labels(image), seen, drift.report())
         return sights
+
+
+def drift_of(sights: Sights) -> tuple[Finding, ...]:
+    """What is to be said of the light."""
+    return drift_findings({name: sight.drift for name, sight in sights.items()})
 
 
 def mask_overlay(sight: Sight, markers: MarkerSet, chosen: int | None) -> Overlay:

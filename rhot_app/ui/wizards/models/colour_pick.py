@@ -10,7 +10,7 @@ from rhot_app.calibration.colour_gathering import ColourGathering
 from rhot_app.calibration.separability import SKIN
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.feed import Picture
-from rhot_app.ui.wizards.models.colour_mask import MaskMaker, Sights, mask_overlay
+from rhot_app.ui.wizards.models.colour_mask import MaskMaker, Sights, drift_of, mask_overlay
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
 from rhot_node.detect.colour import learn_chroma_from_colours
 from rhot_node.markers import MarkerSet
@@ -149,6 +149,9 @@ class PickStep(Step):
     def _hint(self) -> str:
         if self.gathering.names and not len(self.gathering.skin):
             return "Pick bare skin too: then it is said whether a marker looks like it."
+        drift = () if self.gathering.names else drift_of(self._sights)
+        if drift:
+            return f"By the rig's colours: {drift[0].figure}"
         if not self.gathering.names:
             return "Space holds the pictures, if your hands are full."
         missing = [name for name in self.gathering.names if self.gathering.variety(name) < 1.0]

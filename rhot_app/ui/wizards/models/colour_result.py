@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,15 @@ import numpy as np
 
 from rhot_app.calibration.colour_room import HUE_STEP_DEG
 from rhot_app.calibration.colours import ColourReport
+from rhot_app.calibration.verdict import Finding, judged_anew
 from rhot_app.project import Rig
 from rhot_app.ui.models.palette import hex_of
 from rhot_app.ui.wizards.models.chart import Chart, ChartedStep, Curve
 from rhot_app.ui.wizards.models.colour_bounds import BoundsStep, learning
+from rhot_app.ui.wizards.models.colour_mask import MaskMaker, drift_of
 from rhot_app.ui.wizards.models.proposal import Change, NodeChange, Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.rig_rows import rig_rows
-from rhot_app.ui.wizards.models.step import StepView, Task
+from rhot_app.ui.wizards.models.step import Pictures, StepView, Task
 from rhot_node.markers import ChromaModel
 
 REASON = "colour calibration"
@@ -26,16 +29,25 @@ _HEADROOM = 1.05  # of the chart above the highest column
 
 
 class ApartStep(ChartedStep):
-    """The verdict on the colours with the bounds that a person has left them."""
+    """The verdict on the colours with the bounds that a person has left them, and on the light since then."""
 
     title = "Tell them apart"
+    watches = True
 
     def __init__(self, bounds: BoundsStep) -> None:
+        self.cameras = bounds.cameras
         self.report: ColourReport | None = None
         self._bounds = bounds
         self._learnt: ColourReport | None = None
         self._given: Mapping[str, ChromaModel] = {}
         self._problem = ""
+        self._maker = MaskMaker()
+        self._drift: tuple[Finding, ...] = ()
+
+    @property
+    def judged(self) -> ColourReport | None:
+        """The report with what the cameras say of the light now."""
+        return self.report and replace(self.report, verdict=judged_anew(self.report.verdict, self._drift))
 
     @property
     def keeps(self) -> bool:
@@ -62,19 +74,29 @@ class ApartStep(ChartedStep):
         """Why there is none."""
         self._problem = sentence
 
+    def see(self, pictures: Pictures) -> tuple[Finding, ...] | None:
+        """How the light stands to the one of the samples; None before they are learnt."""
+        report = self.report
+        return None if report is None else drift_of(self._maker.look(pictures, report.markers))
+
+    def take(self, seen: tuple[Finding, ...]) -> None:
+        """What is said of the light."""
+        self._drift = seen
+
     def _take(self, report: ColourReport | None) -> None:
-        self.report = report
+        self.report, self._drift = report, ()
         self.charts = () if report is None else (hue_chart(report),)
 
     def view(self) -> StepView:
         """The verdict, with what to do about it."""
-        if self.report is None:
+        judged = self.judged
+        if judged is None:
             return StepView("Go back and pick a colour." if self._learnt is None else
                             "It did not work out." if self._problem else "One moment.", hint=self._problem)
-        apart = self.report.separability.sentences
+        apart = judged.separability.sentences
         hint = "; ".join(apart[:3]) + "." if apart else "No two colours overlap."
         return StepView("Read what may be mistaken for a marker, then go on.", done=True, hint=hint,
-                        verdict=self.report.verdict)
+                        verdict=judged.verdict)
 
 
 def hue_chart(report: ColourReport) -> Chart:

@@ -1,0 +1,97 @@
+"""The colour wizard says when the light is another one than that of the rig's colours, or of those just picked."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from colour_scenes import PAINTS, picture
+from fake_engine import synthetic_rig
+from paint_scene import PaintScene
+
+from rhot_app.calibration.colours import solve_colours
+from rhot_app.calibration.verdict import Grade
+from rhot_app.project import Rig
+from rhot_app.ui.wizards.feed import Picture
+from rhot_app.ui.wizards.models.colour_bounds import BoundsStep
+from rhot_app.ui.wizards.models.colour_pick import PickStep
+from rhot_app.ui.wizards.models.colour_result import ApartStep, propose
+from rhot_node.detect.image import to_bgr
+from rhot_node.detect.light import gains_of
+
+COLDER = (("gains", tuple(gains_of(-0.35))),)
+EMPTY: tuple = ("nothing",)
+MOST = 12  # pictures after which what is seen now outweighs what was seen before
+
+
+@pytest.fixture(scope="module")
+def rig() -> Rig:
+    return synthetic_rig()
+
+
+@cache
+def frame(seed: int, light: tuple) -> np.ndarray:
+    return to_bgr(picture({}, seed=seed) if light == EMPTY else picture(seed=seed, **dict(light)))
+
+
+def look(step: PickStep | BoundsStep | ApartStep, times: int = 4, light: tuple = ()) -> None:
+    """Let a step see some pictures by a light."""
+    for number in range(times):
+        image = frame(number % 3, light)
+        step.take(step.see({"left": Picture("left", image, number, number, number)}))
+
+
+@pytest.fixture(scope="module")
+def steps(rig: Rig) -> tuple[BoundsStep, ApartStep]:
+    """All markers picked and learnt in the light of the scene."""
+    picks = PickStep(rig.markers, ("left",))
+    look(picks, 1)
+    for name in PAINTS:
+        x, y = PaintScene.where(name)
+        picks.chosen = name
+        assert picks.pick("left", x, y, 0.0, 0.0), picks.problem
+    bounds = BoundsStep(picks)
+    bounds.enter()
+    task = bounds.task()
+    assert task is not None and task.function is solve_colours
+    bounds.take_result(task.function(*task.arguments, **task.options))
+    return bounds, ApartStep(bounds)
+
+
+@pytest.mark.parametrize(("light", "word"), [((), None), (COLDER, "colder")])
+def test_the_rigs_colours_are_held_against_the_light_before_anything_is_picked(rig: Rig, light: tuple,
+                                                                               word: str | None) -> None:
+    picks = PickStep(rig.markers, ("left",))
+    look(picks, light=light)
+    hint = picks.view().hint
+    assert ("By the rig's colours" in hint) == (word is not None) and (word or "") in hint
+
+
+def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_the_verdict(
+        rig: Rig, steps: tuple[BoundsStep, ApartStep]) -> None:
+    bounds, apart = steps
+    look(bounds)
+    assert "Since the colours were picked" not in bounds.view().hint
+    look(bounds, MOST, COLDER)
+    assert "Since the colours were picked" in bounds.view().hint and "colder" in bounds.view().hint
+    apart.enter()
+    look(apart)
+    calm = apart.view().verdict
+    assert calm is not None and "temperature" not in calm.codes
+    look(apart, MOST, COLDER)
+    verdict = apart.view().verdict
+    assert verdict is not None and "temperature" in verdict.codes
+    assert verdict.grade is Grade.FAIR and verdict.sentence.startswith("Usable, not good: 6 colours")
+    (finding,) = [one for one in verdict.findings if one.code == "temperature"]
+    assert finding.figure.startswith("Camera left: The light has become colder")
+    proposal = propose(apart.judged, rig, None, {})
+    assert proposal is not None and proposal.verdict == verdict
+    look(apart, MOST)
+    assert apart.view().verdict == calm
+
+
+def test_markers_that_were_never_seen_say_nothing_of_the_light(rig: Rig) -> None:
+    picks = PickStep(rig.markers, ("left",))
+    look(picks, light=EMPTY)
+    assert "rig's colours" not in picks.view().hint
