@@ -84,7 +84,7 @@ class UdpLink:
                 except OSError as exc:
                     log.debug("link: %s", exc)
                     break
-                self._take(data, sender, kernel_time.receive_time_ns(ancillary)[0])
+                self.take(data, sender, kernel_time.receive_time_ns(ancillary)[0])
 
     def start(self) -> None:
         """Answer in a thread of its own until `close`."""
@@ -102,7 +102,9 @@ class UdpLink:
         while not self._ending.is_set():
             self.step(0.1)
 
-    def _take(self, data: bytes, sender: tuple[str, int], t_receive_host_ns: int) -> None:
+    def take(self, data: bytes, sender: tuple[str, int], t_receive_host_ns: int) -> None:
+        """Act upon one datagram that the kernel received from `sender` at `t_receive_host_ns`; whatever it is, nothing
+        raises."""
         try:
             message, seal = self._open(data)
         except WireError as exc:

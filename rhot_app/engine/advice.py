@@ -25,8 +25,8 @@ _REFUSALS = {
                         "If this does not end, restart the node."),
     "foreign_node": ("warning", "Another node sends to the port of {name}; check the node ids and data ports."),
     "version": ("error", "Node {name} speaks another version of the wire; install the same version here and there."),
-    "tag": ("warning", "Datagrams that are not tagged with the key of node {name} are refused at its port: somebody sends "
-                       "in its place."),
+    "tag": ("warning", "Datagrams that are not tagged with the key of node {name} are refused at its port: somebody "
+                       "sends in its place."),
     "untagged": ("warning", "Datagrams without a tag are refused at the port of node {name}: somebody sends in its "
                             "place, or the node was made open after it was paired."),
     "jump": ("warning", "Node {name} jumped in its sequence numbers; if this does not end, restart the node."),
@@ -84,9 +84,9 @@ def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     if status.state == "silent" and status.text_datagrams:
         return [Advice("info", f"Node {name}: no text datagrams come in; send them to its data port.")]
     if status.turned_away:
-        return [Advice("error", f"Node {name} at {facts.address} does not know this computer: it was reset, or never "
-                                f"paired with it. Pair it: `rhot-node pair` on the node, `rhot pair {name} --rig FILE` "
-                                "here.")]
+        return [Advice("error", f"Node {name} at {facts.address} does not know this computer: it was reset or made "
+                                "open, or never paired with it. Pair it: `rhot-node pair` on the node, "
+                                f"`rhot pair {name} --rig FILE` here.")]
     if status.state == "silent":
         return [Advice("error", f"Node {name} does not answer at {facts.address}:{facts.udp_port}. Is it switched on, "
                                 "is rhot-node running there, and does the rig name the right address?"

@@ -56,7 +56,7 @@ class PairDialog(QDialog):
         for widget in (intro, self.code, self.verdict):
             layout.addWidget(widget)
         layout.addLayout(buttons)
-        self.resize(560, 300)
+        self.resize(600, 340)
         self.code.setFocus()
 
     def _show_whether_complete(self) -> None:

@@ -8,8 +8,10 @@ from fake_engine import FakeEngine
 from screen_pictures import SIZE, UPDATE, check, colours_in, picture_of
 
 from rhot_app.engine.status import Advice
+from rhot_app.sources.pairing import NodeAddress
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.nodes_dialog import NodesDialog
+from rhot_app.ui.pair_dialog import PairDialog
 from rhot_app.ui.rig_dialog import RigDialog
 
 WRIST = "Right camera saw no wrist marker for 12 s: it is behind the forearm. Turn the hand or add rhot8."
@@ -85,7 +87,9 @@ def test_scene_alone(shown):
 
 
 def test_dialogs(qtbot, bench):
-    for name, dialog in (("connect-nodes", NodesDialog(DARK)), ("rig-cameras", RigDialog(FakeEngine().rig, "cameras")),
+    pairing = PairDialog("left", NodeAddress("192.168.1.11"), lambda address, code: "left")
+    for name, dialog in (("connect-nodes", NodesDialog(DARK)), ("pair-node", pairing),
+                         ("rig-cameras", RigDialog(FakeEngine().rig, "cameras")),
                          ("rig-markers", RigDialog(FakeEngine().rig, "markers"))):
         qtbot.addWidget(dialog)
         dialog.show()

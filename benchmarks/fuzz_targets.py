@@ -1,0 +1,226 @@
+"""What `fuzz.py` throws datagrams at: a master's door, a master's command port, a node's link. Time stands still."""
+
+from __future__ import annotations
+
+import socket
+from typing import Protocol
+
+import msgspec
+import numpy as np
+
+from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.sources.door import OLDEST_FRAME_NS
+from rhot_app.sources.node_link import PENDING_MAX, NodeLink
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.clock import NodeClock
+from rhot_node.config import NodeSettings
+from rhot_node.errors import WireError
+from rhot_node.link import UdpLink
+from rhot_node.link_keys import Link, LinkKeys
+from rhot_node.session import Sessions
+from rhot_node.wire.codec import encode
+from rhot_node.wire.messages import (
+    ClockReply,
+    ClockRequest,
+    MarkerFlag,
+    MarkerObservation,
+    Message,
+    NodeState,
+    Observations,
+    Start,
+    StartEntry,
+    Stop,
+)
+from rhot_node.wire.seal import Seal
+
+NOW_NS = 5 * 10**12
+SLACK_NS = 5_000_000
+SESSION = 1 << 40
+KEY = bytes(range(32))
+RIG = synthetic_rig()
+
+
+class WronglyTakenError(Exception):
+    """Something was taken that must not be."""
+
+
+class Target(Protocol):
+    """One receiver of datagrams."""
+
+    name: str
+    seal: Seal
+
+    def renew(self) -> None:
+        """Begin anew with numbers, as a new session or link does."""
+        ...
+
+    def genuine(self) -> list[bytes]:
+        """The next datagrams that must be taken, tagged."""
+        ...
+
+    def feed(self, data: bytes) -> bool:
+        """Whether a datagram was taken for one of ours; raises WronglyTakenError when it is not plausible."""
+        ...
+
+    def refused(self) -> dict[str, int]:
+        """Datagrams that were not taken, by reason."""
+        ...
+
+
+def paired_link() -> NodeLink:
+    """A master's link to a paired node whose clock it knows."""
+    node = msgspec.structs.replace(RIG.nodes[0], public_key="0" * 64)
+    link = NodeLink(msgspec.structs.replace(RIG, nodes=(node, RIG.nodes[1])), 0)
+    link.use_key("fuzz", KEY)
+    for k in range(5):
+        t = NOW_NS - (5 - k) * 10**8
+        link.clock.add(t, t + 50_000, t + 50_000, t + 100_000, 1)
+    return link
+
+
+class Door:
+    """A master's data port."""
+
+    name = "door"
+    seal = Seal(KEY)
+
+    def __init__(self) -> None:
+        self._link = paired_link()
+        self._session = SESSION
+        self.renew()
+
+    def renew(self) -> None:
+        """Another session."""
+        self._session, self._sequence = self._session + 1, 0
+        self._link.want(self._session, NOW_NS)
+
+    def genuine(self) -> list[bytes]:
+        """The node's next frame."""
+        markers = tuple(MarkerObservation(k, 100.0 + k, 200.0, 16.0, 0.01, 0.001, 0.02, 0.9) for k in range(6))
+        self._sequence += 1
+        frame = Observations(1, self._session, self._sequence, NOW_NS - 9_000_000, NOW_NS - 200_000, 10**6, 10**6,
+                             10**4, 640, 480, self._sequence, RIG.markers.checksum, markers)
+        return [encode(frame, self.seal)]
+
+    def feed(self, data: bytes) -> bool:
+        """Through the door and into arrays, as in the receiver."""
+        frame = self._link.door.admit(data, NOW_NS)
+        if frame is not None:
+            check_frame(frame)
+        return frame is not None
+
+    def refused(self) -> dict[str, int]:
+        """The door's own count."""
+        return self._link.door.dropped
+
+
+def check_frame(frame: CameraObservations) -> None:
+    """The oracle: a camera of 640 x 480 px could have seen this a moment ago."""
+    lost = (frame.flags & MarkerFlag.LOST) != 0
+    seen, xx, yy, xy = (frame.pixels[~lost], frame.covariances[:, 0, 0], frame.covariances[:, 1, 1],
+                        frame.covariances[:, 0, 1])
+    sound = (frame.pixels.shape == (6, 2) and np.isnan(frame.pixels[lost]).all()
+             and ((seen >= -64.0) & (seen <= (703.0, 543.0))).all()
+             and ((xx >= 0.0) & (yy >= 0.0) & (xx <= 1e8) & (yy <= 1e8)).all()
+             and (xy * xy <= xx * yy * 1.00001 + 1e-29).all()
+             and ((frame.diameters[~lost] > 0.0) & (frame.diameters[~lost] <= 1280.0)).all()
+             and ((frame.qualities >= 0.0) & (frame.qualities <= 1.0)).all() and (frame.flags < 64).all()
+             and NOW_NS - OLDEST_FRAME_NS <= frame.t_row0_master_ns <= NOW_NS + SLACK_NS)
+    if not sound:
+        raise WronglyTakenError(f"an implausible frame was taken: {frame}")
+
+
+class Replies:
+    """A master's command port: answers to its clock requests."""
+
+    name = "replies"
+    seal = Seal(KEY)
+
+    def __init__(self) -> None:
+        self._link = paired_link()
+        self._refused: dict[str, int] = {}
+
+    def renew(self) -> None:
+        """A node that lied about its clock is restarted."""
+        self._link = paired_link()
+
+    def genuine(self) -> list[bytes]:
+        """The answer to the next question."""
+        request = self._link.request(NOW_NS - 300_000)
+        return [encode(ClockReply(1, 0, request.sequence, request.t1_master_ns, NOW_NS - 200_000, NOW_NS - 100_000, 1,
+                                  NodeState.READY), self.seal)]
+
+    def feed(self, data: bytes) -> bool:
+        """As the command socket's thread does it, which has asked the next question meanwhile."""
+        self._link.request(NOW_NS - 300_000)
+        try:
+            reply = self._link.door.admission.open(data)
+        except WireError as exc:
+            self._refused[exc.reason] = self._refused.get(exc.reason, 0) + 1
+            return False
+        taken = isinstance(reply, ClockReply) and self._link.take_reply(reply, NOW_NS)
+        if taken and len(self._link._pending) > PENDING_MAX:
+            raise WronglyTakenError("questions pile up")
+        if not taken:
+            self._refused["unasked"] = self._refused.get("unasked", 0) + 1
+        return taken
+
+    def refused(self) -> dict[str, int]:
+        """By reason; `unasked` answers no question."""
+        return self._refused
+
+
+class CountedKeys(LinkKeys):
+    """Counts what was taken for a master's."""
+
+    taken = 0
+
+    def open(self, data: bytes) -> tuple[Message, Link]:
+        """As the keys do."""
+        opened = super().open(data)
+        self.taken += 1
+        return opened
+
+
+class NodeSide:
+    """A node's link. Its answers go to a socket that nobody reads."""
+
+    name = "node"
+
+    def __init__(self) -> None:
+        settings = NodeSettings(1, "left", RIG.markers, "127.0.0.1", 0, 0, 0, None)
+        self._drain = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._drain.bind(("127.0.0.1", 0))
+        self._sender = self._drain.getsockname()
+        self._keys, self._sessions = CountedKeys(), Sessions()
+        self._udp = UdpLink(settings, NodeClock(), self._sessions, 7, lambda: NodeState.READY, self._keys)
+        self._session = SESSION
+        self.renew()
+
+    def renew(self) -> None:
+        """Another link, as after a restart of the master; eight stay known."""
+        self.seal = self._keys.grant("fuzz").seal
+        self._sequence = 0
+
+    def genuine(self) -> list[bytes]:
+        """What a master says next."""
+        self._sequence += 1
+        self._session += 1
+        messages: list[Message] = [
+            ClockRequest(1, self._session, self._sequence, NOW_NS),
+            Start(self._session, self._sequence, (StartEntry(1, 50_001, 0), StartEntry(2, 50_002, 0))),
+            Stop(self._session, self._sequence)]
+        return [encode(message, self.seal) for message in messages]
+
+    def feed(self, data: bytes) -> bool:
+        """As the link's thread does it."""
+        before = self._keys.taken
+        self._udp.take(data, self._sender, NOW_NS)
+        stream = self._sessions.current
+        if stream is not None and (stream.address[0] != self._sender[0] or not 1 <= stream.address[1] <= 65535):
+            raise WronglyTakenError(f"the node streams to {stream}")
+        return self._keys.taken > before
+
+    def refused(self) -> dict[str, int]:
+        """The link's own count."""
+        return self._udp.dropped
