@@ -121,9 +121,11 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     from rhot_node.link import UdpLink
     from rhot_node.link_keys import LinkKeys
     from rhot_node.pairing_offer import OfferFile, offer_path
+    from rhot_node.presence import Presence
     from rhot_node.reception import Reception
     from rhot_node.requests import Responder, SettingsStore
     from rhot_node.service.notify import ServiceManager
+    from rhot_node.trust import trust_state
 
     clock = settings.clock.clock(time.monotonic_ns())
     store = SettingsStore(options.settings, settings)
@@ -134,15 +136,20 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
                         camera_takes_settings=takes_settings(options.camera), loop=options.loop,
                         troubles=HealthMonitor(Machine()).troubles)
     manager = ServiceManager()
+    boot_id = secrets.randbits(32)
     with contextlib.ExitStack() as stack:
         stack.callback(daemon.close)
-        link = UdpLink(settings, clock, daemon.sessions, secrets.randbits(32), lambda: daemon.state, keys)
+        link = UdpLink(settings, clock, daemon.sessions, boot_id, lambda: daemon.state, keys)
         stack.callback(link.close)
         control = ControlServer(settings, trust)
         stack.callback(control.close)
         stack.callback(manager.stopping)
         ports = {"udp_port": link.port, "control_port": control.control_port, "preview_port": control.preview_port,
                  "pairing_port": control.pairing_port}
+
+        def introduce() -> Presence:
+            return Presence(settings.node_id, boot_id, store.current.name, **ports, trust=trust_state(trust))
+        link.introduce = introduce
         link.start()
         control.start(Responder(store, daemon.sessions, control.pictures, clock, daemon.report,
                                 lambda: {**daemon.count(), **link.count(), "strangers": control.refused}, keys),

@@ -1,4 +1,5 @@
-"""The node's UDP side: start, stop and clock requests come in, clock replies and observations go out."""
+"""The node's UDP side: start, stop, clock requests and questions who is there come in, clock replies, answers and
+observations go out."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ import select
 import socket
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 
 from rhot_node.clock import NodeClock
@@ -16,14 +17,16 @@ from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError, WireError
 from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.link_keys import LinkKeys
+from rhot_node.presence import Presence
 from rhot_node.session import Sessions, Stream
-from rhot_node.wire.codec import decode, encode
-from rhot_node.wire.messages import ClockReply, ClockRequest, Message, NodeState, Observations, Start, Stop
+from rhot_node.wire.codec import asks_who_is_there, decode, encode
+from rhot_node.wire.messages import ClockReply, ClockRequest, Find, Message, NodeState, Observations, Start, Stop
 from rhot_node.wire.seal import Seal
 
 log = logging.getLogger(__name__)
 
 DATAGRAM_MAX = 8192  # bytes; the longest start message has 4108
+ANSWERS_PER_S = 20  # to strangers who ask who is there
 BURST = 64  # datagrams taken from one socket before looking at the other one and at the end
 
 
@@ -33,9 +36,12 @@ class UdpLink:
     def __init__(self, settings: NodeSettings, clock: NodeClock, sessions: Sessions, boot_id: int,
                  state: Callable[[], NodeState], keys: LinkKeys | None) -> None:
         """Open the ports; raises LinkError. `state` tells what a clock reply says of the node; any thread calls it.
-        Only datagrams that a link of `keys` has tagged are taken; with None the node is open, and all are."""
+        Only datagrams that a link of `keys` has tagged are taken; with None the node is open, and all are. Who asks
+        whether somebody is there is answered once `introduce` is set; any thread may call it."""
         self.dropped: Counter[str] = Counter()  # datagrams not acted upon, by reason
         self.clock_requests = 0
+        self.introduce: Callable[[], Presence] | None = None
+        self._answered_s = deque([-1.0] * ANSWERS_PER_S, ANSWERS_PER_S)  # when strangers were answered
         self._node_id = settings.node_id
         self._clock = clock
         self._sessions = sessions
@@ -118,11 +124,13 @@ class UdpLink:
             case Stop():
                 if not self._sessions.stop(message.session):
                     self.dropped["stop_of_nothing"] += 1
+            case Find() if seal is None:
+                self._say_who(message, sender)
             case _:
                 self.dropped["kind"] += 1
 
     def _open(self, data: bytes) -> tuple[Message, Seal | None]:
-        if self._keys is None:
+        if self._keys is None or asks_who_is_there(data):
             return decode(data), None
         message, link = self._keys.open(data)
         return message, link.seal
@@ -142,6 +150,20 @@ class UdpLink:
             self._socket.sendto(encode(reply, seal), sender)
         except OSError as exc:
             log.debug("clock reply to %s port %d: %s", *sender, exc)
+
+    def _say_who(self, question: Find, sender: tuple[str, int]) -> None:
+        """Answer a stranger, who may have put another's address into his question: never more than was asked with."""
+        now_s = time.monotonic()
+        if question.node_id not in (0, self._node_id) or self.introduce is None:
+            self.dropped["foreign_node"] += 1
+        elif now_s - self._answered_s[0] < 1.0:
+            self.dropped["find_often"] += 1
+        else:
+            self._answered_s.append(now_s)
+            try:
+                self._socket.sendto(encode(self.introduce().answer(question, self._state())), sender)
+            except (OSError, WireError) as exc:
+                log.debug("answer to %s port %d: %s", *sender, exc)
 
     def _take_start(self, message: Start, sender: str, seal: Seal | None) -> None:
         entry = next((entry for entry in message.entries if entry.node_id == self._node_id), None)

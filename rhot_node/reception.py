@@ -16,7 +16,7 @@ from rhot_node.errors import NodeError, TrustError
 from rhot_node.keys import HexKey, Name
 from rhot_node.pairing import NONCE_LENGTH, Transcript, proof, proves
 from rhot_node.pairing_offer import OfferFile
-from rhot_node.trust import Master, NodeTrust
+from rhot_node.trust import Master, NodeTrust, trust_state
 
 log = logging.getLogger(__name__)
 
@@ -63,12 +63,11 @@ class Reception:
         return msgspec.json.encode(reply)
 
     def _hello(self) -> dict[str, Any]:
-        about = {"ok": True, **self._about()}
+        about = {"ok": True, **self._about(), "trust": trust_state(self._trust).name.lower()}
         if self._trust is None:
-            return {**about, "trust": "open"}
+            return about
         offer = self._offers.current()
-        return {**about, "trust": "paired" if self._trust.masters else "unpaired",
-                "public_key": self._trust.own.public_key, "nonce": "" if offer is None else offer.nonce}
+        return {**about, "public_key": self._trust.own.public_key, "nonce": "" if offer is None else offer.nonce}
 
     def _pair(self, request: PairRequest) -> dict[str, Any]:
         if self._trust is None:

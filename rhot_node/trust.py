@@ -15,6 +15,7 @@ from rhot_node.errors import TrustError
 from rhot_node.files import decode_document
 from rhot_node.keys import HexKey, KeyPair, Name, new_key_pair
 from rhot_node.private_files import read_private, write_private
+from rhot_node.wire.messages import TrustState
 
 log = logging.getLogger(__name__)
 
@@ -100,6 +101,13 @@ class NodeTrust:
         except OSError:
             return None
         return info.st_ino, info.st_mtime_ns
+
+
+def trust_state(trust: NodeTrust | None) -> TrustState:
+    """Whom a node with these keys answers; None: it is open."""
+    if trust is None:
+        return TrustState.OPEN
+    return TrustState.PAIRED if trust.masters else TrustState.UNPAIRED
 
 
 def pair_beforehand(path: Path, master: Master) -> str:

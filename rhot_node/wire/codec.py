@@ -8,10 +8,13 @@ from struct import Struct
 from struct import error as struct_error
 
 from rhot_node.errors import WireError
+from rhot_node.wire.discovery import decode_find, decode_here, encode_find, encode_here
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    Find,
+    Here,
     MarkerFlag,
     Message,
     NodeState,
@@ -31,6 +34,8 @@ TYPE_CLOCK_REQUEST = 2
 TYPE_CLOCK_REPLY = 3
 TYPE_START = 4
 TYPE_STOP = 5
+TYPE_FIND = 6
+TYPE_HERE = 7
 
 MARKERS_MAX = 64
 IMAGE_SIZE_MAX = 16384  # px
@@ -108,6 +113,12 @@ def node_of(data: Datagram) -> int:
     return int(_HEADER.unpack_from(data)[4])
 
 
+def asks_who_is_there(data: Datagram) -> bool:
+    """Whether the datagram claims to be an untagged `Find`, the one message that every node takes from anybody. Raises
+    WireError like `is_tagged`."""
+    return not is_tagged(data) and _HEADER.unpack_from(data)[2] == TYPE_FIND
+
+
 def is_tagged(data: Datagram) -> bool:
     """Whether the datagram has a tag and room for it. Raises WireError when it is none of ours."""
     if len(data) < _HEADER.size:
@@ -147,6 +158,10 @@ def _encode(message: Message) -> bytes:
             return _encode_start(message)
         case Stop():
             return _header(TYPE_STOP, 0, message.session, message.sequence)
+        case Find():
+            return _header(TYPE_FIND, message.node_id, 0, message.sequence) + encode_find(message)
+        case Here():
+            return _header(TYPE_HERE, message.node_id, 0, message.sequence) + encode_here(message)
 
 
 def _header(kind: int, node_id: int, session: int, sequence: int) -> bytes:
@@ -282,4 +297,6 @@ _DECODERS: dict[int, Callable[[memoryview, int, int, int], Message]] = {
     TYPE_CLOCK_REPLY: _decode_clock_reply,
     TYPE_START: _decode_start,
     TYPE_STOP: _decode_stop,
+    TYPE_FIND: decode_find,
+    TYPE_HERE: decode_here,
 }

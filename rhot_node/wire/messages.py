@@ -18,6 +18,14 @@ class NodeState(enum.IntEnum):
     FAULT = 3
 
 
+class TrustState(enum.IntEnum):
+    """Whom a node answers: everybody, nobody yet, or the masters that it is paired with."""
+
+    OPEN = 0
+    UNPAIRED = 1
+    PAIRED = 2
+
+
 class MarkerFlag(enum.IntFlag):
     """What a node noticed about one marker."""
 
@@ -142,4 +150,33 @@ class Stop:
     sequence: int
 
 
-Message = Observations | ClockRequest | ClockReply | Start | Stop
+@dataclass(frozen=True, slots=True)
+class Find:
+    """Anybody to all nodes, or to `node_id` (0: all): who and where are you? Never tagged. `nonce` comes back."""
+
+    node_id: int
+    sequence: int
+    nonce: int
+
+
+@dataclass(frozen=True, slots=True)
+class Here:
+    """A node to whoever asked: who it is. Never tagged, so only good for showing and for trying an address.
+
+    `sequence` and `nonce` are the question's. `boot_id` is that of the clock replies.
+    """
+
+    node_id: int
+    sequence: int
+    nonce: int
+    boot_id: int
+    udp_port: int
+    control_port: int
+    preview_port: int
+    pairing_port: int
+    state: NodeState
+    trust: TrustState
+    name: str
+
+
+Message = Observations | ClockRequest | ClockReply | Start | Stop | Find | Here

@@ -12,19 +12,24 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError
 from rhot_node.files import resource_path
-from rhot_node.link import UdpLink
+from rhot_node.link import ANSWERS_PER_S, UdpLink
+from rhot_node.link_keys import LinkKeys
 from rhot_node.markers import load_markers
+from rhot_node.presence import Presence
 from rhot_node.session import Sessions, Stream
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    Find,
+    Here,
     Message,
     NodeState,
     Observations,
     Start,
     StartEntry,
     Stop,
+    TrustState,
 )
 
 CLOCK = NodeClock(offset_ns=-4_000_000_000_000, drift_ppm=30.0)
@@ -36,10 +41,10 @@ def make_link() -> Iterator[MakeLink]:
     links: list[UdpLink] = []
 
     def make(node_id: int = 3, udp_port: int = 0, broadcast_port: int | None = None,
-             bind_address: str = "127.0.0.1") -> UdpLink:
+             bind_address: str = "127.0.0.1", keys: LinkKeys | None = None) -> UdpLink:
         settings = NodeSettings(node_id, "left", load_markers(resource_path("markers", "rhot6.json")), bind_address,
                                 udp_port, 0, 0, broadcast_port)
-        links.append(UdpLink(settings, CLOCK, Sessions(), 0xB007, lambda: NodeState.READY, None))
+        links.append(UdpLink(settings, CLOCK, Sessions(), 0xB007, lambda: NodeState.READY, keys))
         return links[-1]
 
     yield make
@@ -113,6 +118,36 @@ def test_two_nodes_of_one_machine_hear_one_broadcast(make_link: MakeLink, master
         link.step(1.0)
         stream = link._sessions.current
         assert stream is not None and stream.address == ("127.0.0.1", data_port)
+
+
+PRESENCE = Presence(3, 0xB007, "left", 47800, 47801, 47802, 47803, TrustState.UNPAIRED)
+
+
+@pytest.mark.parametrize("keys", [None, LinkKeys()], ids=["open", "closed"])
+def test_whoever_asks_is_told_who_is_there(make_link: MakeLink, master: socket.socket, keys: LinkKeys | None) -> None:
+    port = free_port()
+    link = make_link(broadcast_port=port, keys=keys)
+    link.introduce = lambda: PRESENCE
+    master.sendto(encode(Find(0, 7, 99)), ("127.255.255.255", port))
+    link.step(1.0)
+    say(master, link, Find(3, 8, 100))
+    for number, nonce in ((7, 99), (8, 100)):
+        data, sender = master.recvfrom(2048)
+        assert decode(data) == Here(3, number, nonce, 0xB007, 47800, 47801, 47802, 47803, NodeState.READY,
+                                    TrustState.UNPAIRED, "left")
+        assert sender == ("127.0.0.1", link.port)
+    say(master, link, Find(4, 9, 101), encode(Find(0, 9, 101))[:-1])
+    assert link.dropped == {"foreign_node": 1, "length": 1}
+
+
+def test_a_flood_of_questions_is_not_turned_upon_somebody(make_link: MakeLink, master: socket.socket) -> None:
+    link = make_link()
+    link.introduce = lambda: PRESENCE
+    for _ in range(3 * ANSWERS_PER_S):
+        link.take(encode(Find(0, 7, 99)), master.getsockname(), 0)
+    assert link.dropped == {"find_often": 2 * ANSWERS_PER_S}
+    for _ in range(ANSWERS_PER_S):
+        assert len(master.recv(2048)) < len(encode(Find(0, 7, 99)))
 
 
 def test_observations_arrive(make_link: MakeLink, master: socket.socket) -> None:

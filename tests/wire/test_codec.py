@@ -15,14 +15,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from wire_samples import RHOT6_CHECKSUM, SAMPLES, SESSION, SIX, TAGGED, found, lost, observations
+from wire_samples import KEY, RHOT6_CHECKSUM, SAMPLES, SESSION, SIX, TAGGED, found, lost, observations
 
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import decode, encode
+from rhot_node.wire.codec import asks_who_is_there, decode, encode
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    Find,
+    Here,
     MarkerFlag,
     MarkerObservation,
     Message,
@@ -31,7 +33,9 @@ from rhot_node.wire.messages import (
     Start,
     StartEntry,
     Stop,
+    TrustState,
 )
+from rhot_node.wire.seal import Seal
 
 PACKETS = Path(__file__).parents[1] / "packets"
 OBSERVATIONS = "observations_some_lost"
@@ -81,7 +85,7 @@ HEADER_FAULTS: list[Fault] = [
     (0, "<4s", (b"rhot",), "magic"),
     (4, "<B", (2,), "version"),
     (5, "<B", (0,), "type"),
-    (5, "<B", (6,), "type"),
+    (5, "<B", (8,), "type"),
     (6, "<H", (1,), "tag"),
     (6, "<H", (2,), "flags"),
     (6, "<H", (0x8001,), "flags"),
@@ -131,6 +135,18 @@ OTHER_FAULTS = [
     ("start_two", 32, "<H", (0,), "range"),
     ("start_two", 34, "<H", (1,), "range"),
     ("stop", 8, "<I", (9,), "header"),
+    ("find_all", 12, "<Q", (1,), "header"),  # of no session
+    ("find_all", 303, "<B", (1,), "reserved"),
+    ("here", 8, "<I", (0,), "header"),
+    ("here", 12, "<Q", (1,), "header"),
+    ("here", 36, "<H", (0,), "range"),  # port 0
+    ("here", 42, "<H", (0,), "range"),
+    ("here", 44, "<B", (4,), "range"),
+    ("here", 45, "<B", (3,), "range"),
+    ("here", 46, "<H", (4,), "length"),
+    ("here", 48, "<B", (27,), "range"),  # an escape sequence is no name
+    ("here", 48, "<B", (255,), "range"),  # nor is what is not UTF-8
+    ("here_longest_name", 48, "<4s", (b"abcd",), "range"),  # more than 64 characters
 ]
 
 
@@ -191,6 +207,7 @@ def test_columns_say_what_the_markers_say() -> None:
 
 f32 = st.floats(width=32, allow_nan=False, allow_infinity=False)
 u32 = st.integers(0, 2**32 - 1)
+u64 = st.integers(0, 2**64 - 1)
 times = st.integers(-(2**62) + 1, 2**62 - 1)
 
 
@@ -209,7 +226,7 @@ def markers(draw: st.DrawFn, index: int) -> MarkerObservation:
 @st.composite
 def messages(draw: st.DrawFn) -> Message:
     node_id, session, sequence = draw(st.integers(1, 2**32 - 1)), draw(st.integers(1, 2**64 - 1)), draw(u32)
-    match draw(st.integers(1, 5)):
+    match draw(st.integers(1, 7)):
         case 1:
             t_frame = draw(st.integers(-(2**61), 2**61))
             count = draw(st.integers(0, 12))
@@ -225,6 +242,12 @@ def messages(draw: st.DrawFn) -> Message:
         case 4:
             ids = draw(st.lists(st.integers(1, 2**32 - 1), unique=True, max_size=16))
             return Start(session, sequence, tuple(StartEntry(i, draw(st.integers(1, 65535)), draw(times)) for i in ids))
+        case 5:
+            return Find(draw(u32), sequence, draw(u64))
+        case 6:
+            name = draw(st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=64))
+            return Here(node_id, sequence, draw(u64), draw(u32), *(draw(st.integers(1, 65535)) for _ in range(4)),
+                        draw(st.sampled_from(NodeState)), draw(st.sampled_from(TrustState)), name)
         case _:
             return Stop(session, sequence)
 
@@ -235,6 +258,12 @@ def test_every_message_survives_the_way(message: Message) -> None:
     data = encode(message)
     assert decode(data) == message
     assert encode(decode(data)) == data
+
+
+def test_an_answer_is_never_longer_than_its_question() -> None:
+    assert len(packet("here_longest_name")) == len(packet("find_all")) == len(packet("find_one"))
+    assert asks_who_is_there(packet("find_one")) and not asks_who_is_there(packet("here"))
+    assert not asks_who_is_there(encode(Find(0, 1, 2), Seal(KEY))), "only an untagged one is taken from anybody"
 
 
 def assert_sound(data: bytes) -> None:

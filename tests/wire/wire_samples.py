@@ -8,6 +8,8 @@ from rhot_node.wire.messages import (
     NO_FLAGS,
     ClockReply,
     ClockRequest,
+    Find,
+    Here,
     MarkerFlag,
     MarkerObservation,
     Message,
@@ -16,6 +18,7 @@ from rhot_node.wire.messages import (
     Start,
     StartEntry,
     Stop,
+    TrustState,
 )
 
 SESSION = 0x1122334455667788
@@ -58,6 +61,12 @@ SAMPLES: dict[str, Message] = {
     "start_nobody": Start(SESSION, 4, ()),
     "stop": Stop(SESSION, 5),
     "stop_any": Stop(0, 6),
+    "find_all": Find(0, 8, 0x0123456789ABCDEF),
+    "find_one": Find(2, 9, 1),
+    "here": Here(2, 8, 0x0123456789ABCDEF, 0xB007_B007, 47800, 47801, 47802, 47803, NodeState.STREAMING,
+                 TrustState.PAIRED, "right"),
+    "here_longest_name": Here(2**32 - 1, 2**32 - 1, 2**64 - 1, 1, 1, 65535, 2, 3, NodeState.FAULT, TrustState.OPEN,
+                              "\U0001d4d7" * 64),
 }
 
 KEY = bytes(range(32))
