@@ -113,6 +113,7 @@ def _serve(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     """Put the parts together and loop until the end."""
+    from rhot_node.announce import Announcer
     from rhot_node.capture.open import open_camera, takes_settings
     from rhot_node.control import ControlServer
     from rhot_node.daemon import NodeDaemon
@@ -159,6 +160,10 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
         width, height = daemon.size
         print(json.dumps({"event": "ready", "node_id": settings.node_id, "name": settings.name, **ports,
                           "width": width, "height": height}), flush=True)
+        if settings.announce:  # not before: it imports and waits
+            announcer = Announcer(introduce, settings.bind_address)
+            stack.callback(announcer.close)
+            announcer.start()
         manager.ready(f"node {settings.name}, {width} x {height} px")
         while daemon.step(link, control.pictures) and not end.due():
             manager.alive()

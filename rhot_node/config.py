@@ -81,6 +81,7 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     clock: ClockSettings = ClockSettings()
     pairing_port: Port = 47803
     trust: Literal["paired", "open"] = "paired"  # open: whoever reaches the node may do everything with it
+    announce: bool = True  # by zeroconf, unless the node is bound to this machine
     format: Literal["rhot-node"] = FORMAT
     version: Literal[1] = VERSION
 
@@ -95,7 +96,7 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 RESTART_FIELDS = ("node_id", "bind_address", "udp_port", "control_port", "preview_port", "pairing_port",
-                  "broadcast_port", "trust", "clock")
+                  "broadcast_port", "trust", "announce", "clock")
 """Settings that a running daemon cannot change."""
 
 
