@@ -79,7 +79,18 @@ def detect(image: NDArray[np.uint8], board: Board, *, thorough: bool = True, sou
     if rough is None:
         return None
     grid, blur = refine(gray, rough, free=board.free_space)
+    if isinstance(board, Chessboard) and not _bordered(grid, gray.shape):
+        return None
     return _view(grid, blur, gray.shape, source)
+
+
+def _bordered(grid: Array, shape: tuple[int, ...]) -> bool:
+    """Whether the picture shows most corners of each outer line of a plain board's grid (rows, cols, 2).
+
+    A board whose last line is beyond the picture's rim is found as well, put one line too far to either side.
+    """
+    inside = np.all((grid >= 0.0) & (grid <= np.array(shape[::-1]) - 1.0), axis=-1)
+    return min(line.mean() for line in (inside[0], inside[-1], inside[:, 0], inside[:, -1])) > 0.5
 
 
 def to_grid(pixels: Array, ids: NDArray[np.int64], board: Board) -> Array:

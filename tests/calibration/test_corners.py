@@ -91,6 +91,20 @@ def test_part_of_a_charuco_board_is_enough() -> None:
     assert np.isnan(view.grid(board)).any()
 
 
+@pytest.mark.parametrize(("turned", "centre_m"), [((0.04, 0.09, -0.199), (0.1463, 0.0238, 0.3936)),
+                                                  ((-0.165, -0.352, -0.245), (-0.1917, 0.1626, 0.5276))])
+def test_a_board_beyond_the_rim_is_not_counted_a_line_too_far(turned: tuple[float, float, float],
+                                                             centre_m: tuple[float, float, float]) -> None:
+    """The search continues a grid past the rim: with a corner or two missing on one side it may do so on the other."""
+    board = Chessboard(8, 6, 0.030)
+    where = pose(turned, centre_m, board)
+    lens = (535.0, 536.07, 324.5, 235.5, -0.28, 0.09, 0.001, -0.0005, 0.0)
+    truth = corners_px(board, where, lens)
+    assert np.sum((truth < 0.0) | (truth > np.array([639.0, 479.0]))) > 0
+    view = detect(take(board, where, Photo(lens=lens)), board)
+    assert view is None or np.abs(view.pixels - truth[view.ids]).max() < 0.5
+
+
 def test_why_a_charuco_board_was_not_found() -> None:
     board = CharucoBoard(8, 6, 0.03, 0.022, "DICT_5X5_100")
     image, _ = photo(board, 34)
