@@ -59,8 +59,8 @@ def judge_depth(figures: DepthFigures) -> Verdict:
 
 def _units(figures: DepthFigures) -> list[Finding]:
     ratio = figures.constant_m / figures.expected_m
-    figure = (f"Distance times disparity is {100 * figures.constant_m:.4g} cm px; cameras of this baseline and view "
-              f"angle have {100 * figures.expected_m:.4g} cm px.")
+    figure = (f"Distance times disparity is {100 * figures.constant_m:.0f} cm px; cameras of this baseline and view "
+              f"angle have {100 * figures.expected_m:.0f} cm px.")
     for factor, (said, meant) in _UNIT_FACTORS.items():
         if factor / _UNIT_MARGIN < ratio < factor * _UNIT_MARGIN:
             return [Finding("units", Grade.POOR, figure, f"The distances look as if they were in {meant}, not {said}.",
