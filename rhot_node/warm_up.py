@@ -15,8 +15,12 @@ FRAMES = 3  # acquire, then track
 def warm_up(detector: Detector, markers: MarkerSet, size: tuple[int, int]) -> None:
     """Show the detector a few frames of `size` (width, height) with a disc of every marker's colour, then reset it.
 
-    A blank frame would leave the code that measures a marker uncompiled until the first marker is seen.
+    The first frame is blank, so that markers are also sought in other lights; blank frames alone would leave the code
+    that measures a marker uncompiled until the first one is seen.
     """
+    width, height = size
+    grey = np.full((height // 2, width // 2), 128, dtype=np.uint8)
+    detector.detect(YuvImage(np.full((height, width), 128, dtype=np.uint8), grey, grey))
     image = rehearsal_image(markers, size)
     for _ in range(FRAMES):
         detector.detect(image)

@@ -15,15 +15,21 @@ from rhot_app.calibration.colour_samples import PaintSamples
 from rhot_app.calibration.separability import SKIN, Separability
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_node.detect.light import RGB_FROM_YCC
+from rhot_node.detect.light_guess import MARKERS_LEAST
 from rhot_node.markers import ChromaModel
 
 OVERLAP = 0.1  # of a colour taken for a marker, over all lamps: less are specks, which the detector leaves out
 SAME_COLOUR = 0.35  # of one marker taken for another: only chance tells them apart
 LOST = 0.1  # of the pictures, over all lamps: more is not only by lamps at the end of the range
+NEVER_FOUND = 0.9  # of the pictures in which a marker is lost, while something else has its colour: it is that
 RIVAL = 0.7  # of the marker's own merit: a thing that is about as good a marker
 PALE = 28.0  # grey levels of chroma: less drowns in noise when a hand is in shade
 BURNT, BURNT_SHARE = 253.0, 0.1  # a channel that is cut off falsifies the hue
 DARK, DIM = 25.0, 60.0  # grey levels of luma: too dark; so dark that light helps
+_OTHER_COLOUR = ("Its colour then looks like another, or is too bright for the camera.",
+                 "Shorten the exposure; keep the lamps as they are, or learn again when they change.")
+_UNKNOWN_LAMP = (f"Less than {MARKERS_LEAST} markers do not tell a camera which lamp there is, unless it changes "
+                 "slowly.", f"Wear {MARKERS_LEAST} markers or more, or keep the lamps as they are.")
 FAIR, GOOD, POOR = Grade.FAIR, Grade.GOOD, Grade.POOR
 
 
@@ -35,7 +41,7 @@ def judge_report(samples: Sequence[PaintSamples], models: Sequence[ChromaModel],
     joined = {one.name for one, lost in zip(samples, rehearsal.lost, strict=True) if lost >= LOST} & runs_on
     findings = [
         *_pairs(separability, other_paint), *_skin(separability, free, joined), *_rivals(samples, room, free),
-        *_lamps(samples, rehearsal, separability), *_paints(samples, models),
+        *_lamps(samples, rehearsal, separability, room), *_paints(samples, models),
     ]
     worst = separability.sentences[0] if separability.sentences else "no two colours overlap"
     names = ", ".join(_with_paint(one.name, model) for one, model in zip(samples, models, strict=True))
@@ -61,8 +67,9 @@ def _skin(separability: Separability, free: Sequence[str], joined: set[str]) -> 
     for name in separability.names:
         share = separability.pair(name, SKIN)
         if share >= OVERLAP:
-            yield Finding("skin", FAIR, f"{name} and skin overlap by {100 * share:.0f} %.",
-                          "In some light skin has this colour: the marker's place will jump onto the hand.", remedy)
+            grade, cause = (POOR, "For the camera it is skin.") if share >= SAME_COLOUR else \
+                (FAIR, "In some light skin has this colour: the marker's place will jump onto the hand.")
+            yield Finding("skin", grade, f"{name} and skin overlap by {100 * share:.0f} %.", cause, remedy)
         elif name in joined:
             yield Finding("runs-on", FAIR, f"The colour of {name} goes on beyond what a marker can be.",
                           "What surrounds the marker has nearly its colour.", remedy)
@@ -81,22 +88,23 @@ def _rivals(samples: Sequence[PaintSamples], room: RoomReport, free: Sequence[st
         yield Finding("room", FAIR, figure, cause, f"Take it away or cover it, choose a plainer background{paint}.")
 
 
-def _lamps(samples: Sequence[PaintSamples], rehearsal: Rehearsal, separability: Separability) -> Iterator[Finding]:
-    for one, lost, coverage in zip(samples, rehearsal.lost, separability.coverage, strict=True):
+def _lamps(samples: Sequence[PaintSamples], rehearsal: Rehearsal, separability: Separability,
+           room: RoomReport) -> Iterator[Finding]:
+    for one, lost, coverage, rival in zip(samples, rehearsal.lost, separability.coverage, room.rivals, strict=True):
         own = [failure for failure in rehearsal.failures if failure.marker == one.name]
         now = [failure for failure in own if failure.lamp == SAME]
         if now:
             what = {"lost": "not found", "elsewhere": "found in another place", "joined": "found together with what "
                     "surrounds it"}[now[0].outcome]
-            yield Finding("fails", FAIR, f"{one.name} is {what} in picture {now[0].picture + 1} itself.",
+            grade = POOR if lost >= NEVER_FOUND and rival is not None and rival.merit >= 1.0 else FAIR
+            yield Finding("fails", grade, f"{one.name} is {what} in picture {now[0].picture + 1} itself.",
                           "Other things in the picture have its colour, or the sample was not of the marker.",
                           "Draw the box over the marker alone; if that does not help, use another paint.")
         elif lost >= LOST:
             usual = min(own, key=lambda failure: abs(failure.lamp.warmth))
             yield Finding("lamp", FAIR, f"{one.name} would be lost or misplaced in {100 * lost:.0f} % of the pictures "
                           f"when lamps change, such as by {_in_words(usual.lamp)}.",
-                          "Its colour then looks like another, or is too bright for the camera.",
-                          "Shorten the exposure; keep the lamps as they are, or learn again when they change.")
+                          *(_OTHER_COLOUR if len(samples) >= MARKERS_LEAST else _UNKNOWN_LAMP))
         elif coverage < COVERAGE:
             yield Finding("coverage", GOOD, f"{100 * coverage:.1f} % of the paint of {one.name} passes by every lamp.",
                           "Its model had to stay narrow because of what has a similar colour.")

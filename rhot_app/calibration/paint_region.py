@@ -21,6 +21,7 @@ HUE_REACH_DEG = 16.0  # of the same paint in other shade, noise included
 LEVEL_REACH = (0.42, 2.0)  # of the sample's chroma: shade, and the edge where half the pixel is paint
 SEED = 40  # chroma pixels; a smaller box only says where the paint is, which is taken from round it
 SEED_HUE_DEG, SEED_LEVEL = 8.0, (0.65, 1.5)  # ... as far as it is plainly the same
+LEAK = 3.0  # times what is plainly the same: what is only alike is then something else, such as the finger
 GREY = 128  # chroma of grey, bytes
 SOLID = 0.7  # of its convex hull that a marker fills, half hidden ones included
 REGION_MOST = 0.2  # of the picture; more is the room, or an arm, and no marker
@@ -30,7 +31,7 @@ REGION_MOST = 0.2  # of the picture; more is the room, or an arm, and no marker
 class PaintRegion:
     """Chroma pixels (H/2, W/2) of one marker: `sample`, those that are surely paint; `whole`, all it may touch.
 
-    `runs_on`: its colour has no end where the marker must have one; `whole` is then no more than the sample.
+    `runs_on`: its colour goes on where the marker must end; `whole` is then what is plainly the same, or the sample.
     """
 
     sample: Mask
@@ -55,10 +56,11 @@ def region_at(image: YuvImage, point: Point) -> PaintRegion:
     column, row = min(int(x) // 2, width // 2 - 1), min(int(y) // 2, height // 2 - 1)
     around = np.zeros(image.u.shape, dtype=np.bool_)
     around[max(row - 1, 0):row + 2, max(column - 1, 0):column + 2] = True
-    flooded = _flood(image, around)
-    if flooded is None:
+    found = _extent(image, around)
+    if found is None:
         raise CalibrationError("there is no colour under the click: grey, black and white cannot be told from the "
                                "room. Click the middle of the paint.")
+    flooded, runs_on = found
     share = np.count_nonzero(flooded) / flooded.size
     if share > REGION_MOST:
         raise CalibrationError(f"the colour under the click runs over {100 * share:.0f} % of the picture: that is the "
@@ -68,7 +70,7 @@ def region_at(image: YuvImage, point: Point) -> PaintRegion:
     if np.count_nonzero(sample) < SAMPLES_MIN:
         raise CalibrationError(f"only {np.count_nonzero(sample)} colour pixels belong to the paint under the click; "
                                f"{SAMPLES_MIN} are needed. Go nearer, or draw a box over the marker.")
-    return PaintRegion(sample, _grown(flooded, RING))
+    return PaintRegion(sample, _grown(flooded, RING), runs_on)
 
 
 def region_in(image: YuvImage, box: Box) -> PaintRegion:
@@ -80,15 +82,26 @@ def region_in(image: YuvImage, box: Box) -> PaintRegion:
     if not sample.any():
         width, height = image.size
         raise CalibrationError(f"the box {box} holds no colour pixel of the picture of {width} x {height} px.")
-    flooded = _flood(image, sample)
-    if flooded is None:
+    found = _extent(image, sample)
+    if found is None:
         return PaintRegion(sample, _grown(sample, RING))
+    flooded, runs_on = found
     if np.count_nonzero(sample) < SEED:
         alike = _flood(image, sample, SEED_HUE_DEG, SEED_LEVEL)
         if alike is not None and _may_be_a_marker(alike, SEED):
             sample = sample | _shrunk(alike, 1)
-    runs_on = not _may_be_a_marker(flooded, int(np.count_nonzero(sample)))
-    return PaintRegion(sample, _grown(sample if runs_on else flooded | sample, RING), runs_on)
+    if not _may_be_a_marker(flooded, int(np.count_nonzero(sample))):
+        return PaintRegion(sample, _grown(sample, RING), True)
+    return PaintRegion(sample, _grown(flooded | sample, RING), runs_on)
+
+
+def _extent(image: YuvImage, seed: Mask) -> tuple[Mask, bool] | None:
+    """What is connected with `seed` and of its paint, and whether something alike adjoins it; None for grey."""
+    alike, same = _flood(image, seed), _flood(image, seed, SEED_HUE_DEG, SEED_LEVEL)
+    if alike is None or same is None:
+        return None
+    leaks = np.count_nonzero(alike) > LEAK * max(np.count_nonzero(same), SAMPLES_MIN)
+    return (same, True) if leaks else (alike, False)
 
 
 def _may_be_a_marker(flooded: Mask, sampled: int) -> bool:

@@ -128,6 +128,35 @@ def test_wrong_input_is_a_sentence(shot: Path, tmp_path: Path, capsys: pytest.Ca
     assert not out.exists()
 
 
+def test_a_damaged_picture_among_others_is_left_out_and_named_unless_a_box_is_in_it(
+        shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    damaged, out = tmp_path / "damaged.png", tmp_path / "markers.json"
+    damaged.write_bytes(shot.read_bytes()[:2000])
+    pictures = ["--image", str(shot), "--image", str(damaged)]
+    assert calibrate(*pictures, *sample("ring"), *sample("thumb"), *sample("index"), "--out", str(out), "--json") == 0
+    report = json.loads(capsys.readouterr().out)
+    assert [str(damaged) in warning for warning in report["warnings"]].count(True) == 1
+    assert len(load_markers(out).ids) == 3
+    x0, y0, x1, y1 = box("ring")
+    assert calibrate(*pictures, "--sample", f"ring@2={x0},{y0},{x1 - x0},{y1 - y0}", "--out", str(out)) == 2
+    assert "can be decoded" in capsys.readouterr().err
+
+
+def test_a_box_on_skin_is_refused_as_a_marker(shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    x, y = (round(at) for at in place("ring"))
+    out, boxes = tmp_path / "markers.json", (f"index={x - 4},{y + 30},8,8", f"{x - 4},{y + 50},8,20")
+    assert calibrate("--image", str(shot), "--sample", boxes[0], "--skin", boxes[1], "--out", str(out)) == 2
+    assert "index and skin overlap by" in capsys.readouterr().err and not out.exists()
+
+
+def test_one_picture_is_a_hint_and_no_verdict(shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = [word for name in PAINTS for word in sample(name)]
+    assert calibrate("--image", str(shot), *words, "--out", str(tmp_path / "markers.json")) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("Good: 6 colours") and "[good]" not in said
+    assert said.count("learnt from one picture") == 1
+
+
 def test_grey_paint_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "grey.png"
     cv2.imwrite(str(path), np.full((100, 100, 3), 120, np.uint8))

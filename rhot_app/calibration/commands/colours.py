@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.commands.output import add_json_argument, announce_compilation, show
 from rhot_app.errors import CalibrationError
 
 if TYPE_CHECKING:
     import numpy as np
 
     from rhot_app.calibration.colours import ColourReport
+    from rhot_app.calibration.verdict import Finding
     from rhot_node.detect.image import YuvImage
 
 EPILOG = """Boxes are x,y,w,h in pixels of the picture, (0, 0) at its top-left corner: nothing but paint inside, and as
@@ -25,9 +26,9 @@ the samples of NAME. Pictures that show more of the room tell more of what else 
 Without --markers every name makes a marker: thumb, index, middle, ring, little and wrist are worn on the hand, others
 are free points. With --markers the named markers of that file get new colours, and nothing else changes.
 
-With --json: "markers" (per marker "chroma", "range", "coverage_percent", "samples", "pictures", "area_px"),
-"separability" ("rows", "columns", "percent", "sentences"), "room" ("hue_px", "rivals"), "failures", "free_paints",
-"verdict", "grade", "warnings", "findings", "written"."""
+With --json: "markers" (per marker "chroma", "range", "coverage_percent", "lost_percent", "samples", "pictures",
+"area_px"), "separability" ("rows", "columns", "percent", "sentences"), "room" ("hue_px", "rivals"),
+"failures", "free_paints", "verdict", "grade", "warnings", "findings", "written"."""
 
 _SAMPLE = re.compile(r"(?P<name>[^=@]+)(?:@(?P<picture>\d+))?=(?P<box>[^=]+)")
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,32}")
@@ -62,24 +63,27 @@ def run(args: argparse.Namespace) -> int:
     """Learn, judge, print and write. Raises CalibrationError or SettingsError before anything is printed."""
     from rhot_app.calibration.colour_samples import ColourSamples
     from rhot_app.calibration.colours import solve_colours
+    from rhot_app.calibration.verdict import judged_anew
     from rhot_app.progress import ProgressLine
     from rhot_node.markers import load_markers, save_markers
 
     if not args.out.parent.is_dir():
         raise CalibrationError(f"--out {args.out}: the folder {args.out.parent} does not exist; create it first.")
     base = load_markers(args.markers) if args.markers else None
-    images = [_read(path) for path in args.image]
+    images, unreadable = _read_all(args.image)
     collector = ColourSamples()
     for sample in _samples(args.sample):
         collector.add(sample.name, _image(sample, images, args.image), _corners(sample))
     for image in images:
-        collector.keep_view(image)
+        if image is not None:
+            collector.keep_view(image)
     skin = _skin([parse_box(f"skin{text}" if text.startswith("@") else f"skin={text}", "--skin") for text in args.skin],
                  images, args.image)
+    announce_compilation()
     line = ProgressLine("colours", sys.stderr)
     report = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
     line.finish()
-    written = ""
+    verdict, written = judged_anew(report.verdict, unreadable), ""
     if report.verdict.acceptable:
         try:
             save_markers(args.out, report.markers)
@@ -87,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
             raise CalibrationError(f"--out {args.out}: cannot be written ({exc.strerror}).") from exc
         written = str(args.out)
     fields = {**report.to_json(), "images": [str(path) for path in args.image]}
-    return show(fields, _lines(report), report.verdict, as_json=args.json, written=written)
+    return show(fields, _lines(report), verdict, as_json=args.json, written=written)
 
 
 def parse_box(text: str, option: str) -> BoxArgument:
@@ -121,7 +125,24 @@ def _samples(texts: list[str]) -> list[BoxArgument]:
     return samples
 
 
-def _read(path: Path) -> YuvImage:
+def _read_all(paths: list[Path]) -> tuple[list[YuvImage | None], list[Finding]]:
+    """All pictures, None for those that cannot be decoded, of which the findings tell; some must remain."""
+    from rhot_app.calibration.verdict import Finding, Grade
+
+    images = [_read(path) for path in paths]
+    damaged = [path for path, image in zip(paths, images, strict=True) if image is None]
+    if len(damaged) == len(paths):
+        raise CalibrationError(_undecodable(paths[0]))
+    return images, [Finding("file", Grade.FAIR, f"{path} cannot be decoded.", "The file is damaged.",
+                            "The others were used without it; take it again.") for path in damaged]
+
+
+def _undecodable(path: Path) -> str:
+    return f"--image {path}: not an image that can be decoded (PNG, JPEG, BMP, TIFF)."
+
+
+def _read(path: Path) -> YuvImage | None:
+    """The picture, None for one that cannot be decoded; raises CalibrationError for one that is missing or tiny."""
     import cv2
     import numpy as np
 
@@ -131,18 +152,20 @@ def _read(path: Path) -> YuvImage:
         raise CalibrationError(f"--image {path}: there is no such file.")
     bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if bgr is None:
-        raise CalibrationError(f"--image {path}: not an image that can be decoded (PNG, JPEG, BMP, TIFF).")
+        return None
     if min(bgr.shape[:2]) < 16:
         raise CalibrationError(f"--image {path}: {bgr.shape[1]} x {bgr.shape[0]} px is too small to show a marker.")
     return from_bgr(np.asarray(bgr, dtype=np.uint8))
 
 
-def _image(box: BoxArgument, images: list[YuvImage], paths: list[Path]) -> YuvImage:
+def _image(box: BoxArgument, images: list[YuvImage | None], paths: list[Path]) -> YuvImage:
     """The picture that a box lies in; raises CalibrationError unless it does, wholly."""
     if not 0 <= box.picture < len(images):
         raise CalibrationError(f"{box.text!r} asks for picture {box.picture + 1}, and there "
                                f"{'is' if len(images) == 1 else 'are'} {len(images)}; give another --image.")
     image = images[box.picture]
+    if image is None:
+        raise CalibrationError(f"{_undecodable(paths[box.picture])} {box.text!r} is in it.")
     (width, height), (x, y, wide, high) = image.size, box.box
     if x < 0 or y < 0 or x + wide > width or y + high > height:
         raise CalibrationError(f"{box.text!r} reaches outside {paths[box.picture]}, which has {width} x {height} px.")
@@ -154,7 +177,7 @@ def _corners(box: BoxArgument) -> tuple[int, int, int, int]:
     return x, y, x + width, y + height
 
 
-def _skin(boxes: list[BoxArgument], images: list[YuvImage], paths: list[Path]) -> np.ndarray:
+def _skin(boxes: list[BoxArgument], images: list[YuvImage | None], paths: list[Path]) -> np.ndarray:
     import numpy as np
 
     from rhot_app.calibration.colours import NO_COLOURS
@@ -170,15 +193,18 @@ def _skin(boxes: list[BoxArgument], images: list[YuvImage], paths: list[Path]) -
 def _lines(report: ColourReport) -> list[str]:
     """The tables for people: every marker's model, and the separability matrix in percent."""
     lines = [f"{'marker':<12} {'Cb':>6} {'Cr':>6} {'hue +-':>7} {'chroma >=':>9} {'luma':>8} {'covered %':>9} "
-             f"{'pictures':>8}"]
+             f"{'pictures':>8} {'lost %':>6}"]
     chosen = {marker.id: marker.chroma for marker in report.markers.markers}
-    for one, covered in zip(report.samples, report.separability.coverage, strict=True):
+    for one, covered, lost in zip(report.samples, report.separability.coverage, report.rehearsal.lost, strict=True):
         chroma = chosen[one.name]
         lines.append(f"{one.name:<12} {chroma.cb:6.1f} {chroma.cr:6.1f} {chroma.hue_tolerance_deg:7.1f} "
                      f"{chroma.magnitude_min:9.1f} {chroma.luma_min:4d}-{chroma.luma_max:<3d} {100 * covered:9.1f} "
-                     f"{one.frames:8d}")
+                     f"{one.frames:8d} {100 * lost:6.1f}")
     columns = (*report.names, *report.separability.others)
     lines += ["", "taken for     " + " ".join(f"{name[:9]:>9}" for name in columns) + "   (% of the column)"]
     for name, row in zip(report.names, report.separability.matrix, strict=True):
         lines.append(f"{name:<13} " + " ".join(f"{100 * share:9.1f}" for share in row))
+    if max(one.frames for one in report.samples) == 1:
+        lines += ["", "Every colour was learnt from one picture. Boxes in others (NAME@2), with the marker in another "
+                  "place and turned, make the models safer."]
     return lines
