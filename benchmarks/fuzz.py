@@ -79,8 +79,9 @@ def wild(target: Target, mutator: Mutator, count: int) -> None:
     genuine = target.genuine()
     if not all(target.feed(data) for data in genuine):
         raise WronglyTakenError(f"{target.name}: a genuine datagram was refused; {target.refused()}")
-    for data in genuine:
-        rows, lengths = mutator.batch(data, count // len(genuine))
+    sources = [*genuine, *target.public()]
+    for data in sources:
+        rows, lengths = mutator.batch(data, count // len(sources))
         flat, width = rows.tobytes(), rows.shape[1]
         for at, length in zip(range(0, len(flat), width), lengths.tolist(), strict=True):
             if target.feed(flat[at:at + length]):

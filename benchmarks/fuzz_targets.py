@@ -17,11 +17,13 @@ from rhot_node.config import NodeSettings
 from rhot_node.errors import WireError
 from rhot_node.link import UdpLink
 from rhot_node.link_keys import Link, LinkKeys
+from rhot_node.presence import Presence
 from rhot_node.session import Sessions
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    Find,
     MarkerFlag,
     MarkerObservation,
     Message,
@@ -30,6 +32,7 @@ from rhot_node.wire.messages import (
     Start,
     StartEntry,
     Stop,
+    TrustState,
 )
 from rhot_node.wire.seal import Seal
 
@@ -56,6 +59,10 @@ class Target(Protocol):
 
     def genuine(self) -> list[bytes]:
         """The next datagrams that must be taken, tagged."""
+        ...
+
+    def public(self) -> list[bytes]:
+        """What anybody may say, and which changes nothing."""
         ...
 
     def feed(self, data: bytes) -> bool:
@@ -101,6 +108,10 @@ class Door:
         frame = Observations(1, self._session, self._sequence, NOW_NS - 9_000_000, NOW_NS - 200_000, 10**6, 10**6,
                              10**4, 640, 480, self._sequence, RIG.markers.checksum, markers)
         return [encode(frame, self.seal)]
+
+    def public(self) -> list[bytes]:
+        """Nothing."""
+        return []
 
     def feed(self, data: bytes) -> bool:
         """Through the door and into arrays, as in the receiver."""
@@ -150,6 +161,10 @@ class Replies:
         return [encode(ClockReply(1, 0, request.sequence, request.t1_master_ns, NOW_NS - 200_000, NOW_NS - 100_000, 1,
                                   NodeState.READY), self.seal)]
 
+    def public(self) -> list[bytes]:
+        """Nothing."""
+        return []
+
     def feed(self, data: bytes) -> bool:
         """As the command socket's thread does it, which has asked the next question meanwhile."""
         self._link.request(NOW_NS - 300_000)
@@ -194,6 +209,7 @@ class NodeSide:
         self._sender = self._drain.getsockname()
         self._keys, self._sessions = CountedKeys(), Sessions()
         self._udp = UdpLink(settings, NodeClock(), self._sessions, 7, lambda: NodeState.READY, self._keys)
+        self._udp.introduce = lambda: Presence(1, 7, "left", 1, 2, 3, 4, TrustState.PAIRED)
         self._session = SESSION
         self.renew()
 
@@ -211,6 +227,10 @@ class NodeSide:
             Start(self._session, self._sequence, (StartEntry(1, 50_001, 0), StartEntry(2, 50_002, 0))),
             Stop(self._session, self._sequence)]
         return [encode(message, self.seal) for message in messages]
+
+    def public(self) -> list[bytes]:
+        """A question who is there."""
+        return [encode(Find(1, self._sequence, 77))]
 
     def feed(self, data: bytes) -> bool:
         """As the link's thread does it."""
