@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import Advice, NodeStatus
+from rhot_app.project import Rig
 
 UNSEEN_S = 3.0
 """A marker that one camera has not seen for so long is worth a sentence."""
@@ -74,6 +75,13 @@ def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool) -> list[Advi
     return []
 
 
+def moved_advice(rig: Rig, moved: Mapping[int, str]) -> list[Advice]:
+    """One sentence for each node that is not where it was, by id, when the rig was read or saved."""
+    return [Advice("warning", f"Node {node.name} has moved from {moved[node.node_id]} to {node.address} and is used "
+                              "there. Save the rig, so that it is looked for there the next time.")
+            for node in rig.nodes if moved.get(node.node_id, node.address) != node.address]
+
+
 def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     status = facts.status
     name = status.name
@@ -89,7 +97,7 @@ def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
                                 f"`rhot pair {name} --rig FILE` here.")]
     if status.state == "silent":
         return [Advice("error", f"Node {name} does not answer at {facts.address}:{facts.udp_port}. Is it switched on, "
-                                "is rhot-node running there, and does the rig name the right address?"
+                                "is rhot-node running there, and on the same network? It is looked for by its id."
                                 + ("" if status.paired else " The rig has no key for it: if it waits to be paired, run "
                                                             "`rhot-node pair` there and `rhot pair` here."))]
     if status.state == "fault":

@@ -12,8 +12,10 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
+from rhot_app.engine.advice import moved_advice
 from rhot_app.engine.observer import NodeMessage, Observer
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
 from rhot_app.engine.status import Advice, EngineStatus
@@ -49,6 +51,7 @@ class Engine:
         self._make_tracker = make_tracker
         self._node_message = node_message
         self._notice = ""  # why the last recording ended
+        self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
         self._lock = threading.RLock()
         self._source = make_source(rig)
         try:
@@ -131,8 +134,10 @@ class Engine:
             target = path or self.rig_path
             if target is None:
                 raise EngineError("this rig came from no file; give a path to save it to.")
+            self._follow_nodes()
             accept(target, self.rig, "saving the engine's rig")
             self.rig_path = target
+            self._moved = {}
             return target
 
     def status(self) -> EngineStatus:
@@ -140,7 +145,9 @@ class Engine:
         with self._lock:
             if self.recorder is not None and self.recorder.failure:
                 self.record_stop()
+            self._follow_nodes()
             extra = [Advice("error", self._notice)] if self._notice else []
+            extra += moved_advice(self.rig, self._moved)
             return self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
                                          self._node_message, extra)
 
@@ -151,6 +158,16 @@ class Engine:
                 self.stop()
             self.record_stop()
             self._source.close()
+
+    def _follow_nodes(self) -> None:
+        """The rig has every node where the source has found it."""
+        nodes = tuple(link.node for link in self._source.links)
+        if not self._source.live or nodes == self.rig.nodes:
+            return
+        for old, new in zip(self.rig.nodes, nodes, strict=True):
+            if new.address != old.address:
+                self._moved.setdefault(old.node_id, old.address)
+        self.rig = self._observer.rig = msgspec.structs.replace(self.rig, nodes=nodes)
 
     def _listen(self) -> None:
         self._source.deliver_to(functools.partial(self._pipeline.take, self._source))

@@ -38,7 +38,8 @@ class ZeroconfBrowser:
         from zeroconf import IPVersion, ServiceBrowser, Zeroconf
         own = [str(one.ip) for one in own_interfaces() if not one.is_loopback]
         self._found = found
-        self._zeroconf = Zeroconf(interfaces=list(interfaces) or own or ["127.0.0.1"], ip_version=IPVersion.V4Only)
+        self._version = IPVersion.V4Only
+        self._zeroconf = Zeroconf(interfaces=list(interfaces) or own or ["127.0.0.1"], ip_version=self._version)
         try:
             ServiceBrowser(self._zeroconf, SERVICE, handlers=[self._take])
         except BaseException:
@@ -55,5 +56,5 @@ class ZeroconfBrowser:
         info = zeroconf.get_service_info(service_type, name, _RESOLVE_MS)
         presence = None if info is None else presence_of(info.decoded_properties, info.port)
         if info is not None and presence is not None:
-            for address in info.parsed_addresses():
+            for address in info.parsed_addresses(self._version):
                 self._found(Sighting(presence, address))

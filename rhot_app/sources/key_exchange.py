@@ -12,6 +12,7 @@ import zmq
 from zmq.utils.monitor import recv_monitor_message
 
 from rhot_app.errors import SourceError
+from rhot_app.project import RigNode
 from rhot_app.sources.node_link import NodeLink
 from rhot_node.keys import HexKey, KeyPair, connect_with
 
@@ -38,6 +39,7 @@ class _Peer:
     link: NodeLink
     socket: zmq.Socket[bytes]
     monitor: zmq.Socket[bytes]
+    endpoints: set[str]
     asked_ns: int = 0
 
 
@@ -67,6 +69,19 @@ class KeyExchange:
                 except zmq.Again:  # no connection: nothing is queued for a node that is not there
                     continue
 
+    def reach(self, link: NodeLink, places: Sequence[RigNode]) -> None:
+        """Be connected to where the node is and to these places where it may be. What does not have its key can make no
+        connection of any."""
+        peer = next((peer for peer in self._peers if peer.link is link), None)
+        if peer is None:
+            return
+        wanted = {_endpoint(node) for node in (link.node, *places)}
+        for endpoint in peer.endpoints - wanted:
+            peer.socket.disconnect(endpoint)
+        for endpoint in wanted - peer.endpoints:
+            peer.socket.connect(endpoint)
+        peer.endpoints = wanted
+
     def close(self) -> None:
         """Close all connections. May be called twice."""
         for peer in self._peers:
@@ -79,8 +94,8 @@ class KeyExchange:
     def _look(self, peer: _Peer) -> None:
         try:
             while True:
-                recv_monitor_message(peer.monitor, zmq.DONTWAIT)
-                peer.link.turned_away = True
+                event = recv_monitor_message(peer.monitor, zmq.DONTWAIT)
+                peer.link.turned_away |= event["endpoint"].decode() == _endpoint(peer.link.node)
         except zmq.Again:
             pass
         try:
@@ -112,9 +127,13 @@ class KeyExchange:
         connect_with(socket, own, node.public_key)
         monitor = socket.get_monitor_socket(_REFUSED)
         try:
-            socket.connect(f"tcp://{node.address}:{node.control_port}")
+            socket.connect(_endpoint(node))
         except zmq.ZMQError as exc:
             self.close()
             raise SourceError(f"node {node.name}: {node.address}:{node.control_port} is no address to connect to "
                               f"({exc.strerror}).") from exc
-        self._peers.append(_Peer(link, socket, monitor))
+        self._peers.append(_Peer(link, socket, monitor, {_endpoint(node)}))
+
+
+def _endpoint(node: RigNode) -> str:
+    return f"tcp://{node.address}:{node.control_port}"

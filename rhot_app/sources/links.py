@@ -16,6 +16,7 @@ from collections.abc import Callable
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.key_exchange import KeyExchange
+from rhot_app.sources.lost_nodes import LostNodes
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.tap import Tap
 from rhot_node.errors import WireError
@@ -59,6 +60,7 @@ class NodeLinks:
                          for link, port in zip(links, data_ports, strict=True) if not link.node.text_datagrams}
         self._broadcast = (rig.broadcast.address, rig.broadcast.port)
         self._addresses: dict[int, str | None] = {}
+        self._lost = LostNodes(list(self._links.values()), rig.broadcast.port, time.monotonic_ns())
         self._due_ns = dict.fromkeys(self._links, 0)
         self._sequence = 0
         self._lock = threading.Lock()
@@ -112,6 +114,9 @@ class NodeLinks:
         except OSError as exc:  # an unreachable host answers with an ICMP error on some systems
             log.debug("command socket: %s", exc)
         now_ns = time.monotonic_ns()
+        self._lost.step(now_ns)
+        for link in self._links.values():
+            self._keys.reach(link, self._lost.places(link))
         self._keys.step(now_ns)
         with self._lock:
             for node_id, link in self._links.items():
@@ -136,6 +141,7 @@ class NodeLinks:
         self._ending.set()
         if self._thread.is_alive():
             self._thread.join()
+        self._lost.close()
         self._keys.close()
         self._socket.close()
 
@@ -144,7 +150,7 @@ class NodeLinks:
             self.step(0.02)
 
     def _receive(self, flags: int) -> None:
-        data, ancillary, _, _ = self._socket.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE, flags)
+        data, ancillary, _, sender = self._socket.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE, flags)
         t_receive_ns, _ = self._kernel_time.receive_time_ns(ancillary)
         try:
             link = self._links.get(node_of(data))
@@ -154,7 +160,16 @@ class NodeLinks:
             return
         if link is not None and isinstance(reply, ClockReply):
             self._note(RecordKind.CLOCK_REPLY, reply.node_id, t_receive_ns, data)
-            link.take_reply(reply, t_receive_ns)
+            if link.take_reply(reply, t_receive_ns):
+                self._look_where(link, sender)
+
+    def _look_where(self, link: NodeLink, sender: tuple[str, int]) -> None:
+        """What the node alone can answer came from one of the places where it may be: it is there from now on."""
+        place = self._lost.at(link, sender)
+        if place is not None:
+            log.warning("node %s has moved from %s to %s", link.node.name, link.node.address, place.address)
+            link.node = place
+            self._addresses[place.node_id] = place.address
 
     def _ask(self, link: NodeLink, now_ns: int) -> None:
         known = link.clock.estimate_at(now_ns) is not None or link.silent(now_ns)
@@ -201,10 +216,12 @@ class NodeLinks:
         return Stop(session, self._sequence)
 
     def _send(self, link: NodeLink, datagram: bytes) -> None:
+        """To where the node is, and to every place where it may be."""
         address = self._addresses.get(link.node.node_id)
-        if address is not None:
+        known = [] if address is None else [(address, link.node.udp_port)]
+        for target in [*known, *((place.address, place.udp_port) for place in self._lost.places(link))]:
             try:
-                self._socket.sendto(datagram, (address, link.node.udp_port))
+                self._socket.sendto(datagram, target)
             except OSError as exc:  # unreachable now; the node is shown as silent until it answers
                 log.debug("node %s: %s", link.node.name, exc)
 

@@ -40,12 +40,12 @@ class NodeLink:
         self.unexpected_replies = 0
         self.turned_away = False  # the node lets no encrypted connection of ours in: it does not know us
         self.key_name = ""  # of the link whose key we have
+        self.last_reply_ns: int | None = None
         self._seal: Seal | None = None
         self._key_is_new = False  # what the node streams is tagged with another
         self._boot_id: int | None = None
         self._sequence = 0
         self._pending: dict[int, int] = {}
-        self._last_reply_ns: int | None = None
         self._last_start_ns: int | None = None
         self._ready_since_ns: int | None = None
         self._was_ours = False
@@ -68,7 +68,7 @@ class NodeLink:
 
     def wants_key(self, now_ns: int) -> bool:
         """Whether the node should be asked for the key of our datagrams, or whether it still knows it."""
-        return self._seal is None or now_ns - (self._last_reply_ns or 0) > UNANSWERED_NS
+        return self._seal is None or now_ns - (self.last_reply_ns or 0) > UNANSWERED_NS
 
     def use_key(self, name: str, key: bytes) -> None:
         """Tag what we say with `key` and believe only what is tagged with it, from now on."""
@@ -107,7 +107,7 @@ class NodeLink:
             self._ready_since_ns = None
         elif self._ready_since_ns is None:
             self._ready_since_ns = t4_master_ns
-        self._last_reply_ns = t4_master_ns
+        self.last_reply_ns = t4_master_ns
         return True
 
     def want(self, session: int, now_ns: int) -> None:
@@ -139,5 +139,5 @@ class NodeLink:
 
     def silent(self, now_ns: int) -> bool:
         """Whether neither an answer nor an accepted datagram came lately."""
-        heard_ns = max(self._last_reply_ns or 0, self.door.last_t_receive_ns)
+        heard_ns = max(self.last_reply_ns or 0, self.door.last_t_receive_ns)
         return heard_ns == 0 or now_ns - heard_ns > SILENT_NS

@@ -38,9 +38,10 @@ class FakeBoot:
 class TrustedNode:
     """The server under test and the sockets of those who try it."""
 
-    def __init__(self, folder: Path) -> None:
-        settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")), "127.0.0.1", 0, 0, 0,
-                                None, preview_hz=20.0, pairing_port=0, trust="paired")
+    def __init__(self, folder: Path, address: str = "127.0.0.1") -> None:
+        self.address = address
+        settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")), address, 0, 0, 0, None,
+                                preview_hz=20.0, pairing_port=0, trust="paired")
         self.keys_path = folder / "left.keys.json"
         self.clock = FakeBoot()
         self.offers = OfferFile(folder / "left.pairing.json", self.clock)
@@ -51,7 +52,7 @@ class TrustedNode:
         store = SettingsStore(folder / "left.json", settings)
         save_settings(store.path, settings)
         self.responder = Responder(store, self.sessions, self.server.pictures, NodeClock(),
-                                          lambda: {"state": "ready"}, lambda: {}, self.keys)
+                                   lambda: {"state": "ready"}, dict, self.keys)
         self.server.start(self.responder, Reception(self.trust, self.offers, lambda: ABOUT))
         self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
 
@@ -69,7 +70,7 @@ class TrustedNode:
         sock.setsockopt(zmq.RECONNECT_IVL, 20)
         if own is not None:
             connect_with(sock, own, server_key or self.trust.own.public_key)
-        sock.connect(f"tcp://127.0.0.1:{port}")
+        sock.connect(f"tcp://{self.address}:{port}")
         return sock
 
     def ask(self, sock: zmq.Socket[bytes], timeout_s: float = 3.0, **request: Any) -> dict[str, Any] | None:
