@@ -1,10 +1,12 @@
-"""Connect two nodes: enter their addresses, ask whether they are there, pair with them, and write a first rig file."""
+"""Connect two nodes: find them or enter their addresses, pair with them, and write a first rig file."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
@@ -20,8 +22,10 @@ from PySide6.QtWidgets import (
 
 from rhot_app.errors import RhotError
 from rhot_app.project import save_rig
+from rhot_app.sources.discovery import FoundNode
 from rhot_app.sources.pairing import PAIRING_PORT, NodeAddress
-from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig, pair_node
+from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig, look_for_nodes, pair_node
+from rhot_app.ui.found_nodes import Find, FoundNodes
 from rhot_app.ui.job import Job
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.pair_dialog import PairDialog
@@ -29,23 +33,33 @@ from rhot_app.ui.shapes import ShapeMark
 
 SIDES = ("left", "right")
 
+Ask = Callable[[list[NodeAddress]], list[NodeAnswer]]
+"""Asks every address who is there; called in a worker."""
+
 
 class NodesDialog(QDialog):
     """`rig_path` is the file written when the dialog was accepted."""
 
-    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None, find: Find = look_for_nodes,
+                 ask: Ask = ask_nodes) -> None:
         super().__init__(parent)
         self.setWindowTitle("Connect nodes")
         self.setProperty("guide", "nodes")
         self._scheme = scheme
         self._answers: list[NodeAnswer] = []
+        self._ask = ask
         self._job: Job | None = None
+        self._ask_again = False
         self.rig_path: Path | None = None
-        intro = QLabel("Enter the address of each Raspberry Pi that runs rhot-node; nodes are not found by themselves. "
-                       "The address stands on the node's console, and <b>hostname -I</b> prints it there. Left and "
-                       "right are as seen from behind the cameras.")
+        intro = QLabel("Select a node in the list and say which camera it is. Left and right are as seen from behind "
+                       "the cameras. The address of a node that is not found can be typed in: it stands on the node's "
+                       "console, and <b>hostname&nbsp;-I</b> prints it there.")
         intro.setWordWrap(True)
         intro.setTextFormat(Qt.TextFormat.RichText)
+        self.found = FoundNodes(find, SIDES)
+        self.found.chosen.connect(self.choose)
+        self.found.searched.connect(self._choose_by_name)
+        self.finished.connect(self.found.stop)
         self.hosts: list[QLineEdit] = []
         self.ports: list[QSpinBox] = []
         self._marks: list[ShapeMark] = []
@@ -86,11 +100,32 @@ class NodesDialog(QDialog):
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(16)
         layout.addWidget(intro)
+        layout.addWidget(self.found)
         layout.addLayout(grid)
         layout.addWidget(default)
         layout.addWidget(self.verdict)
         layout.addLayout(buttons)
-        self.resize(820, 340)
+        self.resize(820, 560)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Look for nodes as soon as somebody sees the dialog."""
+        super().showEvent(event)
+        if not event.spontaneous():
+            self.found.search()
+
+    def choose(self, side: int, node: FoundNode) -> None:
+        """Take the camera of a side from the list; when both are there they are asked."""
+        self.hosts[side].setText(node.address)
+        self.ports[side].setValue(node.presence.pairing_port)
+        if all(host.text().strip() for host in self.hosts):
+            self.ask()
+
+    def _choose_by_name(self) -> None:
+        """Nodes that are called as the sides are taken for these, unless something was typed or chosen before."""
+        for side, name in enumerate(SIDES):
+            named = [node for node in self.found.nodes if node.presence.name == name]
+            if len(named) == 1 and not self.hosts[side].text().strip():
+                self.choose(side, named[0])
 
     def _add_row(self, grid: QGridLayout, row: int, side: str) -> None:
         host, port, mark, reply = QLineEdit(), QSpinBox(), ShapeMark(14), QLabel("not asked yet")
@@ -106,6 +141,7 @@ class NodesDialog(QDialog):
         port.setAccessibleName(f"Pairing port of the {side} node")
         port.valueChanged.connect(self._forget_answers)
         reply.setWordWrap(True)
+        reply.setTextFormat(Qt.TextFormat.PlainText)  # it has the node's own words in it
         reply.setProperty("muted", True)
         mark.set_shape("square", self._scheme.neutral)
         pair = QPushButton("Pair …")
@@ -119,6 +155,12 @@ class NodesDialog(QDialog):
         self.ports.append(port)
         self._marks.append(mark)
         self.replies.append(reply)
+
+    def _show_not_asked(self) -> None:
+        for mark, reply in zip(self._marks, self.replies, strict=True):
+            mark.set_shape("square", self._scheme.neutral)
+            reply.setText("not asked yet")
+        self._forget_answers()
 
     def _forget_answers(self) -> None:
         self._answers = []
@@ -134,6 +176,7 @@ class NodesDialog(QDialog):
 
     def ask(self) -> None:
         """Ask both addresses in a worker."""
+        self._ask_again = self._job is not None
         if self._job is not None:
             return
         addresses = self.addresses()
@@ -141,11 +184,16 @@ class NodesDialog(QDialog):
         for mark, reply in zip(self._marks, self.replies, strict=True):
             mark.set_shape("ring", self._scheme.accent)
             reply.setText("asking …")
-        self._job = Job(lambda progress: ask_nodes(addresses), self._show_answers, self._show_error, None, self).start()
+        self._job = Job(lambda progress: self._ask(addresses), self._show_answers, self._show_error, None, self).start()
 
     def _show_answers(self, answers: list[NodeAnswer]) -> None:
         self._job = None
         self.ask_button.setEnabled(True)
+        if [answer.address for answer in answers] != self.addresses():  # something else was entered since
+            self._show_not_asked()
+            if self._ask_again:
+                self.ask()
+            return
         self._answers = answers
         for answer, mark, reply, button in zip(answers, self._marks, self.replies, self.pair_buttons, strict=True):
             shape, colour = ("disc", self._scheme.good) if answer.usable else (
@@ -163,6 +211,7 @@ class NodesDialog(QDialog):
         answer = self._answers[row]
         if answer.who is not None and PairDialog(answer.who.name, answer.address, pair_node, self).exec():
             self.ask()
+            self.found.search()
 
     def _show_error(self, sentence: str) -> None:
         self._job = None

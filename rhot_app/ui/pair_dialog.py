@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.sources.pairing import NodeAddress
@@ -30,6 +31,7 @@ class PairDialog(QDialog):
         self._pair = pair
         self._job: Job | None = None
         intro = QLabel(INTRO.format(name=name))
+        intro.setTextFormat(Qt.TextFormat.PlainText)  # the name is the node's own word
         intro.setWordWrap(True)
         self.code = QLineEdit()
         self.code.setPlaceholderText("code shown by the node")

@@ -1,7 +1,8 @@
-"""Connecting nodes by address: honest words for silence, pairing by code, a rig file when both are paired."""
+"""Connecting nodes, found or by address: honest words for silence, pairing by code, a rig file when both are paired."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,8 +14,11 @@ from PySide6.QtWidgets import QApplication
 from rhot_app.errors import PairingError, SourceError
 from rhot_app.keys import load_master_keys
 from rhot_app.project import load_rig
+from rhot_app.sources.discovery import Search, conflicts, together
+from rhot_app.sources.find_socket import Sighting
 from rhot_app.sources.pairing import Introduction, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig
+from rhot_app.ui.job import CancelledError
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.nodes_dialog import NodesDialog
 from rhot_app.ui.pair_dialog import PairDialog
@@ -24,17 +28,19 @@ from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 from rhot_node.pairing import show_code
 from rhot_node.pairing_offer import OfferFile
+from rhot_node.presence import Presence
 from rhot_node.reception import Reception
 from rhot_node.requests import Responder
 from rhot_node.trust import NodeTrust
+from rhot_node.wire.messages import NodeState, TrustState
 
 
 class Node:
     """The reception of a real node."""
 
     def __init__(self, folder: Path, node_id: int, name: str) -> None:
-        settings = NodeSettings(node_id, name, load_markers(resource_path("markers", "rhot6.json")), "127.0.0.1", 0, 0, 0,
-                                None, pairing_port=0)
+        settings = NodeSettings(node_id, name, load_markers(resource_path("markers", "rhot6.json")), "127.0.0.1", 0, 0,
+                                0, None, pairing_port=0)
         self.offers = OfferFile(folder / f"{name}.pairing.json")
         self.trust = NodeTrust(folder / f"{name}.keys.json")
         self.server = ControlServer(settings, self.trust)
@@ -72,7 +78,7 @@ def type_code(code: str, qtbot) -> PairDialog:
 
 
 def test_both_nodes_are_asked_paired_and_written_into_a_rig(nodes, qtbot, themed, tmp_path, monkeypatch):
-    dialog = NodesDialog(DARK)
+    dialog = NodesDialog(DARK, find=lambda progress: Search((), (), ()))
     qtbot.addWidget(dialog)
     dialog.show()
     assert not dialog.ask_button.isEnabled(), "there is nobody to ask yet"
@@ -142,3 +148,115 @@ def test_nodes_that_cannot_make_a_rig_are_refused():
         first_rig([answer, answer])
     with pytest.raises(SourceError, match="two nodes"):
         first_rig([answer, NodeAnswer(NodeAddress("10.0.0.2", 1), Introduction(4, "b", "ready", "paired", 1, 2, 3, 4))])
+
+
+def found(*who: tuple[str, int]) -> Search:
+    """Unpaired nodes of these names, whose ids and addresses end in these numbers."""
+    nodes = together(Sighting(Presence(last, last, name, 47800, 47801, 47802, 40000 + last, TrustState.UNPAIRED),
+                              f"10.0.0.{last}", NodeState.READY) for name, last in who)
+    return Search(nodes, conflicts(nodes), ())
+
+
+class Network:
+    """What the dialog finds, and who answers it; nothing is waited for."""
+
+    def __init__(self, *who: tuple[str, int]) -> None:
+        self.who = who
+        self.searches = 0
+        self.asked: list[list[str]] = []
+
+    def find(self, progress) -> Search:
+        self.searches += 1
+        progress("looking for nodes", 0.5)
+        return found(*self.who)
+
+    def ask(self, addresses: list[NodeAddress]) -> list[NodeAnswer]:
+        self.asked.append([str(address) for address in addresses])
+        who = [Introduction(address.pairing_port - 40000, "x", "ready", "paired", 1, 2, 3, 4) for address in addresses]
+        return [NodeAnswer(address, one, True) for address, one in zip(addresses, who, strict=True)]
+
+
+def open_dialog(network: Network, qtbot) -> NodesDialog:
+    dialog = NodesDialog(DARK, find=network.find, ask=network.ask)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    return dialog
+
+
+def row_of(dialog: NodesDialog, row: int) -> list[str]:
+    table = dialog.found.table
+    return [table.item(row, column).text() for column in range(table.columnCount())]
+
+
+def test_nodes_called_left_and_right_are_found_and_asked_by_themselves(qtbot, themed):
+    network = Network(("left", 11), ("right", 12), ("spare", 13))
+    dialog = open_dialog(network, qtbot)
+    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=5000)
+    assert row_of(dialog, 0) == ["left", "11", "10.0.0.11", "not paired yet", "ready"]
+    assert network.asked == [["10.0.0.11:40011", "10.0.0.12:40012"]]
+    assert "answers; it is ready. Paired with this computer" in dialog.replies[1].text()
+
+
+def test_what_was_typed_stays_and_a_node_is_chosen_from_the_list(qtbot, themed):
+    network = Network(("left", 11), ("spare", 13))
+    dialog = open_dialog(network, qtbot)
+    dialog.hosts[0].setText("my-pi.local")
+    qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=5000)
+    assert dialog.hosts[0].text() == "my-pi.local" and dialog.hosts[1].text() == "" and network.asked == []
+    assert not dialog.found.side_buttons[1].isEnabled()
+    dialog.found.table.selectRow(1)
+    qtbot.mouseClick(dialog.found.side_buttons[1], Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=5000)
+    assert network.asked == [["my-pi.local:47803", "10.0.0.13:40013"]]
+    qtbot.mouseClick(dialog.found.again, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: network.searches == 2 and dialog.found.again.isEnabled(), timeout=5000)
+    assert dialog.hosts[0].text() == "my-pi.local" and dialog.save_button.isEnabled()
+
+
+def test_an_answer_to_what_is_not_entered_any_more_does_not_count(qtbot, themed):
+    network = Network(("left", 11), ("right", 12), ("spare", 13))
+    dialog = open_dialog(network, qtbot)
+    begun, go_on = threading.Event(), threading.Event()
+
+    def slow(addresses: list[NodeAddress]) -> list[NodeAnswer]:
+        begun.set()
+        go_on.wait(5.0)
+        return network.ask(addresses)
+    dialog._ask = slow
+    qtbot.waitUntil(begun.is_set, timeout=5000)
+    dialog.choose(1, dialog.found.nodes[2])
+    go_on.set()
+    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=5000)
+    assert network.asked == [["10.0.0.11:40011", "10.0.0.12:40012"], ["10.0.0.11:40011", "10.0.0.13:40013"]]
+    assert [answer.address.host for answer in dialog._answers] == ["10.0.0.11", "10.0.0.13"]
+
+
+def test_conflicts_and_an_empty_network_are_told(qtbot, themed):
+    network = Network(("left", 11), ("left", 12))
+    dialog = open_dialog(network, qtbot)
+    qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=5000)
+    assert "Two nodes are called left" in dialog.found.told.text()
+    assert dialog.hosts[0].text() == "", "nobody can know which is meant"
+    network.who = ()
+    dialog.found.search()
+    qtbot.waitUntil(lambda: "No node was found" in dialog.found.told.text(), timeout=5000)
+    assert dialog.found.table.rowCount() == 0
+
+
+def test_a_search_ends_with_the_dialog(qtbot, themed):
+    stopped, go_on = threading.Event(), threading.Event()
+
+    def find(progress) -> Search:
+        go_on.wait(5.0)
+        try:
+            progress("looking for nodes", 0.5)
+        except CancelledError:
+            stopped.set()
+            raise
+        return found()
+    dialog = NodesDialog(DARK, find=find)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    dialog.reject()
+    go_on.set()
+    assert stopped.wait(5.0)

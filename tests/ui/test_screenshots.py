@@ -8,11 +8,16 @@ from fake_engine import FakeEngine
 from screen_pictures import SIZE, UPDATE, check, colours_in, picture_of
 
 from rhot_app.engine.status import Advice
-from rhot_app.sources.pairing import NodeAddress
+from rhot_app.sources.discovery import Search, conflicts, together
+from rhot_app.sources.find_socket import Sighting
+from rhot_app.sources.pairing import Introduction, NodeAddress
+from rhot_app.ui.backend.ping import NodeAnswer
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.nodes_dialog import NodesDialog
 from rhot_app.ui.pair_dialog import PairDialog
 from rhot_app.ui.rig_dialog import RigDialog
+from rhot_node.presence import Presence
+from rhot_node.wire.messages import NodeState, TrustState
 
 WRIST = "Right camera saw no wrist marker for 12 s: it is behind the forearm. Turn the hand or add rhot8."
 
@@ -86,9 +91,25 @@ def test_scene_alone(shown):
     check("scene", picture_of(shown.window), 60)
 
 
+def connecting() -> NodesDialog:
+    """Three nodes were found, two of them chosen by their names; one of these is not paired yet."""
+    def find(progress) -> Search:
+        nodes = [("left", 1, TrustState.PAIRED), ("right", 2, TrustState.UNPAIRED), ("right", 3, TrustState.OPEN)]
+        seen = together(Sighting(Presence(node_id, 1, name, 47800, 47801, 47802, 47803, trust),
+                                 f"192.168.1.{10 + node_id}", NodeState.READY) for name, node_id, trust in nodes)
+        return Search(seen, conflicts(seen), ())
+
+    def ask(addresses: list[NodeAddress]) -> list[NodeAnswer]:
+        who = [Introduction(k, name, "ready", "paired", 1, 2, 3, 4) for k, name in ((1, "left"), (2, "right"))]
+        return [NodeAnswer(address, one, one.name == "left") for address, one in zip(addresses, who, strict=True)]
+    dialog = NodesDialog(DARK, find=find, ask=ask)
+    dialog.found.searched.connect(lambda: dialog.choose(1, dialog.found.nodes[1]))
+    return dialog
+
+
 def test_dialogs(qtbot, bench):
     pairing = PairDialog("left", NodeAddress("192.168.1.11"), lambda address, code: "left")
-    for name, dialog in (("connect-nodes", NodesDialog(DARK)), ("pair-node", pairing),
+    for name, dialog in (("connect-nodes", connecting()), ("pair-node", pairing),
                          ("rig-cameras", RigDialog(FakeEngine().rig, "cameras")),
                          ("rig-markers", RigDialog(FakeEngine().rig, "markers"))):
         qtbot.addWidget(dialog)

@@ -1,4 +1,4 @@
-"""Ask nodes at given addresses who they are, and make a first rig of those that answer."""
+"""Look for nodes, ask those at given addresses who they are, and make a first rig of those that answer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import msgspec
 
 from rhot_app.errors import SourceError
 from rhot_app.keys import load_master_keys
+from rhot_app.progress import Progress
 from rhot_app.project import Rig, RigNode, load_rig
+from rhot_app.sources.discovery import Search, find_nodes
 from rhot_app.sources.pairing import TIMEOUT_S, Introduction, NodeAddress, ask_who, pair
 from rhot_node.files import resource_path
 
@@ -43,6 +45,11 @@ class NodeAnswer:
         if self.who.trust == "open":
             return f"{begin} Open: anybody on the network may see its pictures and steer it."
         return f"{begin} Not paired with this computer: press Pair."
+
+
+def look_for_nodes(progress: Progress) -> Search:
+    """Who is on the network. Waits, so call it in a worker."""
+    return find_nodes(progress=progress)
 
 
 def ask_nodes(addresses: list[NodeAddress], timeout_s: float = TIMEOUT_S) -> list[NodeAnswer]:

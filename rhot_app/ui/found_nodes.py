@@ -1,0 +1,140 @@
+"""The nodes that are found on the network, in a list that one can take the left and the right camera from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from rhot_app.progress import Progress
+from rhot_app.sources.discovery import FoundNode, Search
+from rhot_app.ui.job import Job
+from rhot_node.wire.messages import TrustState
+
+Find = Callable[[Progress], Search]
+"""Searches and reports its progress; called in a worker."""
+
+COLUMNS = ("name", "id", "address", "trust", "state")
+NOBODY = ("No node was found. Is rhot-node running there, and on the same network? Some networks let no search "
+          "through: then type the address in below.")
+_TRUST = {TrustState.OPEN: "open to everybody", TrustState.UNPAIRED: "not paired yet", TrustState.PAIRED: "paired"}
+
+
+class FoundNodes(QWidget):
+    """A list that fills itself. `chosen(side, node)`: the node is to be camera number `side`; `searched()`: the list is
+    complete."""
+
+    chosen = Signal(int, object)
+    searched = Signal()
+
+    def __init__(self, find: Find, sides: Sequence[str], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._find = find
+        self._job: Job | None = None
+        self.nodes: tuple[FoundNode, ...] = ()
+        self.table = QTableWidget(0, len(COLUMNS))
+        self.table.setHorizontalHeaderLabels(COLUMNS)
+        self.table.verticalHeader().hide()
+        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.table.horizontalHeader().setStretchLastSection(True)
+        self.table.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setTabKeyNavigation(False)
+        self.table.setShowGrid(False)
+        self.table.setAccessibleName("Nodes on the network")
+        self.table.setMinimumHeight(140)
+        self.table.itemSelectionChanged.connect(self._show_whether_chosen)
+        self.side_buttons = [self._side_button(number, side) for number, side in enumerate(sides)]
+        self.again = QPushButton("Search again")
+        self.again.setAutoDefault(False)
+        self.again.clicked.connect(self.search)
+        self.progress_bar = QProgressBar()
+        self.progress_bar.setRange(0, 100)
+        self.progress_bar.setTextVisible(False)
+        policy = self.progress_bar.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.progress_bar.setSizePolicy(policy)
+        self.told = QLabel("")
+        self.told.setTextFormat(Qt.TextFormat.PlainText)  # names come from anybody
+        self.told.setWordWrap(True)
+        buttons = QHBoxLayout()
+        for button in self.side_buttons:
+            buttons.addWidget(button)
+        buttons.addWidget(self.progress_bar, 1)
+        buttons.addWidget(self.again)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        layout.addWidget(self.table)
+        layout.addLayout(buttons)
+        layout.addWidget(self.told)
+
+    def search(self) -> None:
+        """Search anew in a worker; what was found before stays in sight until then."""
+        if self._job is None:
+            self.again.setEnabled(False)
+            self.progress_bar.show()
+            self.told.setText("Looking for nodes …")
+            self._job = Job(lambda progress: self._find(progress.report), self._show, self._show_error,
+                            self._show_progress, self).start()
+
+    def stop(self) -> None:
+        """End a search that nobody waits for any more."""
+        if self._job is not None:
+            self._job.cancel()
+            self._job = None
+
+    def _side_button(self, number: int, side: str) -> QPushButton:
+        button = QPushButton(f"Use as {side} camera")
+        button.setAutoDefault(False)
+        button.setEnabled(False)
+        button.setToolTip("Possible once a node is selected in the list.")
+        button.clicked.connect(lambda: self.chosen.emit(number, self.nodes[self.table.currentRow()]))
+        return button
+
+    def _show(self, found: Search) -> None:
+        self._rest()
+        self.nodes = found.nodes
+        self.table.clearSelection()
+        self.table.setRowCount(len(found.nodes))
+        for row, node in enumerate(found.nodes):
+            who = node.presence
+            state = "announces itself" if node.state is None else node.state.name.lower()
+            for column, text in enumerate((who.name, str(who.node_id), ", ".join(node.addresses), _TRUST[who.trust],
+                                           state)):
+                self.table.setItem(row, column, QTableWidgetItem(text))
+        sentences = [*([] if found.nodes else [NOBODY]), *found.conflicts, *found.notes]
+        self.told.setText("\n".join(sentences))
+        self._show_whether_chosen()
+        self.searched.emit()
+
+    def _show_error(self, sentence: str) -> None:
+        self._rest()
+        self.told.setText(sentence)
+
+    def _show_progress(self, text: str, fraction: float) -> None:
+        self.progress_bar.setValue(round(100 * fraction))
+
+    def _rest(self) -> None:
+        self._job = None
+        self.again.setEnabled(True)
+        self.progress_bar.reset()
+        self.progress_bar.hide()
+
+    def _show_whether_chosen(self) -> None:
+        for button in self.side_buttons:
+            button.setEnabled(bool(self.table.selectedItems()))
