@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
+from rhot_node.detect.follow import Followed, learn_noise, noise_level
 from rhot_node.detect.gate import ColourGate, Labels, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
@@ -18,31 +19,31 @@ from rhot_node.detect.light import DEAD_ZONE, SWITCHED, Light
 from rhot_node.detect.light_guess import MARKERS_LEAST, guess_light
 from rhot_node.detect.outline import INTERIOR, OUTSIDE
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
-from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, Track, lost_observation
+from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, TRACK_COLUMNS, Track, lost_observation
 from rhot_node.detect.whereabouts import Whereabouts, middle_of
 from rhot_node.markers import MarkerSet
-from rhot_node.wire.messages import MarkerFlag, MarkerObservation
+from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
 Blobs = NDArray[np.float64]
 
 AS_PLAUSIBLE = 0.3  # merit of a second blob, as a fraction of the best, that makes the choice ambiguous
 CANDIDATES = 4  # blobs per marker that are measured until one proves to be paint
-NOISE_START = 1.5  # grey levels of chroma noise, until the first frames have told
-NOISE_MIN = 0.5  # quantisation alone leaves 0.3
-NOISE_GAIN = 0.1
+NOISE_START, NOISE_START_BLOCKS = 1.5, 20.0  # grey levels of chroma noise, until so many blocks of paint have told
 SUDDENLY = 2  # markers fewer in plain view than in the last frame: was a lamp switched?
 GUESS_EVERY = 20  # frames without all markers in plain view until the light is guessed anew
 STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
 HAND_PASSES = 2  # of finding the hand by its likeliest markers, and those by the hand
+GLANCE = 8  # frames between looks at the light and the hand as a whole while all markers are followed in plain view
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
 
 
 class FastDetector:
     """Finds every marker of a set in one YUV420 image after the other; see `rhot_node.detect.detector.Detector`."""
 
-    def __init__(self, markers: MarkerSet) -> None:
+    def __init__(self, markers: MarkerSet, *, precise: bool = True) -> None:
+        """`precise` False: markers in plain view are placed by their soft centroid, without a fit of the outline."""
         self._set = markers
         self._markers = markers.markers
         self._light = Light(markers)
@@ -55,8 +56,12 @@ class FastDetector:
         self._request = np.zeros(m.REQUEST_COLUMNS)
         self._row = np.zeros(m.MEASURE_COLUMNS)
         self._scratch = m.Scratch(0, 0)
+        self._states = np.zeros((len(self._markers), TRACK_COLUMNS))
         self._tracks: list[Track] = []
-        self._noise_variance = NOISE_START**2
+        self._noise_variance = np.array([NOISE_START**2, NOISE_START_BLOCKS])
+        self._followed = Followed([marker.shape for marker in self._markers], self._states, self._noise_variance)
+        self._precise = precise
+        self._until_glance = 0
         self._paint = np.zeros((len(self._markers), 3))
         self._paint_pixels = np.zeros(len(self._markers))
         self.reset()
@@ -69,6 +74,7 @@ class FastDetector:
 
     def paint_colours(self) -> NDArray[np.float64]:
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was found last."""
+        self._note_paint()
         return self._paint.copy()
 
     def paint_mask(self, image: YuvImage, seen: MarkerObservation) -> NDArray[np.bool_]:
@@ -93,12 +99,31 @@ class FastDetector:
             guess_light(image, self._light, self._gate, self._set)
             seen = self._find_in_new_light(image)
         else:
+            self._followed.follow(image, self._precise)
+            if self._followed.count == len(self._markers):
+                return self._glance(image)
             seen = self._find(image)
             if ((self._light_in_doubt(seen) and guess_light(image, self._light, self._gate, self._set))
                     or self._read_light(seen, STEADY) >= SWITCHED):  # somebody switched a lamp
                 seen = self._find_in_new_light(image)
         self._fresh, self._plain = False, len(self._plainly(seen))
         return seen
+
+    def _glance(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """The markers when all are followed in plain view; now and then with a look at the light and the hand."""
+        self._until_glance -= 1
+        if self._until_glance > 0:
+            return self._followed.observations()
+        self._until_glance = GLANCE
+        self._plain, self._until_guess = len(self._markers), GUESS_EVERY
+        seen = self._find(image)
+        self._read_light(seen, STEADY**GLANCE)
+        return seen
+
+    def _note_paint(self) -> None:
+        """The colours of the markers that are followed."""
+        for index, colour in self._followed.paint():
+            self._paint[index] = colour
 
     def _light_in_doubt(self, seen: tuple[MarkerObservation, ...]) -> bool:
         """Whether markers went out of plain view together, or some have not been in plain view for a while."""
@@ -125,6 +150,7 @@ class FastDetector:
 
     def _read_light(self, seen: tuple[MarkerObservation, ...], steady: float) -> float:
         """Take the light from the markers that are plainly seen; returns by how much its warmth changed."""
+        self._note_paint()
         plain = self._plainly(seen)
         if len(plain) < MARKERS_LEAST:
             steady = STEADY_FEW  # things of a marker's colour must not tell the light
@@ -132,20 +158,25 @@ class FastDetector:
 
     def _find(self, camera_image: YuvImage) -> tuple[MarkerObservation, ...]:
         """Every marker, in the picture as it would look in the light of the calibration."""
-        image = self._light.balanced(camera_image)
         found: dict[int, MarkerObservation] = {}
         lost = []
+        if self._followed.count:
+            found = {mark.index: mark for mark in self._followed.observations()}
+        image = camera_image if len(found) == len(self._tracks) else self._light.balanced(camera_image)
         for index, track in enumerate(self._tracks):
+            if index in found:
+                continue
             if track.alive and self._measure(image, index, track.request(self._request)) \
                     and not track.is_litter(self._row.tolist()):
-                found[index] = self._observe(index, MarkerFlag(0))
+                found[index] = self._observe(index, NO_FLAGS, camera_image)
             else:
                 lost.append(index)
         for index in self._strays(found):  # what was taken for a marker, far from the hand
-            self._tracks[index] = Track(self._markers[index].shape)
+            self._tracks[index] = Track(self._markers[index].shape, self._states[index])
+            self._followed.drop(index)
             lost.append(index)
         if lost:
-            self._acquire(image, lost, found)
+            self._acquire(camera_image, lost, found)
         return tuple(found[index] for index in range(len(self._tracks)))
 
     def labels(self, image: YuvImage) -> Labels:
@@ -173,11 +204,12 @@ class FastDetector:
         return everything
 
     def _forget_tracks(self) -> None:
-        self._tracks = [Track(marker.shape) for marker in self._markers]
+        self._tracks = [Track(marker.shape, state) for marker, state in zip(self._markers, self._states, strict=True)]
+        self._followed.forget()
 
     @property
     def _noise(self) -> float:
-        return max(math.sqrt(self._noise_variance), NOISE_MIN)
+        return float(noise_level(self._noise_variance))
 
     def _fit_scratch(self, image: YuvImage) -> None:
         if self._scratch.mask.shape != image.u.shape:
@@ -190,20 +222,23 @@ class FastDetector:
         if not m.measure(image.y, image.u, image.v, self._sector, index + 1, self._directions[index], request,
                          self._scratch.arrays, row):
             return False
-        if row[m.NOISE_COUNT] >= 4:
-            gain = NOISE_GAIN * min(1.0, row[m.NOISE_COUNT] / 50.0)
-            self._noise_variance += gain * (row[m.NOISE_SUM] / row[m.NOISE_COUNT] - self._noise_variance)
+        learn_noise(self._noise_variance, row[m.NOISE_SUM], row[m.NOISE_COUNT])
         return True
 
-    def _observe(self, index: int, flags: MarkerFlag) -> MarkerObservation:
-        """Take what was measured into the marker's track, and note the colour of its paint."""
+    def _observe(self, index: int, flags: MarkerFlag, camera_image: YuvImage) -> MarkerObservation:
+        """Take what was measured into the marker's track, and follow it from now on when it is in plain view."""
         row = self._row
         self._paint_pixels[index] = row[m.PAINT_PIXELS]
         self._paint[index] = self._light.unbalanced(row[m.PAINT_Y:m.PAINT_CR + 1])
-        return self._tracks[index].observe(index, row.tolist(), self._noise, flags)
+        values = row.tolist()
+        seen = self._tracks[index].observe(index, values, self._noise, flags)
+        if not seen.flags & DOUBTFUL:
+            self._followed.start(camera_image, index, values)
+        return seen
 
-    def _acquire(self, image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
+    def _acquire(self, camera_image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
         """Search the whole frame for the lost markers and state each as found or lost."""
+        image = self._light.balanced(camera_image)
         blobs = self._gate.blobs(image, lost).copy()
         own = {index: blobs[blobs[:, LABEL] == index + 1] for index in lost}
         worth = self._worth(own)
@@ -213,7 +248,7 @@ class FastDetector:
             for blob in ranked[:CANDIDATES]:
                 if self._measure(image, index, self._blob_request(index, blob)):
                     self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
-                    found[index] = self._observe(index, flags)
+                    found[index] = self._observe(index, flags, camera_image)
                     break
             else:
                 track.lose()

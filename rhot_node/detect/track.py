@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
@@ -28,6 +29,8 @@ SLIVER_AREA = 0.15  # of the expected area: too little to be believed without th
 JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
 FLOOR_VARIANCE = 4e-4  # px^2: sampling and shading leave about 0.02 px
+OUTLINE_FLOOR_VARIANCE = 1.5e-4  # px^2: of a fitted outline
+AROUND_VARIANCE = 0.09  # px^2 per squared contrast that the surroundings vary by, which they may do right beside it
 BAND_FLOOR_VARIANCE = 3e-3  # px^2: the fit of a band's curvature magnifies them
 SMALL_AREA, SMALL_VARIANCE = 22.0, 0.01  # chroma px^2, px^2: too few inner pixels to see the shading
 NOISE_INFLATION = 1.2  # paint and surroundings are themselves means of few noisy pixels
@@ -37,24 +40,34 @@ CHROMA_TO_LUMA = 2.0
 SITING = 0.5  # chroma (x, y) lies at luma 2 (x, y) + 0.5
 
 
-@dataclass(slots=True)
-class Track:
-    """State between frames; chroma pixels."""
+# Columns of a track's state; chroma pixels. VX, VY: px per frame. AREA: expected in the next frame; RATE: the trend of
+# its logarithm per frame (approach, foreshortening). EXTENT: length along the major axis. FITTED: a band's curvature is
+# known. SAG_X, SAG_Y: from a band's centre to its centroid.
+X, Y, VX, VY, AREA, RATE, EXTENT, LEVEL, FITTED, SAG_X, SAG_Y, ALIVE, MISSED = range(13)
+TRACK_COLUMNS = 13
 
-    shape: Shape
-    alive: bool = False
-    missed: int = MEMORY_FRAMES
-    x: float = 0.0
-    y: float = 0.0
-    vx: float = 0.0  # px per frame
-    vy: float = 0.0
-    area: float = 0.0  # expected in the next frame
-    rate: float = 0.0  # trend of its logarithm per frame: approach, foreshortening
-    extent: float = 0.0  # length along the major axis
-    level: float = 0.0
-    fitted: bool = False  # a band's curvature is known
-    sag_x: float = 0.0  # from a band's centre to its centroid
-    sag_y: float = 0.0
+
+def _field(column: int) -> Any:
+    return property(lambda track: track.state[column].item(),
+                    lambda track, value: track.state.__setitem__(column, value))
+
+
+class Track:
+    """State between frames, in a row of numbers that compiled code shares."""
+
+    __slots__ = ("shape", "state")
+
+    x, y, vx, vy = _field(X), _field(Y), _field(VX), _field(VY)
+    area, rate, extent, level = _field(AREA), _field(RATE), _field(EXTENT), _field(LEVEL)
+    fitted, sag_x, sag_y = _field(FITTED), _field(SAG_X), _field(SAG_Y)
+    alive, missed = _field(ALIVE), _field(MISSED)
+
+    def __init__(self, shape: Shape, state: NDArray[np.float64] | None = None) -> None:
+        """`state` (TRACK_COLUMNS,) is taken over and cleared; None: an own one."""
+        self.shape = shape
+        self.state = np.zeros(TRACK_COLUMNS) if state is None else state
+        self.state[:] = 0.0
+        self.missed = MEMORY_FRAMES
 
     @property
     def remembered(self) -> bool:
@@ -98,7 +111,7 @@ class Track:
 
     def lose(self) -> None:
         """Not in this frame."""
-        self.alive = False
+        self.alive = 0.0
         self.missed = min(self.missed + 1, MEMORY_FRAMES)
 
     def observe(self, index: int, row: Row, noise: float, flags: MarkerFlag) -> MarkerObservation:
@@ -133,8 +146,7 @@ class Track:
     def _plausible_bias(self, row: Row, ratio: float, extent: float, flags: MarkerFlag) -> float:
         """Standard deviation, chroma px, of how far what is hidden or mistaken may have drawn the centroid."""
         whole = max(extent, self.extent)
-        change = 1.0 - min(ratio, 1.0 / ratio)
-        bias = 0.5 * change * whole if change > STEADY_AREA else 0.0
+        bias = hidden_bias(ratio, whole)
         if flags & MarkerFlag.PARTIAL:
             bias = max(bias, 0.05 * whole)
         if flags & MarkerFlag.EDGE:
@@ -145,51 +157,79 @@ class Track:
 
     def _update(self, row: Row, x: float, y: float, extent: float, ratio: float, known: bool,
                 flags: MarkerFlag) -> None:
-        gap = self.missed + 1
-        if known:
-            gain = VELOCITY_GAIN if self.alive else 1.0
-            self.vx += gain * ((x - self.x) / gap - self.vx)
-            self.vy += gain * ((y - self.y) / gap - self.vy)
-        else:
-            self.vx = self.vy = 0.0
-        self.x, self.y, self.level = x, y, row[m.LEVEL]
         if not known:
-            self.area, self.rate, self.extent = row[p.AREA], 0.0, extent
-        elif flags & (MarkerFlag.PARTIAL | MarkerFlag.EDGE) and ratio < 1.0:
-            self.area, self.rate = self.area * HIDDEN_DECAY, 0.0
-        else:
-            surprise = math.log(ratio)
-            self.rate = min(max(self.rate + RATE_GAIN * surprise, -RATE_MAX), RATE_MAX)
-            self.area *= math.exp(AREA_GAIN * surprise + self.rate)
-            self.extent = extent
-        if not known:
-            self.fitted, self.sag_x, self.sag_y = False, 0.0, 0.0
+            self.state[VX:EXTENT] = self.state[FITTED:ALIVE] = 0.0
+        hidden = bool(flags & (MarkerFlag.PARTIAL | MarkerFlag.EDGE)) and ratio < 1.0
+        take(self.state, x, y, row[p.AREA], extent, row[m.LEVEL], hidden)
         if row[p.FIT]:
             sag = 0.25 * math.pi * row[p.SAG]
-            self.fitted, self.sag_x, self.sag_y = True, -row[p.AXIS_Y] * sag, row[p.AXIS_X] * sag
-        self.alive, self.missed = True, 0
+            self.fitted, self.sag_x, self.sag_y = 1.0, -row[p.AXIS_Y] * sag, row[p.AXIS_X] * sag
+
+
+@njit(cache=True)
+def take(state, x, y, area, extent, level, hidden):
+    """Take what was seen into a track's state: motion, and, unless something hides a part, size and its trend.
+
+    A track whose area is 0 knows nothing yet.
+    """
+    gap = state[MISSED] + 1.0
+    if state[AREA] > 0.0:
+        gain = VELOCITY_GAIN if state[ALIVE] > 0.0 else 1.0
+        state[VX] += gain * ((x - state[X]) / gap - state[VX])
+        state[VY] += gain * ((y - state[Y]) / gap - state[VY])
+        if hidden:
+            state[AREA] *= HIDDEN_DECAY
+            state[RATE] = 0.0
+        else:
+            surprise = math.log(area / state[AREA])
+            state[RATE] = min(max(state[RATE] + RATE_GAIN * surprise, -RATE_MAX), RATE_MAX)
+            state[AREA] *= math.exp(AREA_GAIN * surprise + state[RATE])
+            state[EXTENT] = extent
+    else:
+        state[AREA], state[EXTENT] = area, extent
+    state[X], state[Y], state[LEVEL] = x, y, level
+    state[ALIVE], state[MISSED] = 1.0, 0.0
+
+
+@njit(cache=True)
+def hidden_bias(ratio, whole):
+    """Standard deviation, chroma px, of how far hiding or uncovering may have drawn the centroid of a marker.
+
+    `ratio`: of its area to what was expected; `whole`: its length.
+    """
+    change = 1.0 - min(ratio, 1.0 / ratio)
+    return 0.5 * change * whole if change > STEADY_AREA else 0.0
+
+
+@njit(cache=True)
+def luma_values(x, y, area, cov_xx, cov_xy, cov_yy, floor, bias, level, noise, out):
+    """Write x, y, diameter, the covariance (xx, xy, yy) and the quality of an observation, luma px.
+
+    Given in chroma px, the covariance per unit variance of the noise; `floor`, luma px^2, is what sampling leaves.
+    """
+    scale = CHROMA_TO_LUMA**2 * NOISE_INFLATION * noise**2
+    if area < SMALL_AREA:
+        floor += SMALL_VARIANCE
+    widened = floor + (CHROMA_TO_LUMA * bias) ** 2
+    out[0], out[1] = CHROMA_TO_LUMA * x + SITING, CHROMA_TO_LUMA * y + SITING
+    out[2] = CHROMA_TO_LUMA * math.sqrt(4.0 * area / math.pi)
+    out[3], out[4], out[5] = scale * cov_xx + widened, scale * cov_xy, scale * cov_yy + widened
+    out[6] = min(1.0, level / (15.0 * noise)) * min(1.0, area / 12.0)
 
 
 def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: float, ratio: float,
                  flags: MarkerFlag) -> MarkerObservation:
-    scale = CHROMA_TO_LUMA**2 * NOISE_INFLATION * noise**2
+    out = np.empty(7)
     floor = BAND_FLOOR_VARIANCE if row[p.FIT] else FLOOR_VARIANCE
-    if row[p.AREA] < SMALL_AREA:
-        floor += SMALL_VARIANCE
-    widened = floor + (CHROMA_TO_LUMA * bias) ** 2
-    area = row[p.AREA]
-    quality = min(1.0, row[m.LEVEL] / (15.0 * noise)) * min(1.0, area / 12.0)
+    luma_values(x, y, row[p.AREA], row[p.COV_XX], row[p.COV_XY], row[p.COV_YY], floor, bias, row[m.LEVEL], noise, out)
+    x, y, diameter, cov_xx, cov_xy, cov_yy, quality = out.tolist()
     if flags & MarkerFlag.PARTIAL:
         quality *= min(ratio, 0.8)
     if flags & MarkerFlag.EDGE:
         quality *= 0.7
     if flags & MarkerFlag.AMBIGUOUS:
         quality *= 0.5
-    return MarkerObservation(
-        index=index, x=CHROMA_TO_LUMA * x + SITING, y=CHROMA_TO_LUMA * y + SITING,
-        diameter=CHROMA_TO_LUMA * math.sqrt(4.0 * area / math.pi),
-        cov_xx=scale * row[p.COV_XX] + widened, cov_xy=scale * row[p.COV_XY],
-        cov_yy=scale * row[p.COV_YY] + widened, quality=quality, flags=flags)
+    return MarkerObservation(index, x, y, diameter, cov_xx, cov_xy, cov_yy, quality, flags)
 
 
 def lost_observation(index: int) -> MarkerObservation:
