@@ -60,7 +60,7 @@ def make_node(folder: Path) -> list[str]:
         for k in range(FRAMES):
             writer.append(k * round(1e9 / FPS), frame)
     save_settings(folder / "node.json", NodeSettings(
-        1, "left", markers, bind_address="127.0.0.1", udp_port=0, control_port=0, preview_port=0, pairing_port=0,
+        1, "left", markers, udp_port=0, control_port=0, preview_port=0, pairing_port=0,
         broadcast_port=None, camera=CameraSettings(width=SIZE[0], height=SIZE[1], fps=FPS)))
     return ["--settings", str(folder / "node.json"), "--camera", f"yuv:{folder / 'frames'}", "--loop"]
 
