@@ -44,6 +44,21 @@ def grab(path: Path) -> np.ndarray:
     return np.asarray(picture)
 
 
+def await_moving_hand(folder: Path, timeout_s: float = START_S) -> None:
+    """Wait until a window shows a hand that moves."""
+    scene = np.s_[80:540, 220:900]
+    end = time.monotonic() + timeout_s
+    last = grab(folder / "last.png")
+    while time.monotonic() < end:
+        time.sleep(0.7)
+        now = grab(folder / "now.png")
+        moved = (np.abs(last[scene].astype(int) - now[scene]).max(axis=2) > 40).sum() > 100
+        if moved and len(np.unique(now.reshape(-1, 3) >> 4, axis=0)) > 200:
+            return
+        last = now
+    raise AssertionError("no window shows a hand that moves")
+
+
 def tracks(client: EngineClient) -> bool:
     """Whether the newest state is a hand that is being tracked."""
     state = client.state
@@ -69,13 +84,7 @@ def test_the_demo_shows_a_moving_hand_and_survives_crashes(bench: Bench) -> None
     window = bench.start(["rhot_app", "demo", *options], "window")
     with EngineClient(bench.sockets) as client:
         wait_until(client, lambda: tracks(client), START_S, "the demo tracks the hand")
-        states_of(client, 3.0)  # until the window has drawn it
-        first = grab(bench.folder / "first.png")
-        time.sleep(0.7)
-        second = grab(bench.folder / "second.png")
-        assert len(np.unique(first.reshape(-1, 3) >> 4, axis=0)) > 200, "the window is nearly blank"
-        scene = np.s_[80:540, 220:900]
-        assert (np.abs(first[scene].astype(int) - second[scene]).max(axis=2) > 40).sum() > 100, "the hand does not move"
+        await_moving_hand(bench.folder)
         if os.environ.get("RHOT_UPDATE_SCREENSHOTS") == "1":
             states_of(client, 30.0)  # until the plots are full
             grab(README_PICTURE)
@@ -88,7 +97,7 @@ def test_the_demo_shows_a_moving_hand_and_survives_crashes(bench: Bench) -> None
         assert len(alive(started)) == len(started), "engine and nodes outlive the window"
 
         second_window = bench.start(["rhot_app", *options], "second window")
-        time.sleep(5.0)
+        await_moving_hand(bench.folder)
         (engine,) = [process for process in started if process.role == "engine"]
         os.kill(engine.pid, 9)
         wait_until(client, lambda: client.status is not None and client.status.pid != engine.pid, START_S,
