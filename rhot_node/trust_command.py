@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of both commands."""
     installed = SETTINGS if SETTINGS.exists() else None
     parser.add_argument("--settings", type=Path, required=installed is None, default=installed, metavar="FILE",
-                        help="settings of this node (JSON, see docs/node.md); the keys lie beside it. Default: those of "
+                        help="settings of this node (JSON, see docs/node.md); keys lie beside it. Default: those of "
                              f"the installed service, {SETTINGS}")
 
 

@@ -92,8 +92,8 @@ def camera_seed(scene: Scene, index: int) -> int:
 
 
 def save_shot(shot: Shot, folder: Path) -> None:
-    """Write ``shot.json``, the rig file and the settings of its nodes: on this machine only, and open, because the folder
-    may be given to others and no key should be. Raises OSError."""
+    """Write ``shot.json``, the rig file and the settings of its nodes: on this machine only, and open, because the
+    folder may be given to others and no key should be. Raises OSError."""
     scene = shot.scene
     firsts = [FIRST_PORT + 10 * index for index in range(len(scene.names))]
     ports = tuple(NodePorts(first, first + 1, first + 2, first + 3) for first in firsts)

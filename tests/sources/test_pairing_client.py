@@ -88,7 +88,7 @@ def test_a_wrong_code_and_no_code_pair_nothing(node: TrustedNode, address: NodeA
     with pytest.raises(PairingError, match="rhot-node pair"):
         pair(address, new_code(), load_master_keys())
     node.offers.renew()
-    with pytest.raises(PairingError, match="code is wrong.*4 more tries"):
+    with pytest.raises(PairingError, match=r"code is wrong.*4 more tries"):
         pair(address, new_code(), load_master_keys())
     with pytest.raises(TrustError, match="15 letters"):
         pair(address, "1234", load_master_keys())
