@@ -114,7 +114,8 @@ class NodeLinks:
         except OSError as exc:  # an unreachable host answers with an ICMP error on some systems
             log.debug("command socket: %s", exc)
         now_ns = time.monotonic_ns()
-        self._lost.step(now_ns)
+        with self._lock:
+            self._lost.step(now_ns)
         for link in self._links.values():
             self._keys.reach(link, self._lost.places(link))
         self._keys.step(now_ns)
