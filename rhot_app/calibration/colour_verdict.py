@@ -20,6 +20,7 @@ from rhot_node.markers import ChromaModel
 
 OVERLAP = 0.1  # of a colour taken for a marker, over all lamps: less are specks, which the detector leaves out
 SAME_COLOUR = 0.35  # of one marker taken for another: only chance tells them apart
+SKIN_COLOUR = 0.75  # of skin taken for a marker: also where that is not in shade
 LOST = 0.1  # of the pictures, over all lamps: more is not only by lamps at the end of the range
 NEVER_FOUND = 0.9  # of the pictures in which a marker is lost, while something else has its colour: it is that
 RIVAL = 0.7  # of the marker's own merit: a thing that is about as good a marker
@@ -67,8 +68,8 @@ def _skin(separability: Separability, free: Sequence[str], joined: set[str]) -> 
     for name in separability.names:
         share = separability.pair(name, SKIN)
         if share >= OVERLAP:
-            grade, cause = (POOR, "For the camera it is skin.") if share >= SAME_COLOUR else \
-                (FAIR, "In some light skin has this colour: the marker's place will jump onto the hand.")
+            grade, cause = (POOR, "For the camera it is skin.") if share >= SKIN_COLOUR else \
+                (FAIR, "In some light or shade skin has this colour: the marker's place will jump onto the hand.")
             yield Finding("skin", grade, f"{name} and skin overlap by {100 * share:.0f} %.", cause, remedy)
         elif name in joined:
             yield Finding("runs-on", FAIR, f"The colour of {name} goes on beyond what a marker can be.",

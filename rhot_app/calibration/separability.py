@@ -25,6 +25,7 @@ from rhot_node.markers import MarkerSet
 
 SKIN, ROOM = "skin", "room"
 CHANCES = chances(LAMPS)
+SHADES = (1.0, 0.8)  # of a marker's level: beside skin that faces the lamp it may be turned away and get 40 % less
 PIXELS = 3000  # of each colour that are tried by every lamp
 
 
@@ -103,9 +104,10 @@ class Judge:
         found[(luma < limits[:, 0]) | (luma > limits[:, 1])] = 0
         sector = self._sector[u, v]
         along = self._directions @ colours[:, 1:].T.astype(np.float64)
-        strong = along >= WINDOW_LEVEL * lamp.gains[1] * self._levels[:, None]
+        least = WINDOW_LEVEL * lamp.gains[1] * self._levels[:, None]
         numbers = np.arange(1, len(self._levels) + 1)[:, None]
-        return np.mean(found == numbers, axis=1), np.mean((sector == numbers) & strong, axis=1)
+        joining = np.mean([(sector == numbers) & (along >= shade * least) for shade in SHADES], axis=(0, 2))
+        return np.mean(found == numbers, axis=1), joining
 
 
 def judge_colours(markers: MarkerSet, samples: Sequence[PaintSamples], skin: Colours,
