@@ -1,6 +1,6 @@
 """Colour calibration on the twin: is a marker lost by another lamp, and does the warning come where tracking fails?
 
-    python benchmarks/colours.py [--seeds N] [--frames N] [--only lamps|paints] [--json FILE]
+    python benchmarks/colours.py [--seeds N] [--frames N] [--only lamps|paints|others] [--json FILE]
 
 First table: colours learnt by lamps of 4300, 6500 and 3000 K in turn, on wood with things on it and on cloth; then
 other poses by lamps of 3000 to 6500 K with 80 to 120 % of the light. Every marker of which half can be seen counts;
@@ -8,7 +8,7 @@ lost, or found in another place or together with something else. Compared with t
 
 Second table: one paint mixed step by step with the colours of skin, wood and another marker. Every marker counts.
 Warned: the calibration says that it will be mistaken or lost; advice on exposure (burnt, pale) is listed, not counted.
-Fails: in more than 5 % of the pictures the marker is lost or found elsewhere.
+Fails: in more than 5 % of the pictures the marker is lost or found elsewhere. Third table: other mixtures and scenes.
 """
 
 from __future__ import annotations
@@ -44,6 +44,9 @@ TARGETS: dict[str, tuple[float, float, float]] = {
                                        for name in ("wrist", "ring", "middle")}}
 MIXTURES = (("thumb", "skin"), ("index", "skin"), ("wrist", "skin"), ("index", "wood"), ("thumb", "wrist"),
             ("little", "ring"), ("index", "middle"))
+OTHERS = (("middle", "skin"), ("ring", "wood"), ("middle", "ring"), ("index", "wrist"), ("little", "middle"))
+OTHER_SHARES = (0.6, 0.8, 0.92, 1.0)
+OTHER_SEEDS = 34
 SHARES = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
@@ -105,11 +108,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--frames", type=int, default=8)
-    parser.add_argument("--only", choices=("lamps", "paints"))
+    parser.add_argument("--only", choices=("lamps", "paints", "others"))
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
     result: dict[str, Any] = {"seeds": options.seeds, "frames": options.frames}
-    if options.only != "paints":
+    if options.only in (None, "lamps"):
         print(f"{'background':<10} {'colours':<18} {'in view':>8} {'lost':>6} {'elsewhere':>10}")
         for background in ("cloth", "clutter"):
             result[background] = lamps(background, options.seeds, options.frames)
@@ -117,11 +120,12 @@ def main() -> int:
                 if isinstance(counts, list):
                     print(f"{background:<10} {name:<18} {counts[0]:8d} {counts[1]:6d} {counts[2]:10d}", flush=True)
             print(f"{background:<10} warnings: {result[background]['warnings']}")
-    if options.only != "lamps":
-        mixtures = [(name, target, share) for name, target in MIXTURES for share in SHARES]
-        rows = [row for number, mixture in enumerate(mixtures, 1) for row in paint(*mixture, options.frames, number)]
-        result["paints"] = rows
-        print_paints(rows)
+    tables = (("paints", MIXTURES, SHARES, 1), ("others", OTHERS, OTHER_SHARES, OTHER_SEEDS))
+    for part, mixtures, shares, first in tables:
+        if options.only in (None, part):
+            mixed = [(name, target, share) for name, target in mixtures for share in shares]
+            result[part] = [row for k, one in enumerate(mixed, first) for row in paint(*one, options.frames, k)]
+            print_paints(result[part])
     if options.json:
         options.json.write_text(json.dumps(result, indent=2) + "\n")
     return 0
