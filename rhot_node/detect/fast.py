@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
-from rhot_node.detect.follow import Followed, learn_noise, noise_level
+from rhot_node.detect.follow import learn_noise, noise_level
+from rhot_node.detect.followed import Followed
 from rhot_node.detect.gate import ColourGate, Labels, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
@@ -34,6 +35,7 @@ GUESS_EVERY = 20  # frames without all markers in plain view until the light is 
 STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
+SEARCH_STEP = 2  # chroma rows: every other one shows where markers are
 HAND_PASSES = 2  # of finding the hand by its likeliest markers, and those by the hand
 GLANCE = 8  # frames between looks at the light and the hand as a whole while all markers are followed in plain view
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
@@ -72,6 +74,10 @@ class FastDetector:
         self._light.warmth = 0.0
         self._fresh = True
 
+    def lose_all(self) -> None:
+        """Forget all tracks, but not the light: the next frame is searched as a whole."""
+        self._forget_tracks()
+
     def paint_colours(self) -> NDArray[np.float64]:
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was found last."""
         self._note_paint()
@@ -96,8 +102,7 @@ class FastDetector:
         """One observation per marker, in the order of the marker set; lost markers are stated as lost."""
         self._fit_scratch(image)
         if self._fresh:
-            guess_light(image, self._light, self._gate, self._set)
-            seen = self._find_in_new_light(image)
+            seen = self._find_at_first(image)
         else:
             self._followed.follow(image, self._precise)
             if self._followed.count == len(self._markers):
@@ -108,6 +113,15 @@ class FastDetector:
                 seen = self._find_in_new_light(image)
         self._fresh, self._plain = False, len(self._plainly(seen))
         return seen
+
+    def _find_at_first(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """Find the markers in a picture of which nothing is known: by the light of the calibration, if that shows all
+        of them, else by the light in which most are recognised."""
+        seen = self._find(image)
+        if len(self._plainly(seen)) < len(seen):
+            guess_light(image, self._light, self._gate, self._set)
+            return self._find_in_new_light(image)
+        return seen if self._read_light(seen, 0.0) < DEAD_ZONE else self._find_in_new_light(image)
 
     def _glance(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """The markers when all are followed in plain view; now and then with a look at the light and the hand."""
@@ -239,7 +253,7 @@ class FastDetector:
     def _acquire(self, camera_image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
         """Search the whole frame for the lost markers and state each as found or lost."""
         image = self._light.balanced(camera_image)
-        blobs = self._gate.blobs(image, lost).copy()
+        blobs = self._gate.blobs(image, lost, step=SEARCH_STEP).copy()
         own = {index: blobs[blobs[:, LABEL] == index + 1] for index in lost}
         worth = self._worth(own)
         for index in lost:

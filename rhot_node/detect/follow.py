@@ -4,7 +4,7 @@ A marker's window is predicted at constant velocity. The projection of its chrom
 as the camera shows it (so that no light has to be mended), gives a soft centroid; about that the outline of the last
 frame is fitted anew (`contour`). Whatever is not as plain as it was - area, level, outline, misfit, the frame's border,
 a rival in the window - sends the marker back to the careful measurement (`measure`), which also brings it here
-(`start`).
+(`rhot_node.detect.begin`).
 
 All coordinates are chroma pixels.
 """
@@ -12,20 +12,15 @@ All coordinates are chroma pixels.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from rhot_node.detect import contour as c
-from rhot_node.detect import position as p
+from rhot_node.detect import contour_columns as c
 from rhot_node.detect import track as t
-from rhot_node.detect.image import YuvImage
-from rhot_node.markers import Shape
-from rhot_node.wire.messages import MarkerObservation
-
-Array = NDArray[np.float64]
+from rhot_node.detect.contour import fit
+from rhot_node.detect.contour_pixels import project
+from rhot_node.detect.followed_band import IS_BAND, READY, SAG, mend_band
 
 AREA_LEAST = 22.0  # px^2: a smaller marker has too little inside
 NOISE_MOST = 0.12  # of the contrast
@@ -39,31 +34,18 @@ DENT_MOST = 0.45  # px that a radius may move against the others in a frame
 MISFIT_NOISE, MISFIT_MOST = 2.0, 0.10  # standard deviations of the noise, and of the contrast
 TURN_MOST = 0.17  # rad: an elongated marker that has turned further gets new axes
 ELONGATED = 1.3
-START_AWAY, START_RATIO = 0.35, 1.15  # px, area: how well outline and careful measurement agree
 MARGIN = 3.0  # px around a resting marker
 
 NOISE_MIN = 0.5  # grey levels of chroma noise; quantisation alone leaves 0.3
 NOISE_BLOCKS_MOST = 600.0  # that its mean is taken over
 
-# The wrist band's sag (`position.band_center`): a measured value within so many standard deviations of the last one is
-# taken in with this gain, any other as it is.
-SAG_GAIN, SAG_STEADY = 0.25, 5.0
-SAG_MOST = 0.3  # of half the band's length: what the sag may change before the outline is straightened anew
-SAG_SETTLE, SAG_JUMP = 4.0, 0.35  # frames that say what is no sag; px that it may jump in them
-ARC_VARIANCE = 2.0 / 3.0 - (0.25 * math.pi) ** 2  # of sqrt(1 - u^2) over -1..1
-GAUSS_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
-GAUSS_WEIGHT = 0.5 * np.polynomial.legendre.leggauss(4)[1]
-
-# Columns of `marks`: how a marker is followed.
-READY, IS_BAND, SAG, SAG_VARIANCE, SAG_ZERO, SAG_FRAMES = range(6)
-MARK_COLUMNS = 6
 # Columns of what is stated about a marker, luma pixels.
 OUT_X, OUT_Y, OUT_DIAMETER, OUT_XX, OUT_XY, OUT_YY, OUT_QUALITY, DONE = range(8)
 OUT_COLUMNS = 8
 
 
 @njit(**c.FAST)
-def follow(y, u, v, tracks, looks, radii, rims, marks, noise_variance, precise, pixels, sums, soft, fitted, out):
+def follow(y, u, v, tracks, looks, radii, rims, marks, noise_variance, precise, pixels, work, soft, fitted, out):
     """Follow every ready marker; rows of `out` (M, OUT_COLUMNS) with DONE 1 are filled, and their tracks updated.
 
     `precise` False takes the soft centroid as it is. A marker whose DONE is 0 is no longer ready. Learns the
@@ -77,7 +59,7 @@ def follow(y, u, v, tracks, looks, radii, rims, marks, noise_variance, precise, 
             continue
         marks[index, READY] = 0.0
         track, look = tracks[index], looks[index]
-        c.project(look)
+        project(look)
         if not look[c.GAIN] * noise < NOISE_MOST or not _soft(u, v, track, look, soft):
             continue
         if precise:
@@ -85,9 +67,9 @@ def follow(y, u, v, tracks, looks, radii, rims, marks, noise_variance, precise, 
             rest = 0.25 * math.pi * marks[index, SAG]
             soft[0] -= look[c.AXIS_Y] * rest
             soft[1] += look[c.AXIS_X] * rest
-            if not _outline(y, u, v, track, look, radii[index], rims[index], noise, pixels, sums, soft, fitted):
+            if not _outline(y, u, v, track, look, radii[index], rims[index], noise, pixels, work, soft, fitted):
                 continue
-            if marks[index, IS_BAND] > 0.0 and not _mend_band(look, radii[index], marks[index], noise, fitted, track):
+            if marks[index, IS_BAND] > 0.0 and not mend_band(look, radii[index], marks[index], noise, fitted, track):
                 continue
         else:
             _take_soft(track, look, soft, fitted)
@@ -169,15 +151,14 @@ def _soft(u, v, track, look, soft):
 
 
 @njit(**c.FAST)
-def _outline(y, u, v, track, look, radius, rim, noise, pixels, sums, soft, fitted):
+def _outline(y, u, v, track, look, radius, rim, noise, pixels, work, soft, fitted):
     """Fit the outline about the soft centroid; False when the marker is not as plainly in view as it was."""
     growth = math.exp(0.5 * track[t.RATE])
     for j in range(c.NODES + 1):
         radius[j] *= growth
     before_u, before_v = look[c.PAINT_U], look[c.PAINT_V]
     contrast = math.hypot(before_u - look[c.AROUND_U], before_v - look[c.AROUND_V])
-    if not c.fit(y, u, v, soft[0], soft[1], look, radius, rim, 2 if look[c.WIDTH] > 0.0 else 1, pixels, sums,
-                 fitted):
+    if not fit(y, u, v, soft[0], soft[1], look, radius, rim, 1, pixels, work, fitted):
         return False
     area = fitted[c.AREA]
     return (track[t.AREA] < AREA_RATIO * area and area < AREA_RATIO * track[t.AREA]
@@ -217,71 +198,6 @@ def _take_soft(track, look, soft, fitted):
 
 
 @njit(**c.FAST)
-def _mend_band(look, radius, mark, noise, fitted, track):
-    """Place a band on its axis: by what its sag, smoothed, differs from that which its outline is straightened by.
-
-    The corners, which the outline rounds, look like a bend of their own: that is what the first frames measure, and it
-    is taken off. False when the sag differs too much.
-    """
-    half = 0.5 * (fitted[c.M_XX] + fitted[c.M_YY])
-    spread = math.hypot(0.5 * (fitted[c.M_XX] - fitted[c.M_YY]), fitted[c.M_XY])
-    ax, ay = look[c.AXIS_X], look[c.AXIS_Y]
-    measured = _sag(radius, look)
-    mark[SAG_FRAMES] += 1.0
-    if mark[SAG_FRAMES] <= SAG_SETTLE:
-        if mark[SAG_FRAMES] > 1.0 and abs(measured - mark[SAG_ZERO]) > SAG_JUMP:
-            return False
-        mark[SAG_ZERO] += (measured - mark[SAG_ZERO]) / mark[SAG_FRAMES]
-    away = measured - mark[SAG_ZERO] - mark[SAG]
-    steady = SAG_STEADY * noise * math.sqrt(mark[SAG_VARIANCE])
-    if mark[SAG_FRAMES] > SAG_SETTLE:
-        mark[SAG] += (SAG_GAIN if abs(away) < steady else 1.0) * away
-    rest = 0.25 * math.pi * mark[SAG]
-    sag = 0.25 * math.pi * (look[c.BEND] + mark[SAG])
-    fitted[c.X] += ay * rest
-    fitted[c.Y] -= ax * rest
-    track[t.SAG_X], track[t.SAG_Y] = -ay * sag, ax * sag
-    along = 0.6 * mark[SAG_VARIANCE] * SAG_GAIN  # (pi / 4)^2 of the smoothed sag's
-    fitted[c.V_XX] += ay * ay * along
-    fitted[c.V_XY] -= ax * ay * along
-    fitted[c.V_YY] += ax * ax * along
-    return abs(mark[SAG]) < SAG_MOST * math.sqrt(max(3.0 * (half - spread), 0.0))
-
-
-@njit(**c.FAST)
-def _sag(radius, look):
-    """s of `position.band_center`, of the area inside the outline, which is straightened already: what is left of it.
-
-    Least squares of the axial coordinate on (1, u, sqrt(1 - u^2)), by angle and, with Gauss's points, by radius.
-    """
-    to_u = look[c.LONG] / look[c.WIDTH]
-    n = n_u = n_b = uu = ub = bb = s_v = uv = bv = 0.0
-    for j in range(c.NODES):
-        for half in range(2):
-            r = radius[j] + 0.5 * half * (radius[j + 1] - radius[j])
-            cosine, sine = c.COSINES[j], c.SINES[j]
-            if half == 1:
-                cosine, sine = c.HALF_COSINES[j], c.HALF_SINES[j]
-            for k in range(4):
-                rho = r * GAUSS_AT[k]
-                weight = GAUSS_WEIGHT[k] * rho * r
-                across, along = to_u * rho * cosine, look[c.HIGH] * rho * sine
-                arc = math.sqrt(max(1.0 - across * across, 0.0))
-                n += weight
-                n_u += weight * across
-                n_b += weight * arc
-                uu += weight * across * across
-                ub += weight * across * arc
-                bb += weight * arc * arc
-                s_v += weight * along
-                uv += weight * across * along
-                bv += weight * arc * along
-    uu, ub, bb = uu - n_u * n_u / n, ub - n_u * n_b / n, bb - n_b * n_b / n
-    uv, bv = uv - n_u * s_v / n, bv - n_b * s_v / n
-    return (uu * bv - ub * uv) / (uu * bb - ub * ub)
-
-
-@njit(**c.FAST)
 def _state(track, fitted, look, noise, is_band, out):
     """Write the observation and take the result into the track."""
     area = fitted[c.AREA]
@@ -298,138 +214,3 @@ def _state(track, fitted, look, noise, is_band, out):
     t.luma_values(fitted[c.X], fitted[c.Y], area, fitted[c.V_XX], fitted[c.V_XY], fitted[c.V_YY], floor, bias, level,
                   noise, out)
     t.take(track, fitted[c.X], fitted[c.Y], area, extent, level, False)
-
-
-@njit(**c.FAST)
-def start(y, u, v, x, y_at, var_long, var_high, axis_x, axis_y, area, noise, is_band, sag, mark, look, radius, rim,
-          pixels, sums, fitted):
-    """Begin to follow a marker that was measured carefully in this picture; sets READY when its outline is found.
-
-    `x`, `y_at`: its place; `var_long`, `var_high`, `axis_x`, `axis_y`: second moments and major axis; `sag`: a band's.
-    """
-    mark[READY] = 0.0
-    first_x, first_y = x, y_at
-    long2, high2 = max(var_long - p.BLUR_VARIANCE, 0.5), max(var_high - p.BLUR_VARIANCE, 0.5)
-    if area < AREA_LEAST:
-        return
-    if not _levels(u, v, x - 0.25 * math.pi * sag * axis_y, y_at + 0.25 * math.pi * sag * axis_x, axis_x, axis_y,
-                   math.sqrt(4.0 * long2), math.sqrt(4.0 * high2), look):
-        return
-    high2 = max(high2 - ARC_VARIANCE * sag * sag, 0.5)
-    look[c.BEND], look[c.WIDTH], mark[SAG] = sag, math.sqrt(3.0 * long2) if is_band else 0.0, 0.0
-    aspect = math.sqrt(long2 / high2)
-    look[c.AXIS_X], look[c.AXIS_Y] = axis_x, axis_y
-    look[c.LONG] = look[c.HIGH] = 1.0
-    side = math.sqrt(math.sqrt(long2 * high2) * (3.0 if is_band else 4.0))
-    if aspect > ELONGATED:
-        look[c.LONG], look[c.HIGH] = math.sqrt(aspect), 1.0 / math.sqrt(aspect)
-        aspect = 1.0
-    for j in range(c.NODES):
-        cosine, sine = c.COSINES[j], c.SINES[j]
-        if is_band:
-            radius[j] = side / max(abs(cosine), abs(sine))
-        else:
-            radius[j] = side / math.sqrt(cosine * cosine / aspect + sine * sine * aspect)
-    radius[c.NODES] = radius[0]
-    rim[:] = 0.0
-    look[c.SLOPE_X] = look[c.SLOPE_Y] = look[c.AGE] = 0.0
-    look[c.BLUR] = c.BLUR_START
-    for _ in range(3):
-        c.project(look)
-        if not look[c.GAIN] * noise < NOISE_MOST:
-            return
-        if not c.fit(y, u, v, x, y_at, look, radius, rim, 3, pixels, sums, fitted):
-            return
-        x, y_at = fitted[c.X], fitted[c.Y]
-    mark[SAG_FRAMES] = mark[SAG_ZERO] = 0.0
-    mark[READY] = (
-        fitted[c.MISFIT] < math.hypot(MISFIT_NOISE * look[c.GAIN] * noise, MISFIT_MOST)
-        and fitted[c.AREA] < START_RATIO * area and area < START_RATIO * fitted[c.AREA]
-        and math.hypot(x - first_x, y_at - first_y) < START_AWAY)
-
-
-@njit(**c.FAST)
-def _levels(u, v, x, y_at, ax, ay, long, high, look):
-    """Mean chroma of the inner half of the marker, and mean and covariance around it, by ellipses."""
-    reach = int(long + 6.0)
-    x0, x1 = max(int(x) - reach, 0), min(int(x) + reach + 1, u.shape[1] - 1)
-    y0, y1 = max(int(y_at) - reach, 0), min(int(y_at) + reach + 1, u.shape[0] - 1)
-    n = s_u = s_v = r_n = r_u = r_v = r_uu = r_uv = r_vv = 0.0
-    for row in range(y0, y1 + 1):
-        for column in range(x0, x1 + 1):
-            dx, dy = column - x, row - y_at
-            long_way, high_way = dx * ax + dy * ay, dy * ax - dx * ay
-            cu, cv = u[row, column] - 128.0, v[row, column] - 128.0
-            if (long_way / long) ** 2 + (high_way / high) ** 2 < 0.4:
-                n += 1.0
-                s_u += cu
-                s_v += cv
-            elif (long_way / (1.1 * long + 2.0)) ** 2 + (high_way / (1.1 * high + 2.0)) ** 2 > 1.0 and (
-                    (long_way / (1.1 * long + 4.5)) ** 2 + (high_way / (1.1 * high + 4.5)) ** 2 < 1.0):
-                r_n += 1.0
-                r_u += cu
-                r_v += cv
-                r_uu += cu * cu
-                r_uv += cu * cv
-                r_vv += cv * cv
-    if n < 4.0 or r_n < 10.0:
-        return False
-    m_u, m_v = r_u / r_n, r_v / r_n
-    look[c.PAINT_U], look[c.PAINT_V] = 128.0 + s_u / n, 128.0 + s_v / n
-    look[c.AROUND_U], look[c.AROUND_V] = 128.0 + m_u, 128.0 + m_v
-    look[c.C_UU], look[c.C_UV], look[c.C_VV] = r_uu / r_n - m_u * m_u, r_uv / r_n - m_u * m_v, r_vv / r_n - m_v * m_v
-    return True
-
-
-class Followed:
-    """What is kept of the markers in plain view from frame to frame, and room to work in: a frame allocates nothing."""
-
-    def __init__(self, shapes: Sequence[Shape], tracks: Array, noise_variance: Array) -> None:
-        """`tracks` (M, TRACK_COLUMNS) and `noise_variance` (2,) are shared with the careful lane."""
-        count = len(shapes)
-        self._tracks, self._noise_variance = tracks, noise_variance
-        self._looks = np.zeros((count, c.LOOK_COLUMNS))
-        self._radii, self._rims = np.zeros((count, c.NODES + 1)), np.zeros((count, 2, c.NODES + 1))
-        self._marks = np.zeros((count, MARK_COLUMNS))
-        self._marks[:, IS_BAND] = [shape == "band" for shape in shapes]
-        self._pixels, self._sums = np.zeros((c.PIXELS_MAX, c.PIXEL_COLUMNS)), np.zeros((c.SUM_ROWS, c.NODES + 1))
-        self._soft, self._fitted = np.zeros(3), np.zeros(c.FIT_COLUMNS)
-        self._seen = np.zeros((count, OUT_COLUMNS))
-        self.count = 0
-        """Markers that were seen in the last frame."""
-
-    def forget(self) -> None:
-        """No marker is followed any more."""
-        self._marks[:, READY] = self._seen[:, DONE] = 0.0
-        self.count = 0
-
-    def drop(self, index: int) -> None:
-        """The marker is no longer followed."""
-        self._marks[index, READY] = self._seen[index, DONE] = 0.0
-
-    def follow(self, image: YuvImage, precise: bool) -> None:
-        """Look for the markers that are followed in the next picture; `precise` False: by their soft centroids."""
-        self.count = follow(image.y, image.u, image.v, self._tracks, self._looks, self._radii, self._rims, self._marks,
-                            self._noise_variance, precise, self._pixels, self._sums, self._soft, self._fitted,
-                            self._seen)
-
-    def observations(self) -> tuple[MarkerObservation, ...]:
-        """The markers that were seen in the last frame."""
-        return tuple([MarkerObservation(index, x, y, diameter, xx, xy, yy, quality)
-                      for index, (x, y, diameter, xx, xy, yy, quality, done) in enumerate(self._seen.tolist()) if done])
-
-    def start(self, image: YuvImage, index: int, row: Sequence[float]) -> None:
-        """Follow a marker from now on that was measured in plain view, with the result `row` of `measure`."""
-        band = bool(self._marks[index, IS_BAND])
-        if band and not row[p.FIT]:
-            return
-        self._marks[index, SAG_VARIANCE] = row[p.SAG_VARIANCE]
-        start(image.y, image.u, image.v, row[p.X], row[p.Y], row[p.VAR_MAJOR], row[p.VAR_MINOR], row[p.AXIS_X],
-              row[p.AXIS_Y], row[p.AREA], noise_level(self._noise_variance), band, row[p.SAG], self._marks[index],
-              self._looks[index], self._radii[index], self._rims[index], self._pixels, self._sums, self._fitted)
-
-    def paint(self) -> Iterator[tuple[int, tuple[float, float, float]]]:
-        """Index, and Y, Cb and Cr (minus 128) of the paint as the camera showed it, of the markers seen last."""
-        for index in np.flatnonzero(self._seen[:, DONE]).tolist():
-            look = self._looks[index]
-            yield index, (look[c.PAINT_Y].item(), look[c.PAINT_U].item() - 128.0, look[c.PAINT_V].item() - 128.0)

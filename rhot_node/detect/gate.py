@@ -41,14 +41,15 @@ class ColourGate:
         label_plane(image.y, image.u, image.v, self.table, self.luma_limits, out)
         return out
 
-    def blobs(self, image: YuvImage, indices: list[int] | range, area_min: int = AREA_MIN) -> NDArray[np.float64]:
+    def blobs(self, image: YuvImage, indices: list[int] | range, area_min: int = AREA_MIN,
+              step: int = 1) -> NDArray[np.float64]:
         """(N, 10) blobs of the markers `indices`, columns as in rhot_node.detect.search; a view, valid until the next.
 
-        A blob has at least `area_min` chroma pixels.
+        A blob has at least `area_min` chroma pixels. Of every `step` chroma rows one stands for the others.
         """
         wanted = np.zeros(len(self.luma_limits) + 1, dtype=np.bool_)
         wanted[np.asarray(indices, dtype=np.intp) + 1] = True
-        return self._searcher.find(image.y, image.u, image.v, wanted, area_min)
+        return self._searcher.find(image.y, image.u, image.v, wanted, area_min, step=step)
 
 
 def merits(blobs: NDArray[np.float64], marker: Marker, shape: tuple[int, int],

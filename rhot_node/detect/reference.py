@@ -103,10 +103,14 @@ def _observe(index: int, box: Box, area: float, size: tuple[int, int], flags: Ma
 
 def threshold(bgr: Plane, model: RangeModel) -> Plane:
     """Binary mask (0, 255) of the pixels inside the model's bounds."""
-    lower, upper = model.lower, model.upper
     if model.space == "rgb":
-        return _in_range(bgr, lower[::-1], upper[::-1])
-    hsv = np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV), dtype=np.uint8)
+        return _in_range(bgr, model.lower[::-1], model.upper[::-1])
+    return threshold_hsv(np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV), dtype=np.uint8), model)
+
+
+def threshold_hsv(hsv: Plane, model: RangeModel) -> Plane:
+    """The same of a picture that is in HSV already, by a model in HSV."""
+    lower, upper = model.lower, model.upper
     if lower[0] <= upper[0]:
         return _in_range(hsv, lower, upper)
     below = _in_range(hsv, (0, lower[1], lower[2]), upper)  # across red: from 0, and up to 179

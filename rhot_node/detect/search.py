@@ -26,7 +26,6 @@ BLOB_COLUMNS = 10
 # Columns of a run.
 _LABEL, _START, _END, _ROW, _SUM_U, _SUM_V, _PARENT = range(7)
 
-AS_IT_IS = np.zeros((0, 3))  # the balance matrix of a picture in the light of the calibration
 _ONES = np.uint64(0x0101010101010101)
 _TOPS = np.uint64(0x8080808080808080)
 _NO_WORDS = np.zeros((0, 0), dtype=np.uint64)
@@ -45,20 +44,19 @@ class Searcher:
         self._slots = np.zeros(RUNS_MAX, dtype=np.int32)
         self._blobs = np.zeros((BLOBS_MAX, BLOB_COLUMNS), dtype=np.float64)
 
-    def find(self, y: Plane, u: Plane, v: Plane, wanted: NDArray[np.bool_], area_min: int, *, step: int = 1,
-             balance: NDArray[np.float64] = AS_IT_IS) -> NDArray[np.float64]:
+    def find(self, y: Plane, u: Plane, v: Plane, wanted: NDArray[np.bool_], area_min: int, *,
+             step: int = 1) -> NDArray[np.float64]:
         """(N, 10) blobs of the wanted labels with at least `area_min` chroma pixels; a view, valid until the next.
 
-        Of every `step` rows one is looked at and stands for the others. `balance` (2, 3) takes the picture into the
-        light of the calibration (`rhot_node.detect.light`); pixels are then looked at one by one.
+        Of every `step` rows one is looked at and stands for the others.
         """
         words_u = words_v = _NO_WORDS
-        if len(balance) == 0 and u.shape[1] % WORD == 0 and u.strides[1] == v.strides[1] == 1:
+        if u.shape[1] % WORD == 0 and u.strides[1] == v.strides[1] == 1:
             words_u, words_v = u.view(np.uint64), v.view(np.uint64)
             if len(self._bright) != words_u.shape[1]:
                 self._bright = np.zeros(words_u.shape[1], dtype=np.uint64)
         runs = label_runs(y, u, v, words_u, words_v, self._bright, self._dull, self._table, wanted, self._luma_limits,
-                          step, balance, self._runs)
+                          step, self._runs)
         count = gather_blobs(self._runs, runs, area_min, step, self._slots, self._blobs)
         return self._blobs[:count]
 
@@ -90,32 +88,12 @@ def dull_box(table: Table) -> tuple[int, int, int, int]:
 @njit(cache=True)
 def label_at(y, u, v, row, column, table, luma_limits):
     """1 + the index of the marker that a chroma pixel is taken for, 0 for none: hue and magnitude, then luma."""
-    return _label_of(y, np.int64(u[row, column]), np.int64(v[row, column]), row, column, table, luma_limits)
-
-
-@njit(cache=True)
-def _label_of(y, cb, cr, row, column, table, luma_limits):
-    label = np.int64(table[cb, cr])
+    label = np.int64(table[u[row, column], v[row, column]])
     if label != 0:
         luma = y[2 * row, 2 * column]
         if luma < luma_limits[label - 1, 0] or luma > luma_limits[label - 1, 1]:
-            return np.int64(0)
+            return 0
     return label
-
-
-@njit(cache=True)
-def balanced_pixel(y, cb, cr, row, column, balance):
-    """The bytes (U, V) of a chroma pixel in the light of the calibration; `balance` (2, 3) as of `light`."""
-    luma = 0.25 * (np.float64(y[2 * row, 2 * column]) + y[2 * row, 2 * column + 1]
-                   + y[2 * row + 1, 2 * column] + y[2 * row + 1, 2 * column + 1])
-    u, v = cb - 128.0, cr - 128.0
-    return (_byte(balance[0, 0] * luma + balance[0, 1] * u + balance[0, 2] * v),
-            _byte(balance[1, 0] * luma + balance[1, 1] * u + balance[1, 2] * v))
-
-
-@njit(cache=True)
-def _byte(chroma):
-    return min(max(int(np.floor(chroma + 128.5)), 0), 255)
 
 
 @njit(cache=True)
@@ -135,7 +113,7 @@ def _mark_bright(words_u, words_v, row, dull, bright):
 
 
 @njit(cache=True)
-def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limits, step, balance, runs):
+def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limits, step, runs):
     """Fill `runs` with the runs of equal wanted label, each joined to its neighbours above; return how many.
 
     Words that are all in the box `dull` (1, 4) are passed over; `words_u` and `words_v` (H/2, W/16) may be empty.
@@ -155,10 +133,7 @@ def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limi
                 current = 0
                 continue
             for column in range(first, first + block):
-                cb, cr = np.int64(u[row, column]), np.int64(v[row, column])
-                if balance.shape[0] > 0:
-                    cb, cr = balanced_pixel(y, cb, cr, row, column, balance)
-                label = _label_of(y, cb, cr, row, column, table, luma_limits)
+                label = label_at(y, u, v, row, column, table, luma_limits)
                 if not wanted[label]:
                     current = 0
                     continue
@@ -169,8 +144,8 @@ def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limi
                     count += 1
                     current = label
                 runs[count - 1, _END] = column
-                runs[count - 1, _SUM_U] += np.int32(cb - 128)
-                runs[count - 1, _SUM_V] += np.int32(cr - 128)
+                runs[count - 1, _SUM_U] += np.int32(u[row, column]) - 128
+                runs[count - 1, _SUM_V] += np.int32(v[row, column]) - 128
         _join_rows(runs, above_start, above_end, row_start, count, step)
         above_start, above_end = row_start, count
     return count

@@ -6,7 +6,6 @@ import pytest
 
 from rhot_node.detect import search as s
 from rhot_node.detect.labels import acquisition_table
-from rhot_node.detect.light import balance, balance_matrix
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 
@@ -121,12 +120,3 @@ def test_every_other_row_stands_for_its_neighbour() -> None:
         assert same[s.AREA] == pytest.approx(blob[s.AREA], rel=0.1)
         np.testing.assert_allclose(same[s.SUM_X:s.SUM_U] / same[s.AREA], blob[s.SUM_X:s.SUM_U] / blob[s.AREA], atol=0.6)
         np.testing.assert_allclose(same[s.X_MIN:], blob[s.X_MIN:], atol=1)
-
-
-def test_another_light_is_mended_pixel_by_pixel() -> None:
-    luma, u, v = colourful_picture(1)
-    matrix, out_u, out_v = balance_matrix(0.4), np.empty_like(u), np.empty_like(v)
-    balance(luma, u, v, matrix, out_u, out_v)
-    searcher = s.Searcher(acquisition_table(RHOT6), ANY_LUMA)
-    expected = searcher.find(luma, out_u, out_v, ALL, 4).copy()
-    np.testing.assert_array_equal(searcher.find(luma, u, v, ALL, 4, balance=matrix), expected)

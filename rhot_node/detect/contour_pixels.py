@@ -1,0 +1,217 @@
+"""Sort the pixels about an outline: the paint's inside, the surroundings, and those near it (`contour`)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from rhot_node.detect.contour_columns import (
+    AGE,
+    AROUND_U,
+    AROUND_V,
+    AT_NODE,
+    AXIS_X,
+    AXIS_Y,
+    BAND,
+    BEND,
+    C_UU,
+    C_UV,
+    C_VV,
+    COSINES,
+    COVER,
+    DX,
+    DY,
+    FAST,
+    FLATNESS,
+    GAIN,
+    HIGH,
+    INSIDE,
+    INSIDE_MIN,
+    LONG,
+    NODES,
+    ONE,
+    OUT,
+    PAINT_U,
+    PAINT_V,
+    PAINT_Y,
+    PART,
+    RADIUS,
+    RESTING,
+    RHO,
+    RING_COUNT,
+    RING_FAR,
+    RING_NEAR,
+    RING_SUM,
+    SCALE,
+    SINES,
+    SLOPE_X,
+    SLOPE_Y,
+    SLOW,
+    STEP_RAD,
+    W_U,
+    W_V,
+    WIDTH,
+)
+
+
+@njit(**FAST)
+def project(look):
+    """Set the projection that lets least of the surroundings' variation through, paint - around = 1."""
+    du, dv = look[PAINT_U] - look[AROUND_U], look[PAINT_V] - look[AROUND_V]
+    uu, uv, vv = look[C_UU] + FLATNESS, look[C_UV], look[C_VV] + FLATNESS
+    wu, wv = vv * du - uv * dv, uu * dv - uv * du
+    norm = wu * du + wv * dv
+    look[W_U], look[W_V] = wu / norm, wv / norm
+    look[GAIN] = math.hypot(look[W_U], look[W_V])
+
+
+@njit(**FAST)
+def _turn(u, v):
+    """The angle of (u, v) in steps of NODES per turn, 0 <= turn <= NODES, to 1e-3 of a step's tenth."""
+    a, b = abs(u), abs(v)
+    low, high = min(a, b), max(a, b)
+    z = low / high
+    z2 = z * z
+    angle = z * (0.99997726 + z2 * (-0.33262347 + z2 * (0.19354346 + z2 * (-0.11643287
+                                                                         + z2 * (0.05265332 - z2 * 0.01172120)))))
+    if b > a:
+        angle = 0.5 * math.pi - angle
+    if u < 0.0:
+        angle = math.pi - angle
+    if v < 0.0:
+        angle = 2.0 * math.pi - angle
+    return min(angle * (NODES / (2.0 * math.pi)), NODES - 1e-9)
+
+
+@njit(**FAST)
+def gather(y, u, v, cx, cy, look, radius, pixels, work):
+    """Sort the pixels about the outline: the paint's inside and the surroundings are summed, those near it listed."""
+    work[:] = 0.0
+    ax, ay, long, high = look[AXIS_X], look[AXIS_Y], 1.0 / look[LONG], 1.0 / look[HIGH]
+    bend, width = look[BEND], 1.0 / max(look[WIDTH], 1.0)
+    wu, wv, bu, bv = look[W_U], look[W_V], look[AROUND_U], look[AROUND_V]
+    least, most = _slopes(look, radius, work)
+    short = max(long, high)
+    deep, beyond = least - (BAND + 0.2) * short, most + RING_FAR * short
+    reach_x = beyond * math.sqrt((ax / long) ** 2 + (ay / high) ** 2) + abs(ay * bend)
+    reach_y = beyond * math.sqrt((ay / long) ** 2 + (ax / high) ** 2) + abs(ax * bend)
+    x0, x1 = max(int(cx - reach_x), 0), min(int(cx + reach_x) + 1, u.shape[1] - 1)
+    y0, y1 = max(int(cy - reach_y), 0), min(int(cy + reach_y) + 1, u.shape[0] - 1)
+    with_luma = look[AGE] % RESTING == 0.0
+    deep2, beyond2 = deep * deep if deep > 0.0 else 0.0, beyond * beyond
+    count = 0
+    n = s_a = s_x = s_y = s_ax = s_ay = s_xx = s_xy = s_yy = s_u = s_v = s_l = 0.0
+    r_n = r_u = r_v = r_uu = r_uv = r_vv = 0.0
+    for row in range(y0, y1 + 1):
+        dy = row - cy
+        for column in range(x0, x1 + 1):
+            dx = column - cx
+            across, along = dx * ax + dy * ay, dy * ax - dx * ay
+            if bend != 0.0:
+                along -= bend * math.sqrt(max(1.0 - (across * width) ** 2, 0.0))
+            un, vn = across * long, along * high
+            square = un * un + vn * vn
+            if square > beyond2:
+                continue
+            pu, pv = np.float64(u[row, column]) - bu, np.float64(v[row, column]) - bv
+            a = wu * pu + wv * pv
+            inside = square < deep2
+            if not inside:
+                rho = math.sqrt(square)
+                turn = _turn(un, vn)
+                node = np.uint64(turn)
+                part = turn - node
+                after = node + ONE
+                d = ((rho - work[node, RADIUS] - part * (work[after, RADIUS] - work[node, RADIUS]))
+                     * (work[node, SCALE] + part * (work[after, SCALE] - work[node, SCALE])))
+                if d > RING_FAR:
+                    continue
+                if d > RING_NEAR:
+                    work[node, RING_SUM] += (1.0 - part) * a
+                    work[node, RING_COUNT] += 1.0 - part
+                    work[after, RING_SUM] += part * a
+                    work[after, RING_COUNT] += part
+                    r_n += 1.0
+                    r_u += pu
+                    r_v += pv
+                    r_uu += pu * pu
+                    r_uv += pu * pv
+                    r_vv += pv * pv
+                if abs(d) <= BAND:
+                    if count == pixels.shape[0]:
+                        return 0
+                    pixels[count, AT_NODE], pixels[count, PART], pixels[count, RHO] = node, part, rho
+                    pixels[count, COVER], pixels[count, DX], pixels[count, DY] = a, dx, dy
+                    count += 1
+                inside = d < -BAND
+            if inside:
+                n += 1.0
+                s_a += a
+                s_x += dx
+                s_y += dy
+                s_ax += a * dx
+                s_ay += a * dy
+                s_xx += dx * dx
+                s_xy += dx * dy
+                s_yy += dy * dy
+                s_u += pu
+                s_v += pv
+                if with_luma:
+                    s_l += y[2 * row, 2 * column]
+    if n < INSIDE_MIN or r_n < NODES:
+        return 0
+    gain = max(SLOW, 1.0 / (look[AGE] + 1.0))
+    xx, xy, yy = s_xx - s_x * s_x / n, s_xy - s_x * s_y / n, s_yy - s_y * s_y / n
+    xa, ya = s_ax - s_x * s_a / n, s_ay - s_y * s_a / n
+    determinant = xx * yy - xy * xy
+    if determinant > 0.05 * xx * yy:
+        look[SLOPE_X] += gain * ((yy * xa - xy * ya) / determinant - look[SLOPE_X])
+        look[SLOPE_Y] += gain * ((xx * ya - xy * xa) / determinant - look[SLOPE_Y])
+    # The paint's level, carried to the outline's origin.
+    look[INSIDE] = (s_a - look[SLOPE_X] * s_x - look[SLOPE_Y] * s_y) / n
+    look[PAINT_U], look[PAINT_V] = bu + s_u / n, bv + s_v / n
+    if with_luma:
+        look[PAINT_Y] = s_l / n
+    m_u, m_v = r_u / r_n, r_v / r_n
+    look[AROUND_U], look[AROUND_V] = bu + m_u, bv + m_v
+    look[C_UU], look[C_UV], look[C_VV] = r_uu / r_n - m_u * m_u, r_uv / r_n - m_u * m_v, r_vv / r_n - m_v * m_v
+    return count
+
+
+@njit(**FAST)
+def _slopes(look, radius, work):
+    """Set px per unit of radius, square to the outline, at every node; returns the least and the greatest radius."""
+    least = most = radius[0]
+    for j in range(NODES):
+        here = radius[j]
+        slope = (radius[j + 1] - radius[j - 1 if j > 0 else NODES - 1]) / (2.0 * STEP_RAD * here)
+        gu = (COSINES[j] + slope * SINES[j]) / look[LONG]
+        gv = (SINES[j] - slope * COSINES[j]) / look[HIGH]
+        if look[BEND] != 0.0:
+            across = min(max(here * COSINES[j] * look[LONG] / look[WIDTH], -0.97), 0.97)
+            gu += gv * look[BEND] * across / (look[WIDTH] * math.sqrt(1.0 - across * across))
+        work[j, RADIUS], work[j, SCALE] = here, 1.0 / math.sqrt(gu * gu + gv * gv)
+        least, most = min(least, here), max(most, here)
+    work[NODES, RADIUS], work[NODES, SCALE] = radius[0], work[0, SCALE]
+    return least, most
+
+
+@njit(**FAST)
+def smooth_around(work):
+    """Turn the surroundings' sums by node into levels, each with half of its neighbours."""
+    work[0, RING_SUM] += work[NODES, RING_SUM]
+    work[0, RING_COUNT] += work[NODES, RING_COUNT]
+    total = count = 0.0
+    for j in range(NODES):
+        total += work[j, RING_SUM]
+        count += work[j, RING_COUNT]
+    mean = total / count
+    for j in range(NODES):
+        before, after = j - 1 if j > 0 else NODES - 1, j + 1 if j + 1 < NODES else 0
+        weight = work[j, RING_COUNT] + 0.5 * (work[before, RING_COUNT] + work[after, RING_COUNT])
+        total = work[j, RING_SUM] + 0.5 * (work[before, RING_SUM] + work[after, RING_SUM])
+        work[j, OUT] = (total + 0.5 * mean) / (weight + 0.5)
+    for j in range(NODES):
+        work[j, RING_SUM] = work[j, OUT]
