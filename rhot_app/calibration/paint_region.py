@@ -100,7 +100,7 @@ def _extent(image: YuvImage, seed: Mask) -> tuple[Mask, bool] | None:
     alike, same = _flood(image, seed), _flood(image, seed, SEED_HUE_DEG, SEED_LEVEL)
     if alike is None or same is None:
         return None
-    leaks = np.count_nonzero(alike) > LEAK * max(np.count_nonzero(same), SAMPLES_MIN)
+    leaks = int(np.count_nonzero(alike)) > LEAK * max(int(np.count_nonzero(same)), SAMPLES_MIN)
     return (same, True) if leaks else (alike, False)
 
 
