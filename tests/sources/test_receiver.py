@@ -18,10 +18,28 @@ from rhot_app.sources.receiver import (
     open_data_socket,
 )
 from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import MarkerObservation, Observations
 
 SESSION = 3
+
+
+@pytest.fixture(scope="module", autouse=True)
+def stamping():
+    """A kernel stamps datagrams from some time after the first socket has asked for it: have it do so all the time."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.bind(("127.0.0.1", 0))
+        ask_for_times(sock)
+        kernel_time = KernelTime()
+        for _ in range(200):
+            sock.sendto(b"?", sock.getsockname())
+            sent_ns = time.monotonic_ns()
+            time.sleep(0.01)
+            _, ancillary, _, _ = sock.recvmsg(16, ANCILLARY_SIZE)
+            if kernel_time.receive_time_ns(ancillary)[0] < sent_ns + 5_000_000:
+                break
+        yield
 
 
 def make_receiver() -> tuple[NodeReceiver, list[CameraObservations], socket.socket]:
