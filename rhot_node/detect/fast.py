@@ -255,11 +255,13 @@ class FastDetector:
         image = self._light.balanced(camera_image)
         blobs = self._gate.blobs(image, lost, step=SEARCH_STEP).copy()
         own = {index: blobs[blobs[:, LABEL] == index + 1] for index in lost}
-        worth = self._worth(own)
+        worth, hand = self._worth(own)
         for index in lost:
             track = self._tracks[index]
             ranked, flags = self._rank(index, own[index], worth[index])
             for blob in ranked[:CANDIDATES]:
+                if self._is_elsewhere(index, blob, hand):
+                    continue
                 if self._measure(image, index, self._blob_request(index, blob)):
                     self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
                     found[index] = self._observe(index, flags, camera_image)
@@ -268,13 +270,18 @@ class FastDetector:
                 track.lose()
                 found[index] = lost_observation(index)
 
-    def _worth(self, own: dict[int, Blobs]) -> dict[int, NDArray[np.float64]]:
+    def _is_elsewhere(self, index: int, blob: Blobs, hand: Whereabouts | None) -> bool:
+        """Whether a blob is where the hand, which wears the marker, cannot reach."""
+        return (hand is not None and self._markers[index].role is not None
+                and hand.beyond(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA]))
+
+    def _worth(self, own: dict[int, Blobs]) -> tuple[dict[int, NDArray[np.float64]], Whereabouts | None]:
         """(N,) merit of every blob of each lost marker: by themselves at first, then by where that puts the hand."""
         shape, hand = self._scratch.mask.shape, None
         for _ in range(HAND_PASSES):
             worth = {index: merits(blobs, self._markers[index], shape, hand) for index, blobs in own.items()}
             hand = self._whereabouts(own, worth)
-        return {index: merits(blobs, self._markers[index], shape, hand) for index, blobs in own.items()}
+        return {index: merits(blobs, self._markers[index], shape, hand) for index, blobs in own.items()}, hand
 
     def _whereabouts(self, own: dict[int, Blobs], worth: dict[int, NDArray[np.float64]]) -> Whereabouts | None:
         """Where the hand is: by the worn markers that are tracked, and by the likeliest blob of each lost one."""

@@ -73,7 +73,7 @@ def follow(y, u, v, tracks, looks, radii, rims, marks, noise_variance, precise, 
                 continue
         else:
             _take_soft(track, look, soft, fitted)
-        _state(track, fitted, look, noise, marks[index, IS_BAND] > 0.0, out[index])
+        _state(track, fitted, look, noise, marks[index, IS_BAND] > 0.0, precise, out[index])
         _learn_noise_inside(u, v, fitted, noise_variance)
         marks[index, READY] = 1.0
         out[index, DONE] = 1.0
@@ -198,7 +198,7 @@ def _take_soft(track, look, soft, fitted):
 
 
 @njit(**c.FAST)
-def _state(track, fitted, look, noise, is_band, out):
+def _state(track, fitted, look, noise, is_band, precise, out):
     """Write the observation and take the result into the track."""
     area = fitted[c.AREA]
     ratio = area / track[t.AREA]
@@ -209,6 +209,8 @@ def _state(track, fitted, look, noise, is_band, out):
     varied = (look[c.W_U] ** 2 * look[c.C_UU] + 2.0 * look[c.W_U] * look[c.W_V] * look[c.C_UV]
               + look[c.W_V] ** 2 * look[c.C_VV] - (look[c.GAIN] * noise) ** 2)
     floor = t.OUTLINE_FLOOR_VARIANCE + t.AROUND_VARIANCE * max(varied, 0.0)
+    if not precise:
+        floor += t.SOFT_FLOOR_VARIANCE
     if is_band:
         floor += t.BAND_FLOOR_VARIANCE
     t.luma_values(fitted[c.X], fitted[c.Y], area, fitted[c.V_XX], fitted[c.V_XY], fitted[c.V_YY], floor, bias, level,

@@ -34,6 +34,7 @@ class ColourGate:
         self.luma_limits = np.array([(mark.chroma.luma_min, mark.chroma.luma_max) for mark in markers.markers],
                                     dtype=np.uint8)
         self._searcher = Searcher(self.table, self.luma_limits)
+        self._wanted = np.zeros(len(markers.markers) + 1, dtype=np.bool_)
 
     def labels(self, image: YuvImage) -> Labels:
         """(H/2, W/2) for every chroma pixel 1 + the index of the marker it is taken for, 0 for none."""
@@ -47,9 +48,10 @@ class ColourGate:
 
         A blob has at least `area_min` chroma pixels. Of every `step` chroma rows one stands for the others.
         """
-        wanted = np.zeros(len(self.luma_limits) + 1, dtype=np.bool_)
-        wanted[np.asarray(indices, dtype=np.intp) + 1] = True
-        return self._searcher.find(image.y, image.u, image.v, wanted, area_min, step=step)
+        self._wanted[:] = False
+        for index in indices:
+            self._wanted[index + 1] = True
+        return self._searcher.find(image.y, image.u, image.v, self._wanted, area_min, step=step)
 
 
 def merits(blobs: NDArray[np.float64], marker: Marker, shape: tuple[int, int],

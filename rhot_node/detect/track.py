@@ -30,6 +30,7 @@ JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
 FLOOR_VARIANCE = 4e-4  # px^2: sampling and shading leave about 0.02 px
 OUTLINE_FLOOR_VARIANCE = 1.5e-4  # px^2: of a fitted outline
+SOFT_FLOOR_VARIANCE = 0.01  # px^2: of a soft centroid, which shading and surroundings draw
 AROUND_VARIANCE = 0.09  # px^2 per squared contrast that the surroundings vary by, which they may do right beside it
 BAND_FLOOR_VARIANCE = 3e-3  # px^2: the fit of a band's curvature magnifies them
 SMALL_AREA, SMALL_VARIANCE = 22.0, 0.01  # chroma px^2, px^2: too few inner pixels to see the shading

@@ -84,10 +84,14 @@ class Canvas:
         patch += coverage * (np.asarray(rgb) * light - patch)
         return self
 
+    def seen(self, psf_sigma: float = PSF_SIGMA) -> Array:
+        """(H, W, 3) RGB behind the lens."""
+        return np.asarray(cv2.GaussianBlur(self.rgb, (0, 0), psf_sigma)) if psf_sigma > 0 else self.rgb.copy()
+
     def expose(self, rng: np.random.Generator | None = None, noise: float = 3.0,
                psf_sigma: float = PSF_SIGMA) -> YuvImage:
         """Blur by the lens, add noise of `noise` grey levels per RGB sample when `rng` is given, convert to YUV420."""
-        picture = cv2.GaussianBlur(self.rgb, (0, 0), psf_sigma) if psf_sigma > 0 else self.rgb.copy()
+        picture = self.seen(psf_sigma)
         if rng is not None:
             picture = picture + rng.normal(0.0, noise, picture.shape)
         return to_yuv(np.clip(picture, 0.0, 255.0))

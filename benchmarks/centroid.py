@@ -1,0 +1,188 @@
+"""How precisely and how truly markers are placed, against the truth, the Cramer-Rao bound and the thesis's box centre.
+
+    python benchmarks/centroid.py [--only disc|twin] [--poses N] [--json FILE]
+
+Discs of 20 px in the paints of `rhot6`, shaded by 25 %, noise of 4 grey levels in red, green and blue, lens blur of 0.7
+px: on grey, on the edge between skin and desk, and moving, exposed for 16 % of the frame. Jitter: standard deviation
+about the mean, per axis; the bound is that of a single frame, with radius, colours and shading unknown.
+
+Then the twin's painted fingertips and wrist band, at 0.6 m with its own noise: bias and jitter against the true outline
+(band: the projected axis), and the mean bias of left minus right, which is depth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "detect"))
+
+from chroma_bound import place_bound  # noqa: E402
+from marker_rendering import SKIN, Canvas, disc, to_yuv  # noqa: E402
+from painted_hand import Pose, held_poses, twin_scene  # noqa: E402
+
+from rhot_node.detect.detector import Detector  # noqa: E402
+from rhot_node.detect.fast import FastDetector  # noqa: E402
+from rhot_node.detect.image import YuvImage  # noqa: E402
+from rhot_node.detect.reference import ReferenceDetector  # noqa: E402
+from rhot_node.files import resource_path  # noqa: E402
+from rhot_node.markers import Marker, MarkerSet, load_markers  # noqa: E402
+
+MARKERS = load_markers(resource_path("markers", "rhot6.json"))
+GREY, DESK = (120.0, 122.0, 118.0), (142.0, 104.0, 70.0)
+RADIUS, SHADING, TOWARDS, NOISE = 10.0, 0.25, 0.6, 4.0
+PLACES, FRAMES, SETTLE = 12, 40, 12
+EXPOSED, MOMENTS, FASTEST = 0.16, 5, 9.0  # of a frame; per exposure; px per frame
+SIZE = (112, 96)
+
+Array = np.ndarray
+
+
+def drawn(parameters: Array) -> Canvas:
+    """A disc: x, y, radius, paint's rgb, shading, its direction, the surroundings' rgb."""
+    x, y, radius, *paint, shading, towards = parameters[:8].tolist()
+    canvas = Canvas(*SIZE, tuple(parameters[8:].tolist()))
+    return canvas.paint(disc(x, y, radius), tuple(paint), (50.0, 44.0), RADIUS + 3.0, shading, towards)
+
+
+def on_grey(marker: Marker, x: float, y: float) -> Array:
+    """The parameters of a disc of the marker's paint on grey."""
+    return np.array([x, y, RADIUS, *marker.display_rgb, SHADING, TOWARDS, *GREY], dtype=np.float64)
+
+
+def on_an_edge(marker: Marker, x: float, y: float) -> Canvas:
+    """Half on skin, half on a desk."""
+    canvas = Canvas(*SIZE, DESK).paint(lambda px, py: px + 0.0 * py < 50.0, SKIN, (0.0, 48.0), 120.0)
+    return canvas.paint(disc(x, y, RADIUS), marker.display_rgb, (50.0, 44.0), RADIUS + 3.0, SHADING, TOWARDS)
+
+
+def seen_by(detector: Detector, images: Iterator[YuvImage] | list[YuvImage]) -> Array:
+    """(F, M, 2) px; NaN where lost."""
+    return np.array([[(mark.x, mark.y) for mark in detector.detect(image)] for image in images])
+
+
+def still_disc(marker: Marker, edge: bool) -> dict[str, dict[str, float]]:
+    """Jitter per axis, and rms of the bias, of both detectors, over sub-pixel places."""
+    rng = np.random.default_rng(7)
+    found: dict[str, list[Array]] = {"fast": [], "box": []}
+    for x, y in np.array([50.0, 44.0]) + rng.uniform(-1.0, 1.0, (PLACES, 2)):
+        canvas = on_an_edge(marker, x, y) if edge else drawn(on_grey(marker, x, y))
+        images = [canvas.expose(rng, NOISE) for _ in range(FRAMES)]
+        for name, detector in detectors(marker).items():
+            found[name].append(seen_by(detector, images)[SETTLE:, 0] - (x, y))
+    return {name: {"jitter": float(np.sqrt(np.mean([np.var(part, axis=0, ddof=1) for part in parts]))),
+                   "bias": float(np.sqrt(np.mean([part.mean(axis=0) ** 2 for part in parts]))),
+                   "worst": float(max(np.hypot(*part.mean(axis=0)) for part in parts))}
+            for name, parts in found.items()}
+
+
+def moving_disc(marker: Marker) -> dict[str, float]:
+    """Rms error per axis of a disc that goes to and fro, up to FASTEST px per frame."""
+    rng = np.random.default_rng(8)
+    images, truth = [], []
+    for step in range(120):
+        swing = [(210.0 + FASTEST / 0.1 * np.sin(0.1 * t), 60.3 + 20.0 * np.sin(0.037 * t))
+                 for t in step + EXPOSED * ((np.arange(MOMENTS) + 0.5) / MOMENTS - 0.5)]
+        rgb = np.zeros((120, 420, 3))
+        for x, y in swing:
+            rgb += Canvas(420, 120, GREY).paint(disc(x, y, RADIUS), marker.display_rgb, (x, y), RADIUS + 3.0,
+                                                SHADING, TOWARDS).seen() / MOMENTS
+        images.append(to_yuv(np.clip(rgb + rng.normal(0.0, NOISE, rgb.shape), 0.0, 255.0)))
+        truth.append((210.0 + FASTEST / 0.1 * np.sin(0.1 * step), 60.3 + 20.0 * np.sin(0.037 * step)))
+    return {name: float(np.sqrt(np.nanmean((seen_by(detector, images)[SETTLE:, 0] - np.array(truth)[SETTLE:]) ** 2)))
+            for name, detector in detectors(marker).items()}
+
+
+def detectors(marker: Marker) -> dict[str, Detector]:
+    """Ours and the thesis's, for this marker alone."""
+    alone = MarkerSet(markers=(marker,))
+    return {"fast": FastDetector(alone), "box": ReferenceDetector(alone)}
+
+
+def discs() -> dict[str, Any]:
+    """Every paint: bound, still, on an edge, moving. Prints a table."""
+    print("disc of 20 px, px     bound    jitter  / bound   bias rms  box jitter  box bias | skin/desk edge bias  box |"
+          " moving rms   box")
+    results: dict[str, Any] = {}
+    for painted in MARKERS.markers:
+        marker = msgspec.structs.replace(painted, shape="disc", role=None)
+        bound = float(np.sqrt(np.mean(place_bound(drawn, on_grey(marker, 50.2, 44.3), NOISE) ** 2)))
+        still, edge, moving = still_disc(marker, False), still_disc(marker, True), moving_disc(marker)
+        results[marker.id] = {"bound": bound, "grey": still, "edge": edge, "moving": moving}
+        fast, box = still["fast"], still["box"]
+        print(f"{marker.id:<18}{bound:9.4f} {fast['jitter']:9.4f} {fast['jitter'] / bound:8.2f} {fast['bias']:10.4f} "
+              f"{box['jitter']:11.3f} {box['bias']:9.3f} | {edge['fast']['bias']:19.3f} {edge['box']['bias']:5.2f} | "
+              f"{moving['fast']:10.4f} {moving['box']:5.2f}", flush=True)
+    return results
+
+
+def twin(poses: int) -> dict[str, Any]:
+    """The painted hand before cloth and before a cluttered desk. Prints a table."""
+    results: dict[str, Any] = {}
+    for background, motion, seed in (("cloth", "grasp", 1), ("clutter", "rest", 3)):
+        scene = twin_scene(background, seed=seed)
+        rows: list[list[Array]] = [[] for _ in MARKERS.markers]
+        boxes: list[list[Array]] = [[] for _ in MARKERS.markers]
+        for pose in held_poses(scene, motion, poses, FRAMES // 2):
+            for name, store in (("fast", rows), ("box", boxes)):
+                _score(pose, name, store)
+        print(f"\n{motion} before {background}, px   jitter x      y   bias rms    left-right  |  box: bias  "
+              "left-right")
+        results[background] = {}
+        for marker, ours, theirs in zip(MARKERS.markers, rows, boxes, strict=True):
+            if not ours:
+                continue
+            a, b = np.array(ours), np.array(theirs)  # (N, 2 cameras, 2 means + 2 variances)
+            figures = _figures(a) | {f"box_{key}": value for key, value in _figures(b).items()}
+            results[background][marker.id] = figures
+            print(f"{marker.id:<26}{figures['jitter_x']:9.4f} {figures['jitter_y']:7.4f} {figures['bias']:9.3f} "
+                  f"{figures['left_minus_right']:13.3f}  | {figures['box_bias']:10.2f} "
+                  f"{figures['box_left_minus_right']:10.3f}", flush=True)
+    return results
+
+
+def _score(pose: Pose, name: str, store: list[list[Array]]) -> None:
+    """Mean error and variance of each marker that both cameras see whole: (2, 4) per marker and pose."""
+    seen = [seen_by(FastDetector(MARKERS) if name == "fast" else ReferenceDetector(MARKERS), frames)[4:]
+            for frames in pose.frames]
+    for index, marker in enumerate(MARKERS.markers):
+        truth = pose.centre[:, index] if marker.shape == "band" else pose.outline[:, index]
+        points = np.array([part[:, index] for part in seen])
+        if np.isfinite(truth).all() and np.isfinite(points).all():
+            store[index].append(np.concatenate([points.mean(axis=1) - truth, points.var(axis=1, ddof=1)], axis=1))
+
+
+def _figures(scored: Array) -> dict[str, float]:
+    jitter = np.sqrt(scored[:, :, 2:].mean(axis=(0, 1)))
+    return {"jitter_x": float(jitter[0]), "jitter_y": float(jitter[1]),
+            "bias": float(np.sqrt((scored[:, :, :2] ** 2).sum(axis=2).mean())),
+            "left_minus_right": float((scored[:, 0, 0] - scored[:, 1, 0]).mean())}
+
+
+def main() -> int:
+    """Run, print the tables, write the JSON."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", choices=("disc", "twin"))
+    parser.add_argument("--poses", type=int, default=12)
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    result: dict[str, Any] = {}
+    if options.only != "twin":
+        result["disc"] = discs()
+    if options.only != "disc":
+        result["twin"] = twin(options.poses)
+    if options.json:
+        options.json.write_text(json.dumps(result, indent=2) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

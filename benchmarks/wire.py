@@ -1,0 +1,86 @@
+"""What a datagram of observations costs to write and read, beside the thesis's text; and what a node's memory is.
+
+    python benchmarks/wire.py [--rounds N] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rhot_node.detect.fast import FastDetector
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+from rhot_node.warm_up import rehearsal_image, warm_up
+from rhot_node.wire.codec import decode, encode
+from rhot_node.wire.messages import MarkerObservation, Observations
+from rhot_node.wire.text import format_text, parse_text
+
+MARKERS = load_markers(resource_path("markers", "rhot6.json"))
+SIZE = (640, 480)
+
+
+def six() -> Observations:
+    """A frame's observations."""
+    markers = [MarkerObservation(k, 100.0 + 80.31 * k, 200.0 + 7.17 * k, 16.2, 0.0021, 0.0001, 0.0019, 0.97)
+               for k in range(6)]
+    return Observations(1, 7, 1234, 10**12, 10**12 + 9_000_000, 900_000, 4_000_000, 48_000, *SIZE, 1234,
+                        MARKERS.checksum, markers)
+
+
+def median_us(work: Callable[[], object], rounds: int) -> float:
+    """Microseconds of one call, median over rounds of 100."""
+    taken = []
+    for _ in range(rounds):
+        start = time.perf_counter_ns()
+        for _ in range(100):
+            work()
+        taken.append(1e-5 * (time.perf_counter_ns() - start))
+    return float(np.median(taken))
+
+
+def resident_mb() -> float:
+    """Resident memory of this process, MB."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(float(line.split()[1]) / 1024.0 for line in lines if line.startswith("VmRSS"))
+
+
+def main() -> int:
+    """Run, print the table, write the JSON."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=200)
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    frame = six()
+    points = [(mark.x, mark.y) for mark in frame.markers]
+    datagram, text = encode(frame), format_text(points)
+    result: dict[str, Any] = {
+        "bytes": {"datagram": len(datagram), "text": len(text)},
+        "us": {"encode": median_us(lambda: encode(frame), options.rounds),
+               "decode": median_us(lambda: decode(datagram), options.rounds),
+               "text, format": median_us(lambda: format_text(points), options.rounds),
+               "text, parse": median_us(lambda: parse_text(text, 6), options.rounds)}}
+    detector = FastDetector(MARKERS)
+    warm_up(detector, MARKERS, SIZE)
+    image = rehearsal_image(MARKERS, SIZE)
+    before = resident_mb()
+    for _ in range(2000):
+        detector.detect(image)
+    result["memory_mb"] = {"detector, warm": before, "2000 frames later": resident_mb()}
+    for group, unit in (("bytes", "bytes"), ("us", "us"), ("memory_mb", "MB")):
+        for name, value in result[group].items():
+            print(f"{name:<20} {value:10.2f} {unit}")
+    if options.json:
+        options.json.write_text(json.dumps(result, indent=2) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,144 @@
+"""The quick lane: precise, cheap, and left as soon as something is not as plain as it was."""
+
+from __future__ import annotations
+
+import math
+import tracemalloc
+
+import numpy as np
+import pytest
+from marker_rendering import SKIN, Canvas, Rgb, disc
+
+from rhot_node.detect import contour_pixels
+from rhot_node.detect.contour_columns import COSINES, HALF_COSINES, HALF_SINES, NODES, SINES
+from rhot_node.detect.fast import GLANCE, FastDetector
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.light import Light, gains_of
+from rhot_node.files import resource_path
+from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.wire.messages import MarkerFlag
+
+RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
+TIPS = MarkerSet(markers=RHOT6.markers[:5])
+PLACES = [(40.0 + 55.0 * k, 60.0 + 20.0 * (k % 2)) for k in range(5)]
+GREY: Rgb = (120, 122, 118)
+
+
+def tips(shift: tuple[float, float] = (0.0, 0.0)) -> Canvas:
+    canvas = Canvas(320, 160)
+    for marker, (x, y) in zip(TIPS.markers, PLACES, strict=True):
+        canvas.paint(disc(x + shift[0], y + shift[1], 9), marker.display_rgb, (x, y), 13, 0.25)
+    return canvas
+
+
+def single(name: str, x: float, y: float, edge: bool = False) -> tuple[FastDetector, Canvas]:
+    """A disc of 20 px on grey, or across the edge of skin and desk."""
+    marker = RHOT6.markers[RHOT6.ids.index(name)]
+    canvas = Canvas(112, 96, (142, 104, 70) if edge else GREY)
+    if edge:
+        canvas.paint(lambda px, py: px + 0.0 * py < 50.0, SKIN, (0, 48), 120)
+    return (FastDetector(MarkerSet(markers=(marker,))),
+            canvas.paint(disc(x, y, 10), marker.display_rgb, (50, 44), 13, 0.25))
+
+
+@pytest.mark.parametrize("name", ["thumb", "index", "ring"])
+def test_a_disc_is_placed_at_the_limit_of_its_noise(name: str) -> None:
+    rng = np.random.default_rng(7)
+    errors = []
+    for x, y in np.array((50, 44)) + rng.uniform(-1, 1, (5, 2)):
+        detector, canvas = single(name, x, y)
+        seen = [detector.detect(canvas.expose(rng, 4.0))[0] for _ in range(36)][12:]
+        errors.append([(mark.x - x, mark.y - y) for mark in seen])
+    spread = np.array(errors)
+    assert np.sqrt(spread.var(axis=1, ddof=1).mean()) < 0.016
+    assert np.sqrt((spread.mean(axis=1) ** 2).mean()) < 0.013  # 0.01 over many places (benchmarks/centroid.py)
+
+
+@pytest.mark.parametrize("name", ["thumb", "ring"])
+def test_an_edge_behind_the_marker_does_not_draw_it(name: str) -> None:
+    rng = np.random.default_rng(3)
+    for x, y in np.array((50, 44)) + rng.uniform(-1, 1, (3, 2)):
+        detector, canvas = single(name, x, y, edge=True)
+        seen = [detector.detect(canvas.expose(rng, 4.0))[0] for _ in range(30)][12:]
+        assert math.hypot(np.mean([mark.x for mark in seen]) - x, np.mean([mark.y for mark in seen]) - y) < 0.04
+
+
+def test_soft_centroids_alone_are_near_and_say_how_near() -> None:
+    rng = np.random.default_rng(4)
+    detector = FastDetector(TIPS, precise=False)
+    for _ in range(6):
+        seen = detector.detect(tips().expose(rng))
+    for mark, (x, y) in zip(seen, PLACES, strict=True):
+        assert math.hypot(mark.x - x, mark.y - y) < 2.5 * math.sqrt(mark.cov_xx)
+        assert math.sqrt(mark.cov_xx) < 0.15
+        assert not mark.flags
+
+
+def test_a_frame_in_plain_view_allocates_no_arrays() -> None:
+    rng = np.random.default_rng(5)
+    images = [tips().expose(rng) for _ in range(4)]
+    detector = FastDetector(TIPS)
+    for k in range(12):
+        detector.detect(images[k % 4])
+    peaks = []
+    tracemalloc.start()
+    try:
+        for k in range(3 * GLANCE):
+            tracemalloc.reset_peak()
+            before = tracemalloc.get_traced_memory()[0]
+            detector.detect(images[k % 4])
+            peaks.append(tracemalloc.get_traced_memory()[1] - before)
+    finally:
+        tracemalloc.stop()
+    assert np.median(peaks) < 4096  # the observations themselves
+    assert sorted(peaks)[-4] < 4096  # all but the glances
+
+
+def test_another_light_costs_a_followed_frame_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(6)
+    canvas = tips()
+    canvas.rgb *= gains_of(0.4)
+    detector = FastDetector(TIPS)
+    for _ in range(6):
+        detector.detect(canvas.expose(rng))
+    assert detector.warmth == pytest.approx(0.4, abs=0.06)
+    balanced: list[YuvImage] = []
+    monkeypatch.setattr(Light, "balanced", lambda _, image: balanced.append(image) or image)
+    for _ in range(2 * GLANCE):
+        assert all(mark.found for mark in detector.detect(canvas.expose(rng)))
+    assert not balanced
+
+
+def test_what_is_hidden_in_part_leaves_the_lane_and_comes_back() -> None:
+    rng = np.random.default_rng(8)
+    detector, canvas = single("ring", 50.0, 44.0)
+    for _ in range(8):
+        assert not detector.detect(canvas.expose(rng))[0].flags & MarkerFlag.PARTIAL
+    half = single("ring", 50.0, 44.0)[1].paint(lambda px, py: px + 0.0 * py > 52.0, SKIN, (112, 48), 61)
+    seen = detector.detect(half.expose(rng))[0]
+    assert seen.flags & MarkerFlag.PARTIAL
+    for _ in range(4):
+        seen = detector.detect(canvas.expose(rng))[0]
+    assert not seen.flags
+    assert math.hypot(seen.x - 50.0, seen.y - 44.0) < 0.06
+
+
+def test_a_missing_marker_is_not_taken_from_far_beyond_the_hand() -> None:
+    rng = np.random.default_rng(9)
+    canvas = Canvas(640, 480)
+    for marker, (x, y) in zip(TIPS.markers[:4], PLACES, strict=False):
+        canvas.paint(disc(x, y, 9), marker.display_rgb, (x, y), 13, 0.25)
+    canvas.paint(disc(560, 420, 12), TIPS.markers[4].display_rgb, (560, 420), 15)
+    detector = FastDetector(TIPS)
+    for _ in range(3):
+        seen = detector.detect(canvas.expose(rng))
+    assert [mark.found for mark in seen] == [True, True, True, True, False]
+
+
+def test_the_angle_of_a_pixel_is_right_all_round() -> None:
+    angles = np.linspace(0.0, 2.0 * math.pi, 721, endpoint=False)
+    turns = [contour_pixels._turn(3.7 * math.cos(angle), 3.7 * math.sin(angle)) for angle in angles]
+    np.testing.assert_allclose(turns, angles * NODES / (2.0 * math.pi), atol=1e-3)
+    assert max(turns) < NODES
+    half = np.exp(1j * math.pi / NODES) * (COSINES + 1j * SINES)
+    np.testing.assert_allclose(half, HALF_COSINES + 1j * HALF_SINES, atol=1e-12)
