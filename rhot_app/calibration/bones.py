@@ -45,12 +45,14 @@ def solve_bones(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress =
 def _by_movement(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) -> BonesReport:
     fit = fit_hand(tracks, base, progress=progress)
     unknowns, bundle = fit.unknowns, fit.bundle
-    bones = bone_lengths(unknowns, bundle.vector, bundle.covariance)
-    reaches, size, size_std = finger_reaches(unknowns, bundle.vector, bundle.covariance)
+    bones = bone_lengths(unknowns, bundle.vector, fit.covariance)
+    reaches, size, size_std = finger_reaches(unknowns, bundle.vector, fit.covariance)
     pairs = rigid_pairs(tracks.positions, fit.raw_noise_m)
     error_mm = 1e3 * fit.model_error_m
     local = in_segments(unknowns, bundle.vector, bundle.poses, bundle.residuals)
+    spots = marker_spots(unknowns, bundle.vector, fit.covariance)
     findings = [
+        *judgement.misplaced_findings(bundle.residuals, tracks.places), *judgement.order_findings(spots, bones),
         *judgement.length_findings(tracks.duration_s), *judgement.side_findings(base.side, fit.other_side_cost),
         *judgement.stillness_findings(bundle.poses.angles), *judgement.slip_findings(tracks),
         *judgement.drift_findings(tracks.times_s[fit.instants], local, tracks.places,
@@ -60,7 +62,7 @@ def _by_movement(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) ->
         *judgement.plausibility_findings(bones, size * 1e3 * unknowns.prior.mean[:BONE_COUNT])]
     return BonesReport(
         hand=unknowns.anatomy(bundle.vector), method="movement", size=size, size_std=size_std,
-        bones=bones, reaches=reaches, markers=marker_spots(unknowns, bundle.vector, bundle.covariance),
+        bones=bones, reaches=reaches, markers=spots,
         rigid=rigid_distances(pairs, unknowns), residual_mm=_rms_mm(bundle.residuals),
         noise_mm=1e3 * fit.raw_noise_m, error_mm=error_mm, seconds=tracks.duration_s, instants=len(fit.instants),
         verdict=judge(f"{_count(bones)}; the hand is {100 * size:.1f} % of the base hand; beyond their noise the "
@@ -86,7 +88,14 @@ def _rms_mm(residuals: Array) -> float:
 
 
 def _count(bones: tuple[BoneLength, ...]) -> str:
-    """How many bones are known how."""
-    kinds = {known: sum(bone.known is known for bone in bones) for known in (Known.OBSERVED, Known.PARTLY, Known.PRIOR)}
-    words = {Known.OBSERVED: "observed", Known.PARTLY: "partly observed", Known.PRIOR: "not observed"}
-    return "bones " + ", ".join(f"{count} {words[known]}" for known, count in kinds.items() if count)
+    """How many bones are known how: "12 of 15 bones are observed, 2 in part, 1 not at all"."""
+    observed, partly, unseen = (sum(bone.known is known for bone in bones)
+                                for known in (Known.OBSERVED, Known.PARTLY, Known.PRIOR))
+    if observed == len(bones):
+        return f"all {observed} bones are observed"
+    if unseen == len(bones):
+        return "no bone is observed by itself"
+    parts = [f"{observed} of {len(bones)} bones are observed" if observed else "no bone is observed fully"]
+    parts += [f"{partly} in part"] if partly else []
+    parts += [f"{unseen} not at all"] if unseen else []
+    return ", ".join(parts)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.bones_report import BoneLength, Known
+from rhot_app.calibration.bones_report import BoneLength, Known, MarkerSpot
 from rhot_app.calibration.marker_places import PALM, MarkerPlace, MarkerTracks
 from rhot_app.calibration.rigid_segments import RigidPair, find_slip, find_step
 from rhot_app.calibration.verdict import Finding, Grade
@@ -29,8 +29,14 @@ STEP_M = 0.5e-3
 """A step of a marker about the fitted hand, which gives way to a slip and shows a quarter of it or less."""
 
 LARGE_ERROR_MM, USELESS_ERROR_MM = 2.0, 5.0
+MISPLACED_MM = 4.0
+"""A marker this far off on average sits somewhere else: skin does not slide so far."""
+
+_MISPLACED_TIMES = 2.5  # what is usual of the other markers
+_NAMED = 4
+_BEYOND_BONE, _FAR_BEYOND_BONE = 0.25, 0.5  # of its length
 _BEYOND_ERROR = 5.0  # times what markers are off anyway, which also steps when a hand takes hold of something
-_FAR_FROM_USUAL = 3.0  # standard deviations
+_FAR_FROM_USUAL, _NO_HAND_HAS = 3.0, 6.0  # standard deviations
 
 
 def length_findings(seconds: float) -> list[Finding]:
@@ -146,6 +152,37 @@ def error_findings(error_mm: float) -> list[Finding]:
                     "Check the roles, and that no two markers look alike.")]
 
 
+def misplaced_findings(residuals: Array, places: Sequence[MarkerPlace]) -> list[Finding]:
+    """Markers that follow the fitted hand much worse than the others, from residuals (F, M, 3) m."""
+    counts = np.isfinite(residuals).sum(axis=(0, 2))
+    off_mm = 1e3 * np.sqrt(np.nansum(np.square(residuals), axis=(0, 2)) / np.maximum(counts, 1))
+    usual = float(np.median(off_mm))
+    odd = [m for m in np.argsort(-off_mm) if off_mm[m] > max(MISPLACED_MM, _MISPLACED_TIMES * usual)]
+    if not odd:
+        return []
+    names = " and ".join(f"{places[m].name} ({off_mm[m]:.0f} mm)" for m in odd[:_NAMED])
+    return [Finding("misplaced", Grade.POOR, f"Far off the fitted hand: {names}; the others are {usual:.1f} mm off.",
+                    "They sit elsewhere than their roles or names say, or were confused with each other.",
+                    "Check their roles, above all whether two of these are swapped.")]
+
+
+def order_findings(spots: Sequence[MarkerSpot], bones: Sequence[BoneLength]) -> list[Finding]:
+    """Markers that came out far before or behind the bone on which they are said to sit."""
+    lengths = {bone.name.replace(".", " "): bone.length_mm for bone in bones}
+    found = []
+    for spot in spots:
+        length = lengths.get(spot.place, 0.0)
+        beyond = max(-spot.along_mm, spot.along_mm - length)
+        if length and beyond > _BEYOND_BONE * length:
+            found.append(Finding(
+                "beyond_bone", Grade.POOR if beyond > _FAR_BEYOND_BONE * length else Grade.FAIR,
+                f"{spot.marker} came out {spot.along_mm:.0f} mm along the {spot.place} bone, which is {length:.0f} mm "
+                "long.",
+                "It sits on another bone than its role or name says, or was confused with its neighbour.",
+                "Check its role, and whether it is swapped with the next one on the finger."))
+    return found
+
+
 def few_marker_findings(markers: int) -> list[Finding]:
     """What so few markers cannot show."""
     return [Finding("not_observed", Grade.GOOD, f"{markers} markers show the size of the hand and how far each finger "
@@ -171,9 +208,11 @@ def plausibility_findings(bones: Sequence[BoneLength], usual_mm: Array) -> list[
     """Lengths far from what is usual in a hand of this size, `usual_mm` (15,)."""
     found = []
     for bone, usual in zip(bones, usual_mm, strict=True):
-        if bone.known is not Known.PRIOR and abs(bone.length_mm - usual) > _FAR_FROM_USUAL * bone.usual_std_mm:
+        off = abs(bone.length_mm - usual) / bone.usual_std_mm
+        if bone.known is not Known.PRIOR and off > _FAR_FROM_USUAL:
             found.append(Finding(
-                "unusual_bone", Grade.FAIR, f"{bone.name} is {bone.length_mm:.1f} mm; {usual:.1f} +- "
+                "unusual_bone", Grade.POOR if off > _NO_HAND_HAS else Grade.FAIR,
+                f"{bone.name} is {bone.length_mm:.1f} mm; {usual:.1f} +- "
                 f"{bone.usual_std_mm:.1f} mm is usual in a hand of this size.",
                 "An unusual hand, or a marker on another bone than its role says.", "Measure it with a ruler."))
     return found

@@ -34,6 +34,11 @@ class Known(enum.Enum):
     PRIOR = "prior"  # not observed: what is usual for a hand of this size
     ENTERED = "entered"
 
+    @property
+    def word(self) -> str:
+        """As a person reads it."""
+        return {Known.PARTLY: "partly observed", Known.PRIOR: "not observed: what is usual"}.get(self, self.value)
+
 
 @dataclass(frozen=True, slots=True)
 class BoneLength:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.hand_bundle_model import POSE, Linearised, Poses, expected, linearise
+from rhot_app.calibration.hand_incidental import DRAWS, scatter_of
 from rhot_app.calibration.hand_shape import BONE_COUNT, HandUnknowns
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.kinematics import TWIST
@@ -42,22 +43,23 @@ _DIAGONAL = np.arange(POSE)
 @dataclass(frozen=True, slots=True)
 class Weights:
     """How much the terms count: `noise_m` standard deviation of a marker per axis; all instants together as
-    `independent` ones, the natural pose in `habits` of them."""
+    `independent` ones, the natural pose in `habits` of them; `fresh`: the part of the markers' variance that is noise,
+    anew at every instant."""
 
     noise_m: float
     independent: float
     habits: float = HABITS
+    fresh: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class HandBundle:
     """The adjusted `vector` (G,) and `poses`, what is left (F, M, 3) m, seen minus expected in the world, NaN where
-    unseen; `covariance` (G, G) of the vector; `cost` half the sum of squares; `steps` taken."""
+    unseen; `cost` half the sum of squares; `steps` taken."""
 
     vector: Array
     poses: Poses
     residuals: Array
-    covariance: Array
     cost: float
     steps: int
 
@@ -112,8 +114,22 @@ class HandAdjustment:
             if gain < _STILL:
                 break
         residuals = self._seen - expected(self._unknowns, vector, poses)
-        covariance = np.linalg.inv(self._reduce(vector, poses).matrix)
-        return HandBundle(vector, poses, residuals, np.asarray(covariance), cost, taken)
+        return HandBundle(vector, poses, residuals, cost, taken)
+
+    def pose_covariances(self, vector: Array, poses: Poses) -> Array:
+        """(F, 27, 27), how every pose scatters by the noise of its own instant."""
+        at = linearise(self._unknowns, vector, poses, per_shape=False)
+        information = self._pose_system(vector, poses, at)[0]
+        return np.asarray(self._weights.fresh * self._data_part * np.linalg.inv(information))
+
+    def covariance(self, vector: Array, poses: Poses) -> Array:
+        """(G, G) of the shape. Poses that scatter by their noise look like movement, which would show the joints: what
+        that adds to the information is taken off again, as far as the prior, which nobody can know less than."""
+        information = self._reduce(vector, poses).matrix - self._pretended(vector, poses)
+        half = np.linalg.cholesky(self._unknowns.prior.covariance)
+        values, axes = np.linalg.eigh(half.T @ information @ half)
+        root = half @ axes / np.sqrt(np.maximum(values, 1.0))
+        return np.asarray(root @ root.T)
 
     def settle(self, vector: Array, poses: Poses, steps: int) -> Poses:
         """The poses after so many steps of their own, each instant with its own damping, while the shape stays."""
@@ -178,6 +194,21 @@ class HandAdjustment:
         change = vector - self._unknowns.prior.mean
         right = flat.T @ gap.ravel() - self._prior_information @ change - tied.T @ alone.ravel()
         return _Reduced(np.asarray(matrix), np.asarray(right), alone, coupled)
+
+    def _pretended(self, vector: Array, poses: Poses) -> Array:
+        """(G, G) of the information, what comes from the scatter of the poses only."""
+        at = linearise(self._unknowns, vector, poses, per_shape=False)
+        root, _, per_pose = self._weighed(at)
+        pose_matrix, _ = self._pose_system(vector, poses, at)
+        total = np.zeros((self._unknowns.size, self._unknowns.size))
+        for scatter in scatter_of(self.pose_covariances(vector, poses)):
+            there, back = (linearise(self._unknowns, vector, poses.moved(sign * scatter)).per_shape
+                           for sign in (1.0, -1.0))
+            change = (0.5 * root[..., None, None] * (there - back)).reshape(len(root), -1, self._unknowns.size)
+            between = per_pose.transpose(0, 2, 1) @ change
+            flat, tied = change.reshape(-1, self._unknowns.size), between.reshape(-1, self._unknowns.size)
+            total += flat.T @ flat - tied.T @ _solve(pose_matrix, between).reshape(tied.shape)
+        return np.asarray(total / DRAWS)
 
     def _pose_system(self, vector: Array, poses: Poses, at: Linearised) -> tuple[Array, Array]:
         """Normal equations of each pose by itself, (F, 27, 27) and (F, 27)."""

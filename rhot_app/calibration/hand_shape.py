@@ -66,6 +66,7 @@ class HandUnknowns:
                              if not place.on_palm and place.segment != DISTAL and not place.painted)
         self.size = self.slides + 2 * len(self.sliding)
         self._base = base
+        self._kept: tuple[Array, HandModel] | None = None
         self._model = build_model(msgspec.structs.replace(base, side="right"))
         self.bone_rows = self._model.dh.point_row[1:len(JOINTS)].reshape(5, 4)[:, 1:]  # (5, 3) rows that end each bone
         self.prior = self._make_prior()
@@ -82,8 +83,11 @@ class HandUnknowns:
         return self._model.limits
 
     def model(self, vector: Array) -> HandModel:
-        """The right hand that `vector` describes, to the last digit."""
-        return build_model(msgspec.structs.replace(self.anatomy(vector, _EXACT), side="right"))
+        """The right hand that `vector` describes, to the last digit; the last one asked for is kept."""
+        if self._kept is None or not np.array_equal(self._kept[0], vector):
+            hand = msgspec.structs.replace(self.anatomy(vector, _EXACT), side="right")
+            self._kept = vector.copy(), build_model(hand)
+        return self._kept[1]
 
     def anatomy(self, vector: Array, digits: int = 2) -> HandAnatomy:
         """The hand file of `vector`, to so many `digits` of mm and degrees: name, side and limits of the base hand,

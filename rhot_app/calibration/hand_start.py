@@ -18,19 +18,24 @@ _SMALL_M = 5e-3
 _CLOSINGS = (0.0, 1.0, 2.0, 3.0)
 
 
-def choose_instants(positions: Array, count: int) -> Indices:
+def choose_instants(positions: Array, count: int, apart: int = 1) -> Indices:
     """At most `count` instants of `positions` (T, M, 3) m, as different from each other as possible, in their order.
 
-    Different in the distances between markers, whatever the hand's place: farthest-point sampling. Instants at which
-    markers are missing are taken when others do not suffice.
+    Different in the distances between markers, whatever the hand's place: farthest-point sampling. `apart`: samples
+    from one instant whose noise is its own to the next, as after smoothing; those between are left out if enough
+    remain, since rare poses would else be taken whole and their noise be believed as often. Instants at which markers
+    are missing are left out too.
     """
     seen = np.isfinite(positions[..., 0]).sum(axis=1)
     usable = np.flatnonzero(seen >= max(3, int(0.7 * seen.max(initial=0))))
+    spaced = usable[np.diff(usable // apart, prepend=-1) > 0]
+    usable = spaced if len(spaced) >= count else usable
     if len(usable) <= count:
         return usable
     usable = usable[np.linspace(0, len(usable) - 1, min(_CANDIDATES, len(usable))).astype(np.int64)]
     first, second = np.triu_indices(positions.shape[1], 1)
     features = np.linalg.norm(positions[usable][:, first] - positions[usable][:, second], axis=2)
+    features = features[:, np.isfinite(features).any(axis=0)]  # a marker may never have been seen
     middle = np.nanmedian(features, axis=0)
     low, high = np.nanpercentile(features, [1.0, 99.0], axis=0)  # what lies beyond are mistakes rather than poses
     features = np.where(np.isfinite(features), np.clip(features, low, high), middle) - middle

@@ -1,4 +1,9 @@
-"""How noisy tracks are, and the same tracks without most of it: a parabola through every tenth of a second or so."""
+"""How noisy tracks are, and the same tracks without most of it: a polynomial through every tenth of a second or two.
+
+How long a polynomial follows a hand depends on the hand and on the noise that there is to average, so the recording
+decides: a longer window is taken as long as what it changes about the fastest movements is no more than noise (Lepski's
+method). Being off the curve would not average out over the recording as noise does.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +14,18 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-WINDOW_S = 0.1
-"""A parabola follows a finger for so long: on motion capture of a hand that takes hold of things it is off by 0.02 mm
-in the median, with half as much again 0.04 mm, which is more than the longer window takes from the noise."""
+WINDOWS_S = (0.08, 0.1, 0.15, 0.2)
+"""None is longer: at 0.3 s a curve was off by a tenth of a millimetre where fingers turn round, hidden in noise of 0.4
+mm, and that alone made a last phalanx 3 mm shorter."""
 
-_ORDER = 2
-_LEAST_SAMPLES = 5  # in a window: fewer do not average anything
+_ORDER = 4
+_LEAST_SAMPLES = 2 * _ORDER - 1  # in a window: fewer do not average enough to be worth it
 _WORST_GAIN = 1.5  # a sample with gaps around it is left out: the odd ones would be taken for odd poses
 _MAD = 1.4826  # standard deviation per median absolute deviation of Gaussian noise
 _THIRD_DIFFERENCE = np.sqrt(20.0)  # standard deviation of x0 - 3 x1 + 3 x2 - x3, of one sample's
+_FAST = 99.0, 3.3682  # a percentile of distances, which the fastest samples decide; its value in a 3-D unit Gaussian
+_DOUBT = 1.15  # the noise is known to a few hundredths, and gaps leave some samples with more of it
+_LOOKED_AT = 6  # markers suffice to choose the window
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,27 +39,55 @@ class SmoothTracks:
     noise_m: float
     looks: float
 
+    @property
+    def apart(self) -> int:
+        """So many samples lie between instants whose noise has nothing to do with each other's any more."""
+        return int(np.ceil(len(self.positions) / max(self.looks, 1.0)))
+
 
 def smooth(times_s: Array, positions: Array) -> SmoothTracks:
     """Smooth tracks (T, M, 3) m at even `times_s` (T,). Those too slow for it stay as they are."""
     raw = _noise(positions)
-    period_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else WINDOW_S
-    half = int(0.5 * WINDOW_S / max(period_s, 1e-6))
-    if 2 * half + 1 < _LEAST_SAMPLES:
+    half = _best_half(times_s, positions, raw)
+    if half == 0:
         return SmoothTracks(positions, raw, raw, float(len(positions)))
+    smoothed, left = _smooth_all(positions, half)
+    return SmoothTracks(smoothed, raw, raw * float(np.sqrt(left)), left * len(positions))
+
+
+def _best_half(times_s: Array, positions: Array, raw_noise_m: float) -> int:
+    """How many samples to either side make the best window; 0 when even the longest holds too few."""
+    period_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else WINDOWS_S[0]
+    halves = sorted({int(0.5 * window_s / max(period_s, 1e-6)) for window_s in WINDOWS_S})
+    looked_at = positions[:, ::max(1, positions.shape[1] // _LOOKED_AT)]
+    best, before, before_left = 0, looked_at, 1.0
+    for half in halves:
+        if not _LEAST_SAMPLES <= 2 * half + 1 <= len(positions):
+            continue
+        smoothed, left = _smooth_all(looked_at, half)
+        change = np.linalg.norm(smoothed - before, axis=2)
+        change = change[np.isfinite(change)]
+        noise = _FAST[1] * raw_noise_m * float(np.sqrt(max(before_left - left, 0.0)))
+        if not len(change) or (best and float(np.percentile(change, _FAST[0])) > _DOUBT * noise):
+            break
+        best, before, before_left = half, smoothed, left
+    return best
+
+
+def _smooth_all(positions: Array, half: int) -> tuple[Array, float]:
+    """Tracks smoothed with windows of `half` to either side, and the part of the noise's variance that is left."""
     smoothed = np.full_like(positions, np.nan)
     gains = []
     for marker in range(positions.shape[1]):
-        smoothed[:, marker], gain = _parabolas(positions[:, marker], half)
+        smoothed[:, marker], gain = _polynomials(positions[:, marker], half)
         gains.append(gain[np.isfinite(smoothed[:, marker, 0])])
     kept = np.concatenate(gains)
-    left = float(np.mean(kept)) if len(kept) else 1.0
-    return SmoothTracks(smoothed, raw, raw * float(np.sqrt(left)), left * len(positions))
+    return smoothed, float(np.mean(kept)) if len(kept) else 1.0
 
 
 def _noise(positions: Array) -> float:
     """Standard deviation per axis from third differences, which leave nothing of a smooth course."""
-    if len(positions) < 2 * _LEAST_SAMPLES:
+    if len(positions) < 10:
         return 0.0
     third = np.abs(np.diff(positions, 3, axis=0))
     of_marker = [float(np.median(track[np.isfinite(track)])) for track in third.transpose(1, 0, 2)
@@ -59,8 +95,8 @@ def _noise(positions: Array) -> float:
     return _MAD * float(np.median(of_marker)) / float(_THIRD_DIFFERENCE) if of_marker else 0.0
 
 
-def _parabolas(track: Array, half: int) -> tuple[Array, Array]:
-    """Least-squares parabola through the samples of each window of `half` to either side, at its middle: positions
+def _polynomials(track: Array, half: int) -> tuple[Array, Array]:
+    """Least-squares polynomial through the samples of each window of `half` to either side, at its middle: positions
     (T, 3), NaN where the middle is missing or too few are there, and what is left of the noise's variance (T,)."""
     seen = np.isfinite(track[:, 0])
     offsets = np.arange(-half, half + 1) / max(half, 1)

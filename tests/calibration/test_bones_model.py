@@ -13,7 +13,7 @@ from rhot_app.calibration.hand_shape import MARKERS, HandUnknowns
 from rhot_app.calibration.hand_start import choose_instants
 from rhot_app.calibration.marker_places import tracks_of
 from rhot_app.calibration.rigid_segments import find_slip, rigid_bodies, rigid_pairs
-from rhot_app.calibration.track_noise import smooth
+from rhot_app.calibration.track_noise import _smooth_all, smooth
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
@@ -93,14 +93,23 @@ def test_smoothing_tells_the_noise_and_halves_it() -> None:
     times = np.arange(3000) / 60.0
     true = 0.1 * np.stack([np.sin(2 * times), np.cos(3 * times), np.sin(times)], axis=1)[:, None]
     noisy = true + rng.normal(0, 0.4e-3, true.shape)
-    noisy[rng.random(3000) < 0.2] = np.nan
+    noisy[rng.random(3000) < 0.05] = np.nan
     smoothed = smooth(times, noisy)
     assert smoothed.raw_noise_m == pytest.approx(0.4e-3, rel=0.1)
     left = np.nanstd(smoothed.positions - true)
-    assert left == pytest.approx(smoothed.noise_m, rel=0.15) and left < 0.27e-3
+    assert left == pytest.approx(smoothed.noise_m, rel=0.15) and left < 0.25e-3
     slow = smooth(times[::4], noisy[::4])
     assert slow.noise_m == slow.raw_noise_m == pytest.approx(0.4e-3, rel=0.25)
     np.testing.assert_array_equal(slow.positions, noisy[::4])
+
+
+def test_a_fast_finger_is_not_smoothed_away() -> None:
+    rng = np.random.default_rng(4)
+    times = np.arange(3000) / 100.0
+    true = 0.01 * np.stack([np.sin(45 * times), np.cos(45 * times), np.sin(9 * times)], axis=1)[:, None]
+    smoothed = smooth(times, true + rng.normal(0, 0.02e-3, true.shape))
+    assert np.nanstd(smoothed.positions - true) < 0.03e-3 < np.nanstd(_smooth_all(true, 10)[0] - true)
+    assert smoothed.apart <= 3
 
 
 def test_rigid_markers_are_found_and_grouped() -> None:

@@ -21,7 +21,7 @@ from rhot_app.calibration.bones_entry import BONE_NAMES
 from rhot_app.calibration.bones_report import BoneLength, BonesReport
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.models.bones_steps import EntryStep, HandStep, knowledge_of, word_of
+from rhot_app.ui.wizards.models.bones_steps import EntryStep, HandStep, knowledge_of
 from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.page import Page
 
@@ -158,7 +158,7 @@ class HandPage(Page):
             f"{reach.finger} {reach.length_mm:.0f} ± {reach.std_mm:.0f}" for reach in report.reaches) + " mm")
 
     def _fill(self, r: int, bone: BoneLength) -> None:
-        texts = (bone.name.replace(".", " "), f"{bone.length_mm:.1f}", f"{bone.std_mm:.1f}", word_of(bone))
+        texts = (bone.name.replace(".", " "), f"{bone.length_mm:.1f}", f"{bone.std_mm:.1f}", bone.known.word)
         for c, text in enumerate(texts):
             item = QTableWidgetItem(text)
             if c in (1, 2):

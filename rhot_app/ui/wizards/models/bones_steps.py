@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 REASON = "bones calibration"
 SECONDS = 60.0
 
+_NAMES = {"movement": "measured by movement", "reach": "measured by movement", "entered": "measured with a ruler"}
+
 Side = Literal["right", "left"]
 
 
@@ -210,17 +212,11 @@ def knowledge_of(bone: BoneLength) -> str:
     return {"observed": "measured", "entered": "measured", "partly": "inferred"}.get(bone.known.value, "guessed")
 
 
-def word_of(bone: BoneLength) -> str:
-    """The same as a person reads it."""
-    return {"observed": "observed", "entered": "entered", "partly": "partly observed"}.get(
-        bone.known.value, "prior: what is usual")
-
-
 def propose(report: Any, rig: Rig, path: Path | None) -> Proposal | None:
     """The rig with this hand."""
     if report is None:
         return None
-    after = msgspec.structs.replace(rig, hand=report.hand)
+    after = msgspec.structs.replace(rig, hand=msgspec.structs.replace(report.hand, name=_NAMES[report.method]))
     size = Row("size", "100 %", f"{100 * report.size:.1f} ± {100 * report.size_std:.1f} %")
     return Proposal(REASON, report.verdict, (size, *rig_rows(rig, after)), (RigChange(rig, after, path, REASON),))
 
