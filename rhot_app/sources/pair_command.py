@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot pair``."""
-    parser.add_argument("node", metavar="NODE", help="address of the node, or with --rig its name in the rig")
+    parser.add_argument("node", metavar="NODE",
+                        help="ADDRESS or ADDRESS:PORT of the node, or with --rig its name in the rig")
     parser.add_argument("--rig", type=Path, metavar="FILE", help="write the node's key into this rig file")
     parser.add_argument("--port", type=int, default=None, metavar="N",
                         help="the node's pairing port (default: the rig's, or 47803)")
@@ -31,10 +32,14 @@ def run(args: argparse.Namespace) -> int:
 
     rig = None if args.rig is None else load_rig(args.rig)
     named = None if rig is None else next((node for node in rig.nodes if node.name == args.node), None)
-    address = _address(args, named)
+    address = _address(args, rig, named)
     keys = load_master_keys()
-    known = None if args.code is not None else _known(address, keys.knows)
-    who = known or pair(address, args.code if args.code is not None else _ask_for_code(), keys)
+
+    def check(who: Introduction) -> None:
+        if rig is not None:
+            _meant(args.rig, rig, named, who)
+    known = None if args.code is not None else _known(address, keys.knows, check)
+    who = known or pair(address, args.code if args.code is not None else _ask_for_code(), keys, check=check)
     done = "was paired before" if known else "is paired"
     print(f"{who.name} (id {who.node_id}) {done}; its key is {who.public_key}.")
     if rig is not None:
@@ -42,21 +47,41 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _address(args: argparse.Namespace, named: RigNode | None) -> NodeAddress:
-    from rhot_app.sources.pairing import PAIRING_PORT, NodeAddress
-    port = args.port if args.port is not None else named.pairing_port if named is not None else PAIRING_PORT
-    if not 1 <= port <= 65535:
-        raise PairingError(f"--port is a number from 1 to 65535, not {port}.")
-    return NodeAddress(named.address if named is not None else args.node, port)
+def _address(args: argparse.Namespace, rig: Rig | None, named: RigNode | None) -> NodeAddress:
+    from rhot_app.sources.pairing import PAIRING_PORT, NodeAddress, read_address
+    if args.port is not None and not 1 <= args.port <= 65535:
+        raise PairingError(f"--port is a number from 1 to 65535, not {args.port}.")
+    if named is not None:
+        return NodeAddress(named.address, args.port if args.port is not None else named.pairing_port)
+    host, port = read_address(args.node)
+    if rig is not None and not _is_address(host):
+        names = ", ".join(node.name for node in rig.nodes) or "none"
+        raise PairingError(f"there is no node {args.node!r} in {args.rig}; there are: {names}.")
+    if None not in (port, args.port) and port != args.port:
+        raise PairingError(f"{args.node} and --port {args.port} name two ports; leave one of them out.")
+    return NodeAddress(host, args.port or port or PAIRING_PORT)
 
 
-def _known(address: NodeAddress, knows: Callable[[str], bool]) -> Introduction | None:
+def _is_address(host: str) -> bool:
+    """Whether `host` is written as an address is, or is the name of a computer."""
+    import socket
+    if "." in host or ":" in host:
+        return True
+    try:
+        return bool(socket.getaddrinfo(host, None))
+    except (OSError, UnicodeError):
+        return False
+
+
+def _known(address: NodeAddress, knows: Callable[[str], bool],
+           check: Callable[[Introduction], None]) -> Introduction | None:
     """Who is there, if it claims a key that was proved once; that it has the key shows when it is spoken to. Raises
-    PairingError when nobody answers, before a code is asked for."""
+    PairingError when nobody answers or `check` refuses who does, before a code is asked for."""
     from rhot_app.sources.pairing import ask_who
     who = ask_who([address])[0]
     if isinstance(who, str):
         raise PairingError(who)
+    check(who)
     return who if knows(who.public_key) and not who.nonce else None
 
 
@@ -67,14 +92,21 @@ def _ask_for_code() -> str:
         raise PairingError("no code was entered; nothing was paired.") from exc
 
 
+def _meant(path: Path, rig: Rig, named: RigNode | None, who: Introduction) -> RigNode:
+    """The rig's node that `who` is; raises PairingError when it is another than `named`, or none of the rig's."""
+    node = named or next((node for node in rig.nodes if node.node_id == who.node_id), None)
+    if node is None or node.node_id != who.node_id:
+        meant = "has no node of this id" if node is None else f"means node {node.node_id} by {node.name!r}"
+        raise PairingError(f"node {who.node_id} ({who.name}) answers there, but {path} {meant}. Nothing was changed. "
+                           "Give the node the rig's node_id in its settings file, or the rig the node's.")
+    return node
+
+
 def _write_key(path: Path, rig: Rig, named: RigNode | None, who: Introduction) -> None:
     import msgspec
 
     from rhot_app.rig_history import accept
-    node = named or next((node for node in rig.nodes if node.node_id == who.node_id), None)
-    if node is None or node.node_id != who.node_id:
-        raise PairingError(f"{path}: node {who.node_id} ({who.name}) is not the one that the rig means; the rig was "
-                           "not changed. Give the node the rig's node_id in its settings file, or the rig the node's.")
+    node = _meant(path, rig, named, who)
     changed = msgspec.structs.replace(node, public_key=who.public_key, text_datagrams=False)
     nodes = tuple(changed if one is node else one for one in rig.nodes)
     accept(path, msgspec.structs.replace(rig, nodes=nodes), "pairing")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -38,6 +38,16 @@ class NodeAddress:
 
     def __str__(self) -> str:
         return f"{self.host}:{self.pairing_port}"
+
+
+def read_address(text: str) -> tuple[str, int | None]:
+    """Host and port of ``HOST`` or ``HOST:PORT``; None for a port that is not told. Raises PairingError."""
+    host, colon, port = text.rpartition(":")
+    if not colon or ":" in host:
+        return text, None
+    if not host or not (port.isascii() and port.isdecimal() and 1 <= int(port) <= 65535):
+        raise PairingError(f"{text!r} is not ADDRESS:PORT with a port from 1 to 65535.")
+    return host, int(port)
 
 
 class Introduction(msgspec.Struct, frozen=True):
@@ -76,15 +86,20 @@ def ask_who(addresses: Sequence[NodeAddress], timeout_s: float = TIMEOUT_S) -> l
     return found
 
 
-def pair(address: NodeAddress, code_text: str, keys: MasterKeys, timeout_s: float = TIMEOUT_S) -> Introduction:
+def pair(address: NodeAddress, code_text: str, keys: MasterKeys, timeout_s: float = TIMEOUT_S,
+         check: Callable[[Introduction], object] | None = None) -> Introduction:
     """Pair with the node at `address` by the code that it shows, and remember it; returns who it proved to be.
 
-    Raises PairingError, or TrustError when the code cannot be one or what was learned cannot be written down.
+    `check` sees who it says it is while the code is still unspent, and raises when it is not the node that is meant.
+    Raises PairingError, what `check` raises, or TrustError when the code cannot be one or what was learned cannot be
+    written down.
     """
     code = read_code(code_text)
     who = ask_who([address], timeout_s)[0]
     if isinstance(who, str):
         raise PairingError(who)
+    if check is not None:
+        check(who)
     if who.trust == "open":
         raise PairingError(f"node {who.name} is open to everybody; there is nothing to pair. Its settings file says so "
                            '("trust").')

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -156,8 +157,48 @@ def test_the_command_pairs_and_writes_the_key_into_the_rig(node: TrustedNode, ad
     assert main(["pair", "left", "--rig", str(path)]) == 0, "a second time needs no code"
     assert "was paired before" in capsys.readouterr().out
     assert main(["pair", "right", "--rig", str(path), "--port", str(address.pairing_port)]) == 2
-    assert "not the one that the rig means" in capsys.readouterr().err
+    assert "means node" in capsys.readouterr().err
     assert main(["pair", "127.0.0.1", "--port", str(address.pairing_port), "--code", "zz"]) == 2
+
+
+@pytest.mark.parametrize("by_name", [True, False])
+def test_another_node_than_the_rig_means_is_refused_before_the_code_is_spent(
+        node: TrustedNode, address: NodeAddress, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        by_name: bool) -> None:
+    rig = synthetic_rig()
+    left, right = (msgspec.structs.replace(one, node_id=node_id, pairing_port=address.pairing_port)
+                   for one, node_id in zip(rig.nodes, (7, 8), strict=True))
+    path = tmp_path / "rig.json"
+    save_rig(path, msgspec.structs.replace(rig, nodes=(left, right)))
+    before = path.read_bytes()
+    offer = node.offers.renew()
+    target = "left" if by_name else str(address)
+    assert main(["pair", target, "--rig", str(path), "--code", show_code(offer.code)]) == 2
+    said = capsys.readouterr().err
+    assert "node 3 (left) answers there" in said and "Nothing was changed" in said
+    assert node.offers.current() == offer and not node.trust.masters and not load_master_keys().nodes
+    assert path.read_bytes() == before
+
+
+def test_the_port_may_stand_behind_the_address(node: TrustedNode, address: NodeAddress,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["pair", str(address), "--code", show_code(node.offers.renew().code)]) == 0
+    assert "left (id 3) is paired" in capsys.readouterr().out
+    assert main(["pair", "127.0.0.1:0"]) == 2
+    assert "is not ADDRESS:PORT" in capsys.readouterr().err
+    assert main(["pair", str(address), "--port", "4"]) == 2
+    assert "two ports" in capsys.readouterr().err
+
+
+def test_a_name_that_the_rig_has_not_is_told_with_those_it_has(
+        node: TrustedNode, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(*_: object) -> list[object]:
+        raise socket.gaierror(-2, "Name or service not known")
+    monkeypatch.setattr(socket, "getaddrinfo", unknown)
+    path = tmp_path / "rig.json"
+    save_rig(path, synthetic_rig())
+    assert main(["pair", "lefft", "--rig", str(path), "--code", "zz"]) == 2
+    assert f"there is no node 'lefft' in {path}; there are: left, right." in capsys.readouterr().err
 
 
 def test_keys_of_the_master_are_drawn_once_and_private(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
