@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _words(found: Search, seconds: float) -> str:
     rows = [("name", "id", "address", "trust", "state")]
-    rows += [(node.presence.name, str(node.presence.node_id), ", ".join(node.addresses),
+    rows += [(node.presence.name, str(node.presence.node_id), ", ".join(_askable(node)),
               node.presence.trust.name.lower(), _state(node) or "announced") for node in found.nodes]
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
@@ -45,6 +45,13 @@ def _words(found: Search, seconds: float) -> str:
         lines = [f"No node was found within {seconds:g} s. Is rhot-node running, and on the same network? Some "
                  "networks pass on neither broadcast nor multicast; `rhot pair ADDRESS` asks one address."]
     return "\n".join([*lines, *found.conflicts, *found.notes])
+
+
+def _askable(node: FoundNode) -> list[str]:
+    """Its addresses as `rhot pair` takes them: with the pairing port where it is not the usual one."""
+    from rhot_app.sources.pairing import PAIRING_PORT, NodeAddress
+    port = node.presence.pairing_port
+    return [address if port == PAIRING_PORT else str(NodeAddress(address, port)) for address in node.addresses]
 
 
 def _fields(found: Search) -> dict[str, Any]:

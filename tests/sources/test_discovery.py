@@ -3,6 +3,7 @@ nodes that cannot be told apart."""
 
 from __future__ import annotations
 
+import dataclasses
 import ipaddress
 import json
 import queue
@@ -156,6 +157,15 @@ def test_the_command_shows_who_is_there(monkeypatch: pytest.MonkeyPatch, capsys:
     monkeypatch.setattr(discovery, "find_nodes", lambda seconds, progress: Search((), (), ()))
     assert main(["nodes", "--seconds", "1"]) == 1
     assert "No node was found within 1 s" in capsys.readouterr().out
+
+
+def test_an_unusual_pairing_port_stands_behind_the_address(monkeypatch: pytest.MonkeyPatch,
+                                                           capsys: pytest.CaptureFixture[str]) -> None:
+    unusual = dataclasses.replace(presence(), pairing_port=47853)
+    found = Search(together([Sighting(unusual, "10.0.0.5", READY)]), (), ())
+    monkeypatch.setattr(discovery, "find_nodes", lambda seconds, progress: found)
+    assert main(["nodes"]) == 0
+    assert capsys.readouterr().out.splitlines()[1].split() == ["left", "3", "10.0.0.5:47853", "unpaired", "ready"]
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "61", "nan"])
