@@ -23,7 +23,7 @@ _USUAL_OFFSET = 0.15  # of the picture's side, principal point from the middle
 _USUAL_ASPECT = 0.05  # fx against fy: pixels are square
 _GRID = 19
 _TOGETHER_M = 0.005
-_APART_M = 3.0
+_NARROW_M, _APART_M = 0.025, 3.0
 _GOOD_OVERLAP, _LEAST_OVERLAP = 0.5, 0.15
 _STEEP_RAD = np.radians(70.0)
 
@@ -104,6 +104,10 @@ def pair_findings(rig: Rig, pairs: list[PairGeometry]) -> list[Finding]:
         if pair.baseline_m < _TOGETHER_M:
             found.append(Finding("coincident", Grade.POOR, f"{both} stand at the same place "
                                  f"({pair.baseline_m * 1e3:.0f} mm apart).", "Depth needs two places.", _STEREO))
+        elif pair.baseline_m < _NARROW_M:
+            found.append(Finding("narrow", Grade.FAIR, f"{both} are only {pair.baseline_m * 1e3:.0f} mm apart.",
+                                 "So near to each other they hardly see depth; or the board's squares were given too "
+                                 "small.", "Measure from lens to lens. If that is right, put them 75 mm apart."))
         elif pair.baseline_m > _APART_M:
             found.append(Finding("apart", Grade.POOR, f"{both} are {pair.baseline_m:.0f} m apart.",
                                  "A pose's translation is in metres, not millimetres.", _STEREO))

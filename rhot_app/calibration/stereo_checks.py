@@ -28,6 +28,8 @@ _SQUARE_FAIR, _SQUARE_POOR = 0.005, 0.02
 _FLATNESS = 0.005  # of the board's diagonal, and
 _BOARD_OFF = 0.01  # of a square's side
 _BEYOND_NOISE = 2.0  # times what the noise of the corners explains
+_NEAREST_M, _NEAR_M, _FAR_M = 0.08, 0.15, 4.0
+"""Where a board is held before cameras that look at hands: other distances mean squares of another size than said."""
 
 
 def fit_findings(figures: StereoFigures, *, lenses_from_views: bool) -> list[Finding]:
@@ -43,7 +45,7 @@ def fit_findings(figures: StereoFigures, *, lenses_from_views: bool) -> list[Fin
             "between any two.",
             "Focal length and distance then look the same to the cameras.",
             "Tilt the board by 30 degrees to either side, up and down, and move it near and far."))
-    found += [_rms(figures), _squares(figures), _error(figures), _board(figures)]
+    found += [_rms(figures), _scale(figures), _squares(figures), _error(figures), _board(figures)]
     return [each for each in found if each is not None]
 
 
@@ -96,6 +98,20 @@ def _rms(figures: StereoFigures) -> Finding | None:
         "The board is bent or moved while the pictures were taken, pictures are blurred, or the cameras do not expose "
         "together.",
         "Use a stiff board, hold it still for each picture, and give more light.")
+
+
+def _scale(figures: StereoFigures) -> Finding | None:
+    boards = figures.state.world_from_board @ np.append(figures.board.object_points().mean(axis=0), 1.0)
+    away = boards[:, :3] - figures.world_from_camera[:, None, :3, 3]
+    typical = float(np.median(np.linalg.norm(away, axis=-1)))
+    if _NEAR_M <= typical <= _FAR_M:
+        return None
+    return Finding(
+        "scale", Grade.POOR if typical < _NEAREST_M else Grade.FAIR,
+        f"With squares of {figures.board.square_m * 1e3:g} mm the board was held {typical * 100:.0f} cm from the "
+        "cameras.",
+        "The squares have another size: they are given in millimetres.",
+        "Measure a square with a ruler, and say with --baseline-mm how far the lenses are apart.")
 
 
 def _squares(figures: StereoFigures) -> Finding | None:

@@ -142,7 +142,13 @@ def in_natural_order(files: Sequence[Path]) -> list[Path]:
 
 
 def matching_files(pattern: str) -> list[Path]:
-    """The files that a pattern names, in natural order; the folder is what stands before the first wildcard."""
+    """The files that a pattern names, in natural order; the folder is what stands before the first wildcard.
+
+    Raises CalibrationError when it names a folder.
+    """
+    if Path(pattern).is_dir():
+        raise CalibrationError(f"{pattern} is a folder; say which files in it, for example "
+                               f"'{pattern.rstrip('/')}/*.jpg'.")
     parts = Path(pattern).parts
     wild = next((i for i, part in enumerate(parts) if set(part) & set("*?[")), len(parts) - 1)
     if not parts:

@@ -76,6 +76,7 @@ def test_a_lens_that_cannot_be_is_named(rig: Rig, code: str, grade: Grade, field
 
 def test_cameras_that_cannot_work_together_are_named(rig: Rig) -> None:
     assert "coincident" in check_rig(with_right_at(rig, 0.001, 0.0, 0.0)).verdict.codes
+    assert "narrow" in check_rig(with_right_at(rig, 0.01, 0.0, 0.0)).verdict.codes
     assert "apart" in check_rig(with_right_at(rig, 75.0, 0.0, 0.0)).verdict.codes
     assert "swapped" in check_rig(with_right_at(rig, -0.075, 0.0, 0.0)).verdict.codes
     away = check_rig(with_right_at(rig, 0.075, 0.0, 0.0, turn=(0.0, 0.0, 1.0, 0.0))).verdict

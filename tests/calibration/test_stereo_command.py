@@ -179,6 +179,11 @@ def test_a_rig_on_the_table_has_z_up(pictures: Path, capsys: pytest.CaptureFixtu
     assert np.linalg.norm(baseline) * 1e3 == pytest.approx(answer["baseline_mm"])
 
 
+def test_a_square_size_of_another_unit_is_refused(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = told(pictures, capsys, "--square-mm", "3", code=2)
+    assert "scale" in [finding["code"] for finding in wrong["findings"] if finding["grade"] == "poor"]
+
+
 def test_a_ruler_catches_a_wrong_square(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The ends of 240 mm, two corners of the board eight squares apart, as a person reads them off pair 3."""
     ruler = ("--ruler-mm", "240", "--ruler", "left=277,72,604,168", "--ruler", "right=133,90,448,175")
