@@ -131,7 +131,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     clock = settings.clock.clock(time.monotonic_ns())
     store = SettingsStore(options.settings, settings)
     offers = OfferFile(offer_path(options.settings))
-    trust = _trust(options.settings, settings, offers)
+    trust = _trust(options.settings, settings)
     keys = None if trust is None else LinkKeys()
     daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), make_detector,
                         camera_takes_settings=takes_settings(options.camera), loop=options.loop,
@@ -157,6 +157,8 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
                       Reception(trust, offers, lambda: {**daemon.introduce(), **ports}))
         daemon.prepare()
         gc.freeze()
+        if trust is not None and not trust.masters:  # not before: a code is only for a node that has started
+            _invite(settings, offers)
         width, height = daemon.size
         print(json.dumps({"event": "ready", "node_id": settings.node_id, "name": settings.name, **ports,
                           "width": width, "height": height}), flush=True)
@@ -169,10 +171,9 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
             manager.alive()
 
 
-def _trust(path: Path, settings: NodeSettings, offers: OfferFile) -> NodeTrust | None:
+def _trust(path: Path, settings: NodeSettings) -> NodeTrust | None:
     """Whom the node trusts, and a word about it on the console; None when it is open. Raises TrustError."""
     from rhot_node.trust import NodeTrust, keys_path
-    from rhot_node.trust_command import invitation
     log = logging.getLogger(__name__)
     if settings.trust == "open":
         log.warning('this node is open ("trust" in its settings): whoever reaches it may see its pictures and steer it')
@@ -180,9 +181,14 @@ def _trust(path: Path, settings: NodeSettings, offers: OfferFile) -> NodeTrust |
     trust = NodeTrust(keys_path(path))
     if trust.masters:
         log.info("paired with %s", ", ".join(repr(master.name) for master in trust.masters))
-    else:
-        log.warning("not paired yet\n%s", invitation(settings, offers.current() or offers.renew()))
     return trust
+
+
+def _invite(settings: NodeSettings, offers: OfferFile) -> None:
+    """Show a pairing code on the console. Raises TrustError."""
+    from rhot_node.trust_command import invitation
+    logging.getLogger(__name__).warning("not paired yet\n%s",
+                                        invitation(settings, offers.current() or offers.renew()))
 
 
 def make_detector(settings: NodeSettings) -> Detector:

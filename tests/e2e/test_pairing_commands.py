@@ -69,9 +69,10 @@ class UnpairedNode:
 @pytest.mark.timeout(TEST_S)
 def test_from_shipped_to_paired_and_back(bench: Bench) -> None:
     node = UnpairedNode(bench)
+    code = re.compile(r"Pairing code of node left:  [0-9A-Z]{5}-[0-9A-Z]{5}-[0-9A-Z]{5}")
+    eventually(lambda: code.search(bench.log("left")) is not None, START_S)
     who = node.who()
-    assert who is not None and who.trust == "unpaired" and who.nonce, "it offers a code when it starts"
-    assert re.search(r"Pairing code of node left:  [0-9A-Z]{5}-[0-9A-Z]{5}-[0-9A-Z]{5}", bench.log("left"))
+    assert who is not None and who.trust == "unpaired" and who.nonce, "it offers a code when it has started"
 
     shown = command("rhot_node", "pair", "--settings", str(node.settings))
     match = re.search(r"([0-9A-Z]{5}-){2}[0-9A-Z]{5}", shown.stdout)

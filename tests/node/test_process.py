@@ -347,7 +347,10 @@ def test_what_is_wrong_is_said_in_a_sentence_with_code_2(tmp_path: Path, recordi
     broken = tmp_path / "broken.json"
     broken.write_bytes(Path(settings).read_bytes()[:100])
     assert f"{broken}: not valid JSON" in failed_start("--settings", str(broken), "--camera", "0")
-    assert "/dev/video77: no such camera" in failed_start("--settings", settings, "--camera", "77")
+    settings = str(write_settings(tmp_path, trust="paired"))
+    said = failed_start("--settings", settings, "--camera", "77")
+    assert "/dev/video77: no such camera" in said
+    assert "Pairing code" not in said and not list(tmp_path.glob("*.pairing.json")), "no code before it has started"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.bind(("127.0.0.1", 0))
         port = sock.getsockname()[1]
