@@ -60,10 +60,12 @@ class FilterFigures:
 
 def judge_filters(figures: FilterFigures) -> Verdict:
     """The verdict on a proposal."""
+    lag_s = figures.worst("lag_s")
+    moving = "their lag does not show" if math.isnan(lag_s) else (
+        f"moving, they lag by {1e3 * lag_s:.1f} ms (now {1e3 * figures.worst('lag_now_s'):.1f})")
     summary = (f"at rest the markers jitter by {1e3 * figures.worst('jitter_m'):.2f} mm rms at most (unfiltered "
                f"{1e3 * figures.worst('raw_jitter_m'):.2f}, with the rig's filters "
-               f"{1e3 * figures.worst('jitter_now_m'):.2f}); moving, they lag by {1e3 * figures.worst('lag_s'):.1f} ms "
-               f"(now {1e3 * figures.worst('lag_now_s'):.1f}).")
+               f"{1e3 * figures.worst('jitter_now_m'):.2f}); {moving}.")
     return judge(summary, [*_still(figures), *_fast(figures), *_compromise(figures), *_unseen(figures)])
 
 

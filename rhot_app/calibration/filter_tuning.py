@@ -92,7 +92,7 @@ def tune_filters(still: InstantTable, fast: InstantTable, rig: Rig, targets: Fil
     progress("trying filters after depth", 0.5)
     position = _tune(bench, lambda own: (before, own), POSITION_BETAS, rig.filters.position, targets)
     figures = _figures(bench, rig, before, _rows(position.chosen, markers))
-    progress("done", 1.0)
+    progress("filters", 1.0)
     return FilterReport(targets, figures, pixel, position, judge_filters(
         FilterFigures(targets, figures, bench.drift_m_s)))
 

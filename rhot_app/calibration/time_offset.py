@@ -86,7 +86,7 @@ def calibrate_times(table: ObservationTable, rig: Rig, progress: Progress = sile
         rivals={found.camera: found.rival for found in searches},
         drifts_s={camera: plot.drift_s for camera, plot in plots.items()},
         clock_bounds_s=tuple(camera.clock_bound_s for camera in model.cameras))
-    progress("done", 1.0)
+    progress("times", 1.0)
     return TimeReport(cameras, agree, plots, judge_times(figures))
 
 
