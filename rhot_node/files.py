@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import tempfile
 from importlib.resources import files
 from pathlib import Path
@@ -13,6 +14,17 @@ from typing import Any, TypeVar
 import msgspec
 
 T = TypeVar("T")
+
+_PLACE = re.compile(r"(?P<what>.*) - at `\$\.?(?P<place>[^`]*)`", re.DOTALL)
+_COMPLAINTS = (
+    (re.compile(r"^Object contains unknown field `(.*)`$"),
+     r'there is no field "\1"; is it misspelt, or in the wrong place?'),
+    (re.compile(r"^Object missing required field `(.*)`$"), r'the field "\1" is missing.'),
+    (re.compile(r"^Invalid (?:enum )?value (.*)$"), r"\1 is not one of the values that this field can have."),
+)
+_KIND = re.compile(r"`([^`]*)`")
+_KINDS = {"int": "a whole number", "float": "a number", "str": "text", "bool": "true or false", "null": "null",
+          "array": "a list", "object": "an object {...}"}
 
 
 def resource_path(*parts: str) -> Path:
@@ -42,7 +54,22 @@ def decode_document(data: bytes, kind: type[T], *, format_name: str, version: in
     try:
         return msgspec.json.decode(data, type=kind)
     except msgspec.ValidationError as exc:
-        raise error(f"{where}: {exc}") from exc
+        raise error(f"{where}: {_in_words(str(exc))}") from exc
+
+
+def _in_words(message: str) -> str:
+    """What msgspec found wrong, field first, for people who edit the file; a message that is not its own stays."""
+    match = _PLACE.fullmatch(message)
+    what, place = (match["what"], match["place"]) if match else (message, "")
+    for pattern, words in _COMPLAINTS:
+        what = pattern.sub(words, what)
+    if what.startswith("Expected `"):
+        what = "expected" + _KIND.sub(_kind_in_words, what.removeprefix("Expected")).replace(", got", ", not") + "."
+    return f"{place}: {what}" if place else what
+
+
+def _kind_in_words(kinds: re.Match[str]) -> str:
+    return " or ".join(_KINDS.get(kind, kind) for kind in kinds[1].split(" | "))
 
 
 def read_document(path: Path, kind: type[T], *, format_name: str, version: int, error: type[Exception]) -> T:

@@ -51,6 +51,28 @@ BROKEN: list[tuple[dict[str, Any], str]] = [
 ]
 
 
+SAID: list[tuple[dict[str, Any], str]] = [
+    ({"camera": {"exposure_ms": 4}}, 'camera: there is no field "exposure_ms"; is it misspelt, or in the wrong place?'),
+    ({"prot": 1}, 'there is no field "prot"; is it misspelt, or in the wrong place?'),
+    ({"markers": {}}, 'markers: the field "markers" is missing.'),
+    ({"node_id": "a"}, "node_id: expected a whole number, not text."),
+    ({"camera": {"gain": "a"}}, "camera.gain: expected a number or null, not text."),
+    ({"node_id": 0}, "node_id: expected a whole number >= 1."),
+    ({"detector": "magic"}, "detector: 'magic' is not one of the values that this field can have."),
+]
+
+
+@pytest.mark.parametrize(("changes", "sentence"), SAID)
+def test_what_is_wrong_is_said_in_plain_words(tmp_path: Path, settings: NodeSettings, changes: dict[str, Any],
+                                              sentence: str) -> None:
+    path = tmp_path / "node.json"
+    save_settings(path, settings)
+    path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+    with pytest.raises(SettingsError) as caught:
+        load_settings(path)
+    assert str(caught.value) == f"{path}: {sentence}"
+
+
 @pytest.mark.parametrize(("changes", "named"), BROKEN)
 def test_a_broken_file_is_named_with_its_field(tmp_path: Path, settings: NodeSettings, changes: dict[str, Any],
                                                named: str) -> None:
