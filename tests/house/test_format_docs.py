@@ -28,6 +28,14 @@ PAGES: dict[str, tuple[str, int, tuple[type[msgspec.Struct], ...]]] = {
 }
 
 
+def test_the_sample_settings_of_a_node_are_ones(tmp_path: Path) -> None:
+    sample = re.search(r"```json\n(.*?)```", (DOCS / "node.md").read_text(), re.DOTALL)
+    assert sample is not None, "docs/node.md shows no settings file"
+    path = tmp_path / "node.json"
+    path.write_text(sample[1])
+    assert config.load_settings(path).name == "left"
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_the_page_names_every_field(page: str) -> None:
     format_name, version, structs = PAGES[page]
