@@ -7,7 +7,7 @@ px: on grey, on the edge between skin and desk, and moving, exposed for 16 % of 
 about the mean, per axis; the bound is that of a single frame, with radius, colours and shading unknown.
 
 Then the twin's painted fingertips and wrist band, at 0.6 m with its own noise: bias and jitter against the true outline
-(band: the projected axis), and the mean bias of left minus right, which is depth.
+(band: the projected axis), and the mean bias of left minus right against the outlines, which is depth.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def twin(poses: int) -> dict[str, Any]:
         for marker, ours, theirs in zip(MARKERS.markers, rows, boxes, strict=True):
             if not ours:
                 continue
-            a, b = np.array(ours), np.array(theirs)  # (N, 2 cameras, 2 means + 2 variances)
+            a, b = np.array(ours), np.array(theirs)  # (N, 2 cameras, columns of `_score`)
             figures = _figures(a) | {f"box_{key}": value for key, value in _figures(b).items()}
             results[background][marker.id] = figures
             print(f"{marker.id:<26}{figures['jitter_x']:9.4f} {figures['jitter_y']:7.4f} {figures['bias']:9.3f} "
@@ -150,21 +150,24 @@ def twin(poses: int) -> dict[str, Any]:
 
 
 def _score(pose: Pose, name: str, store: list[list[Array]]) -> None:
-    """Mean error and variance of each marker that both cameras see whole: (2, 4) per marker and pose."""
+    """Of each marker that both cameras see whole, (2 cameras, 5): mean error (x, y), variance (x, y), and the mean
+    horizontal error against the outline, whose perspective the master knows and mends (`geometry.silhouette`)."""
     seen = [seen_by(FastDetector(MARKERS) if name == "fast" else ReferenceDetector(MARKERS), frames)[4:]
             for frames in pose.frames]
     for index, marker in enumerate(MARKERS.markers):
         truth = pose.centre[:, index] if marker.shape == "band" else pose.outline[:, index]
         points = np.array([part[:, index] for part in seen])
         if np.isfinite(truth).all() and np.isfinite(points).all():
-            store[index].append(np.concatenate([points.mean(axis=1) - truth, points.var(axis=1, ddof=1)], axis=1))
+            mean = points.mean(axis=1)
+            store[index].append(np.concatenate([mean - truth, points.var(axis=1, ddof=1),
+                                                mean[:, :1] - pose.outline[:, index, :1]], axis=1))
 
 
 def _figures(scored: Array) -> dict[str, float]:
-    jitter = np.sqrt(scored[:, :, 2:].mean(axis=(0, 1)))
+    jitter = np.sqrt(scored[:, :, 2:4].mean(axis=(0, 1)))
     return {"jitter_x": float(jitter[0]), "jitter_y": float(jitter[1]),
             "bias": float(np.sqrt((scored[:, :, :2] ** 2).sum(axis=2).mean())),
-            "left_minus_right": float((scored[:, 0, 0] - scored[:, 1, 0]).mean())}
+            "left_minus_right": float((scored[:, 0, 4] - scored[:, 1, 4]).mean())}
 
 
 def main() -> int:

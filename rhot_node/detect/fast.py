@@ -35,6 +35,7 @@ GUESS_EVERY = 20  # frames without all markers in plain view until the light is 
 STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
+PALE = 0.5  # of the least chroma that a search takes for paint: a tracked marker in shade has more
 SEARCH_STEP = 2  # chroma rows: every other one shows where markers are
 HAND_PASSES = 2  # of finding the hand by its likeliest markers, and those by the hand
 GLANCE = 8  # frames between looks at the light and the hand as a whole while all markers are followed in plain view
@@ -262,13 +263,18 @@ class FastDetector:
             for blob in ranked[:CANDIDATES]:
                 if self._is_elsewhere(index, blob, hand):
                     continue
-                if self._measure(image, index, self._blob_request(index, blob)):
+                if self._measure(image, index, self._blob_request(index, blob)) and not self._is_pale(
+                        index, self._row[m.LEVEL]):
                     self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
                     found[index] = self._observe(index, flags, camera_image)
                     break
             else:
                 track.lose()
                 found[index] = lost_observation(index)
+
+    def _is_pale(self, index: int, level: float) -> bool:
+        """Whether a level of chroma is too low for the marker's paint: a track has slid to something else."""
+        return bool(level < PALE * self._markers[index].chroma.magnitude_min)
 
     def _is_elsewhere(self, index: int, blob: Blobs, hand: Whereabouts | None) -> bool:
         """Whether a blob is where the hand, which wears the marker, cannot reach."""
@@ -294,12 +300,14 @@ class FastDetector:
         return middle_of(worn)
 
     def _strays(self, found: dict[int, MarkerObservation]) -> list[int]:
-        """Tracked worn markers that no hand can wear together with the others."""
+        """Tracked markers that are none: too pale, or worn where no hand can reach from the others."""
+        pale = [index for index in found if self._is_pale(index, self._tracks[index].level)]
         worn = [index for index in found if self._markers[index].role is not None]
         hand = middle_of([(self._tracks[index].x, self._tracks[index].y, self._tracks[index].area) for index in worn])
         if hand is None:
-            return []
-        return [index for index in worn if hand.beyond(self._tracks[index].x, self._tracks[index].y)]
+            return pale
+        return pale + [index for index in worn if index not in pale
+                       and hand.beyond(self._tracks[index].x, self._tracks[index].y)]
 
     def _rank(self, index: int, blobs: Blobs, worth: NDArray[np.float64]) -> tuple[Blobs, MarkerFlag]:
         """The blobs from the likeliest on: by motion and size while the marker is remembered, else by `worth`."""

@@ -34,6 +34,7 @@ DENT_MOST = 0.45  # px that a radius may move against the others in a frame
 MISFIT_NOISE, MISFIT_MOST = 2.0, 0.10  # standard deviations of the noise, and of the contrast
 TURN_MOST = 0.17  # rad: an elongated marker that has turned further gets new axes
 ELONGATED = 1.3
+SPEED_MOST = 8.0  # px per frame: a faster marker's edges are smeared, by one side more than by the other
 MARGIN = 3.0  # px around a resting marker
 
 NOISE_MIN = 0.5  # grey levels of chroma noise; quantisation alone leaves 0.3
@@ -123,7 +124,7 @@ def _soft(u, v, track, look, soft):
     half = 0.6 * track[t.EXTENT] + MARGIN + 0.5 * speed
     px, py = track[t.X] + track[t.VX] + track[t.SAG_X], track[t.Y] + track[t.VY] + track[t.SAG_Y]
     x0, x1, y0, y1 = int(px - half), int(px + half) + 1, int(py - half), int(py + half) + 1
-    if not half < 200.0 or x0 < 1 or y0 < 1 or x1 > u.shape[1] - 2 or y1 > u.shape[0] - 2:
+    if not speed < SPEED_MOST or x0 < 1 or y0 < 1 or x1 > u.shape[1] - 2 or y1 > u.shape[0] - 2:
         return False
     ramp = 1.0 / (SOFT_HIGH - SOFT_LOW)
     wu, wv = look[c.W_U] * ramp, look[c.W_V] * ramp

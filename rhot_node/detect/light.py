@@ -32,6 +32,7 @@ HUE_CAP_DEG = 15.0  # a marker that is further off is not itself, and counts no 
 INFORMATION_LEAST = 50.0  # 1 / variance of a warmth that is worth as much as the last known one
 INFORMATION_SURE = 300.0  # the same of a warmth known to 0.06
 SWITCHED = 0.12  # of warmth in one frame: no lamp drifts so fast
+STRENGTH_LEAST = 0.3  # of the chroma that a paint should show in this light: less is something else, or deep shade
 MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
 
 RGB_FROM_YCC = np.array([[1.0, 0.0, 1.402], [1.0, -0.344136, -0.714136], [1.0, 1.772, 0.0]])
@@ -62,6 +63,7 @@ class Light:
         self.warmth = 0.0
         self._grid = np.arange(-WARMTH_MOST, WARMTH_MOST + 0.5 * STEP, STEP)
         self._hues = predicted_hues(markers.markers, self._grid)
+        self._strengths = np.hypot(*predicted_chroma(markers.markers, self._grid).transpose(2, 0, 1))
         self._u = self._v = np.zeros((0, 0), dtype=np.uint8)
 
     def balanced(self, image: YuvImage) -> YuvImage:
@@ -88,11 +90,13 @@ class Light:
         `steady`, 0 to 1: how much the last known light counts; it also counts as far as the colours tell nothing. It
         does not count when they plainly tell of a lamp that was switched. Returns by how much the warmth changed.
         """
-        strong = np.hypot(colours[:, 1], colours[:, 2]) >= MAGNITUDE_MIN
+        chosen, here = np.asarray(indices, dtype=np.intp), int(np.argmin(np.abs(self._grid - self.warmth)))
+        strong = np.hypot(colours[:, 1], colours[:, 2]) >= np.maximum(
+            STRENGTH_LEAST * self._strengths[chosen, here], MAGNITUDE_MIN)
         if not strong.any():
             return 0.0
         hues = np.degrees(np.arctan2(colours[strong, 2], colours[strong, 1]))
-        fitted, information = fit_warmth(hues, self._hues[np.asarray(indices)[strong]], self._grid)
+        fitted, information = fit_warmth(hues, self._hues[chosen[strong]], self._grid)
         if abs(fitted - self.warmth) >= SWITCHED and information >= INFORMATION_SURE:
             steady = 0.0
         change = (1.0 - steady) * information / (information + INFORMATION_LEAST) * (fitted - self.warmth)
@@ -100,11 +104,16 @@ class Light:
         return abs(change)
 
 
-def predicted_hues(markers: Sequence[Marker], warmths: Array) -> Array:
-    """(M, K) degrees: the hue of every marker's paint in the light of every warmth (K,)."""
+def predicted_chroma(markers: Sequence[Marker], warmths: Array) -> Array:
+    """(M, K, 2) Cb and Cr of every marker's paint in the light of every warmth (K,)."""
     gains = np.array([gains_of(float(warmth)) for warmth in warmths])
     colours = np.array([paint_rgb(marker) for marker in markers])
-    chroma = (colours[:, None, :] * gains) @ YCC_FROM_RGB[1:].T
+    return np.asarray((colours[:, None, :] * gains) @ YCC_FROM_RGB[1:].T)
+
+
+def predicted_hues(markers: Sequence[Marker], warmths: Array) -> Array:
+    """(M, K) degrees: the hue of every marker's paint in the light of every warmth (K,)."""
+    chroma = predicted_chroma(markers, warmths)
     return np.asarray(np.degrees(np.arctan2(chroma[..., 1], chroma[..., 0])))
 
 
