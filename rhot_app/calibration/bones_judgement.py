@@ -187,7 +187,7 @@ def few_marker_findings(markers: int) -> list[Finding]:
     """What so few markers cannot show."""
     return [Finding("not_observed", Grade.GOOD, f"{markers} markers show the size of the hand and how far each finger "
                     "reaches, not single bones.", "Their lengths are what is usual in a hand of this size.",
-                    "More markers show more: one on each bone and three on the back of the hand show all.")]
+                    "A marker on each bone and three on the back of the hand show single bones.")]
 
 
 def bone_findings(bones: Sequence[BoneLength]) -> list[Finding]:
@@ -198,7 +198,7 @@ def bone_findings(bones: Sequence[BoneLength]) -> list[Finding]:
     seen = [bone.name for bone in bones if bone.known is not Known.PRIOR]
     which = ("no bone by itself" if not seen else f"only {', '.join(seen)}" if len(seen) < len(unseen)
              else f"all but {', '.join(unseen)}")
-    return [Finding("not_observed", Grade.GOOD if seen else Grade.FAIR,
+    return [Finding("not_observed", Grade.GOOD if len(seen) > len(unseen) else Grade.FAIR,
                     f"The recording shows {which}; the lengths not shown are what is usual in a hand of this size.",
                     "No marker, or no movement, tells them from their neighbours.",
                     "Bend every joint by itself, or add markers.")]

@@ -34,7 +34,7 @@ itself none the less. Where skin moved unseen a last phalanx came out 4 mm short
 
 _START_NOISE_M = 3e-3
 _SIDE_INSTANTS = 60
-_ROUNDS = 3
+_ROUNDS, _STEPS = 3, 20  # to see how large the errors are, which the last steps hardly change
 _NOISE_DOUBT = 1.2  # the variance of the noise is known to a fifth; only more than that is an error of another kind
 _FAST = 90.0, 2.5003  # a percentile of distances, and its value in a 3-D unit Gaussian
 
@@ -105,7 +105,8 @@ def _believe(unknowns: HandUnknowns, seen: Array, start: HandBundle, smoothed: S
 
     for turn in range(_ROUNDS):
         share = within(progress, 0.1 + 0.7 * turn / _ROUNDS, 0.1 + 0.7 * (turn + 1) / _ROUNDS)
-        bundle = HandAdjustment(unknowns, seen + shift, weights).run(bundle.vector, bundle.poses, 100, progress=share)
+        adjustment = HandAdjustment(unknowns, seen + shift, weights)
+        bundle = adjustment.run(bundle.vector, bundle.poses, _STEPS, progress=share)
         error = max(_error(bundle.residuals, unknowns.size), 1e-5)
         noise = min(smoothed.noise_m, error)
         weights = Weights(error, everything, fresh=(noise / error) ** 2)

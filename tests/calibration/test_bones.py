@@ -59,7 +59,7 @@ def rich(hand: HandAnatomy) -> MarkerTracks:
 def few_instants() -> pytest.MonkeyPatch:
     """Solve from a part of the instants: less exact, and quick."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hand_fit, "INSTANTS", 150)
+        patch.setattr(hand_fit, "INSTANTS", 100)
         yield patch
 
 
@@ -90,7 +90,7 @@ def test_a_right_hand_is_not_taken_for_a_left_one(rich: MarkerTracks, few_instan
     short = left_out_of_right(rich).within(0.0, 25.0)
     few_instants.setattr(hand_fit, "INSTANTS", 40)
     report = solve_bones(short, base_hand("left"))
-    few_instants.setattr(hand_fit, "INSTANTS", 150)
+    few_instants.setattr(hand_fit, "INSTANTS", 100)
     assert "wrong_side" in report.verdict.codes and not report.verdict.acceptable
     assert "--side right" in report.verdict.findings[0].sentence
 
@@ -127,7 +127,7 @@ def test_a_hand_that_holds_still_is_told_to_move(few_instants: pytest.MonkeyPatc
     still = replace(moving, positions=moving.positions[200] + rng.normal(0, 0.4e-3, moving.positions.shape))
     few_instants.setattr(hand_fit, "INSTANTS", 40)
     report = solve_bones(still, base_hand())
-    few_instants.setattr(hand_fit, "INSTANTS", 150)
+    few_instants.setattr(hand_fit, "INSTANTS", 100)
     told = [finding.sentence for finding in report.verdict.findings if finding.code == "finger_still"]
     assert len(told) == 5 and all("Bend and stretch" in sentence for sentence in told)
     assert sum(bone.known is Known.PRIOR for bone in report.bones) >= 10
@@ -152,7 +152,7 @@ def test_markers_with_swapped_names_are_found_out(few_instants: pytest.MonkeyPat
         order[a], order[b] = b, a
     few_instants.setattr(hand_fit, "INSTANTS", 40)
     report = solve_bones(replace(tracks, positions=tracks.positions[:, order]), base_hand())
-    few_instants.setattr(hand_fit, "INSTANTS", 150)
+    few_instants.setattr(hand_fit, "INSTANTS", 100)
     assert not report.verdict.acceptable
     told = {finding.code: finding.sentence for finding in report.verdict.findings}
     assert "index_proximal" in told["misplaced"] and "little_proximal" in told["misplaced"]
