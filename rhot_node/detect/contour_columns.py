@@ -14,8 +14,8 @@ SINES = np.sin(STEP_RAD * np.arange(NODES))
 HALF_COSINES = np.cos(STEP_RAD * (np.arange(NODES) + 0.5))
 HALF_SINES = np.sin(STEP_RAD * (np.arange(NODES) + 0.5))
 
-BAND = 1.75  # px on either side of the outline that its blurred edge reaches
-RING_NEAR, RING_FAR = 1.5, 3.2  # px outside the outline: what surrounds the marker
+BAND = 1.5  # px on either side of the outline that its blurred edge reaches
+RING_NEAR, RING_FAR = 1.4, 2.8  # px outside the outline: what surrounds the marker
 FLATNESS = 4.0  # grey levels^2 that surroundings are taken to vary by at least, as in `coverage`
 INSIDE_MIN = 8  # pixels that the paint's level is taken from at least
 BLUR_START, BLUR_LEAST, BLUR_MOST = 0.455, 0.38, 0.9  # px: point spread of 0.7 luma px and the 2x2 mean
