@@ -109,8 +109,9 @@ class FastDetector:
             if self._followed.count == len(self._markers):
                 return self._glance(image)
             seen = self._find(image)
-            if ((self._light_in_doubt(seen) and guess_light(image, self._light, self._gate, self._set))
-                    or self._read_light(seen, STEADY) >= SWITCHED):  # somebody switched a lamp
+            if self._light_in_doubt(seen):
+                seen = self._find_in_guessed_light(image, seen)
+            if self._read_light(seen, STEADY) >= SWITCHED:  # somebody switched a lamp
                 seen = self._find_in_new_light(image)
         self._fresh, self._plain = False, len(self._plainly(seen))
         return seen
@@ -120,8 +121,7 @@ class FastDetector:
         of them, else by the light in which most are recognised."""
         seen = self._find(image)
         if len(self._plainly(seen)) < len(seen):
-            guess_light(image, self._light, self._gate, self._set)
-            return self._find_in_new_light(image)
+            return self._find_in_guessed_light(image)
         return seen if self._read_light(seen, 0.0) < DEAD_ZONE else self._find_in_new_light(image)
 
     def _glance(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
@@ -148,6 +148,22 @@ class FastDetector:
         if doubt or plain == len(seen):
             self._until_guess = GUESS_EVERY
         return doubt and plain < len(seen)
+
+    def _find_in_guessed_light(self, image: YuvImage, seen: tuple[MarkerObservation, ...] = (),
+                               ) -> tuple[MarkerObservation, ...]:
+        """Find the markers in the light in which most are recognised, if enough of them then prove to be paint.
+
+        `seen`: what was found by the last known light; nothing: it is searched by that as well.
+        """
+        known = self._light.warmth
+        if guess_light(image, self._light, self._gate, self._set):
+            guessed = self._find_in_new_light(image)
+            plain = self._plainly(guessed)
+            if np.count_nonzero(self._light.strong(plain, self._paint[plain])) >= MARKERS_LEAST:
+                return guessed
+            self._light.warmth = known
+            seen = ()
+        return seen or self._find_in_new_light(image)
 
     def _find_in_new_light(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """Find the markers, read the light from them, and find them again in that."""

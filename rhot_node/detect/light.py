@@ -84,15 +84,20 @@ class Light:
             return colours
         return np.asarray(colours @ np.linalg.inv(np.vstack([(1.0, 0.0, 0.0), balance_matrix(self.warmth)])).T)
 
+    def strong(self, indices: list[int], colours: Array) -> NDArray[np.bool_]:
+        """(N,) whether colours (N, 3) Y, Cb, Cr, as the camera shows them, are as strong as the paints of the markers
+        `indices` should be in this light."""
+        here = int(np.argmin(np.abs(self._grid - self.warmth)))
+        expected = STRENGTH_LEAST * self._strengths[np.asarray(indices, dtype=np.intp), here]
+        return np.asarray(np.hypot(colours[:, 1], colours[:, 2]) >= np.maximum(expected, MAGNITUDE_MIN))
+
     def read(self, indices: list[int], colours: Array, steady: float = 0.0) -> float:
         """Read the light from the paint of the markers `indices`, (N, 3) Y, Cb, Cr as the camera shows them.
 
         `steady`, 0 to 1: how much the last known light counts; it also counts as far as the colours tell nothing. It
         does not count when they plainly tell of a lamp that was switched. Returns by how much the warmth changed.
         """
-        chosen, here = np.asarray(indices, dtype=np.intp), int(np.argmin(np.abs(self._grid - self.warmth)))
-        strong = np.hypot(colours[:, 1], colours[:, 2]) >= np.maximum(
-            STRENGTH_LEAST * self._strengths[chosen, here], MAGNITUDE_MIN)
+        chosen, strong = np.asarray(indices, dtype=np.intp), self.strong(indices, colours)
         if not strong.any():
             return 0.0
         hues = np.degrees(np.arctan2(colours[strong, 2], colours[strong, 1]))
