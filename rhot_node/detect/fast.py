@@ -5,29 +5,25 @@ Works on the planes of a YUV420 image as the camera delivers them, in one thread
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
+from rhot_node.detect.candidates import Blobs, ranked_by, request_of, worth_of
 from rhot_node.detect.follow import learn_noise, noise_level
 from rhot_node.detect.followed import Followed
-from rhot_node.detect.gate import ColourGate, Labels, merits
+from rhot_node.detect.gate import ColourGate, Labels
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
 from rhot_node.detect.light import DEAD_ZONE, SWITCHED, Light
 from rhot_node.detect.light_guess import MARKERS_LEAST, guess_light
 from rhot_node.detect.outline import INTERIOR, OUTSIDE
-from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
-from rhot_node.detect.track import MARGIN, RIVAL_MARGIN, TRACK_COLUMNS, Track, lost_observation
+from rhot_node.detect.search import AREA, LABEL, SUM_X, SUM_Y
+from rhot_node.detect.track import TRACK_COLUMNS, Track, lost_observation
 from rhot_node.detect.whereabouts import Whereabouts, middle_of
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
-Blobs = NDArray[np.float64]
-
-AS_PLAUSIBLE = 0.3  # merit of a second blob, as a fraction of the best, that makes the choice ambiguous
 CANDIDATES = 4  # blobs per marker that are measured until one proves to be paint
 NOISE_START, NOISE_START_BLOCKS = 1.5, 20.0  # grey levels of chroma noise, until so many blocks of paint have told
 SUDDENLY = 2  # markers fewer in plain view than in the last frame: was a lamp switched?
@@ -37,7 +33,6 @@ PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour t
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
 PALE = 0.5  # of the least chroma that a search takes for paint: a tracked marker in shade has more
 SEARCH_STEP = 2  # chroma rows: every other one shows where markers are
-HAND_PASSES = 2  # of finding the hand by its likeliest markers, and those by the hand
 GLANCE = 8  # frames between looks at the light and the hand as a whole while all markers are followed in plain view
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
 
@@ -229,7 +224,7 @@ class FastDetector:
         for index, marker in enumerate(self._markers):
             own = []
             for blob in blobs[blobs[:, LABEL] == index + 1]:
-                if self._measure(image, index, self._blob_request(index, blob)):
+                if self._measure(image, index, self._request_of(index, blob)):
                     own.append(Track(marker.shape).observe(index, self._row.tolist(), self._noise, MarkerFlag.ACQUIRED))
             everything.append(sorted(own, key=lambda seen: -seen.diameter))
         return everything
@@ -256,6 +251,9 @@ class FastDetector:
         learn_noise(self._noise_variance, row[m.NOISE_SUM], row[m.NOISE_COUNT])
         return True
 
+    def _request_of(self, index: int, blob: Blobs) -> NDArray[np.float64]:
+        return request_of(blob, self._directions[index], self._markers[index].shape, self._request)
+
     def _observe(self, index: int, flags: MarkerFlag, camera_image: YuvImage) -> MarkerObservation:
         """Take what was measured into the marker's track, and follow it from now on when it is in plain view."""
         row = self._row
@@ -272,14 +270,14 @@ class FastDetector:
         image = self._light.balanced(camera_image)
         blobs = self._gate.blobs(image, lost, step=SEARCH_STEP).copy()
         own = {index: blobs[blobs[:, LABEL] == index + 1] for index in lost}
-        worth, hand = self._worth(own)
+        worth, hand = worth_of(own, self._markers, self._tracks, self._scratch.mask.shape)
         for index in lost:
             track = self._tracks[index]
-            ranked, flags = self._rank(index, own[index], worth[index])
+            ranked, flags = ranked_by(track, own[index], worth[index])
             for blob in ranked[:CANDIDATES]:
                 if self._is_elsewhere(index, blob, hand):
                     continue
-                if self._measure(image, index, self._blob_request(index, blob)) and not self._is_pale(
+                if self._measure(image, index, self._request_of(index, blob)) and not self._is_pale(
                         index, self._row[m.LEVEL]):
                     self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
                     found[index] = self._observe(index, flags, camera_image)
@@ -297,24 +295,6 @@ class FastDetector:
         return (hand is not None and self._markers[index].role is not None
                 and hand.beyond(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA]))
 
-    def _worth(self, own: dict[int, Blobs]) -> tuple[dict[int, NDArray[np.float64]], Whereabouts | None]:
-        """(N,) merit of every blob of each lost marker: by themselves at first, then by where that puts the hand."""
-        shape, hand = self._scratch.mask.shape, None
-        for _ in range(HAND_PASSES):
-            worth = {index: merits(blobs, self._markers[index], shape, hand) for index, blobs in own.items()}
-            hand = self._whereabouts(own, worth)
-        return {index: merits(blobs, self._markers[index], shape, hand) for index, blobs in own.items()}, hand
-
-    def _whereabouts(self, own: dict[int, Blobs], worth: dict[int, NDArray[np.float64]]) -> Whereabouts | None:
-        """Where the hand is: by the worn markers that are tracked, and by the likeliest blob of each lost one."""
-        worn = [(track.x, track.y, track.area) for index, track in enumerate(self._tracks)
-                if index not in own and self._markers[index].role is not None]
-        for index, blobs in own.items():
-            if self._markers[index].role is not None and len(blobs):
-                blob = blobs[int(np.argmax(worth[index]))]
-                worn.append((blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA]))
-        return middle_of(worn)
-
     def _strays(self, found: dict[int, MarkerObservation]) -> list[int]:
         """Tracked markers that are none: too pale, or worn where no hand can reach from the others."""
         pale = [index for index in found if self._is_pale(index, self._tracks[index].level)]
@@ -324,29 +304,3 @@ class FastDetector:
             return pale
         return pale + [index for index in worn if index not in pale
                        and hand.beyond(self._tracks[index].x, self._tracks[index].y)]
-
-    def _rank(self, index: int, blobs: Blobs, worth: NDArray[np.float64]) -> tuple[Blobs, MarkerFlag]:
-        """The blobs from the likeliest on: by motion and size while the marker is remembered, else by `worth`."""
-        track = self._tracks[index]
-        if track.remembered:
-            costs = np.array([track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
-                              for blob in blobs])
-            order = np.argsort(costs)
-            doubtful = len(blobs) > 1 and costs[order[1]] < costs[order[0]] + RIVAL_MARGIN
-        else:
-            order = np.argsort(-worth)
-            doubtful = len(blobs) > 1 and worth[order[1]] > AS_PLAUSIBLE * worth[order[0]]
-        return blobs[order], MarkerFlag.ACQUIRED | MarkerFlag.AMBIGUOUS if doubtful else MarkerFlag.ACQUIRED
-
-    def _blob_request(self, index: int, blob: Blobs) -> NDArray[np.float64]:
-        request = self._request
-        area = blob[AREA]
-        direction = self._directions[index]
-        request[m.PX], request[m.PY] = blob[SUM_X] / area, blob[SUM_Y] / area
-        request[m.HALF_X] = max(blob[X_MAX] - request[m.PX], request[m.PX] - blob[X_MIN]) + MARGIN
-        request[m.HALF_Y] = max(blob[Y_MAX] - request[m.PY], request[m.PY] - blob[Y_MIN]) + MARGIN
-        request[m.SIGMA] = 1.0 + 0.25 * math.sqrt(area)
-        request[m.AREA_REF] = area
-        request[m.LEVEL_REF] = (blob[SUM_U] * direction[0] + blob[SUM_V] * direction[1]) / area
-        request[m.IS_BAND] = self._markers[index].shape == "band"
-        return request
