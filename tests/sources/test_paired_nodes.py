@@ -160,6 +160,7 @@ def test_a_node_that_was_reset_is_known_by_its_refusal(setup: Setup) -> None:
     setup.run()
     setup.node.keys_path.unlink()
     eventually(lambda: setup.source.links[0].turned_away)
+    assert setup.node.sessions.current is None, "a node without keys streams for nobody"
 
 
 def test_a_rig_with_keys_needs_the_masters(setup: Setup) -> None:

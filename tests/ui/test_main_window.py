@@ -77,6 +77,7 @@ def test_a_hidden_camera_panel_asks_for_no_pictures(tracking):
     tracking.until(lambda: ("preview", {"on": False}) in tracking.backend.engine.commands)
     tracking.press(Qt.Key.Key_3)
     tracking.until(lambda: tracking.backend.engine.commands[-1] == ("preview", {"on": True}))
+    assert tracking.backend.engine.commands.count(("preview", {"on": False})) == 1
 
 
 def test_f_frames_the_hand_and_home_resets(tracking):
@@ -153,6 +154,8 @@ def test_simulated_cameras_that_stopped_can_be_started_again(tracking):
     tracking.backend.alive = True
     tracking.controller.act("twin")
     tracking.until(lambda: tracking.backend.calls.count("twin grasp") == 1)
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
+    assert "The simulated cameras have stopped." not in tracking.window.advice.texts
 
 
 def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
@@ -168,7 +171,8 @@ def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
     QTimer.singleShot(200, escape)
     tracking.click(button)
     tracking.run(0.3)
-    tracking.until(lambda: lit == [True] and button.grab().toImage() == idle)
+    tracking.until(lambda: button.grab().toImage() == idle)
+    assert lit == [True]
     QCursor.setPos(tracking.window.mapToGlobal(tracking.window.rect().center()))
 
 

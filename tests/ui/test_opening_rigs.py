@@ -28,6 +28,7 @@ def test_only_the_first_start_of_all_is_said_to_take_long(bench, tmp_path, monke
     bench.backend.gate.clear()
     bench.click(bench.window.welcome.twin_button)
     bench.until(lambda: bench.window.welcome.compile_note.isVisible())
+    assert bench.window.welcome.progress_bar.isVisible()
 
 
 def test_opening_shows_progress_and_can_be_cancelled(bench, tmp_path, monkeypatch):
@@ -85,6 +86,7 @@ def test_closing_the_rig_ends_everything_and_returns_to_the_first_page(tracking)
     tracking.window.actions_.close_rig.trigger()
     tracking.until(lambda: "close" in tracking.backend.calls and tracking.window.welcome.twin_button.isVisible())
     tracking.until(lambda: tracking.window.toolbar.badge.word == "NO RIG")
+    assert tracking.controller.rig is None and not tracking.window.actions_.start.isEnabled()
 
 
 def test_layout_and_look_are_remembered_and_can_be_reset(make_bench):

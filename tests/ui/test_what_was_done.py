@@ -41,6 +41,7 @@ def test_a_recording_that_vanished_is_said(tracking):
     Path(tracking.backend.engine.log_path).unlink()
     tracking.press(Qt.Key.Key_R)
     tracking.until(lambda: "cannot be found" in tracking.window.advice.texts[0])
+    assert not tracking.controller.recording
 
 
 def test_a_rig_that_differs_from_its_file_is_marked_and_saved(make_bench, tmp_path):
@@ -67,6 +68,7 @@ def test_slow_simulated_cameras_are_told_calmly(tracking):
     tracking.until(lambda: tracking.window.advice.texts == [sentence])
     tracking.backend.pace = None
     tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
+    assert tracking.window.toolbar.badge.word == "TRACKING"
 
 
 def test_the_bar_is_as_tall_as_its_sentences(bench):
