@@ -12,8 +12,9 @@ from rhot_app.sources.clock import ClockEstimate
 SLACK_NS = 1_000_000
 """Scheduling at both ends: so much more, or less, than the longest and the shortest way so far is no jump."""
 
-FORGETTING = 1e-3
-"""Per datagram: the range narrows to what the network does now, in some ten seconds."""
+FORGETTING = 1e-4
+"""Per datagram: the range narrows to what the network does now, in a minute or two; a busy machine is not doubted anew
+at every hiccup."""
 
 
 class TravelTimes:

@@ -28,7 +28,8 @@ class NodeCard(QFrame):
             label.setToolTip(tip(term))
         self._rate.setAlignment(Qt.AlignmentFlag.AlignRight)
         self._word.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self._message.setWordWrap(True)
+        for label in (self._losses, self._message):
+            label.setWordWrap(True)  # a card is no wider than its dock, whatever has to be said
         self._message.setVisible(False)
         grid = QGridLayout(self)
         grid.setContentsMargins(8, 6, 8, 6)
