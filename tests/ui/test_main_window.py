@@ -114,7 +114,7 @@ def test_advice_comes_and_goes(tracking):
     tracking.backend.engine.advice = (Advice("warning", sentence),)
     tracking.until(lambda: tracking.window.advice.texts == [sentence])
     tracking.until(lambda: tracking.window.screen_parts.markers.words[-1] == "left only")
-    assert tracking.window.toolbar.badge.word == "PARTIAL"
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "PARTIAL")
     tracking.backend.engine.hidden = {}
     tracking.backend.engine.advice = ()
     tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
@@ -191,7 +191,7 @@ def test_a_hand_that_stands_still_for_a_second_is_taken_away(tracking):
     tracking.until(lambda: scene._actors.items[0].visible())
     tracking.backend.engine.hidden = dict.fromkeys(tracking.backend.engine.rig.markers.ids, "both")
     tracking.until(lambda: not scene._actors.items[0].visible())
-    assert tracking.window.toolbar.badge.word == "LOST"
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "LOST")
     tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not seen"] * 6)
 
 

@@ -39,10 +39,11 @@ def test_opening_shows_progress_and_can_be_cancelled(bench, tmp_path, monkeypatc
     bench.until(lambda: bench.window.welcome.progress_bar.isVisible())
     bench.until(lambda: bench.window.welcome.progress_label.text() == "Starting the engine …")
     assert bench.window.welcome.progress_bar.value() == 40
-    assert bench.window.toolbar.badge.word == "STARTING"
+    bench.until(lambda: bench.window.toolbar.badge.word == "STARTING")
     assert not bench.window.welcome.compile_note.isVisible()
     bench.click(bench.window.welcome.cancel_button)
     bench.until(lambda: "give up" in bench.backend.calls and bench.window.welcome.twin_button.isVisible())
+    bench.until(lambda: bench.window.toolbar.badge.word == "NO RIG")
     bench.run(0.2)
     assert bench.controller.opened is None and bench.window.toolbar.badge.word == "NO RIG"
 

@@ -68,7 +68,7 @@ def test_slow_simulated_cameras_are_told_calmly(tracking):
     tracking.until(lambda: tracking.window.advice.texts == [sentence])
     tracking.backend.pace = None
     tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
-    assert tracking.window.toolbar.badge.word == "TRACKING"
+    tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
 
 
 def test_the_bar_is_as_tall_as_its_sentences(bench):
