@@ -114,6 +114,21 @@ class DepthSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("k and z belong together; give both or neither")
 
 
+class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which tracker makes a hand of the markers, and what it may assume.
+
+    `kind`: `classic` is the thesis's (pair, triangulate, 1-euro, palm fit, FABRIK); `model` estimates one hand from
+    every image position. The other fields are the model tracker's. `variant`: `full` (27 degrees of freedom) or
+    `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT 2.2 to 2.4). `float_scale`: estimate the
+    hand's size as it moves.
+    """
+
+    kind: Literal["classic", "model"] = "classic"
+    variant: Literal["full", "coupled"] = "full"
+    limits: Literal["anatomical", "thesis"] = "anatomical"
+    float_scale: bool = False
+
+
 class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole rig."""
 
@@ -123,6 +138,7 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hand: HandAnatomy
     filters: FilterSettings = FilterSettings()
     depth: DepthSettings = DepthSettings()
+    tracker: TrackerSettings = TrackerSettings()
     up: Literal["-y", "z"] = "-y"  # which axis of the rig frame points up: the left camera's, or a table's frame
     broadcast: Broadcast = Broadcast()
     format: Literal["rhot-rig"] = FORMAT

@@ -19,9 +19,9 @@ from rhot_app.errors import RigError
 from rhot_app.hand.dh import ROOT
 from rhot_app.hand.kinematics import forward, forward_arrays
 from rhot_app.hand.model import HandModel, neutral_pose
+from rhot_app.hand.places import KNUCKLE_ROLES, Place, place_of
 from rhot_app.hand.shape import segments
 from rhot_app.hand.skeleton import FINGERS, JOINTS, TIP_ROLES, WRIST_ROLE
-from rhot_app.simulator.worn import KNUCKLE_ROLES, Place, place_of
 from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]

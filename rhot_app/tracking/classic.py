@@ -15,7 +15,7 @@ from rhot_app.tracking.hand_solver import HandSolver, SolvedHand
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
 from rhot_app.tracking.stages import Sheet
-from rhot_app.tracking.state import Condition, HandState
+from rhot_app.tracking.state import UNESTIMATED, Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
@@ -164,6 +164,7 @@ class ClassicTracker:
             world_from_palm=hand.world_from_palm,
             palm_knowledge=hand.palm_knowledge,
             epipolar_error_px=markers.errors,
+            **UNESTIMATED,
             latency_s={"detect": completed.detect_s, "network": completed.network_s, **clock.laps},
         )
 

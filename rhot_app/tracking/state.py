@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +33,12 @@ class Condition(enum.Enum):
     LOST = "LOST"
     FAULT = "FAULT"
 
+
+UNESTIMATED: dict[str, Any] = {
+    "joint_covariances": np.full((21, 3, 3), np.nan), "fingertip_covariances": np.full((5, 3, 3), np.nan),
+    "angle_sd": np.full(21, np.nan), "palm_covariance": np.full((6, 6), np.nan),
+    "hand_scale": 1.0, "hand_scale_sd": math.nan}
+"""What a tracker without covariances says in their place. Read-only."""
 
 LATENCY_STAGES: tuple[str, ...] = ("detect", "network", "pair", "triangulate", "filter", "solve", "publish",
                                    "receive_to_state")
@@ -65,4 +73,10 @@ class HandState:
     world_from_palm: Array  # (4, 4)
     palm_knowledge: Knowledge
     epipolar_error_px: Array  # (M,) rms distance of the rays' points from the reprojected marker, px
+    joint_covariances: Array  # (21, 3, 3) m^2; NaN from a tracker that does not estimate it, as are the next five
+    fingertip_covariances: Array  # (5, 3, 3) m^2
+    angle_sd: Array  # (21,) rad
+    palm_covariance: Array  # (6, 6) m^2 and rad^2: palm translation, then rotation about its origin, world axes
+    hand_scale: float  # factor on every length of the rig's hand
+    hand_scale_sd: float
     latency_s: dict[str, float]  # by LATENCY_STAGES

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rhot_app.project import Rig
-from rhot_app.tracking.state import LATENCY_STAGES, Condition, HandState, Knowledge
+from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 
 
@@ -47,4 +47,5 @@ class FakeTracker:
             joint_positions=np.zeros((21, 3)), joint_knowledge=np.zeros(21, np.uint8),
             fingertip_positions=np.zeros((5, 3)), angles=np.zeros(21), angle_knowledge=np.zeros(21, np.uint8),
             world_from_palm=np.eye(4), palm_knowledge=Knowledge.GUESSED, epipolar_error_px=np.zeros(count),
+            **UNESTIMATED,
             latency_s=dict.fromkeys(LATENCY_STAGES[:-2], 1e-4))

@@ -9,7 +9,7 @@ import pytest
 from rhot_app.engine import codec
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, Preview
 from rhot_app.errors import EngineError
-from rhot_app.tracking.state import LATENCY_STAGES, Condition, HandState, Knowledge
+from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 
 
 def make_state(markers: int = 6, cameras: int = 2) -> HandState:
@@ -26,6 +26,7 @@ def make_state(markers: int = 6, cameras: int = 2) -> HandState:
         joint_knowledge=np.zeros(21, np.uint8), fingertip_positions=rng.normal(size=(5, 3)),
         angles=rng.normal(size=21), angle_knowledge=np.zeros(21, np.uint8), world_from_palm=np.eye(4)[::-1],
         palm_knowledge=Knowledge.GUESSED, epipolar_error_px=np.zeros(markers),
+        **UNESTIMATED | {"hand_scale_sd": 0.1},
         latency_s=dict.fromkeys(LATENCY_STAGES, 1e-4))
 
 

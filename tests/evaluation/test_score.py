@@ -7,7 +7,7 @@ import pytest
 
 from rhot_app.evaluation.score import TrueSamples, count_swaps, jitter, score, state_ages
 from rhot_app.hand.skeleton import ANGLES, JOINTS, TIP_ROLES
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
 
 ROLES = [*TIP_ROLES, "wrist"]
 IDS = ("thumb", "index", "middle", "ring", "little", "wrist")
@@ -23,7 +23,7 @@ def make_state(k: int, truth: np.ndarray, offset_mm: float, knowledge: int = Kno
         joint_positions=np.zeros((len(JOINTS), 3)), joint_knowledge=np.zeros(len(JOINTS), np.uint8),
         fingertip_positions=position[:5] + np.array([0.0, 1e-3, 0.0]), angles=np.full(len(ANGLES), 0.1),
         angle_knowledge=np.zeros(len(ANGLES), np.uint8), world_from_palm=np.eye(4), palm_knowledge=Knowledge.GUESSED,
-        epipolar_error_px=np.zeros(6), latency_s={"receive_to_state": 0.002})
+        epipolar_error_px=np.zeros(6), **UNESTIMATED, latency_s={"receive_to_state": 0.002})
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
 from rhot_app.rig_history import accept
-from rhot_app.tracking.state import LATENCY_STAGES, Condition, HandState, Knowledge
+from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 from rhot_node.wire.messages import MarkerFlag
@@ -126,7 +126,7 @@ class FakeEngine:
             joint_positions=points.joints, joint_knowledge=joint_knowledge,
             fingertip_positions=points.marker_centres, angles=pose.angles, angle_knowledge=angle_knowledge,
             world_from_palm=pose.world_from_palm, palm_knowledge=Knowledge.GUESSED,
-            epipolar_error_px=np.full(count, 0.12), latency_s=latency)
+            epipolar_error_px=np.full(count, 0.12), **UNESTIMATED, latency_s=latency)
 
     def _sights(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         pixels = np.full((len(self.rig.nodes), len(positions), 2), np.nan)

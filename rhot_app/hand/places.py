@@ -41,7 +41,7 @@ class Place:
 
 
 def place_of(marker: Marker, model: HandModel) -> Place:
-    """Where the marker sits; raises RigError when its role is no place on the simulated hand."""
+    """Where the marker sits; raises RigError when its role is no place on the hand."""
     role = marker.role or ""
     dh = model.dh
     mirrored = np.array([1.0, model.mirror, 1.0])
@@ -62,7 +62,7 @@ def place_of(marker: Marker, model: HandModel) -> Place:
         row = int(dh.point_row[1 + 4 * finger + bone + 1])
         skin = model.radii[finger, bone] * _dorsal(model, finger, row)
         return Place(row, np.array([-0.5 * model.bones[finger, bone], 0.0, 0.0]) + skin, finger)
-    raise RigError(f"marker {marker.id!r} has the role {marker.role!r}; the simulated hand wears markers only at "
+    raise RigError(f"marker {marker.id!r} has the role {marker.role!r}; a hand wears markers at "
                    f"{', '.join(ROLES)}.")
 
 
