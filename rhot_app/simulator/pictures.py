@@ -15,7 +15,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.simulator.film import TRUTH_NAME, Progress, new_folder
+from rhot_app.simulator.camera_workers import Progress
+from rhot_app.simulator.film import TRUTH_NAME, new_folder
 from rhot_app.simulator.painter import Solids
 from rhot_app.simulator.sheet import Sheet, ruler_ends
 from rhot_app.simulator.shot import Shot, make_renderer, save_shot

@@ -20,37 +20,20 @@ from scipy.interpolate import CubicSpline
 
 from rhot_app.errors import SimulatorError
 from rhot_app.project import Rig, load_rig
-from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
-from rhot_app.simulator.film import TRUTH_NAME, Progress, new_folder
+from rhot_app.recording.raw_log import Record
+from rhot_app.simulator.camera_workers import Progress
+from rhot_app.simulator.film import TRUTH_NAME, new_folder
+from rhot_app.simulator.node_log import Network, NodeVoice, write_node_log
 from rhot_app.simulator.sheet import Sheet
 from rhot_app.simulator.shot import RIG_NAME, Shot, save_shot
 from rhot_app.simulator.truth import FrameTruth, save_truth, true_act
-from rhot_node.capture.pace import available_delay_ns
-from rhot_node.clock import NodeClock
-from rhot_node.wire.codec import encode
-from rhot_node.wire.messages import (
-    NO_FLAGS,
-    ClockReply,
-    ClockRequest,
-    MarkerFlag,
-    MarkerObservation,
-    NodeState,
-    Observations,
-    Start,
-    StartEntry,
-)
+from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
 Array = NDArray[np.float64]
 
 LOG_NAME: Final = "points.log"
-SESSION: Final = 1
-T0_MASTER_NS: Final = 1_000_000_000_000
-"""Master time of scene time 0."""
 
 _GRID_HZ = 500.0  # of the splines through the markers' ways
-_ECHO_S, _ECHO_LEAD_S = 0.1, 3.0  # clock exchanges: how often, and how long before the first frame they begin
-_NETWORK_S = (120e-6, 60e-6)  # one way: at least, and mean of the exponential beyond it
-_PROCESSING_NS = 4_000_000
 _RADIUS_M = 8e-3  # where the marker set gives none
 _MARGIN_PX = 4.0  # a marker nearer to the border is cut by it
 
@@ -76,13 +59,7 @@ def write_points(shot: Shot, folder: Path, noise: PointNoise, progress: Progress
         streams = [_Stream(shot, rig, index, noise) for index in range(len(rig.nodes))]
         records = [record for done, stream in enumerate(streams)
                    for record in _noted(stream, done, len(streams), progress)]
-        entries = tuple(StartEntry(node.node_id, 1, 0) for node in rig.nodes)
-        records.append(Record(RecordKind.START, 0, T0_MASTER_NS - round(1e9 * _ECHO_LEAD_S) - 1,
-                              encode(Start(SESSION, 0, entries))))
-        records.sort(key=lambda record: record.t_master_ns)
-        with (work / LOG_NAME).open("wb") as file:
-            file.write(encode_header(rig, {"simulated": shot.act.name}))
-            file.writelines(encode_record(record) for record in records)
+        write_node_log(work / LOG_NAME, rig, {"simulated": shot.act.name}, records)
         save_truth(work / TRUTH_NAME, true_act(shot.act, shot.seconds, tuple(stream.truth() for stream in streams)))
 
 
@@ -96,12 +73,11 @@ class _Stream:
     """One node's part of the log."""
 
     def __init__(self, shot: Shot, rig: Rig, index: int, noise: PointNoise) -> None:
-        self._scene, self._rig, self._node = shot.scene, rig, rig.nodes[index]
+        self._scene, self._rig = shot.scene, rig
         self._camera = shot.scene.camera(index)
         self._noise = noise
         self._rng = np.random.default_rng([shot.scene.seed, index, 0x901])
-        clock = shot.scene.clocks[index]
-        self._clock = NodeClock(round(1e9 * clock.offset_s), clock.drift_ppm, T0_MASTER_NS)
+        self._voice = NodeVoice(shot.scene, rig, index, self._rng, Network())
         self._times_ns = np.array(shot.scene.frame_times_ns(index, shot.seconds))
         self._centres, self._pixels = self._observe(shot)
 
@@ -111,11 +87,12 @@ class _Stream:
 
     def records(self) -> Iterator[Record]:
         """Clock exchanges and datagrams."""
-        end_s = 1e-9 * float(self._times_ns[-1])
-        for sequence, t_s in enumerate(np.arange(-_ECHO_LEAD_S, end_s + _ECHO_S, _ECHO_S)):
-            yield from self._exchange(sequence, T0_MASTER_NS + round(1e9 * t_s))
-        for number in range(len(self._times_ns)):
-            yield self._datagram(number)
+        yield from self._voice.exchanges(1e-9 * float(self._times_ns[-1]))
+        for number, t_ns in enumerate(self._times_ns):
+            record = self._voice.datagram(number, int(t_ns), [self._marker(number, index)
+                                                              for index in range(len(self._rig.markers.markers))])
+            if record is not None:
+                yield record
 
     def _observe(self, shot: Shot) -> tuple[Array, Array]:
         """(F, M, 3) m and (F, M, 2) px at the time of each marker's own row; NaN where it is not in the picture."""
@@ -138,19 +115,6 @@ class _Stream:
             pixels[~seen, marker] = np.nan
         return centres, pixels
 
-    def _datagram(self, number: int) -> Record:
-        scene, lens = self._scene, self._node.intrinsics
-        t_master_ns = T0_MASTER_NS + int(self._times_ns[number])
-        ready_ns = t_master_ns + available_delay_ns(scene.exposure_ns, scene.row_time_ns, lens.height)
-        sent_ns = ready_ns + _PROCESSING_NS
-        message = Observations(
-            node_id=self._node.node_id, session=SESSION, sequence=number,
-            t_frame_node_ns=self._clock.from_host_ns(t_master_ns), t_send_node_ns=self._clock.from_host_ns(sent_ns),
-            processing_ns=_PROCESSING_NS, exposure_ns=scene.exposure_ns, row_time_ns=scene.row_time_ns,
-            width=lens.width, height=lens.height, frame_number=number, marker_checksum=self._rig.markers.checksum,
-            markers=tuple(self._marker(number, index) for index in range(len(self._rig.markers.markers))))
-        return Record(RecordKind.DATAGRAM, self._node.node_id, sent_ns + self._way_ns(), encode(message))
-
     def _marker(self, number: int, index: int) -> MarkerObservation:
         pixel, variance = self._pixels[number, index], self._noise.sigma_px**2
         x, y = pixel + self._rng.normal(0.0, self._noise.sigma_px, 2)
@@ -161,17 +125,3 @@ class _Stream:
         depth = (self._camera.camera_from_world @ np.append(self._centres[number, index], 1.0))[2]
         diameter = 2.0 * radius * self._camera.intrinsics[0] / depth
         return MarkerObservation(index, float(x), float(y), float(diameter), variance, 0.0, variance, 1.0, NO_FLAGS)
-
-    def _exchange(self, sequence: int, t1_ns: int) -> tuple[Record, Record]:
-        t2_ns = t1_ns + self._way_ns()
-        t3_ns = t2_ns + 30_000
-        node_id = self._node.node_id
-        request = ClockRequest(node_id, SESSION, sequence, t1_ns)
-        reply = ClockReply(node_id, SESSION, sequence, t1_ns, self._clock.from_host_ns(t2_ns),
-                           self._clock.from_host_ns(t3_ns), 1, NodeState.STREAMING)
-        return (Record(RecordKind.CLOCK_REQUEST, node_id, t1_ns, encode(request)),
-                Record(RecordKind.CLOCK_REPLY, node_id, t3_ns + self._way_ns(), encode(reply)))
-
-    def _way_ns(self) -> int:
-        least, mean = _NETWORK_S
-        return round(1e9 * (least + self._rng.exponential(mean)))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.simulator.show_arguments import add_show_arguments, show_of
 
 if TYPE_CHECKING:
-    from rhot_app.simulator.film import Progress
+    from rhot_app.simulator.camera_workers import Progress
     from rhot_app.simulator.scene import Scene
     from rhot_app.simulator.shot import Shot
 

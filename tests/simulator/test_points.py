@@ -13,7 +13,8 @@ from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.recording.observation_table import read_observations
 from rhot_app.simulator.distances import write_distances
-from rhot_app.simulator.points import LOG_NAME, T0_MASTER_NS, PointNoise, write_points
+from rhot_app.simulator.node_log import T0_MASTER_NS
+from rhot_app.simulator.points import LOG_NAME, PointNoise, write_points
 from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
 from rhot_app.simulator.shot import make_shot
 from rhot_app.simulator.shows import BoardShow, MarkerShow
