@@ -1,4 +1,4 @@
-"""``rhot evaluate``: the whole system against the truth it never saw."""
+"""``rhot evaluate``: the whole system against the truth it never saw, or trackers side by side on the same logs."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot evaluate``."""
     add_scene_arguments(parser)
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="S",
-                        help="length of the run; its first second is not judged (default 20)")
+    parser.add_argument("--seconds", type=float, default=None, metavar="S",
+                        help="length of a run; its first second is not judged (default 20, with --compare 8)")
     parser.add_argument("--loss", type=float, default=0.0, metavar="P",
                         help="probability 0..1 that a datagram of observations is lost (default 0)")
     parser.add_argument("--detector", default="fast", choices=("fast", "reference"),
@@ -22,16 +22,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=Path, metavar="DIR",
                         help="play this folder of `rhot simulate` instead of rendering; the scene is what it says")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    group = parser.add_argument_group("comparing trackers on the same raw logs, without real time (docs/accuracy.md)")
+    group.add_argument("--compare", action="store_true", help="put the same logs through every tracker")
+    group.add_argument("--motions", metavar="M,M,...", default=None,
+                       help="motions to compare on (default rest,wave,grasp,pinch,fast)")
+    group.add_argument("--recording", metavar="FILE", default=None,
+                       help="compare on this recording as well (Qualisys .tsv, Leap Motion .csv)")
+    group.add_argument("--seeds", type=int, default=5, metavar="N",
+                       help="how many seeds, beginning with --seed (default 5)")
+    group.add_argument("--trackers", metavar="T,T,...", default="classic,model",
+                       help="which trackers (default classic,model); the ratio is the last one's to the first one's")
+    group.add_argument("--logs", type=Path, metavar="DIR", default=None,
+                       help="where logs are kept and found again (default ~/.cache/rhot/takes)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Render (or take) the frames, play them, compare, print."""
+    return _compare(args) if args.compare else _evaluate(args)
+
+
+def _evaluate(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
     from rhot_app.evaluation.report import SETTLE_S, details, table
     from rhot_app.evaluation.runner import evaluate, evaluate_frames
 
-    if args.seconds <= SETTLE_S and args.frames is None:
-        raise SimulatorError(f"a run of {args.seconds:g} s is too short: the first {SETTLE_S:g} s are not judged.")
+    seconds = 20.0 if args.seconds is None else args.seconds
+    if seconds <= SETTLE_S and args.frames is None:
+        raise SimulatorError(f"a run of {seconds:g} s is too short: the first {SETTLE_S:g} s are not judged.")
     if not 0.0 <= args.loss < 1.0:
         raise SimulatorError(f"--loss is a probability from 0 to below 1, not {args.loss:g}.")
     with tempfile.TemporaryDirectory(prefix="rhot-") as work:
@@ -39,9 +56,33 @@ def run(args: argparse.Namespace) -> int:
         if args.frames is not None:
             figures = evaluate_frames(args.frames.absolute(), Path(work), **options)
         else:
-            figures = evaluate(scene_of(args), args.motion, args.seconds, Path(work), **options)
+            figures = evaluate(scene_of(args), args.motion, seconds, Path(work), **options)
     if args.json:
         print(json.dumps(figures))
     else:
         print(table([(figures["motion"], figures)]), details(figures), sep="\n\n")
+    return 0
+
+
+def _compare(args: argparse.Namespace) -> int:
+    from rhot_app.errors import SimulatorError
+    from rhot_app.evaluation.compare import MOTIONS, TRACKERS, as_fields, compare, orders
+    from rhot_app.evaluation.compare_table import table
+    from rhot_app.evaluation.report import SETTLE_S
+    from rhot_app.evaluation.takes import takes_folder
+    from rhot_app.progress import ProgressLine
+
+    names = args.trackers.split(",")
+    unknown = [name for name in names if name not in TRACKERS]
+    if unknown:
+        raise SimulatorError(f"there is no tracker {unknown[0]!r}; --trackers takes some of {', '.join(TRACKERS)}.")
+    seconds = 8.0 if args.seconds is None else args.seconds
+    if seconds <= SETTLE_S or args.seeds < 1:
+        raise SimulatorError(f"give more than {SETTLE_S:g} s to --seconds, and --seeds of 1 or more.")
+    motions = [*(MOTIONS if args.motions is None else args.motions.split(",")),
+               *([] if args.recording is None else [args.recording])]
+    wanted = orders(scene_of(args), motions, range(args.seed, args.seed + args.seeds), seconds)
+    result = compare(wanted, args.logs or takes_folder(), {name: TRACKERS[name] for name in names},
+                     lambda title: ProgressLine(f"filming {title}"))
+    print(json.dumps(as_fields(result)) if args.json else table(result, names))
     return 0

@@ -1,4 +1,4 @@
-"""A raw log as an engine would have written it of simulated nodes: session, clock exchanges, datagrams with delays, losses.
+"""A raw log as an engine would have written it of simulated nodes: session, clock exchanges, datagrams, their delays.
 
 It goes through the same door as a real one. The nodes' clocks disagree as the scene says; nothing in the log tells
 the truth about them.
@@ -47,6 +47,8 @@ class Network:
     mean_s: float = 60e-6
     loss: float = 0.0
 
+
+CABLE: Final = Network()
 
 class NodeVoice:
     """What one node says: its part of the log, deterministic by `rng`."""

@@ -23,7 +23,7 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.recording.raw_log import Record
 from rhot_app.simulator.camera_workers import Progress
 from rhot_app.simulator.film import TRUTH_NAME, new_folder
-from rhot_app.simulator.node_log import Network, NodeVoice, write_node_log
+from rhot_app.simulator.node_log import CABLE, NodeVoice, write_node_log
 from rhot_app.simulator.sheet import Sheet
 from rhot_app.simulator.shot import RIG_NAME, Shot, save_shot
 from rhot_app.simulator.truth import FrameTruth, save_truth, true_act
@@ -77,7 +77,7 @@ class _Stream:
         self._camera = shot.scene.camera(index)
         self._noise = noise
         self._rng = np.random.default_rng([shot.scene.seed, index, 0x901])
-        self._voice = NodeVoice(shot.scene, rig, index, self._rng, Network())
+        self._voice = NodeVoice(shot.scene, rig, index, self._rng, CABLE)
         self._times_ns = np.array(shot.scene.frame_times_ns(index, shot.seconds))
         self._centres, self._pixels = self._observe(shot)
 

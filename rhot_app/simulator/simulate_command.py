@@ -31,7 +31,7 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
                         help="distance of the hand from the cameras in metres (default 0.6)")
     parser.add_argument("--background", default=None, choices=("cloth", "clutter"),
                         help="what stands behind the hand (default cloth)")
-    parser.add_argument("--markers", default=None, metavar="SET",
+    parser.add_argument("--markers", "--marker-set", default=None, metavar="SET",
                         help="which markers the hand wears: rhot6 (default), rhot8, rich, or another of the project's")
     parser.add_argument("--lamp", type=float, default=None, metavar="F",
                         help="brightness of the lamp, a factor on its light (default 1)")

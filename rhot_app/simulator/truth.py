@@ -57,6 +57,11 @@ class Truth:
         """(N, 21) rad at scene times (N,), s."""
         return _interpolate(self.times_s, self.angles, times_s)
 
+    def palm_at(self, times_s: Array) -> Array:
+        """(N, 4, 4) world_from_palm at scene times (N,), s; rotations to the 1e-5 that a straight line between two
+        samples leaves."""
+        return _interpolate(self.times_s, self.world_from_palm, times_s)
+
     def visible_at(self, times_s: Array) -> Array:
         """(N, M): smallest visible part over all cameras, in the frames nearest to scene times (N,), s."""
         parts = []

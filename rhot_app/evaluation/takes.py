@@ -1,0 +1,148 @@
+"""Takes: motions filmed once and seen by the nodes' own detector, as raw logs with the truth beside them.
+
+Trackers are compared on takes: the same datagrams for every one of them, as often as wanted, without waiting. What was
+filmed once is kept in a folder and found again by all that went into it.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+import msgspec
+import numpy as np
+
+from rhot_app.project import Rig, load_rig
+from rhot_app.recording.raw_log import LogReader, Record
+from rhot_app.simulator.camera_workers import Progress, Report, for_each_camera
+from rhot_app.simulator.film import TRUTH_NAME, new_folder
+from rhot_app.simulator.node_log import CABLE, Network, NodeVoice, write_node_log
+from rhot_app.simulator.scene import Scene, node_settings
+from rhot_app.simulator.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
+from rhot_app.simulator.truth import FrameTruth, Truth, load_truth, save_truth, true_act
+from rhot_node.__main__ import make_detector
+from rhot_node.detect.image import from_i420
+from rhot_node.files import resource_path
+
+LOG_NAME: Final = "take.rhotlog"
+
+Told = Callable[[str], Progress | None]
+"""Says how the filming of a take goes: given what is filmed, who is told of its frames."""
+
+_SOURCES = ("rhot_node/detect/*.py", "rhot_app/simulator/*.py")
+"""What a take depends on besides its order; a change of it makes another take."""
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What a take shall show: a motion (name or file) in a scene, for how long, and over which network it is sent."""
+
+    scene: Scene
+    motion: str
+    seconds: float
+    network: Network = CABLE
+
+    @property
+    def title(self) -> str:
+        """What it is, for people."""
+        return f"{Path(self.motion).stem}, {self.seconds:g} s, seed {self.scene.seed}"
+
+    def name(self) -> str:
+        """A folder name that differs whenever the take would."""
+        facts = [msgspec.to_builtins(self.scene.settings), self.scene.seed, self.seconds, asdict(self.network),
+                 _motion_digest(self.motion), _source_digest()]
+        digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+        return f"{Path(self.motion).stem}-{self.seconds:g}s-{self.scene.seed}-{digest[:12]}"
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A raw log, the rig that a perfect calibration would have found, and the truth. Scene time 0 is
+    `rhot_app.simulator.node_log.T0_MASTER_NS`."""
+
+    folder: Path
+    rig: Rig
+    truth: Truth
+    seconds: float
+
+    def records(self) -> list[Record]:
+        """All records of the log, in the order of arrival."""
+        reader = LogReader(self.folder / LOG_NAME)
+        try:
+            return list(reader)
+        finally:
+            reader.close()
+
+
+def takes_folder() -> Path:
+    """Where takes are kept unless told otherwise."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhot" / "takes"
+
+
+def take(order: Order, folder: Path, told: Told = lambda title: None) -> Take:
+    """The take in `folder`, filmed unless it is there already. Raises RhotError.
+
+    Filming takes about as long as what is filmed; an interrupted one leaves nothing behind.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    place = folder / order.name()
+    if not place.exists():
+        try:
+            _film(order, place, told(order.title))
+        except OSError:
+            if not place.exists():  # else somebody has filmed the same meanwhile
+                raise
+    return Take(place, load_rig(place / RIG_NAME), load_truth(place / TRUTH_NAME), order.seconds)
+
+
+def _film(order: Order, place: Path, progress: Progress | None) -> None:
+    shot = make_shot(order.scene, order.motion, order.seconds)
+    with new_folder(place) as work:
+        save_shot(shot, work)
+        rig = load_rig(work / RIG_NAME)
+        streams = for_each_camera(shot, functools.partial(_watch, rig, order.network), progress)
+        write_node_log(work / LOG_NAME, rig, {"simulated": shot.act.name},
+                       [record for records, _ in streams for record in records])
+        save_truth(work / TRUTH_NAME, true_act(shot.act, shot.seconds, tuple(truth for _, truth in streams)))
+
+
+def _watch(rig: Rig, network: Network, shot: Shot, index: int, report: Report) -> tuple[list[Record], FrameTruth]:
+    """What one node says of the shot, and what was true of its frames."""
+    scene, preset = shot.scene, shot.scene.preset
+    voice = NodeVoice(scene, rig, index, np.random.default_rng([scene.seed, index, 0x7A4E]), network)
+    detector = make_detector(node_settings(scene, index))
+    renderer = make_renderer(shot, index)
+    times_ns = scene.frame_times_ns(index, shot.seconds)
+    records, visible = list(voice.exchanges(1e-9 * times_ns[-1])), []
+    for number, t_ns in enumerate(times_ns):
+        frame, fractions = renderer.render(shot.act.source, 1e-9 * t_ns, number)
+        seen = detector.detect(from_i420(frame, preset.width, preset.height))
+        visible.append(fractions.copy())
+        record = voice.datagram(number, t_ns, seen)
+        if record is not None:
+            records.append(record)
+        report(number)
+    return records, FrameTruth(1e-9 * np.array(times_ns), np.array(visible))
+
+
+def _motion_digest(motion: str) -> str:
+    """Of the file that the motion comes from; of its name where it is neither a file nor shipped."""
+    for path in (resource_path("motions", f"{motion}.json"), Path(motion)):
+        if path.is_file():
+            return hashlib.sha256(path.read_bytes()).hexdigest()
+    return motion
+
+
+@functools.cache
+def _source_digest() -> str:
+    root = Path(__file__).parents[2]
+    digest = hashlib.sha256()
+    for path in sorted(path for pattern in _SOURCES for path in root.glob(pattern)):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

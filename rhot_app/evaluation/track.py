@@ -1,0 +1,101 @@
+"""A tracker's states over a whole run as columns, and the way from a log's records to them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.engine.replay_summary import replay_states
+from rhot_app.engine.warm_up import warm_up
+from rhot_app.errors import SimulatorError
+from rhot_app.project import Rig, TrackerSettings
+from rhot_app.recording.raw_log import Record, RecordKind
+from rhot_app.simulator.node_log import T0_MASTER_NS
+from rhot_app.sources.replay import LogDoor
+from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.state import HandState
+from rhot_app.tracking.tracker import Tracker
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """N states of a tracker; M markers. Rig frame, m and rad; times are scene times, s. As in `HandState`.
+
+    `receive_s` (N,): when the datagram that completed the state arrived. `compute_s` (D,): per datagram, from its bytes
+    to the state, if it made one.
+    """
+
+    times_s: Array  # (N,)
+    receive_s: Array  # (N,)
+    marker_positions: Array  # (N, M, 3)
+    marker_raw_positions: Array  # (N, M, 3)
+    marker_covariances: Array  # (N, M, 3, 3)
+    marker_knowledge: NDArray[np.uint8]  # (N, M)
+    joint_positions: Array  # (N, 21, 3)
+    joint_covariances: Array  # (N, 21, 3, 3)
+    joint_knowledge: NDArray[np.uint8]  # (N, 21)
+    fingertip_positions: Array  # (N, 5, 3)
+    fingertip_covariances: Array  # (N, 5, 3, 3)
+    angles: Array  # (N, 21)
+    world_from_palm: Array  # (N, 4, 4)
+    palm_covariance: Array  # (N, 6, 6)
+    hand_scale: Array  # (N,)
+    hand_scale_sd: Array  # (N,)
+    compute_s: Array  # (D,)
+
+    def where(self, chosen: NDArray[np.bool_]) -> Track:
+        """The states of a mask (N,) alone."""
+        columns = {field.name: getattr(self, field.name) for field in fields(self)}
+        return Track(**{name: column if name == "compute_s" else column[chosen] for name, column in columns.items()})
+
+
+_OF_STATES = tuple(field.name for field in fields(Track) if field.name not in ("times_s", "receive_s", "compute_s"))
+
+
+def track_of(states: Sequence[HandState], compute_s: Array | None = None) -> Track:
+    """The columns of states of one run. Raises SimulatorError when there are fewer than two."""
+    if len(states) < 2:
+        raise SimulatorError(f"the tracker made {len(states)} states of the whole log; there is nothing to judge.")
+    columns = {name: np.array([getattr(state, name) for state in states]) for name in _OF_STATES}
+    return Track(times_s=1e-9 * np.array([state.t_master_ns - T0_MASTER_NS for state in states]),
+                 receive_s=1e-9 * np.array([state.t_receive_ns - T0_MASTER_NS for state in states]),
+                 compute_s=np.empty(0) if compute_s is None else compute_s, **columns)
+
+
+def rig_with(rig: Rig, settings: TrackerSettings) -> Rig:
+    """The rig with another tracker."""
+    return msgspec.structs.replace(rig, tracker=settings)
+
+
+def tracked(records: Iterable[Record], rig: Rig, tracker: Tracker | None = None) -> Track:
+    """What the rig's tracker, or another one, makes of a log's records; as fast as it can, one thread.
+
+    Raises SimulatorError when it makes nothing.
+    """
+    chosen = make_tracker(rig) if tracker is None else tracker
+    warm_up(chosen, rig)
+    timed = Timed(records)
+    states = list(replay_states(timed, LogDoor(rig), chosen))
+    return track_of(states, np.array(timed.compute_s))
+
+
+class Timed:
+    """Records that pass, and how long whoever takes them works on each datagram, s."""
+
+    def __init__(self, records: Iterable[Record]) -> None:
+        self.compute_s: list[float] = []
+        self._records = records
+
+    def __iter__(self) -> Iterator[Record]:
+        for record in self._records:
+            begun = time.perf_counter()
+            yield record
+            if record.kind is RecordKind.DATAGRAM:
+                self.compute_s.append(time.perf_counter() - begun)
