@@ -66,21 +66,30 @@ def compile_table(rows: Sequence[DhRow], points: Sequence[tuple[int, tuple[float
     for index, row in enumerate(rows):
         if not ROOT <= row.parent < index:
             raise ValueError(f"DH row {index} names parent {row.parent}, which is not an earlier row")
-    for index, (row_index, _) in enumerate(points):
-        if not ROOT <= row_index < len(rows):
-            raise ValueError(f"point {index} rides on DH row {row_index}, which does not exist")
 
     def column(name: str) -> Array:
         return np.array([getattr(row, name) for row in rows], dtype=np.float64)
 
-    return DhArrays(
+    table = DhArrays(
         parent=np.array([row.parent for row in rows], dtype=np.int64),
         theta=column("theta"), d=column("d"), a=column("a"),
         cos_alpha=np.cos(column("alpha")), sin_alpha=np.sin(column("alpha")),
         angle=np.array([row.angle for row in rows], dtype=np.int64), sign=column("sign"),
-        point_row=np.array([row for row, _ in points], dtype=np.int64),
-        point_offset=np.array([offset for _, offset in points], dtype=np.float64).reshape(-1, 3),
+        point_row=np.empty(0, dtype=np.int64), point_offset=np.empty((0, 3)),
     )
+    return riding_points(table, points)
+
+
+def riding_points(table: DhArrays, points: Sequence[tuple[int, tuple[float, float, float]]]) -> DhArrays:
+    """The table with these points (row, offset in the row's frame, m) instead of its own.
+
+    Raises ValueError when a point rides on a row that does not exist.
+    """
+    for index, (row, _) in enumerate(points):
+        if not ROOT <= row < len(table.parent):
+            raise ValueError(f"point {index} rides on DH row {row}, which does not exist")
+    return table._replace(point_row=np.array([row for row, _ in points], dtype=np.int64),
+                          point_offset=np.array([offset for _, offset in points], dtype=np.float64).reshape(-1, 3))
 
 
 def rigid_rows(parent: int, first: int, rotation: Array, translation: Array) -> tuple[list[DhRow], float]:

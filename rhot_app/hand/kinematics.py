@@ -88,25 +88,32 @@ def jacobian_arrays(dh: DhArrays, world_from_root: Array, frames: Array, points:
         px, py, pz = points[point]
         for i in range(3):
             out[point, i, i] = 1.0
-        _add_turn(out[point], 3, 1.0, 0.0, 0.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
+        add_turn(out[point], 3, 1.0, 0.0, 0.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
                   pz - world_from_root[2, 3])
-        _add_turn(out[point], 4, 0.0, 1.0, 0.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
+        add_turn(out[point], 4, 0.0, 1.0, 0.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
                   pz - world_from_root[2, 3])
-        _add_turn(out[point], 5, 0.0, 0.0, 1.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
+        add_turn(out[point], 5, 0.0, 0.0, 1.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
                   pz - world_from_root[2, 3])
-        row = dh.point_row[point]
-        while row >= 0:
-            parent = dh.parent[row]
-            if dh.angle[row] >= 0:
-                base = world_from_root if parent < 0 else frames[parent]
-                sign = dh.sign[row]
-                _add_turn(out[point], TWIST + dh.angle[row], sign * base[0, 2], sign * base[1, 2], sign * base[2, 2],
-                          px - base[0, 3], py - base[1, 3], pz - base[2, 3])
-            row = parent
+        add_angle_columns(dh, world_from_root, frames, point, px, py, pz, TWIST, out[point])
 
 
 @njit(cache=True)
-def _add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float, ry: float, rz: float) -> None:
+def add_angle_columns(dh: DhArrays, world_from_root: Array, frames: Array, point: int, px: float, py: float, pz: float,
+                      first: int, out: Array) -> None:
+    """Add to `out` (3, first + angles) how the point at (px, py, pz) follows every angle that moves it."""
+    row = dh.point_row[point]
+    while row >= 0:
+        parent = dh.parent[row]
+        if dh.angle[row] >= 0:
+            base = world_from_root if parent < 0 else frames[parent]
+            sign = dh.sign[row]
+            add_turn(out, first + dh.angle[row], sign * base[0, 2], sign * base[1, 2], sign * base[2, 2],
+                     px - base[0, 3], py - base[1, 3], pz - base[2, 3])
+        row = parent
+
+
+@njit(cache=True)
+def add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float, ry: float, rz: float) -> None:
     """Add axis x lever to a column: the velocity of a point at `lever` from an axis of unit angular speed."""
     out[0, column] += ay * rz - az * ry
     out[1, column] += az * rx - ax * rz

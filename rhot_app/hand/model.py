@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,11 +47,10 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
     rotation = np.array([euler_zyx(*np.radians(finger.base_rotation_deg)) for finger in fingers])
     bones = 1e-3 * np.array([finger.bones_mm for finger in fingers], dtype=np.float64)
     marker = 1e-3 * np.array([finger.marker_mm for finger in fingers], dtype=np.float64)
-    right = anatomy.side == "right"
     return HandModel(
         anatomy=anatomy,
-        mirror=1.0 if right else -1.0,
-        dh=_compile_hand(fingers, base, rotation, mirrored=not right),
+        mirror=1.0 if anatomy.side == "right" else -1.0,
+        dh=_compile_hand(anatomy),
         limits=np.radians(np.concatenate([np.array(finger.limits_deg, dtype=np.float64) for finger in fingers])),
         base=base,
         base_rotation=rotation,
@@ -78,19 +78,35 @@ def euler_zyx(z: float, y: float, x: float) -> Array:
                      [-sy, cy * sx, cy * cx]])
 
 
-def _compile_hand(fingers: list[FingerAnatomy], base: Array, rotation: Array, *, mirrored: bool) -> DhArrays:
+class HandTable(NamedTuple):
+    """A right hand's DH rows, and the points on them: the 21 joints of `skeleton.JOINTS`, then 5 marker centres."""
+
+    rows: list[DhRow]
+    joints: list[Point]
+    markers: list[Point]
+
+
+def hand_table(anatomy: HandAnatomy) -> HandTable:
+    """The rows of the right hand that `anatomy` describes: for each finger two fixed ones, then one per angle."""
     rows: list[DhRow] = []
     joints: list[Point] = [(ROOT, (0.0, 0.0, 0.0))]
     markers: list[Point] = []
-    for index, finger in enumerate(fingers):
-        fixed, turn = rigid_rows(ROOT, len(rows), rotation[index], base[index])
+    for index, name in enumerate(FINGERS):
+        finger = anatomy.fingers[name]
+        base = 1e-3 * np.array(finger.base_mm, dtype=np.float64)
+        fixed, turn = rigid_rows(ROOT, len(rows), euler_zyx(*np.radians(finger.base_rotation_deg)), base)
         rows += fixed
         moving = _thumb_rows if index == 0 else _finger_rows
         finger_rows, joint_rows = moving(len(rows), ANGLE_SLICES[index].start, finger, turn)
         joints += [(row, (0.0, 0.0, 0.0)) for row in (len(rows) - 1, *joint_rows)]
         rows += finger_rows
         markers.append((len(rows) - 1, (1e-3 * (finger.marker_mm - finger.bones_mm[2]), 0.0, 0.0)))
-    if mirrored:
+    return HandTable(rows, joints, markers)
+
+
+def _compile_hand(anatomy: HandAnatomy) -> DhArrays:
+    rows, joints, markers = hand_table(anatomy)
+    if anatomy.side == "left":
         rows = [row.mirrored() for row in rows]  # every point lies on its frame's x axis and stays there
     return compile_table(rows, joints + markers)
 

@@ -10,22 +10,25 @@ import pytest
 
 from rhot_app import project
 from rhot_app.calibration import intrinsics_file
-from rhot_app.hand import anatomy
+from rhot_app.hand import anatomy, articulated
 from rhot_node import config, markers
 
 DOCS = Path(__file__).parents[2] / "docs"
 
-PAGES: dict[str, tuple[str, int, tuple[type[msgspec.Struct], ...]]] = {
-    "rig.md": (project.FORMAT, project.VERSION, (
+PAGES: tuple[tuple[str, str, int, tuple[type[msgspec.Struct], ...]], ...] = (
+    ("rig.md", project.FORMAT, project.VERSION, (
         project.Rig, project.RigNode, project.Intrinsics, project.CameraPose, project.Broadcast, project.FilterSettings,
         project.OneEuroSettings)),
-    "markers.md": (markers.FORMAT, markers.VERSION, (
+    ("markers.md", markers.FORMAT, markers.VERSION, (
         markers.MarkerSet, markers.Marker, markers.ChromaModel, markers.RangeModel)),
-    "calibration-files.md": (intrinsics_file.FORMAT, intrinsics_file.VERSION, (
+    ("calibration-files.md", intrinsics_file.FORMAT, intrinsics_file.VERSION, (
         intrinsics_file.IntrinsicsFile, intrinsics_file.BoardUsed)),
-    "hand.md": (anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy)),
-    "node.md": (config.FORMAT, config.VERSION, (config.NodeSettings, config.CameraSettings, config.ClockSettings)),
-}
+    ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy)),
+    ("hand.md", articulated.FORMAT, articulated.VERSION, (
+        articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, articulated.Coupling,
+        articulated.Point, articulated.Capsule, articulated.Box)),
+    ("node.md", config.FORMAT, config.VERSION, (config.NodeSettings, config.CameraSettings, config.ClockSettings)),
+)
 
 
 def test_the_sample_settings_of_a_node_are_ones(tmp_path: Path) -> None:
@@ -36,9 +39,9 @@ def test_the_sample_settings_of_a_node_are_ones(tmp_path: Path) -> None:
     assert config.load_settings(path).name == "left"
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_the_page_names_every_field(page: str) -> None:
-    format_name, version, structs = PAGES[page]
+@pytest.mark.parametrize(("page", "format_name", "version", "structs"), PAGES)
+def test_the_page_names_every_field(page: str, format_name: str, version: int,
+                                    structs: tuple[type[msgspec.Struct], ...]) -> None:
     text = (DOCS / page).read_text()
     one_line = rf'`"?{format_name}"?`,( version)? `?{version}\b'
     two_rows = rf'`"{format_name}"` .*\n.*`version` .*`{version}`'

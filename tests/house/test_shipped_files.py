@@ -10,13 +10,15 @@ from typing import Any
 import pytest
 
 from rhot_app.hand.anatomy import load_hand
+from rhot_app.hand.articulated import load_articulated
 from rhot_app.project import load_rig
 from rhot_node.config import load_settings
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 
 LOADERS: dict[str, Callable[[Path], Any]] = {
-    "rhot-markers": load_markers, "rhot-hand": load_hand, "rhot-rig": load_rig, "rhot-node": load_settings}
+    "rhot-markers": load_markers, "rhot-hand": load_hand, "rhot-articulated": load_articulated,
+    "rhot-rig": load_rig, "rhot-node": load_settings}
 SHIPPED = sorted(resource_path().rglob("*.json"))
 
 

@@ -1,0 +1,220 @@
+"""Any open articulated object as a file of Denavit-Hartenberg frames. Format ``rhot-articulated`` (docs/hand.md).
+
+The file is Rehg's table (1995, Table 2.1 and appendix A) with names: a root with a spatial transform (quaternion and
+translation), frames that each hang on an earlier one, and the angle that turns a frame. Millimetres and degrees in the
+file, metres and radians in every array.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from rhot_app.errors import RigError
+from rhot_node.files import read_document, write_atomically
+
+FORMAT: Final = "rhot-articulated"
+VERSION: Final = 1
+
+Name = Annotated[str, Meta(min_length=1, max_length=64)]
+Length = Annotated[float, Meta(ge=-10_000, le=10_000)]  # mm
+Size = Annotated[float, Meta(gt=0, le=10_000)]  # mm
+Degrees = Annotated[float, Meta(ge=-360, le=360)]
+Vector = tuple[Length, Length, Length]
+
+
+class Capsule(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="capsule"):
+    """A rod with round ends along the frame's own `a_mm`, from its joint to its origin; a ball where that is zero.
+
+    `radius_mm` at the joint; `end_radius_mm` at the origin, where it differs.
+    """
+
+    radius_mm: Size
+    end_radius_mm: Size | None = None
+
+
+class Box(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="box"):
+    """A box along the axes of the shape frame (Rehg eq. 2.4); `centre_mm` from the middle of the frame's own `a_mm`."""
+
+    size_mm: tuple[Size, Size, Size]
+    centre_mm: Vector = (0.0, 0.0, 0.0)
+
+
+Shape = Capsule | Box
+
+
+class Root(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The body that everything hangs on, and where it is to begin with: the first seven numbers of the state."""
+
+    name: Name
+    quaternion_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    translation_mm: Vector = (0.0, 0.0, 0.0)
+    shape: Shape | None = None
+
+
+class Frame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One row: Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha) in its parent's frame (Rehg eq. 2.2).
+
+    `angle`, if any, times `sign` adds to theta. A frame with a `shape` is a body of its own.
+    """
+
+    name: Name
+    parent: Name  # the root, or an earlier frame
+    theta_deg: Degrees = 0.0
+    d_mm: Length = 0.0
+    a_mm: Length = 0.0
+    alpha_deg: Degrees = 0.0
+    angle: Name | None = None
+    sign: Literal[1, -1] = 1
+    shape: Shape | None = None
+
+
+class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One state angle. The file's order of angles is that of the state."""
+
+    name: Name
+    limits_deg: tuple[Degrees, Degrees] = (-180.0, 180.0)
+    rest_deg: Degrees = 0.0
+
+
+class Coupling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """In the object's coupled variant, `angle` = `offset_deg` + `factor` times the free angle `follows`; without
+    `follows` it stays at `offset_deg`."""
+
+    angle: Name
+    follows: Name | None = None
+    factor: Annotated[float, Meta(ge=-100, le=100)] = 1.0
+    offset_deg: Degrees = 0.0
+
+
+class Point(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A named point that rides on the root or on a frame, such as a joint, a fingertip or a marker."""
+
+    name: Name
+    frame: Name
+    offset_mm: Vector = (0.0, 0.0, 0.0)
+
+
+class Articulated(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An open articulated object. `side` ``left``: what is built is the rows' mirror image in `mirror_axis` of the
+    root's frame. `length_mm`: the object's nominal length, for a hand wrist to middle fingertip, by which to scale."""
+
+    format: Literal["rhot-articulated"] = FORMAT
+    version: Literal[1] = VERSION
+    name: str
+    source: str = ""
+    side: Literal["right", "left"] = "right"
+    mirror_axis: Literal["x", "y"] = "y"
+    length_mm: Size | None = None
+    root: Root
+    frames: tuple[Frame, ...]
+    angles: tuple[Angle, ...] = ()
+    points: tuple[Point, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+
+    def __post_init__(self) -> None:
+        complaint = next(_complaints(self), None)
+        if complaint:
+            raise ValueError(complaint)
+
+
+def load_articulated(path: Path) -> Articulated:
+    """Read and validate an object's file; raises RigError naming file and field."""
+    return read_document(path, Articulated, format_name=FORMAT, version=VERSION, error=RigError)
+
+
+def save_articulated(path: Path, document: Articulated) -> None:
+    """Write an object's file atomically, a line for each frame, angle, point and coupling; raises OSError."""
+    fields = (f'  "{key}": {_layout(getattr(document, key))}' for key in document.__struct_fields__)
+    write_atomically(path, ("{\n" + ",\n".join(fields) + "\n}\n").encode())
+
+
+def _layout(value: Any) -> str:
+    if isinstance(value, tuple) and value:
+        return "[\n" + ",\n".join(f"    {_layout(item)}" for item in value) + "\n  ]"
+    return json.dumps(_terse(value) if isinstance(value, msgspec.Struct) else value, ensure_ascii=False)
+
+
+def _terse(row: msgspec.Struct) -> dict[str, Any]:
+    """The fields that say something: what is at its default need not be written."""
+    said: dict[str, Any] = {"kind": row.__struct_config__.tag} if row.__struct_config__.tag else {}
+    for field in msgspec.structs.fields(row):
+        value = getattr(row, field.name)
+        if value != field.default:
+            said[field.name] = _terse(value) if isinstance(value, msgspec.Struct) else value
+    return said
+
+
+def scaled(document: Articulated, factor: float) -> Articulated:
+    """The object with every length `factor` times as long. Raises ValueError for a factor that is not positive, or
+    makes a length that no file may have."""
+    if not factor > 0.0:
+        raise ValueError(f"the scale of an object is positive, not {factor:g}")
+    try:
+        return msgspec.convert(_scale_lengths(msgspec.to_builtins(document), factor), Articulated)
+    except msgspec.ValidationError as exc:
+        raise ValueError(f'"{document.name}" at {factor:g} times its size: {exc}') from exc
+
+
+def scaled_to_length(document: Articulated, length_m: float) -> Articulated:
+    """The object at another nominal length, m. Raises ValueError when its file states none."""
+    if document.length_mm is None:
+        raise ValueError(f'"{document.name}" states no length_mm by which to scale it')
+    return scaled(document, 1e3 * length_m / document.length_mm)
+
+
+def _scale_lengths(value: Any, factor: float, *, is_length: bool = False) -> Any:
+    """The document with the numbers of every ``..._mm`` field multiplied."""
+    if isinstance(value, dict):
+        return {key: _scale_lengths(item, factor, is_length=key.endswith("_mm")) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_scale_lengths(item, factor, is_length=is_length) for item in value]
+    return factor * value if is_length and isinstance(value, int | float) else value
+
+
+def _complaints(document: Articulated) -> Iterator[str]:
+    yield from _tree_complaints(document)
+    angles = {angle.name for angle in document.angles}
+    turned = {frame.angle for frame in document.frames}
+    for angle in document.angles:
+        low, high = angle.limits_deg
+        if low > high:
+            yield f'angle "{angle.name}" has a lower limit above its upper one'
+        if not low <= angle.rest_deg <= high:
+            yield f'angle "{angle.name}" rests at {angle.rest_deg:g} degrees, outside its limits'
+        if angle.name not in turned:
+            yield f'angle "{angle.name}" turns no frame'
+    followers = {coupling.angle for coupling in document.couplings}
+    for coupling in document.couplings:
+        if missing := {coupling.angle, coupling.follows or coupling.angle} - angles:
+            yield f'a coupling names the angle "{min(missing)}", which does not exist'
+        if coupling.follows in followers:
+            yield f'angle "{coupling.angle}" follows "{coupling.follows}", which is not free itself'
+
+
+def _tree_complaints(document: Articulated) -> Iterator[str]:
+    angles = {angle.name for angle in document.angles}
+    known = {document.root.name}
+    if not any(document.root.quaternion_wxyz):
+        yield f'root "{document.root.name}" has a quaternion of length zero, which is no rotation'
+    for frame in document.frames:
+        if frame.parent not in known:
+            yield f'frame "{frame.name}" hangs on "{frame.parent}", which is neither the root nor an earlier frame'
+        if frame.name in known:
+            yield f'there are two frames named "{frame.name}"'
+        if frame.angle is not None and frame.angle not in angles:
+            yield f'frame "{frame.name}" is turned by "{frame.angle}", which is not among the angles'
+        known.add(frame.name)
+    for point in document.points:
+        if point.frame not in known:
+            yield f'point "{point.name}" rides on "{point.frame}", which does not exist'
+    named = {"angles": [angle.name for angle in document.angles], "points": [point.name for point in document.points],
+             "couplings": [coupling.angle for coupling in document.couplings]}
+    for what, names in named.items():
+        if len(set(names)) < len(names):
+            yield f'{what}: "{max(names, key=names.count)}" occurs twice'

@@ -1,0 +1,46 @@
+"""A hand written out as an articulated object is the same hand: points, angles, limits, couplings, sides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hand_samples import random_pose
+
+from rhot_app.geometry.transforms import quaternion_from_rotation
+from rhot_app.hand.articulated import load_articulated, save_articulated
+from rhot_app.hand.articulated_hand import articulated_hand
+from rhot_app.hand.articulated_model import build_articulated, forward_state, state_jacobian
+from rhot_app.hand.kinematics import forward, jacobian
+from rhot_app.hand.skeleton import ANGLES
+from rhot_app.hand.variants import make_variant
+
+
+def state_of(pose):
+    world = pose.world_from_palm
+    return np.concatenate([quaternion_from_rotation(world[:3, :3]), world[:3, 3], pose.angles])
+
+
+@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
+def test_points_and_jacobian_are_the_hands(side, request, tmp_path):
+    hand = request.getfixturevalue(side)
+    path = tmp_path / "hand.json"
+    save_articulated(path, articulated_hand(hand.anatomy))
+    model = build_articulated(load_articulated(path))
+    for seed in range(3):
+        pose = random_pose(hand, np.random.default_rng(seed))
+        points, expected = forward_state(model, state_of(pose)).points, forward(hand, pose)
+        np.testing.assert_allclose(points[:21], expected.joints, atol=1e-11)
+        np.testing.assert_allclose(points[21:], expected.marker_centres, atol=1e-11)
+        per_number, per_twist = state_jacobian(model, state_of(pose)), jacobian(hand, pose)
+        np.testing.assert_allclose(per_number[:, :, 4:7], per_twist[:, :, :3], atol=1e-12)
+        np.testing.assert_allclose(per_number[:, :, 7:], per_twist[:, :, 6:], atol=1e-11)
+
+
+def test_it_has_the_hands_bodies_angles_and_couplings(right_hand):
+    model = build_articulated(articulated_hand(right_hand.anatomy))
+    assert len(model.bodies) == 16
+    assert len(model.rest) == 28
+    assert model.angle_names == ANGLES
+    np.testing.assert_allclose(model.limits, right_hand.limits, atol=1e-12)
+    np.testing.assert_allclose(model.coupled.basis, make_variant("coupled").basis, atol=1e-12)
+    assert model.document.length_mm == pytest.approx(179.31)
