@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from dh_oracle import frames_of, jacobian_of, points_of, root_transform
+from dh_oracle import frames_of, jacobian_of, lever_jacobian, points_of, root_transform
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -95,6 +95,9 @@ def test_kinematics_are_the_numpy_twins(seed):
     for body in MODEL.bodies:
         np.testing.assert_allclose(posed.world_from(body), frames[body.name][:3], atol=1e-12)
     np.testing.assert_allclose(posed.points, points_of(HAND, state), atol=1e-12)
+    jacobian, expected = state_jacobian(MODEL, state), lever_jacobian(HAND, state)
+    np.testing.assert_allclose(jacobian[:, :, 4:7], expected[:, :, :3], atol=1e-12)
+    np.testing.assert_allclose(jacobian[:, :, 7:], expected[:, :, 6:], atol=1e-12)
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
