@@ -36,6 +36,13 @@ def hand_length(anatomy: HandAnatomy) -> float:
     return 1e-3 * (middle.base_mm[0] + sum(middle.bones_mm))
 
 
+def require_human_length(hand_length_m: float) -> None:
+    """Raises ValueError when no human hand is so long."""
+    if not SHORTEST_M <= hand_length_m <= LONGEST_M:
+        raise ValueError(f"a hand is {1e3 * SHORTEST_M:.0f} to {1e3 * LONGEST_M:.0f} mm long, from the wrist to the "
+                         "tip of the middle finger")
+
+
 def scaled_hand(anatomy: HandAnatomy, factor: float) -> HandAnatomy:
     """The hand with every length `factor` times as long; angles and proportions stay.
 
@@ -55,9 +62,7 @@ def scaled_by_hand_length(anatomy: HandAnatomy, hand_length_m: float) -> HandAna
     radii and thickness grow with the length. A marker keeps its part of its bone; limits and turns stay. Raises
     ValueError when the length is none of a human hand.
     """
-    if not SHORTEST_M <= hand_length_m <= LONGEST_M:
-        raise ValueError(f"a hand is {1e3 * SHORTEST_M:.0f} to {1e3 * LONGEST_M:.0f} mm long, from the wrist to the "
-                         f"tip of the middle finger; {1e3 * hand_length_m:g} mm is not")
+    require_human_length(hand_length_m)
     factor = hand_length_m / hand_length(anatomy)
     bones = {name: [1e3 * hand_length_m * part for part in parts] for name, parts in BONE_PER_HAND_LENGTH.items()}
     palm = (1e3 * hand_length_m - sum(bones["middle"])) / anatomy.fingers["middle"].base_mm[0]

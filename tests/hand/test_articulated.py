@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 from dh_oracle import frames_of, jacobian_of, lever_jacobian, points_of, root_transform
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot_app.errors import RigError
@@ -110,6 +110,7 @@ def test_jacobian_of_all_28_numbers_is_the_numerical_one(side):
     np.testing.assert_allclose(along, 0.0, atol=1e-12)  # the quaternion's length means nothing
 
 
+@settings(deadline=None, max_examples=50)
 @given(st.integers(0, 10_000))
 def test_left_is_the_mirror_image(seed):
     left = build_articulated(msgspec.structs.replace(HAND, side="left"))
@@ -119,6 +120,7 @@ def test_left_is_the_mirror_image(seed):
     np.testing.assert_allclose(mirrored, forward_state(MODEL, state).points, atol=1e-12)
 
 
+@settings(deadline=None, max_examples=50)
 @given(st.floats(0.2, 3.0), st.integers(0, 10_000))
 def test_scale_scales_and_turns_nothing(factor, seed):
     state = some_state(MODEL, seed)

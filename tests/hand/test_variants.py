@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from hand_samples import natural_angles
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot_app.hand.skeleton import ANGLES, FINGERS
@@ -26,6 +26,7 @@ def test_full_is_the_angles_themselves():
     np.testing.assert_array_equal(full.coordinates(angles), angles)
 
 
+@settings(deadline=None, max_examples=50)
 @given(coordinates)
 def test_coupled_keeps_the_equations_of_the_thesis(q):
     angles = dict(zip(ANGLES, COUPLED.angles(q), strict=True))

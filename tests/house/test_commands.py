@@ -38,6 +38,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
         "--left", "--right", "--camera", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
         "--left-intrinsics", "--right-intrinsics", "--intrinsics", "--refine-intrinsics", "--baseline-mm", "--ruler-mm",
         "--ruler", "--table-image", "--rig-from", "--out", "--json"),
+    "rhot hand": ("HAND", "--length", "--proportions", "--side", "--name", "--rows", "--out", "--draw", "--json"),
     "rhot nodes": ("--seconds", "--json"),
     "rhot pair": ("NODE", "--rig", "--port", "--code"),
     "rhot-node pair": ("--settings",),

@@ -1,0 +1,76 @@
+"""``rhot hand``: what it makes, writes and draws, and that mistakes end in a sentence with nothing written."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import pytest
+
+from rhot_app.__main__ import main
+from rhot_app.hand.anatomy import load_hand
+from rhot_app.hand.anthropometry import hand_length
+from rhot_app.hand.articulated import load_articulated
+from rhot_node.files import resource_path
+
+DIGITEYES = str(resource_path("hands", "digiteyes.json"))
+ADULT = load_hand(resource_path("hands", "right.json"))
+
+
+def test_a_left_hand_of_190_mm(tmp_path, capsys):
+    out = tmp_path / "mine.json"
+    assert main(["hand", "--length", "190", "--side", "left", "--out", str(out)]) == 0
+    hand = load_hand(out)
+    assert hand.side == "left"
+    assert hand.name == "left hand, 190 mm"
+    assert hand_length(hand) == pytest.approx(0.190, abs=1e-6)
+    assert hand.fingers["middle"].bones_mm[1] == pytest.approx(0.170 * 190)
+    assert str(out) in capsys.readouterr().out
+
+
+def test_proportions_of_the_file_stay(tmp_path):
+    out = tmp_path / "mine.json"
+    assert main(["hand", "--length", "200", "--proportions", "file", "--name", "me", "--out", str(out)]) == 0
+    hand = load_hand(out)
+    factor = 0.2 / hand_length(ADULT)
+    assert hand.name == "me"
+    assert hand.fingers["ring"].bones_mm[0] == pytest.approx(factor * ADULT.fingers["ring"].bones_mm[0], abs=1e-5)
+
+
+def test_rows_and_picture(tmp_path):
+    rows, picture = tmp_path / "rows.json", tmp_path / "hand.png"
+    assert main(["hand", "--rows", "--out", str(rows), "--draw", str(picture)]) == 0
+    assert len(load_articulated(rows).frames) == 31
+    assert cv2.imread(str(picture)).shape == (480, 960, 3)
+
+
+def test_json_of_an_articulated_file(capsys):
+    assert main(["hand", DIGITEYES, "--length", "200", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (len(told["bodies"]), told["state_numbers"], told["degrees_of_freedom"]) == (16, 28, 27)
+    assert told["length_mm"] == pytest.approx(200)
+    assert told["written"] is None
+
+
+@pytest.mark.parametrize(("arguments", "complaint"), [
+    (["--length", "19"], "100 to 260 mm"),
+    (["--length", "nan"], "100 to 260 mm"),
+    (["--length", "1900", "--proportions", "file"], "100 to 260 mm"),
+    ([DIGITEYES, "--length", "0"], "positive"),
+    ([DIGITEYES, "--length", "200", "--proportions", "table"], "--proportions file"),
+    (["--proportions", "file"], "--length"),
+    (["nowhere.json"], "no such file"),
+    ([str(resource_path("rigs", "two_pis.json"))], 'not a "rhot-hand" file'),
+])
+def test_mistakes_are_sentences_and_write_nothing(arguments, complaint, tmp_path, capsys):
+    out = tmp_path / "mine.json"
+    assert main(["hand", *arguments, "--out", str(out)]) == 2
+    assert complaint in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_missing_folder_is_noticed_before_anything_is_written(tmp_path, capsys):
+    out = tmp_path / "mine.json"
+    assert main(["hand", "--out", str(out), "--draw", str(tmp_path / "nowhere" / "hand.png")]) == 2
+    assert "there is no folder" in capsys.readouterr().err
+    assert not out.exists()
