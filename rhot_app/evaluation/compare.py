@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-
-import msgspec
 
 from rhot_app.evaluation.accuracy import Figures, accuracy, pooled
 from rhot_app.evaluation.deviations import deviations, worn_by
+from rhot_app.evaluation.honesty import DEGREES, Consistency, Squares, consistency, squares
 from rhot_app.evaluation.report import SETTLE_S
 from rhot_app.evaluation.takes import Order, Take, Told, take
 from rhot_app.evaluation.track import rig_with, tracked
@@ -21,19 +20,28 @@ TRACKERS = {"classic": TrackerSettings(kind="classic"), "model": TrackerSettings
 
 
 @dataclass(frozen=True, slots=True)
+class Judged:
+    """One tracker on one take."""
+
+    figures: Figures
+    squares: Squares
+
+
+@dataclass(frozen=True, slots=True)
 class Run:
-    """One take through every tracker: figures by the tracker's name."""
+    """One take through every tracker: what came of it by the tracker's name."""
 
     motion: str
     seed: int
-    figures: dict[str, Figures]
+    judged: dict[str, Judged]
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All runs, in order."""
+    """All runs, in order. `outdated`: how many of their takes another detector or twin would film today."""
 
     runs: tuple[Run, ...]
+    outdated: int = 0
 
     def motions(self) -> list[str]:
         """The motions, each once."""
@@ -43,10 +51,18 @@ class Comparison:
         """The runs of one motion."""
         return [run for run in self.runs if run.motion == motion]
 
-    def together(self, motion: str) -> Run:
-        """All seeds of a motion as one run; its seed is 0."""
-        runs = self.of(motion)
-        return Run(motion, 0, {name: pooled([run.figures[name] for run in runs]) for name in runs[0].figures})
+    def trackers(self) -> list[str]:
+        """Their names, in order."""
+        return list(self.runs[0].judged)
+
+    def together(self, motion: str, tracker: str) -> Figures:
+        """The figures of all seeds of a motion."""
+        return pooled([run.judged[tracker].figures for run in self.of(motion)])
+
+    def honesty(self, motion: str, tracker: str) -> dict[str, Consistency]:
+        """How true the covariances are, by quantity, over all seeds of a motion."""
+        runs = [run.judged[tracker].squares for run in self.of(motion)]
+        return {quantity: consistency(runs, quantity) for quantity in DEGREES}
 
 
 def orders(scene: Scene, motions: Iterable[str], seeds: Iterable[int], seconds: float) -> list[Order]:
@@ -59,23 +75,32 @@ def compare(wanted: Sequence[Order], folder: Path, trackers: dict[str, TrackerSe
             told: Told = lambda title: None) -> Comparison:
     """Put every take through every tracker; takes that are not in `folder` are filmed. Raises RhotError."""
     runs: list[Run] = []
+    outdated = 0
     for order in wanted:
         recorded = take(order, folder, told)
-        figures = {name: judge(recorded, settings) for name, settings in trackers.items()}
-        runs.append(Run(Path(order.motion).stem, order.scene.seed, figures))
-    return Comparison(tuple(runs))
+        outdated += recorded.outdated
+        judged = {name: judge(recorded, settings) for name, settings in trackers.items()}
+        runs.append(Run(Path(order.motion).stem, order.scene.seed, judged))
+    return Comparison(tuple(runs), outdated)
 
 
-def judge(recorded: Take, settings: TrackerSettings) -> Figures:
-    """One tracker's figures on one take, after the first second."""
+def judge(recorded: Take, settings: TrackerSettings) -> Judged:
+    """One tracker on one take, after the first second."""
     worn = worn_by(recorded.rig)
     track = tracked(recorded.records(), rig_with(recorded.rig, settings))
     track = track.where((track.times_s >= SETTLE_S) & (track.times_s <= recorded.seconds))
-    return accuracy(track, deviations(track, recorded.truth, worn), recorded.truth, worn)
+    off = deviations(track, recorded.truth, worn)
+    return Judged(accuracy(track, off, recorded.truth, worn), squares(track, off, worn))
 
 
 def as_fields(comparison: Comparison) -> dict[str, object]:
-    """For JSON: every run, and each motion's seeds together."""
-    return {"runs": msgspec.to_builtins([{"motion": run.motion, "seed": run.seed, **run.figures}
-                                         for run in comparison.runs]),
-            "motions": {motion: comparison.together(motion).figures for motion in comparison.motions()}}
+    """For JSON: every run, and each motion's seeds together, with its honesty."""
+    names = comparison.trackers()
+    return {"outdated": comparison.outdated,
+            "runs": [{"motion": run.motion, "seed": run.seed,
+                      **{name: judged.figures for name, judged in run.judged.items()}} for run in comparison.runs],
+            "motions": {motion: {name: comparison.together(motion, name) for name in names}
+                        for motion in comparison.motions()},
+            "honesty": {motion: {name: {quantity: asdict(one)
+                                        for quantity, one in comparison.honesty(motion, name).items()}
+                                 for name in names} for motion in comparison.motions()}}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rhot_app.evaluation.accuracy import Figures, ratio
 from rhot_app.evaluation.compare import Comparison, Run
+from rhot_app.evaluation.honesty import DEGREES, band
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,18 +29,42 @@ COLUMNS = (
 _CELL = 7
 
 
-def table(comparison: Comparison, trackers: Sequence[str], columns: Sequence[Column] = COLUMNS) -> str:
+def table(comparison: Comparison, columns: Sequence[Column] = COLUMNS) -> str:
     """One line per run, and one for all seeds of each motion; under each figure the trackers and the ratio of the last
     tracker's to the first one's."""
+    trackers = comparison.trackers()
     names = [_name(run) for motion in comparison.motions() for run in comparison.of(motion)]
     width = max(len(name) for name in [*names, *comparison.motions()]) + 2
     lines = _heads(width, trackers, columns)
     for motion in comparison.motions():
         runs = comparison.of(motion)
         if len(runs) > 1:
-            lines += [_line(_name(run), width, run.figures, trackers, columns) for run in runs]
-        lines.append(_line(motion, width, comparison.together(motion).figures, trackers, columns))
+            lines += [_line(_name(run), width, [run.judged[name].figures for name in trackers], columns)
+                      for run in runs]
+        lines.append(_line(motion, width, [comparison.together(motion, name) for name in trackers], columns))
     return "\n".join(lines)
+
+
+def honesty_table(comparison: Comparison) -> str:
+    """Per motion and tracker: average NEES by quantity, its share inside the band, and what is within 3 sigma."""
+    seeds = len(comparison.of(comparison.motions()[0]))
+    heads = "".join(f"{quantity + ' ' + _span(seeds, degrees):>22}" for quantity, degrees in DEGREES.items())
+    words = f"{'NEES':>8}{'inside':>7}{'3 sg':>7}"
+    lines = [f"NEES by its degrees of freedom, with the 95 % band of the mean of {seeds} seeds; part of the instants "
+             "inside it; part of what is called measured within 3 sigma",
+             " " * 20 + heads, " " * 20 + words * len(DEGREES)]
+    for motion in comparison.motions():
+        for tracker in comparison.trackers():
+            found = comparison.honesty(motion, tracker)
+            cells = "".join(f"{cell(one.average, '.2f'):>8}{cell(one.inside, '.2f'):>7}{cell(one.within, '.3f'):>7}"
+                            for one in found.values())
+            lines.append(f"{motion[:11]:<11} {tracker[:7]:<8}{cells}")
+    return "\n".join(lines)
+
+
+def _span(seeds: int, degrees: int) -> str:
+    low, high = band(seeds, degrees)
+    return f"{low:.2f}-{high:.2f}"
 
 
 def cell(value: float | None, form: str) -> str:
@@ -61,17 +86,16 @@ def _heads(width: int, trackers: Sequence[str], columns: Sequence[Column]) -> li
     return [first, second]
 
 
-def _line(name: str, width: int, figures: dict[str, Figures], trackers: Sequence[str],
-          columns: Sequence[Column]) -> str:
+def _line(name: str, width: int, figures: Sequence[Figures], columns: Sequence[Column]) -> str:
     line = name.ljust(width)
     for column in columns:
-        values = [figures[tracker][column.key] for tracker in trackers]
+        values = [one[column.key] for one in figures]
         cells = [cell(value, column.form) for value in values]
-        if _has_ratio(column, trackers):
+        if _has_ratio(column, figures):
             cells.append(cell(ratio(values[-1], values[0]), ".2f"))
         line += "  " + "".join(text.rjust(_CELL + 1) for text in cells)
     return line
 
 
-def _has_ratio(column: Column, trackers: Sequence[str]) -> bool:
+def _has_ratio(column: Column, trackers: Sequence[object]) -> bool:
     return column.compared and len(trackers) > 1

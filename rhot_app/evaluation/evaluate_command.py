@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import tempfile
 from pathlib import Path
 
@@ -67,7 +68,7 @@ def _evaluate(args: argparse.Namespace) -> int:
 def _compare(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
     from rhot_app.evaluation.compare import MOTIONS, TRACKERS, as_fields, compare, orders
-    from rhot_app.evaluation.compare_table import table
+    from rhot_app.evaluation.compare_table import honesty_table, table
     from rhot_app.evaluation.report import SETTLE_S
     from rhot_app.evaluation.takes import takes_folder
     from rhot_app.progress import ProgressLine
@@ -82,7 +83,11 @@ def _compare(args: argparse.Namespace) -> int:
     motions = [*(MOTIONS if args.motions is None else args.motions.split(",")),
                *([] if args.recording is None else [args.recording])]
     wanted = orders(scene_of(args), motions, range(args.seed, args.seed + args.seeds), seconds)
-    result = compare(wanted, args.logs or takes_folder(), {name: TRACKERS[name] for name in names},
+    folder = args.logs or takes_folder()
+    result = compare(wanted, folder, {name: TRACKERS[name] for name in names},
                      lambda title: ProgressLine(f"filming {title}"))
-    print(json.dumps(as_fields(result)) if args.json else table(result, names))
+    if result.outdated:
+        print(f"{result.outdated} logs in {folder} were filmed with another detector or twin than today's; "
+              "remove them, or choose another --logs, to film anew.", file=sys.stderr)
+    print(json.dumps(as_fields(result)) if args.json else f"{table(result)}\n\n{honesty_table(result)}")
     return 0

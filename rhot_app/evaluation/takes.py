@@ -1,7 +1,8 @@
 """Takes: motions filmed once and seen by the nodes' own detector, as raw logs with the truth beside them.
 
 Trackers are compared on takes: the same datagrams for every one of them, as often as wanted, without waiting. What was
-filmed once is kept in a folder and found again by all that went into it.
+filmed once is kept in a folder and found again by its order. What films may have changed meanwhile: the log
+says so, and whoever shows figures should (`Take.outdated`); remove the folder to film anew.
 """
 
 from __future__ import annotations
@@ -35,8 +36,10 @@ LOG_NAME: Final = "take.rhotlog"
 Told = Callable[[str], Progress | None]
 """Says how the filming of a take goes: given what is filmed, who is told of its frames."""
 
-_SOURCES = ("rhot_node/detect/*.py", "rhot_app/simulator/*.py")
-"""What a take depends on besides its order; a change of it makes another take."""
+_SOURCES = ("rhot_node/detect/*.py", *(f"rhot_app/simulator/{name}.py" for name in (
+    "background", "body", "controls", "edges", "lamp", "moments", "motion", "node_log", "raycast", "rays", "recorded",
+    "render", "scene", "sensor", "solids_painter", "spans", "trace")))
+"""What a take depends on besides its order: what makes pictures, finds markers in them and sends them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +57,9 @@ class Order:
         return f"{Path(self.motion).stem}, {self.seconds:g} s, seed {self.scene.seed}"
 
     def name(self) -> str:
-        """A folder name that differs whenever the take would."""
+        """A folder name that differs with the order."""
         facts = [msgspec.to_builtins(self.scene.settings), self.scene.seed, self.seconds, asdict(self.network),
-                 _motion_digest(self.motion), _source_digest()]
+                 _motion_digest(self.motion)]
         digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
         return f"{Path(self.motion).stem}-{self.seconds:g}s-{self.scene.seed}-{digest[:12]}"
 
@@ -64,12 +67,13 @@ class Order:
 @dataclass(frozen=True, eq=False)
 class Take:
     """A raw log, the rig that a perfect calibration would have found, and the truth. Scene time 0 is
-    `rhot_app.simulator.node_log.T0_MASTER_NS`."""
+    `rhot_app.simulator.node_log.T0_MASTER_NS`. `outdated`: another detector or twin would film it today."""
 
     folder: Path
     rig: Rig
     truth: Truth
     seconds: float
+    outdated: bool
 
     def records(self) -> list[Record]:
         """All records of the log, in the order of arrival."""
@@ -98,7 +102,10 @@ def take(order: Order, folder: Path, told: Told = lambda title: None) -> Take:
         except OSError:
             if not place.exists():  # else somebody has filmed the same meanwhile
                 raise
-    return Take(place, load_rig(place / RIG_NAME), load_truth(place / TRUTH_NAME), order.seconds)
+    reader = LogReader(place / LOG_NAME)
+    reader.close()
+    return Take(place, reader.rig, load_truth(place / TRUTH_NAME), order.seconds,
+                reader.about.get("sources") != _source_digest())
 
 
 def _film(order: Order, place: Path, progress: Progress | None) -> None:
@@ -107,7 +114,7 @@ def _film(order: Order, place: Path, progress: Progress | None) -> None:
         save_shot(shot, work)
         rig = load_rig(work / RIG_NAME)
         streams = for_each_camera(shot, functools.partial(_watch, rig, order.network), progress)
-        write_node_log(work / LOG_NAME, rig, {"simulated": shot.act.name},
+        write_node_log(work / LOG_NAME, rig, {"simulated": shot.act.name, "sources": _source_digest()},
                        [record for records, _ in streams for record in records])
         save_truth(work / TRUTH_NAME, true_act(shot.act, shot.seconds, tuple(truth for _, truth in streams)))
 

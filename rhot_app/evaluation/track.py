@@ -44,6 +44,8 @@ class Track:
     fingertip_positions: Array  # (N, 5, 3)
     fingertip_covariances: Array  # (N, 5, 3, 3)
     angles: Array  # (N, 21)
+    angle_sd: Array  # (N, 21)
+    angle_knowledge: NDArray[np.uint8]  # (N, 21)
     world_from_palm: Array  # (N, 4, 4)
     palm_covariance: Array  # (N, 6, 6)
     hand_scale: Array  # (N,)
