@@ -119,7 +119,8 @@ def follow(dh: DhArrays, limits: Array, mean: Array, information: Array, mirror:
     if solved:
         world[:], angles[:] = palm_world, palm_angles
         solve_fingers_arrays(angles, world, mirror, base, base_rotation, chain, limits, tips, mean, information,
-                             TOLERANCE, FABRIK_ITERATIONS, TARGET_SD_M, np.empty(5), np.empty(5, np.int64))
+                             TOLERANCE, FABRIK_ITERATIONS, TARGET_SD_M, np.empty(5), np.empty(5, np.int64),
+                             np.empty(5, np.uint8))
     forward_arrays(dh, world, angles, np.empty((dh.parent.shape[0], 3, 4)), points)
     _know(wrist_knowledge, tip_knowledge, solved and placed, joint_knowledge, angle_knowledge)
     return solved

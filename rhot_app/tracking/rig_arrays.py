@@ -58,7 +58,7 @@ def compile_rig(rig: Rig) -> RigArrays:
         shapes=np.array([_shape(marker) for marker in markers]),
         tips=np.array([roles.index(role) if role in roles else -1 for role in TIP_ROLES], dtype=np.int64),
         wrist=wrist,
-        band_half_axes=_band(markers[wrist], rig.hand) if wrist >= 0 and markers[wrist].shape == "band" else None,
+        band_half_axes=band_axes(markers[wrist], rig.hand) if wrist >= 0 and markers[wrist].shape == "band" else None,
         law=disparity_law(rig),
     )
 
@@ -75,7 +75,7 @@ def _shape(marker: Marker) -> Array:
     return ball(radius)
 
 
-def _band(marker: Marker, hand: HandAnatomy) -> Array:
+def band_axes(marker: Marker, hand: HandAnatomy) -> Array:
     """The band goes round the wrist: as flat as the anatomy says, as thick in the mean as the marker says."""
     flat = 0.5e-3 * np.array([hand.wrist_breadth_mm, hand.wrist_thickness_mm])
     scale = 1e-3 * marker.radius_mm / flat.mean() if marker.radius_mm else 1.0

@@ -1,0 +1,117 @@
+"""Which of the hand's markers a sight is of: what the hand confirms, not what the colour says.
+
+Two markers of like colours change names where they cross, and one that is hidden lends its name to another. The hand
+knows where each must be. Asked only when sights are far from where they are expected, so it costs nothing otherwise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.tracking.kalman.estimate import BIAS, POSE, Estimate
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, place_markers, project_marker
+
+Array = NDArray[np.float64]
+
+DOUBT_M = 0.006
+"""A sight that lies farther, on the hand, from where it is expected than the whole hand does may be another's."""
+
+FAR, NEAR = 30.0, 12.0
+"""Squared normalised distances (2 degrees of freedom) of a sight from a marker that it is not of, and that it is of."""
+
+
+@njit(cache=True)
+def relabel(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate) -> int:
+    """Set `frame.label` anew; returns how many sights are taken for another marker than they say."""
+    count = worn.part.shape[0]
+    for m in range(count):
+        frame.label[m] = m
+    points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
+    place_markers(worn, estimate, points, jacobian)
+    expected, slopes = np.empty((count, 2)), np.empty((count, 2, 3))
+    camera = frame.camera[0]
+    for m in range(count):
+        place = points[m] + estimate.bias[m]
+        if frame.seen[m]:
+            for i in range(3):
+                for j in range(POSE):
+                    place[i] += frame.late_s[m] * jacobian[m, i, j] * estimate.velocity[j]
+        if not project_marker(place, estimate.world, worn.half_axes[m], cameras.pose[camera],
+                              cameras.intrinsics[camera], expected[m], slopes[m]):
+            expected[m] = np.nan
+    shift, doubt = _common_shift(frame, expected), False
+    for m in range(count):
+        if frame.seen[m]:
+            off = np.hypot(frame.pixels[m, 0] - expected[m, 0] - shift[0],
+                           frame.pixels[m, 1] - expected[m, 1] - shift[1])
+            doubt |= not off < DOUBT_M * np.hypot(slopes[m, 0, 0], slopes[m, 0, 1])
+    return _rename(frame, estimate, expected + shift, slopes, jacobian) if doubt else 0
+
+
+@njit(cache=True)
+def _common_shift(frame: Frame, expected: Array) -> Array:
+    """(2,) px: the median of what all sights are off."""
+    shift, off = np.zeros(2), np.empty(expected.shape[0])
+    for k in range(2):
+        count = 0
+        for m in range(expected.shape[0]):
+            if frame.seen[m] and not np.isnan(expected[m, k]):
+                off[count] = frame.pixels[m, k] - expected[m, k]
+                count += 1
+        if count > 2:
+            shift[k] = np.median(off[:count])
+    return shift
+
+
+@njit(cache=True)
+def _rename(frame: Frame, estimate: Estimate, expected: Array, slopes: Array, jacobian: Array) -> int:
+    """Swap pairs that fit better swapped; give a sight that fits nowhere near its name to a marker that is not seen."""
+    count, renamed = expected.shape[0], 0
+    distance = np.empty((count, count))  # of sight k from marker m
+    for m in range(count):
+        uu, uv, vv = _spread(estimate, slopes[m], jacobian[m], m)
+        determinant = uu * vv - uv * uv
+        for k in range(count):
+            distance[k, m] = np.inf
+            if frame.seen[k]:
+                u, v = frame.pixels[k, 0] - expected[m, 0], frame.pixels[k, 1] - expected[m, 1]
+                value = (vv * u * u - 2.0 * uv * u * v + uu * v * v) / determinant
+                if value >= 0.0:
+                    distance[k, m] = value
+    for k in range(count):
+        if not frame.seen[k] or frame.label[k] != k or distance[k, k] < FAR:
+            continue
+        for m in range(count):
+            if m == k or frame.label[m] != m or not distance[k, m] < NEAR:
+                continue
+            if not frame.seen[m]:
+                frame.label[k] = m
+                renamed += 1
+                break
+            if distance[m, k] < NEAR and distance[m, m] > FAR:
+                frame.label[k], frame.label[m] = m, k
+                renamed += 2
+                break
+    return renamed
+
+
+@njit(cache=True)
+def _spread(estimate: Estimate, slope: Array, jacobian: Array, m: int) -> tuple[float, float, float]:
+    """Covariance px^2 of where marker `m` is expected, with 1 px^2 for its detection and motion."""
+    rows = slope @ jacobian
+    covariance = estimate.covariance
+    uu, uv, vv = 1.0, 0.0, 1.0
+    for i in range(POSE):
+        for j in range(POSE):
+            p = covariance[i, j]
+            uu += rows[0, i] * p * rows[0, j]
+            uv += rows[0, i] * p * rows[1, j]
+            vv += rows[1, i] * p * rows[1, j]
+    for i in range(3):
+        p = covariance[BIAS + 3 * m + i, BIAS + 3 * m + i]
+        uu += slope[0, i] ** 2 * p
+        uv += slope[0, i] * slope[1, i] * p
+        vv += slope[1, i] ** 2 * p
+    return uu, uv, vv

@@ -1,0 +1,103 @@
+"""What the filter estimates: one hand's pose, its velocities, its size and its markers' biases, on the manifold.
+
+The error state has N = 82 + 3 M numbers, in this order: palm translation (3, m, world), palm rotation (3, rad, about
+the palm's origin along the world's axes), 21 joint angles (rad), the velocities of these 27 (per s), their
+accelerations (per s^2), the logarithm of the hand's scale, and for each of M markers where it sits off its nominal
+place (3, m, world axes).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.kinematics import move
+
+Array = NDArray[np.float64]
+
+POSE = 27
+ROTATION = 3
+ANGLES = 6
+VELOCITY = 27
+ACCELERATION = 54
+SCALE = 81
+BIAS = 82
+
+GROUPS = 7
+"""What accelerates on its own: the palm's translation, its rotation, and each finger's angles."""
+
+LINEAR, TURN, FIRST_FINGER = 0, 1, 2
+
+GROUP_OF = np.array([LINEAR] * 3 + [TURN] * 3 + [FIRST_FINGER] * 5 + [FIRST_FINGER + 1 + k // 4 for k in range(16)])
+"""(27,) the group of each pose number."""
+
+
+class Estimate(NamedTuple):
+    """The mean and covariance at one instant; arrays are changed in place.
+
+    `world` (4, 4) world_from_palm m; `angles` (21,) rad; `velocity` (27,) m/s and rad/s;
+    `acceleration` (27,) m/s^2 and rad/s^2; `log_scale` (1,); `bias` (M, 3) m. `covariance` (N, N). `agitation` (7,):
+    variance of the acceleration that each group is capable of just now, (m/s^2)^2 or (rad/s^2)^2. `drift` (C, M, 2):
+    leaky mean of each camera's normalised innovations of each marker.
+    """
+
+    world: Array
+    angles: Array
+    velocity: Array
+    acceleration: Array
+    log_scale: Array
+    bias: Array
+    covariance: Array
+    agitation: Array
+    drift: Array
+
+
+def empty_estimate(cameras: int, markers: int) -> Estimate:
+    """Room for an estimate; everything zero, the palm at the world's origin."""
+    size = BIAS + 3 * markers
+    return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
+                    np.zeros((size, size)), np.zeros(GROUPS), np.zeros((cameras, markers, 2)))
+
+
+@njit(cache=True)
+def copy_estimate(source: Estimate, target: Estimate) -> None:
+    """Copy every array of `source` into `target`."""
+    copy_mean(source, target)
+    target.covariance[:] = source.covariance
+    target.agitation[:] = source.agitation
+    target.drift[:] = source.drift
+
+
+@njit(cache=True)
+def copy_mean(source: Estimate, target: Estimate) -> None:
+    """Copy the mean alone."""
+    target.world[:] = source.world
+    target.angles[:] = source.angles
+    target.velocity[:] = source.velocity
+    target.acceleration[:] = source.acceleration
+    target.log_scale[:] = source.log_scale
+    target.bias[:] = source.bias
+
+
+@njit(cache=True)
+def displace(source: Estimate, step: Array, target: Estimate) -> None:
+    """Fill the mean of `target` with that of `source` moved by an error state `step` (N,); they may be the same."""
+    world, angles = source.world.copy(), source.angles.copy()
+    move(world, angles, step, target.world, target.angles)
+    for i in range(POSE):
+        target.velocity[i] = source.velocity[i] + step[VELOCITY + i]
+        target.acceleration[i] = source.acceleration[i] + step[ACCELERATION + i]
+    target.log_scale[0] = source.log_scale[0] + step[SCALE]
+    for m in range(source.bias.shape[0]):
+        for k in range(3):
+            target.bias[m, k] = source.bias[m, k] + step[BIAS + 3 * m + k]
+
+
+@njit(cache=True)
+def scale_of(estimate: Estimate) -> float:
+    """Factor on every length of the hand."""
+    return math.exp(estimate.log_scale[0])

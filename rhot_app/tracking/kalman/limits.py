@@ -1,0 +1,54 @@
+"""Joint limits as constraints on the estimate: what lies beyond is brought back along what the markers leave open."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.tracking.kalman.estimate import ANGLES, VELOCITY
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 4
+
+
+@njit(cache=True)
+def project(angles: Array, velocity: Array, covariance: Array, gains: Array, count: int, limits: Array,
+            step: Array) -> None:
+    """Change `step` (N,) so that `angles` (21,) + step keep their `limits` (21, 2).
+
+    The most plausible state with the offending angle on its limit (Simon and Chia 2002), one angle after the other,
+    the farthest first; plausible by `covariance` less what `count` rows of `gains` will take from it. The covariance
+    stays: to know that a joint is within its limits would make it smaller, so it is on the safe side. A joint at its
+    limit does not move on beyond it: `velocity` (27,) + step is stopped likewise.
+    """
+    for _ in range(_ROUNDS * angles.shape[0]):
+        worst, which, target = 1e-9, -1, 0.0
+        for i in range(angles.shape[0]):
+            value = angles[i] + step[ANGLES + i]
+            bound = min(max(value, limits[i, 0]), limits[i, 1])
+            if abs(value - bound) > worst:
+                worst, which, target = abs(value - bound), i, bound
+        if which < 0:
+            return
+        speed = velocity[ANGLES + which] + step[VELOCITY + ANGLES + which]
+        if speed * (target - 0.5 * (limits[which, 0] + limits[which, 1])) > 0.0:
+            _pull(covariance, gains, count, VELOCITY + ANGLES + which, -velocity[ANGLES + which], step)
+        _pull(covariance, gains, count, ANGLES + which, target - angles[which], step)
+    for i in range(angles.shape[0]):
+        step[ANGLES + i] = min(max(angles[i] + step[ANGLES + i], limits[i, 0]), limits[i, 1]) - angles[i]
+
+
+@njit(cache=True)
+def _pull(covariance: Array, gains: Array, count: int, row: int, target: float, step: Array) -> None:
+    """Make one number of the step `target`, and the others what is then most plausible."""
+    column = covariance[row].copy()
+    for k in range(count):
+        factor = gains[k, row]
+        for i in range(column.shape[0]):
+            column[i] -= factor * gains[k, i]
+    pull = (target - step[row]) / max(column[row], 1e-12)
+    for i in range(step.shape[0]):
+        step[i] += column[i] * pull
+    step[row] = target

@@ -1,0 +1,70 @@
+"""One camera's frame as a residual block."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.tracking.kalman.association import relabel
+from rhot_app.tracking.kalman.estimate import Estimate
+from rhot_app.tracking.kalman.markers import Frame, append_markers
+from rhot_app.tracking.kalman.rows import Rows
+from rhot_app.tracking.kalman.wearing import Wearing
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.wire.messages import MarkerFlag
+
+Array = NDArray[np.float64]
+
+_LOST = int(MarkerFlag.LOST)
+_AMBIGUOUS = int(MarkerFlag.AMBIGUOUS)
+
+AMBIGUOUS_PX = 2.0
+"""Standard deviation added to a sight of which another is as plausible."""
+
+
+class MarkerBlock:
+    """The markers that one camera saw in one frame. `t_ns`: the mean time of its sights, or of its middle row."""
+
+    def __init__(self, wearing: Wearing, observations: CameraObservations) -> None:
+        count = len(observations.pixels)
+        self.observations = observations
+        self.frame = Frame(np.array([observations.camera]), np.empty(count, np.bool_), observations.pixels,
+                           observations.covariances.copy(), np.empty(count), np.arange(count))
+        self._wearing = wearing
+        middle = 0.5 * (wearing.cameras.intrinsics[observations.camera, 3])
+        self.t_ns = observations.t_row0_master_ns + int(
+            _read(self.frame, observations.flags, 1e-9 * observations.row_time_ns, 2.0 * middle))
+
+    @property
+    def sights(self) -> int:
+        """How many markers the frame shows."""
+        return int(np.count_nonzero(self.frame.seen))
+
+    def associate(self, estimate: Estimate) -> int:
+        """Ask the hand, carried to this frame's instant, which marker each sight is of; returns how many changed."""
+        return int(relabel(self._wearing.worn, self._wearing.cameras, self.frame, estimate))
+
+    def linearise(self, estimate: Estimate, rows: Rows) -> None:
+        """Append the frame's observations; see `ResidualBlock`."""
+        append_markers(self._wearing.worn, self._wearing.cameras, self.frame, estimate, rows)
+
+
+@njit(cache=True)
+def _read(frame: Frame, flags: NDArray[np.uint16], row_time_s: float, middle_row: float) -> float:
+    """Fill `seen`, `late_s` and the covariances; returns the mean time of the sights after row 0, ns."""
+    total, count = 0.0, 0
+    for m in range(frame.seen.shape[0]):
+        x, y = frame.pixels[m]
+        frame.seen[m] = not flags[m] & _LOST and np.isfinite(x + y)
+        if frame.seen[m]:
+            frame.late_s[m] = y * row_time_s
+            total += frame.late_s[m]
+            count += 1
+            if flags[m] & _AMBIGUOUS:
+                frame.covariances[m, 0, 0] += AMBIGUOUS_PX**2
+                frame.covariances[m, 1, 1] += AMBIGUOUS_PX**2
+    mean = total / count if count else middle_row * row_time_s
+    for m in range(frame.seen.shape[0]):
+        frame.late_s[m] -= mean
+    return 1e9 * mean

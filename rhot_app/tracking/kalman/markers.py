@@ -1,0 +1,179 @@
+"""The residuals of markers: where one camera saw them, less where the estimated hand has them.
+
+Each marker is seen at its own row's time, so its place is carried by the estimated velocities to that time. What the
+hand may have accelerated between the two widens the noise.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.geometry.camera import distort
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.tracking.kalman.estimate import (
+    ACCELERATION,
+    BIAS,
+    FIRST_FINGER,
+    LINEAR,
+    POSE,
+    SCALE,
+    TURN,
+    VELOCITY,
+    Estimate,
+)
+from rhot_app.tracking.kalman.motion import ACCELERATION_S
+from rhot_app.tracking.kalman.rows import Rows
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FLOOR_PX = 0.02
+"""No centroid is better than this, whatever a node says."""
+
+NEAREST_M = 0.02
+"""A marker this near to a camera's plane, or behind it, is not expected to be seen."""
+
+_REACH_M, _FINGER_M = 0.12, 0.05  # mean levers of palm rotation and of a finger's angles
+
+
+class Worn(NamedTuple):
+    """The markers on the hand, M of them, unchanging.
+
+    `dh`: the hand's table with one point per marker. `part` (M,): the finger, PALM_PART on the palm. `half_axes`
+    (M, 3) m: their bodies' along the palm's axes (a ball has three equal ones), zero for flat ones.
+    """
+
+    dh: DhArrays
+    part: Indices
+    half_axes: Array
+
+
+class Cameras(NamedTuple):
+    """C cameras: `pose` (C, 3, 4) camera_from_world m and `intrinsics` (C, 9) as in `CameraModel`."""
+
+    pose: Array
+    intrinsics: Array
+
+
+class Frame(NamedTuple):
+    """What one camera saw: `camera` (1,) its index; `seen` (M,) which markers count; `pixels` (M, 2) raw px with
+    `covariances` (M, 2, 2); `late_s` (M,): when each was seen, s after the estimate's instant (before: negative).
+    `label` (M,): which of the hand's markers the m-th sight is of."""
+
+    camera: Indices
+    seen: NDArray[np.bool_]
+    pixels: Array
+    covariances: Array
+    late_s: Array
+    label: Indices
+
+
+@njit(cache=True)
+def place_markers(worn: Worn, estimate: Estimate, points: Array, jacobian: Array) -> None:
+    """Fill `points` (M, 3) m, world, without biases, and `jacobian` (M, 3, 27) per pose number."""
+    dh, world = worn.dh, estimate.world
+    scale = math.exp(estimate.log_scale[0])
+    frames = np.empty((dh.parent.shape[0], 3, 4))
+    forward_arrays(dh, world, estimate.angles, frames, points)
+    jacobian_arrays(dh, world, frames, points, jacobian)
+    if scale != 1.0:
+        for m in range(points.shape[0]):
+            for i in range(3):
+                points[m, i] = world[i, 3] + scale * (points[m, i] - world[i, 3])
+                for j in range(3, POSE):
+                    jacobian[m, i, j] *= scale
+
+
+@njit(cache=True)
+def project_marker(point: Array, world: Array, half_axes: Array, camera: Array, intrinsics: Array, pixel: Array,
+                   slope: Array) -> bool:
+    """Where the silhouette of a marker at `point` (3,) has its centre: `pixel` (2,) px and `slope` (2, 3) px/m.
+
+    False when it is not before the camera. `geometry.silhouette` has the formula; its slope is that of a point.
+    """
+    local = np.empty(3)
+    for i in range(3):
+        local[i] = camera[i, 3]
+        for k in range(3):
+            local[i] += camera[i, k] * point[k]
+    if not local[2] > NEAREST_M:
+        return False
+    xz, yz, zz = 0.0, 0.0, 0.0
+    if half_axes[0] > 0.0:
+        for axis in range(3):
+            a, b, c = 0.0, 0.0, 0.0
+            for k in range(3):
+                a += camera[0, k] * world[k, axis]
+                b += camera[1, k] * world[k, axis]
+                c += camera[2, k] * world[k, axis]
+            square = half_axes[axis] * half_axes[axis]
+            xz += square * a * c
+            yz += square * b * c
+            zz += square * c * c
+    depth = local[2] * local[2] - zz
+    x, y = (local[0] * local[2] - xz) / depth, (local[1] * local[2] - yz) / depth
+    xd, yd, xx, xy, yx, yy = distort(x, y, intrinsics[4:9])
+    pixel[0] = intrinsics[0] * xd + intrinsics[2]
+    pixel[1] = intrinsics[1] * yd + intrinsics[3]
+    for k in range(3):
+        dx = (camera[0, k] - x * camera[2, k]) / local[2]
+        dy = (camera[1, k] - y * camera[2, k]) / local[2]
+        slope[0, k] = intrinsics[0] * (xx * dx + xy * dy)
+        slope[1, k] = intrinsics[1] * (yx * dx + yy * dy)
+    return True
+
+
+@njit(cache=True)
+def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, rows: Rows) -> None:
+    """Append one observation of two rows, px, for each marker of `frame` that was seen."""
+    count = worn.part.shape[0]
+    points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
+    place_markers(worn, estimate, points, jacobian)
+    camera = frame.camera[0]
+    pixel, slope, place = np.empty(2), np.empty((2, 3)), np.empty(3)
+    for sight in range(count):
+        if not frame.seen[sight]:
+            continue
+        m, late = frame.label[sight], frame.late_s[sight]
+        for i in range(3):
+            place[i] = points[m, i] + estimate.bias[m, i]
+            for j in range(POSE):
+                place[i] += jacobian[m, i, j] * late * (estimate.velocity[j] + 0.5 * late * estimate.acceleration[j])
+        row, observation = rows.count[0], rows.count[1]
+        rows.jacobian[row:row + 2] = 0.0
+        if not project_marker(place, estimate.world, worn.half_axes[m], cameras.pose[camera],
+                              cameras.intrinsics[camera], pixel, slope):
+            pixel[:] = np.nan
+            slope[:] = 0.0
+        strayed = (estimate.agitation[LINEAR] + estimate.agitation[TURN] * _REACH_M**2
+                   + (estimate.agitation[FIRST_FINGER + worn.part[m]] * _FINGER_M**2 if worn.part[m] >= 0 else 0.0))
+        for r in range(2):
+            _fill(rows.jacobian[row + r], slope[r], jacobian[m], late, points[m], estimate, m)
+            rows.residual[row + r] = frame.pixels[sight, r] - pixel[r]
+            spread = slope[r, 0] ** 2 + slope[r, 1] ** 2 + slope[r, 2] ** 2
+            rows.noise[row + r, 0] = (frame.covariances[sight, r, r] + FLOOR_PX**2
+                                      + spread * strayed * abs(late) ** 5 / (10.0 * ACCELERATION_S))
+            rows.noise[row + r, 1] = frame.covariances[sight, 0, 1]
+        rows.part[observation] = worn.part[m]
+        rows.source[observation, 0], rows.source[observation, 1] = camera, sight
+        rows.first[observation + 1] = row + 2
+        rows.count[0], rows.count[1] = row + 2, observation + 1
+
+
+@njit(cache=True)
+def _fill(out: Array, slope: Array, jacobian: Array, late: float, point: Array, estimate: Estimate, m: int) -> None:
+    """One row's Jacobian: the image's `slope` (3,) times that of the place, `jacobian` (3, 27)."""
+    for j in range(POSE):
+        value = slope[0] * jacobian[0, j] + slope[1] * jacobian[1, j] + slope[2] * jacobian[2, j]
+        out[j] = value
+        out[VELOCITY + j] = late * value
+        out[ACCELERATION + j] = 0.5 * late * late * value
+    for k in range(3):
+        out[SCALE] += slope[k] * (point[k] - estimate.world[k, 3])
+        out[BIAS + 3 * m + k] = slope[k]

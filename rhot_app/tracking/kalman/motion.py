@@ -1,0 +1,236 @@
+"""How a hand moves between two observations, and what is forgotten meanwhile.
+
+Accelerations are nearly constant over a frame and forgotten within a tenth of a second (Singer 1970): muscles change
+their pull smoothly. This matters with cameras that take turns. One camera alone does not see depth; were any
+acceleration possible from one frame to the next, a wrong depth would pass for a hand that trembles sideways in time
+with the cameras. How strong accelerations are differs between the palm's translation, its rotation and each finger,
+and with time (`surprise.py`).
+
+Two ways of forgetting keep the covariance honest where nothing is seen. Velocities decay to rest. What is known of the
+joint angles fades exponentially towards the natural pose, in every direction of the state at its own time (stabilised
+forgetting, Kulhavy and Zarrop 1993): a joint that markers show loses nothing that the next frame does not bring back,
+one that none shows becomes as uncertain as the natural pose says, no more and no less, however long it is out of sight.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.tracking.kalman.estimate import (
+    ACCELERATION,
+    ANGLES,
+    BIAS,
+    GROUP_OF,
+    GROUPS,
+    POSE,
+    ROTATION,
+    SCALE,
+    VELOCITY,
+    Estimate,
+)
+
+Array = NDArray[np.float64]
+
+STILL = np.array([1e-8, 1e-6, 5e-6, 5e-6, 5e-6, 5e-6, 5e-6])
+"""Agitation of a hand at rest, by group: what tremor and breath leave between two frames."""
+
+MOST = np.array([60.0**2, 500.0**2, 1000.0**2, 1000.0**2, 1000.0**2, 1000.0**2, 1000.0**2])
+"""Agitation of the fastest hands."""
+
+ACCELERATION_S = 0.08
+"""Accelerations change with this time constant."""
+
+CALM_S = 0.06
+"""Agitation fades with this time constant once nothing surprises any more."""
+
+VELOCITY_S = np.array([1.0] * 6 + [0.3] * 21)
+"""(27,) Velocities decay with these time constants: what swings a finger is soon used up."""
+
+FORGET_S = 2.0
+"""What is known of a pose fades with this time constant; see above."""
+
+BIAS_S = 3.0
+"""Markers' biases change with this time constant: they turn with the hand and its light."""
+
+_WIDEST = 0.7
+"""Standard deviation, m and rad, beyond which a palm's place is not worth knowing."""
+
+
+class Habits(NamedTuple):
+    """What is known of a hand that is not seen.
+
+    `rows` (K, 21) of factors and `values` (K,): beliefs about the angles, in standard deviations. `together` (27, 27):
+    how the pose's numbers accelerate together, 1 for the liveliest of a group: fingers bend all their joints at once.
+    """
+
+    rows: Array
+    values: Array
+    together: Array
+
+
+@njit(cache=True)
+def predict(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array) -> None:
+    """Carry the estimate on by `dt` >= 0 s. `bias_variance` (M,) m^2 is what each marker's bias tends to."""
+    _move_mean(estimate, dt)
+    _move_covariance(estimate, dt)
+    agitation = estimate.agitation
+    fade = math.exp(-dt / CALM_S)
+    for group in range(GROUPS):
+        agitation[group] = max(STILL[group], agitation[group] * fade)
+    shake(estimate.covariance, agitation, habits.together, dt)
+    _fade_biases(estimate, dt, bias_variance)
+
+
+@njit(cache=True)
+def _transition(dt: float) -> tuple[Array, Array, float, float, float]:
+    """How `dt` s carry on: per pose number the factors velocity to pose and velocity to velocity (27,), then those of
+    acceleration to pose, to velocity and to itself."""
+    decay = np.exp(-dt / VELOCITY_S)
+    keep = math.exp(-dt / ACCELERATION_S)
+    gained = ACCELERATION_S * (1.0 - keep)
+    return VELOCITY_S * (1.0 - decay), decay, ACCELERATION_S * (dt - gained), gained, keep
+
+
+@njit(cache=True)
+def _move_mean(estimate: Estimate, dt: float) -> None:
+    velocity, acceleration, world = estimate.velocity, estimate.acceleration, estimate.world
+    way, decay, bend, gained, keep = _transition(dt)
+    moved = np.empty(POSE)
+    for i in range(POSE):
+        moved[i] = way[i] * velocity[i] + bend * acceleration[i]
+        velocity[i] = decay[i] * velocity[i] + gained * acceleration[i]
+        acceleration[i] *= keep
+    rotation = exponential(moved[3], moved[4], moved[5])
+    world[:3, :3] = rotation @ np.ascontiguousarray(world[:3, :3])
+    for i in range(3):
+        world[i, 3] += moved[i]
+    for i in range(21):
+        estimate.angles[i] += moved[ANGLES + i]
+    covariance = estimate.covariance
+    covariance[ROTATION:ANGLES] = rotation @ np.ascontiguousarray(covariance[ROTATION:ANGLES])
+    covariance[:, ROTATION:ANGLES] = covariance[:, ROTATION:ANGLES].copy() @ rotation.T
+
+
+@njit(cache=True)
+def exponential(x: float, y: float, z: float) -> Array:
+    """(3, 3) rotation by the rotation vector (x, y, z), rad."""
+    angle = math.sqrt(x * x + y * y + z * z)
+    a = math.sin(angle) / angle if angle > 1e-9 else 1.0
+    b = (1.0 - math.cos(angle)) / (angle * angle) if angle > 1e-5 else 0.5
+    out = np.empty((3, 3))
+    out[0, 0], out[0, 1], out[0, 2] = 1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y
+    out[1, 0], out[1, 1], out[1, 2] = b * x * y + a * z, 1.0 - b * (x * x + z * z), b * y * z - a * x
+    out[2, 0], out[2, 1], out[2, 2] = b * x * z - a * y, b * y * z + a * x, 1.0 - b * (x * x + y * y)
+    return out
+
+
+@njit(cache=True)
+def _move_covariance(estimate: Estimate, dt: float) -> None:
+    """P becomes F P F^T."""
+    covariance = estimate.covariance
+    size = covariance.shape[0]
+    way, decay, bend, gained, keep = _transition(dt)
+    for i in range(POSE):
+        pose, speed, pull = covariance[i], covariance[VELOCITY + i], covariance[ACCELERATION + i]
+        for j in range(size):
+            pose[j] += way[i] * speed[j] + bend * pull[j]
+            speed[j] = decay[i] * speed[j] + gained * pull[j]
+            pull[j] *= keep
+    for i in range(size):
+        row = covariance[i]
+        for j in range(POSE):
+            row[j] += way[j] * row[VELOCITY + j] + bend * row[ACCELERATION + j]
+            row[VELOCITY + j] = decay[j] * row[VELOCITY + j] + gained * row[ACCELERATION + j]
+            row[ACCELERATION + j] *= keep
+
+
+@njit(cache=True)
+def shake(covariance: Array, agitation: Array, together: Array, dt: float) -> None:
+    """Add what white jerk does in `dt` s that keeps up accelerations of variance `agitation` (7,) by group.
+
+    `together` as in `Habits`.
+    """
+    gains = jerk_gains(dt)
+    for i in range(POSE):
+        for j in range(POSE):
+            if GROUP_OF[i] == GROUP_OF[j] and together[i, j] != 0.0:
+                q = agitation[GROUP_OF[i]] * together[i, j]
+                for a in range(3):
+                    for b in range(3):
+                        covariance[VELOCITY * a + i, VELOCITY * b + j] += q * gains[a, b]
+
+
+@njit(cache=True)
+def jerk_gains(dt: float) -> Array:
+    """(3, 3) covariance of pose, velocity and acceleration after `dt` s per variance of the acceleration."""
+    q = 2.0 / ACCELERATION_S
+    out = np.empty((3, 3))
+    out[0, 0], out[1, 1], out[2, 2] = q * dt**5 / 20.0, q * dt**3 / 3.0, q * dt
+    out[0, 1] = out[1, 0] = q * dt**4 / 8.0
+    out[0, 2] = out[2, 0] = q * dt**3 / 6.0
+    out[1, 2] = out[2, 1] = q * dt**2 / 2.0
+    return out
+
+
+@njit(cache=True)
+def _fade_biases(estimate: Estimate, dt: float, variance: Array) -> None:
+    covariance, fade = estimate.covariance, math.exp(-dt / BIAS_S)
+    size = covariance.shape[0]
+    for i in range(BIAS, size):
+        marker = (i - BIAS) // 3
+        estimate.bias[marker, (i - BIAS) % 3] *= fade
+        for j in range(size):
+            covariance[i, j] *= fade
+            covariance[j, i] *= fade
+        covariance[i, i] += (1.0 - fade * fade) * variance[marker]
+
+
+@njit(cache=True)
+def forget(estimate: Estimate, dt: float, habits: Habits, step: Array) -> None:
+    """Let knowledge of the pose fade for `dt` s, the angles towards the prior. `step` (N,) is what the mean moves by.
+
+    The information of the pose shrinks by exp(-dt / FORGET_S) and that of the prior comes in for the difference; each
+    of its rows is one scalar observation, exact because it is linear.
+    """
+    covariance = estimate.covariance
+    size = covariance.shape[0]
+    grow = math.exp(0.5 * dt / FORGET_S)
+    for i in range(POSE):
+        for j in range(size):
+            covariance[i, j] *= grow
+            covariance[j, i] *= grow
+    for i in range(ANGLES):
+        if covariance[i, i] > _WIDEST * _WIDEST:
+            shrink = _WIDEST / math.sqrt(covariance[i, i])
+            for j in range(size):
+                covariance[i, j] *= shrink
+                covariance[j, i] *= shrink
+    noise = 1.0 / -math.expm1(-dt / FORGET_S)
+    step[:] = 0.0
+    gain = np.empty(size)
+    for k in range(habits.rows.shape[0]):
+        row = habits.rows[k]
+        gain[:] = 0.0
+        expected = 0.0
+        for a in range(21):
+            if row[a] != 0.0:
+                expected += row[a] * (estimate.angles[a] + step[ANGLES + a])
+                for j in range(size):
+                    gain[j] += row[a] * covariance[ANGLES + a, j]
+        variance = noise
+        for a in range(21):
+            if row[a] != 0.0:
+                variance += row[a] * gain[ANGLES + a]
+        pull = (habits.values[k] - expected) / variance
+        for i in range(size):
+            step[i] += gain[i] * pull
+            factor = gain[i] / variance
+            for j in range(size):
+                covariance[i, j] -= factor * gain[j]
+    if estimate.covariance[SCALE, SCALE] <= 0.0:
+        step[SCALE] = 0.0

@@ -1,0 +1,68 @@
+"""Residual rows: the one form in which anything that is observed tells the filter what it saw.
+
+The filter knows neither markers nor cameras, only rows with their Jacobians and noise, gathered into observations
+that are believed or not believed as a whole.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.tracking.kalman.estimate import Estimate
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+PALM_PART = -1
+"""The part of the hand that an observation is attached to: the palm, or the index of a finger."""
+
+
+class Rows(NamedTuple):
+    """Room for K rows in up to L observations.
+
+    `count` (2,): rows and observations in use. `residual` (K,): seen minus expected, in any unit; `jacobian` (K, N):
+    change of what is expected per error state; `noise` (K, 2): of each row, its variance and its covariance with the
+    row before or after it in the same observation of two. `first` (L + 1,): the rows of observation l are
+    first[l] .. first[l + 1] - 1, one or two of them; `part` (L,): PALM_PART or the finger; `source` (L, 2): camera and
+    marker, or -1.
+    """
+
+    count: Indices
+    residual: Array
+    jacobian: Array
+    noise: Array
+    first: Indices
+    part: Indices
+    source: Indices
+
+
+class ResidualBlock(Protocol):
+    """Something that was observed at an instant: a frame's markers, an edge, an object in the hand."""
+
+    def associate(self, estimate: Estimate) -> int:
+        """Decide what the observations are of, given the hand at that instant; returns how many changed."""
+        ...
+
+    def linearise(self, estimate: Estimate, rows: Rows) -> None:
+        """Append this block's observations to `rows`, expected and linearised at the mean of `estimate`.
+
+        Called once or more per update; every time it must append the same observations in the same order.
+        """
+        ...
+
+
+def empty_rows(rows: int, size: int) -> Rows:
+    """Room for `rows` rows of a state with `size` numbers."""
+    return Rows(np.zeros(2, np.int64), np.zeros(rows), np.zeros((rows, size)), np.zeros((rows, 2)),
+                np.zeros(rows + 1, np.int64), np.zeros(rows, np.int64), np.zeros((rows, 2), np.int64))
+
+
+@njit(cache=True)
+def clear(rows: Rows) -> None:
+    """Begin anew."""
+    rows.count[:] = 0
+    rows.first[0] = 0

@@ -1,0 +1,98 @@
+"""A rig compiled to what the filter and its marker residuals need."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.model import HandModel, build_model
+from rhot_app.hand.places import Place, place_of
+from rhot_app.hand.skeleton import ANGLE_SLICES
+from rhot_app.hand.variants import VariantName, limit_set, make_variant
+from rhot_app.project import Rig
+from rhot_app.tracking.kalman.estimate import ANGLES, POSE
+from rhot_app.tracking.kalman.markers import Cameras, Worn
+from rhot_app.tracking.kalman.motion import Habits
+from rhot_app.tracking.rig_arrays import band_axes
+from rhot_node.markers import Marker, MarkerSet
+
+Array = NDArray[np.float64]
+
+PLACE_SD_M = 0.3e-3
+"""How far a marker's seen middle lies from where the hand file has it: paint, its shading, and the hand's skin."""
+
+_COUPLED_SD_RAD = np.radians(0.02)
+
+
+@dataclass(frozen=True, slots=True)
+class Wearing:
+    """`roles` (M,) of the markers, `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places."""
+
+    model: HandModel
+    worn: Worn
+    cameras: Cameras
+    habits: Habits
+    limits: Array  # (21, 2) rad
+    roles: tuple[str, ...]
+    places: tuple[Place, ...]
+    bias_variance: Array
+
+
+def compile_wearing(rig: Rig) -> Wearing:
+    """The arrays of a validated rig. Raises RigError when a marker has no place on the hand."""
+    model = build_model(rig.hand)
+    places = tuple(place_of(marker, model) for marker in rig.markers.markers)
+    models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+    worn = Worn(points_on(model.dh, places), np.array([place.finger for place in places], dtype=np.int64),
+                half_axes_of(rig.markers, model))
+    return Wearing(
+        model, worn,
+        Cameras(np.array([camera.camera_from_world[:3] for camera in models]),
+                np.array([camera.intrinsics for camera in models])),
+        habits_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
+        tuple(marker.role or "" for marker in rig.markers.markers), places,
+        np.full(len(places), PLACE_SD_M**2))
+
+
+def points_on(dh: DhArrays, places: tuple[Place, ...]) -> DhArrays:
+    """The same table with the places as its points."""
+    return dh._replace(point_row=np.array([place.row for place in places], dtype=np.int64),
+                       point_offset=np.array([place.point for place in places]).reshape(-1, 3))
+
+
+def half_axes_of(markers: MarkerSet, model: HandModel) -> Array:
+    """(M, 3) m: half axes of the markers' bodies along the palm's axes."""
+    return np.array([_half_axes(marker, model) for marker in markers.markers])
+
+
+def _half_axes(marker: Marker, model: HandModel) -> Array:
+    if marker.shape == "band":
+        return band_axes(marker, model.anatomy)
+    radius = 1e-3 * marker.radius_mm if marker.radius_mm and marker.shape in ("sphere", "capsule") else 0.0
+    return np.full(3, radius)
+
+
+def habits_of(model: HandModel, variant: VariantName) -> Habits:
+    """What is believed of the angles: the natural pose, and the variant's couplings as good as exactly."""
+    rows = np.linalg.cholesky(model.natural.information).T
+    values = rows @ model.natural.mean
+    chosen = make_variant(variant)
+    basis = chosen.basis
+    bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
+    bound = bound[np.abs(bound).max(axis=1) > 1e-9]
+    return Habits(np.vstack([rows, bound]), np.concatenate([values, bound @ chosen.mean]), _together(model))
+
+
+def _together(model: HandModel) -> Array:
+    """(27, 27) as in `Habits`: within a finger as the natural pose says, the palm's axes each on its own."""
+    natural = np.linalg.inv(model.natural.information)
+    together = np.eye(POSE)
+    for columns in ANGLE_SLICES:
+        block = natural[columns, columns]
+        rows = slice(ANGLES + columns.start, ANGLES + columns.stop)
+        together[rows, rows] = block / block.diagonal().max()
+    return together

@@ -1,0 +1,82 @@
+"""Where a hand is when nothing is known of it: from one instant's triangulated markers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.geometry.transforms import fit_rigid
+from rhot_app.hand.finger_ik import solve_fingers
+from rhot_app.hand.model import neutral_pose
+from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
+from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
+from rhot_app.tracking.kalman.rows import PALM_PART
+from rhot_app.tracking.kalman.wearing import Wearing
+from rhot_app.tracking.locate import choose_views, locate_all
+from rhot_app.tracking.pairing import Paired, Pairing
+from rhot_app.tracking.rig_arrays import RigArrays
+from rhot_app.tracking.tracker import CameraObservations
+
+Array = NDArray[np.float64]
+
+LEAST_MARKERS = 4
+FLATTEST_M2 = 1e-5
+"""Least area spanned by three palm markers that show how the palm is turned."""
+
+_TARGET_SD_M = 1e-3
+
+
+class Starter:
+    """Collects frames until one instant shows enough of the hand."""
+
+    def __init__(self, rig: RigArrays, wearing: Wearing) -> None:
+        self._rig, self._wearing = rig, wearing
+        self._pairing = Pairing(len(rig.cameras), len(rig.marker_ids))
+        self._tips = [wearing.roles.index(role) if role in wearing.roles else -1 for role in TIP_ROLES]
+        self._wrist = wearing.roles.index(WRIST_ROLE) if WRIST_ROLE in wearing.roles else -1
+        self._on_palm = np.flatnonzero(wearing.worn.part == PALM_PART)
+
+    def reset(self) -> None:
+        """Forget the frames."""
+        self._pairing.reset()
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in."""
+        self._pairing.ingest(observations)
+
+    def find(self) -> tuple[int, HandPose] | None:
+        """The hand and its instant, master ns, as soon as the frames so far show it."""
+        paired = self._pairing.due()
+        if paired is None:
+            return None
+        markers = self._locate(paired)
+        pose = self._pose(markers)
+        return None if pose is None else (paired.t_ns, pose)
+
+    def _locate(self, paired: Paired) -> Array:
+        """(M, 3) m, NaN where not located."""
+        rig, count = self._rig, len(self._rig.marker_ids)
+        used = np.empty((len(rig.cameras), count), np.bool_)
+        positions, covariances = np.empty((count, 3)), np.empty((count, 3, 3))
+        choose_views(paired.flags, paired.live, used, np.empty(count, np.bool_))
+        locate_all(paired.pixels, paired.covariances, used, rig.intrinsics, rig.cameras, rig.focal, rig.shapes,
+                   positions, covariances, np.empty(count))
+        return positions
+
+    def _pose(self, markers: Array) -> HandPose | None:
+        located = np.isfinite(markers[:, 0])
+        if np.count_nonzero(located) < min(LEAST_MARKERS, len(markers)):
+            return None
+        tips = np.array([markers[m] if m >= 0 else np.full(3, np.nan) for m in self._tips])
+        on_palm = self._on_palm[located[self._on_palm]]
+        if len(on_palm) >= 3:
+            own = np.array([self._wearing.places[m].point for m in on_palm])
+            if np.linalg.norm(np.cross(own[1] - own[0], own[2] - own[0])) > 2.0 * FLATTEST_M2:
+                pose = neutral_pose(fit_rigid(own, markers[on_palm]))
+                solution = solve_fingers(self._wearing.model, pose, tips, target_sd=_TARGET_SD_M)
+                return HandPose(pose.world_from_palm, solution.angles)
+        wrist = markers[self._wrist] if self._wrist >= 0 else np.full(3, np.nan)
+        if not np.isfinite(wrist[0]) and np.count_nonzero(np.isfinite(tips[:, 0])) < TIPS_WITHOUT_WRIST:
+            return None
+        fit = fit_palm(self._wearing.model, wrist, tips, None, 0.0)
+        return None if fit is None else fit.pose

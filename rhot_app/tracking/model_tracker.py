@@ -1,0 +1,206 @@
+"""The model tracker: one hand estimated from every image position of every camera, each at its own time.
+
+Rehg's idea (1995, chapter 2): one kinematic model, every observation a residual on it. Cameras need no
+synchronisation, a marker that one camera sees counts, and what no marker shows is known as well as the hand's own
+shape and habits tell, with the covariance that says how well that is.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.project import Rig
+from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, copy_estimate, empty_estimate
+from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
+from rhot_app.tracking.kalman.marker_block import MarkerBlock
+from rhot_app.tracking.kalman.motion import predict
+from rhot_app.tracking.kalman.timeline import Timeline
+from rhot_app.tracking.kalman.wearing import compile_wearing
+from rhot_app.tracking.locate import locate_all
+from rhot_app.tracking.model_output import bring_together, describe, empty_report
+from rhot_app.tracking.model_start import Starter
+from rhot_app.tracking.rig_arrays import compile_rig
+from rhot_app.tracking.sights import Sights
+from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.tracking.tracker import CameraObservations
+
+Array = NDArray[np.float64]
+
+LOST_AFTER_NS = 500_000_000
+"""No sight believed for this long: the hand is lost, and looked for anew."""
+
+WRONG_AFTER_NS = 100_000_000
+"""Most sights disbelieved for this long: it is the hand that is wrong, not the sights."""
+
+FARTHEST_AHEAD_S = 0.1
+"""Predictions beyond this say little."""
+
+_PENDING = 16
+_JUMP_NS = 1_000_000_000
+"""A frame this far from the last ones is of another timeline."""
+
+
+class ModelTracker:
+    """Implements `Tracker`: a state after every frame."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig, self._wearing = compile_rig(rig), compile_wearing(rig)
+        cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
+        self._hand = HandFilter(cameras, markers, self._wearing.habits, self._wearing.limits,
+                                self._wearing.bias_variance, float_scale=rig.tracker.float_scale)
+        self._timeline = Timeline(self._hand)
+        self._starter = Starter(self._rig, self._wearing)
+        self._sights = Sights(cameras, markers)
+        self._ahead = empty_estimate(cameras, markers)
+        self._sequence = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything but the count of states."""
+        self._pending: list[CameraObservations] = []
+        self._starter.reset()
+        self._sights.reset()
+        self._tracking = self._ever = False
+        self._believed_ns = self._plausible_ns = 0
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in; it is weighed by the next `solve`."""
+        if len(self._pending) < _PENDING:
+            self._pending.append(observations)
+        else:
+            self._pending = [*self._pending[1:], observations]
+
+    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
+        """Each camera's newest frame, None before its first."""
+        return tuple(self._sights.newest)
+
+    def solve(self) -> HandState | None:
+        """The state after the frames since the last one, None without any."""
+        pending, self._pending = self._pending, []
+        begun = time.perf_counter()
+        taken = [observations for observations in pending if self._take(observations)]
+        if not taken:
+            return None
+        return self._state(taken[-1], begun)
+
+    def state_at(self, t_ns: int) -> HandState | None:
+        """The hand predicted to (or from the past brought to) master time `t_ns`; None while there is no hand.
+
+        Beyond `FARTHEST_AHEAD_S` the prediction stops there.
+        """
+        newest = max((frame for frame in self._sights.newest if frame is not None),
+                     key=lambda frame: frame.t_receive_ns, default=None)
+        if not self._tracking or newest is None:
+            return None
+        copy_estimate(self._hand.estimate, self._ahead)
+        ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
+        predict(self._ahead, ahead, self._wearing.habits, self._wearing.bias_variance)
+        return self._describe(self._ahead, self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
+
+    def _take(self, observations: CameraObservations) -> bool:
+        """Weigh one frame; False when it is a double or too late."""
+        block = MarkerBlock(self._wearing, observations)
+        if self._tracking and abs(block.t_ns - self._timeline.t_ns) > _JUMP_NS:
+            self._give_up()
+        if not self._sights.enter(block):
+            return False
+        if not self._tracking:
+            return self._look_for_hand(observations)
+        for weighed, outcome in self._timeline.add(block):
+            assert isinstance(weighed, MarkerBlock)
+            self._learn(weighed, outcome)
+        if self._timeline.t_ns - self._believed_ns > LOST_AFTER_NS or (
+                self._timeline.t_ns - self._plausible_ns > WRONG_AFTER_NS):
+            self._give_up()
+        return True
+
+    def _look_for_hand(self, observations: CameraObservations) -> bool:
+        self._starter.ingest(observations)
+        found = self._starter.find()
+        if found is None:
+            return True
+        t_ns, pose = found
+        self._hand.start(pose.world_from_palm, pose.angles)
+        self._timeline.begin(t_ns)
+        self._tracking = self._ever = True
+        self._believed_ns = self._plausible_ns = t_ns
+        for block in self._sights.recent(t_ns):
+            for weighed, outcome in self._timeline.add(block):
+                assert isinstance(weighed, MarkerBlock)
+                self._learn(weighed, outcome)
+        return True
+
+    def _give_up(self) -> None:
+        self._tracking = False
+        self._starter.reset()
+
+    def _learn(self, block: MarkerBlock, outcome: Outcome) -> None:
+        """Note what was believed of a frame."""
+        believed = int(np.count_nonzero(outcome.believed))
+        self._sights.believe(block, outcome)
+        if believed:
+            self._believed_ns = max(self._believed_ns, block.t_ns)
+        if 2 * believed >= block.sights:
+            self._plausible_ns = max(self._plausible_ns, block.t_ns)
+
+    def _state(self, newest: CameraObservations, begun: float) -> HandState:
+        if not self._tracking:
+            return self._nothing(newest, begun)
+        return self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
+
+    def _describe(self, estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:  # type: ignore
+        wearing, rig = self._wearing, self._rig
+        cameras, markers = len(rig.camera_names), len(rig.marker_ids)
+        pixels, used = np.empty((cameras, markers, 2)), np.empty((cameras, markers), np.bool_)
+        raw, raw_covariances, errors = np.empty((markers, 3)), np.empty((markers, 3, 3)), np.empty(markers)
+        solved = time.perf_counter()
+        bring_together(wearing.worn, wearing.cameras, estimate, t_ns, self._sights.times, self._sights.fresh_ns,
+                       self._sights.pixels, pixels, used)
+        locate_all(pixels, self._sights.covariances, used, rig.intrinsics, rig.cameras, rig.focal, rig.shapes, raw,
+                   raw_covariances, errors)
+        located = time.perf_counter()
+        knowledge, report = np.empty(markers, np.uint8), empty_report(markers)
+        describe(estimate, wearing.model.dh, wearing.worn, self._sights.clear(t_ns), knowledge, report)
+        seen_pixels, seen_flags = self._sights.last_seen()
+        self._sequence += 1
+        return HandState(
+            sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
+            condition=Condition.TRACKING if (knowledge == Knowledge.MEASURED).all() else Condition.PARTIAL,
+            marker_ids=rig.marker_ids, marker_positions=report.markers, marker_raw_positions=raw,
+            marker_covariances=report.marker_covariances, marker_knowledge=knowledge, camera_names=rig.camera_names,
+            camera_pixels=seen_pixels, camera_flags=seen_flags, joint_positions=report.points[:21],
+            joint_knowledge=report.joint_knowledge, fingertip_positions=report.points[21:],
+            angles=estimate.angles.copy(), angle_knowledge=report.angle_knowledge,
+            world_from_palm=estimate.world.copy(), palm_knowledge=Knowledge(int(report.palm[0])),
+            epipolar_error_px=errors, joint_covariances=report.covariances[:21],
+            fingertip_covariances=report.covariances[21:], angle_sd=report.angle_sd,
+            palm_covariance=estimate.covariance[:ANGLES, :ANGLES].copy(),
+            hand_scale=float(np.exp(estimate.log_scale[0])),
+            hand_scale_sd=float(np.sqrt(max(estimate.covariance[SCALE, SCALE], 0.0))),
+            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0,
+                       "triangulate": located - solved, "filter": solved - begun,
+                       "solve": time.perf_counter() - located})
+
+    def _nothing(self, newest: CameraObservations, begun: float) -> HandState:
+        """No hand: what the cameras see is all there is to tell."""
+        rig = self._rig
+        markers = len(rig.marker_ids)
+        seen_pixels, seen_flags = self._sights.last_seen()
+        unknown = int(Knowledge.UNKNOWN)
+        self._sequence += 1
+        return HandState(
+            sequence=self._sequence - 1, t_master_ns=newest.t_row0_master_ns, t_receive_ns=newest.t_receive_ns,
+            condition=Condition.LOST if self._ever else Condition.SEARCHING, marker_ids=rig.marker_ids,
+            marker_positions=np.full((markers, 3), np.nan), marker_raw_positions=np.full((markers, 3), np.nan),
+            marker_covariances=np.full((markers, 3, 3), np.nan),
+            marker_knowledge=np.full(markers, unknown, np.uint8), camera_names=rig.camera_names,
+            camera_pixels=seen_pixels, camera_flags=seen_flags, joint_positions=np.full((21, 3), np.nan),
+            joint_knowledge=np.full(21, unknown, np.uint8), fingertip_positions=np.full((5, 3), np.nan),
+            angles=np.full(21, np.nan), angle_knowledge=np.full(21, unknown, np.uint8),
+            world_from_palm=np.full((4, 4), np.nan), palm_knowledge=Knowledge.UNKNOWN,
+            epipolar_error_px=np.full(markers, np.nan), **UNESTIMATED,
+            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
+                       "filter": time.perf_counter() - begun, "solve": 0.0})
