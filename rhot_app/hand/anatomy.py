@@ -12,7 +12,8 @@ import msgspec
 from msgspec import Meta
 
 from rhot_app.errors import RigError
-from rhot_app.hand.skeleton import FINGERS
+from rhot_app.hand.couplings import THESIS_COUPLINGS, Coupling, coupling_complaints
+from rhot_app.hand.skeleton import ANGLES, FINGERS
 from rhot_node.files import read_document, write_document
 
 FORMAT: Final = "rhot-hand"
@@ -42,13 +43,15 @@ class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A hand. `fingers` has exactly the five names of `skeleton.FINGERS`."""
+    """A hand. `fingers` has exactly the five names of `skeleton.FINGERS`; `couplings`, of the variant `coupled`, are
+    between angles of `skeleton.ANGLES`."""
 
     side: Literal["right", "left"]
     fingers: dict[str, FingerAnatomy]
     wrist_breadth_mm: Millimetres = 58.0
     wrist_thickness_mm: Millimetres = 40.0
     palm_thickness_mm: Millimetres = 28.0
+    couplings: tuple[Coupling, ...] = THESIS_COUPLINGS
     name: str = ""
     format: Literal["rhot-hand"] = FORMAT
     version: Literal[1] = VERSION
@@ -64,6 +67,9 @@ class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ValueError(f"fingers.{name}.limits_deg has a lower limit above its upper one")
             if finger.marker_mm > finger.bones_mm[2]:
                 raise ValueError(f"fingers.{name}.marker_mm lies beyond the fingertip")
+        complaint = next(coupling_complaints(self.couplings, ANGLES), None)
+        if complaint:
+            raise ValueError(f"couplings: {complaint}")
 
 
 def load_hand(path: Path) -> HandAnatomy:

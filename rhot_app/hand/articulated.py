@@ -16,15 +16,14 @@ import msgspec
 from msgspec import Meta
 
 from rhot_app.errors import RigError
+from rhot_app.hand.couplings import Coupling, Degrees, Name, coupling_complaints
 from rhot_node.files import read_document, write_atomically
 
 FORMAT: Final = "rhot-articulated"
 VERSION: Final = 1
 
-Name = Annotated[str, Meta(min_length=1, max_length=64)]
 Length = Annotated[float, Meta(ge=-10_000, le=10_000)]  # mm
 Size = Annotated[float, Meta(gt=0, le=10_000)]  # mm
-Degrees = Annotated[float, Meta(ge=-360, le=360)]
 Vector = tuple[Length, Length, Length]
 
 
@@ -80,16 +79,6 @@ class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: Name
     limits_deg: tuple[Degrees, Degrees] = (-180.0, 180.0)
     rest_deg: Degrees = 0.0
-
-
-class Coupling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """In the object's coupled variant, `angle` = `offset_deg` + `factor` times the free angle `follows`; without
-    `follows` it stays at `offset_deg`."""
-
-    angle: Name
-    follows: Name | None = None
-    factor: Annotated[float, Meta(ge=-100, le=100)] = 1.0
-    offset_deg: Degrees = 0.0
 
 
 class Point(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -189,12 +178,7 @@ def _complaints(document: Articulated) -> Iterator[str]:
             yield f'angle "{angle.name}" rests at {angle.rest_deg:g} degrees, outside its limits'
         if angle.name not in turned:
             yield f'angle "{angle.name}" turns no frame'
-    followers = {coupling.angle for coupling in document.couplings}
-    for coupling in document.couplings:
-        if missing := {coupling.angle, coupling.follows or coupling.angle} - angles:
-            yield f'a coupling names the angle "{min(missing)}", which does not exist'
-        if coupling.follows in followers:
-            yield f'angle "{coupling.angle}" follows "{coupling.follows}", which is not free itself'
+    yield from coupling_complaints(document.couplings, angles)
 
 
 def _tree_complaints(document: Articulated) -> Iterator[str]:
@@ -213,8 +197,7 @@ def _tree_complaints(document: Articulated) -> Iterator[str]:
     for point in document.points:
         if point.frame not in known:
             yield f'point "{point.name}" rides on "{point.frame}", which does not exist'
-    named = {"angles": [angle.name for angle in document.angles], "points": [point.name for point in document.points],
-             "couplings": [coupling.angle for coupling in document.couplings]}
+    named = {"angles": [angle.name for angle in document.angles], "points": [point.name for point in document.points]}
     for what, names in named.items():
         if len(set(names)) < len(names):
             yield f'{what}: "{max(names, key=names.count)}" occurs twice'

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
 from rhot_app.hand.anthropometry import hand_length
-from rhot_app.hand.articulated import Angle, Articulated, Box, Capsule, Coupling, Frame, Point, Root
+from rhot_app.hand.articulated import Angle, Articulated, Box, Capsule, Frame, Point, Root
 from rhot_app.hand.dh import FIXED, ROOT, DhRow
 from rhot_app.hand.model import HandTable, hand_table
 from rhot_app.hand.skeleton import ANGLES, BONES, FINGERS, JOINTS
-from rhot_app.hand.variants import make_variant
 
 PALM = "palm"
 
 
 def articulated_hand(anatomy: HandAnatomy) -> Articulated:
     """The hand as an articulated object: 16 bodies, 21 angles, 28 state numbers; its points are the 21 joints of
-    `skeleton.JOINTS` and then the five marker centres, `<finger>_marker`; its couplings are the variant `coupled`."""
+    `skeleton.JOINTS` and then the five marker centres, `<finger>_marker`; its couplings are the hand file's."""
     table = hand_table(anatomy)
     names = _row_names()
     shapes = {f"{finger}_{bone}": Capsule(radius_mm=radius) for finger, bones in zip(FINGERS, BONES, strict=True)
@@ -30,7 +27,7 @@ def articulated_hand(anatomy: HandAnatomy) -> Articulated:
                    for name, (low, high) in zip(ANGLES, limits, strict=True))
     return Articulated(name=anatomy.name, side=anatomy.side, length_mm=1e3 * hand_length(anatomy),
                        root=Root(PALM, shape=_palm_shape(anatomy)), frames=frames, angles=angles,
-                       points=_points(table, names), couplings=_couplings())
+                       points=_points(table, names), couplings=anatomy.couplings)
 
 
 def _row_names() -> tuple[str, ...]:
@@ -50,19 +47,6 @@ def _points(table: HandTable, names: tuple[str, ...]) -> tuple[Point, ...]:
     words = (*JOINTS, *(f"{finger}_marker" for finger in FINGERS))
     return tuple(Point(word, PALM if row == ROOT else names[row], (_mm(x), _mm(y), _mm(z)))
                  for word, (row, (x, y, z)) in zip(words, [*table.joints, *table.markers], strict=True))
-
-
-def _couplings() -> tuple[Coupling, ...]:
-    """Every angle of the coupled variant that is not one of its coordinates."""
-    coupled = make_variant("coupled")
-    found = []
-    for name, row, mean in zip(ANGLES, coupled.basis, coupled.mean, strict=True):
-        leaders = np.flatnonzero(row)
-        if not len(leaders):
-            found.append(Coupling(name, offset_deg=_degrees(mean)))
-        elif coupled.names[leaders[0]] != name:
-            found.append(Coupling(name, coupled.names[leaders[0]], float(row[leaders[0]]), _degrees(mean)))
-    return tuple(found)
 
 
 def _palm_shape(anatomy: HandAnatomy) -> Box:

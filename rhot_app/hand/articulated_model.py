@@ -90,7 +90,7 @@ def build_articulated(document: Articulated) -> ArticulatedModel:
         row_names=tuple(frame.name for frame in document.frames),
         point_names=tuple(point.name for point in document.points), bodies=_bodies(document, table),
         limits=np.radians([angle.limits_deg for angle in document.angles]).reshape(-1, 2), rest=rest,
-        coupled=_coupled(document, angles))
+        coupled=linear_variant("coupled", angles, document.couplings))
 
 
 def forward_state(model: ArticulatedModel, state: Array) -> PosedObject:
@@ -112,13 +112,6 @@ def _row(frame: Frame, rows: dict[str, int], angles: tuple[str, ...]) -> DhRow:
     return DhRow(rows[frame.parent], math.radians(frame.theta_deg), 1e-3 * frame.d_mm, 1e-3 * frame.a_mm,
                  math.radians(frame.alpha_deg), FIXED if frame.angle is None else angles.index(frame.angle),
                  float(frame.sign))
-
-
-def _coupled(document: Articulated, angles: tuple[str, ...]) -> Variant:
-    follows = {c.angle: (c.follows, c.factor) for c in document.couplings if c.follows is not None}
-    offsets = {c.angle: math.radians(c.offset_deg) for c in document.couplings}
-    fixed = {c.angle: offsets[c.angle] for c in document.couplings if c.follows is None}
-    return linear_variant("coupled", angles, follows, fixed, offsets)
 
 
 def _mirrored(row: DhRow, axis: str) -> DhRow:

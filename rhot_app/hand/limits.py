@@ -14,12 +14,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.hand.couplings import DIP_PER_PIP
 from rhot_app.hand.skeleton import ANGLES, FINGERS
 
 Array = NDArray[np.float64]
-
-DIP_PER_PIP = 2.0 / 3.0
-"""Flexion of the DIP joint per flexion of the PIP joint (RHOT eq. 2.4; Rijpkema and Girard 1991)."""
 
 MCP_PER_PIP = 0.7
 """Flexion of the MCP joint per flexion of the PIP joint when a hand closes around something (Santello 1998)."""

@@ -8,13 +8,14 @@ which turns a box of angle limits into a box of coordinates.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.hand.limits import DIP_PER_PIP
+from rhot_app.hand.couplings import THESIS_COUPLINGS, Coupling, coupling_complaints
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, FINGERS
 
@@ -22,8 +23,6 @@ Array = NDArray[np.float64]
 
 VariantName = Literal["full", "coupled"]
 LimitsName = Literal["anatomical", "thesis"]
-
-_FIXED_IN_COUPLED: Final = ("middle_mcp_abduction", "thumb_mcp_abduction")  # RHOT eq. 2.2 and 2.3
 
 _THESIS_LIMITS_DEG: Final = {"mcp_abduction": (-15.0, 15.0), "mcp_flexion": (0.0, 90.0), "pip_flexion": (0.0, 110.0),
                              "dip_flexion": (0.0, 90.0)}
@@ -68,37 +67,28 @@ class Variant:
         return box
 
 
-def make_variant(name: VariantName) -> Variant:
-    """``full``: 21 coordinates, the angles themselves. ``coupled``: 15, RHOT eq. 2.2 to 2.4.
+def make_variant(name: VariantName, couplings: Sequence[Coupling] = THESIS_COUPLINGS) -> Variant:
+    """``full``: 21 coordinates, the angles themselves. ``coupled``: without those that `couplings` bind, which are the
+    hand file's (`HandAnatomy.couplings`) or, as a hand file has them by default, the thesis's: 15 coordinates."""
+    return linear_variant(name, ANGLES, couplings if name == "coupled" else ())
 
-    Coupled: DIP = 2/3 PIP in the four fingers; the middle finger does not abduct; the thumb has four angles. Eq. 2.3
-    does not say which angle the thumb gives up. It is the MCP joint's abduction here: without it the other four still
-    bring the tip of natural poses to 1.3 mm rms of its place, without the CMC joint's abduction only to 8 mm.
+
+def linear_variant(name: str, angles: Sequence[str], couplings: Sequence[Coupling]) -> Variant:
+    """The variant of any body in which some angles follow others or stay where they are.
+
+    Raises ValueError for couplings that cannot be: of angles that do not exist, or that follow a bound one.
     """
-    if name == "full":
-        return Variant(name, ANGLES, np.zeros(len(ANGLES)), np.eye(len(ANGLES)))
-    follows = {f"{finger}_dip_flexion": (f"{finger}_pip_flexion", DIP_PER_PIP) for finger in FINGERS[1:]}
-    return linear_variant(name, ANGLES, follows, dict.fromkeys(_FIXED_IN_COUPLED, 0.0))
-
-
-def linear_variant(name: str, angles: tuple[str, ...], follows: dict[str, tuple[str, float]],
-                   fixed: dict[str, float], offsets: dict[str, float] | None = None) -> Variant:
-    """The variant of any body in which some angles follow others and some are fixed.
-
-    `follows`: angle -> (angle that it follows, factor), plus `offsets` rad; `fixed`: angle -> its value, rad. Raises
-    ValueError when an angle follows one that is not free, or that does not exist.
-    """
-    free = tuple(angle for angle in angles if angle not in follows and angle not in fixed)
+    complaint = next(coupling_complaints(couplings, angles), None)
+    if complaint:
+        raise ValueError(complaint)
+    bound = {coupling.angle: coupling for coupling in couplings}
+    free = tuple(angle for angle in angles if angle not in bound)
     mean, basis = np.zeros(len(angles)), np.zeros((len(angles), len(free)))
     for row, angle in enumerate(angles):
-        leader, factor = follows.get(angle, (angle, 1.0))
-        if angle in fixed:
-            mean[row] = fixed[angle]
-        elif leader not in free:
-            raise ValueError(f"{angle} follows {leader}, which is not a free angle")
-        else:
-            basis[row, free.index(leader)] = factor
-            mean[row] = (offsets or {}).get(angle, 0.0)
+        coupling = bound.get(angle, Coupling(angle, angle))
+        mean[row] = math.radians(coupling.offset_deg)
+        if coupling.follows is not None:
+            basis[row, free.index(coupling.follows)] = coupling.factor
     return Variant(name, free, mean, basis)
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 
+import msgspec
 import numpy as np
 import pytest
 from hand_samples import natural_angles
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rhot_app.errors import RigError
+from rhot_app.hand.anatomy import load_hand, save_hand
+from rhot_app.hand.couplings import Coupling
 from rhot_app.hand.skeleton import ANGLES, FINGERS
-from rhot_app.hand.variants import inter_finger, limit_set, linear_variant, make_variant
+from rhot_app.hand.variants import inter_finger, limit_set, make_variant
 from rhot_node.files import resource_path
 
 COUPLED = make_variant("coupled")
@@ -97,9 +101,33 @@ def test_inter_finger_cuts_no_shipped_motion():
             assert np.all(rows @ angles <= bounds), f"{path.name} at {key['t_s']} s"
 
 
-def test_what_cannot_be_is_refused(right_hand):
-    with pytest.raises(ValueError, match="b follows c, which is not a free angle"):
-        linear_variant("x", ("a", "b", "c"), {"b": ("c", 1.0), "c": ("a", 1.0)}, {})
+def test_a_hand_file_has_couplings_of_its_own(right_hand, tmp_path):
+    own = (Coupling("ring_pip_flexion", "little_pip_flexion", 0.5, 10.0),
+           Coupling("index_mcp_abduction", None, 1.0, 5.0))
+    path = tmp_path / "hand.json"
+    save_hand(path, msgspec.structs.replace(right_hand.anatomy, couplings=own))
+    variant = make_variant("coupled", load_hand(path).couplings)
+    assert len(variant.names) == 19
+    angles = dict(zip(ANGLES, np.degrees(variant.angles(np.full(19, 0.2))), strict=True))
+    assert angles["ring_pip_flexion"] == pytest.approx(10.0 + 0.5 * angles["little_pip_flexion"])
+    assert angles["index_mcp_abduction"] == pytest.approx(5.0)
+    np.testing.assert_array_equal(make_variant("full", own).basis, np.eye(21))
+
+
+@pytest.mark.parametrize(("couplings", "complaint"), [
+    ([{"angle": "ring_pip_flexion", "follows": "elbow"}], '"elbow", which does not exist'),
+    ([{"angle": "ring_pip_flexion", "follows": "ring_pip_flexion"}], "not free itself"),
+    ([{"angle": "ring_pip_flexion"}, {"angle": "ring_pip_flexion"}], "coupled twice"),
+])
+def test_couplings_that_cannot_be_are_refused_by_file_and_name(tmp_path, couplings, complaint):
+    hand = json.loads(resource_path("hands", "right.json").read_text()) | {"couplings": couplings}
+    path = tmp_path / "hand.json"
+    path.write_text(json.dumps(hand))
+    with pytest.raises(RigError, match=complaint):
+        load_hand(path)
+
+
+def test_limits_that_exclude_each_other_are_refused(right_hand):
     apart = right_hand.limits.copy()
     apart[ANGLES.index("ring_dip_flexion")] = 1.5, 1.6
     apart[ANGLES.index("ring_pip_flexion")] = 0.0, 0.1

@@ -10,7 +10,7 @@ import pytest
 
 from rhot_app import project
 from rhot_app.calibration import intrinsics_file
-from rhot_app.hand import anatomy, articulated
+from rhot_app.hand import anatomy, articulated, couplings
 from rhot_node import config, markers
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -23,9 +23,9 @@ PAGES: tuple[tuple[str, str, int, tuple[type[msgspec.Struct], ...]], ...] = (
         markers.MarkerSet, markers.Marker, markers.ChromaModel, markers.RangeModel)),
     ("calibration-files.md", intrinsics_file.FORMAT, intrinsics_file.VERSION, (
         intrinsics_file.IntrinsicsFile, intrinsics_file.BoardUsed)),
-    ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy)),
+    ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy, couplings.Coupling)),
     ("hand.md", articulated.FORMAT, articulated.VERSION, (
-        articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, articulated.Coupling,
+        articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, couplings.Coupling,
         articulated.Point, articulated.Capsule, articulated.Box)),
     ("node.md", config.FORMAT, config.VERSION, (config.NodeSettings, config.CameraSettings, config.ClockSettings)),
 )
