@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot hand``."""
     parser.add_argument("file", type=Path, nargs="?", metavar="HAND",
-                        help="a rhot-hand or rhot-articulated file; without it, the hand of an adult that ships")
+                        help="a rhot-hand or rhot-articulated file; without it, the rig's hand or the shipped one")
     parser.add_argument("--length", type=float, metavar="MM",
                         help="hand length to scale to, mm, from the wrist to the tip of the stretched middle finger")
     parser.add_argument("--proportions", choices=("table", "file"),
@@ -24,35 +24,47 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", help="what the file is to call it")
     parser.add_argument("--rows", action="store_true", help="make it a rhot-articulated file: Denavit-Hartenberg rows")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the hand here")
+    parser.add_argument("--rig", type=Path, help="put the hand into this rig file, which keeps its former version")
     parser.add_argument("--draw", type=Path, metavar="FILE.png", help="draw it from two sides")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
 
 
 def run(args: argparse.Namespace) -> int:
     """Make, check, write and show; raises RigError for what cannot be, before anything is written."""
-    from rhot_app.hand.articulated import Articulated
+    import msgspec
 
-    hand = _wanted(args)
+    from rhot_app.errors import RigError
+    from rhot_app.hand.articulated import Articulated
+    from rhot_app.project import load_rig
+    from rhot_app.rig_history import accept
+
+    rig = load_rig(args.rig) if args.rig else None
+    hand = _wanted(args, rig.hand if rig else None)
     _require_folders(args)
+    if rig and isinstance(hand, Articulated):
+        raise RigError(f"--rig {args.rig}: a rig tracks a rhot-hand, not a rhot-articulated object.")
     picture = _picture(hand) if args.draw else b""
     if args.out:
         _write(args.out, hand)
     if args.draw:
         _store(args.draw, picture)
+    if rig and not isinstance(hand, Articulated):
+        accept(args.rig, msgspec.structs.replace(rig, hand=hand), "hand")
     fields = _object_fields(hand) if isinstance(hand, Articulated) else _hand_fields(hand)
-    fields["written"] = str(args.out) if args.out else None
+    fields["written"] = [str(path) for path in (args.out, args.draw, args.rig) if path]
     print(json.dumps(fields) if args.json else "\n".join(_lines(fields)))
     return 0
 
 
-def _wanted(args: argparse.Namespace) -> HandAnatomy | Articulated:
+def _wanted(args: argparse.Namespace, worn: HandAnatomy | None) -> HandAnatomy | Articulated:
+    """The hand that the arguments ask for; `worn`: the rig's, to begin with when no file is named."""
     import msgspec
 
     from rhot_app.errors import RigError
     from rhot_app.hand.articulated import Articulated, scaled_to_length
     from rhot_app.hand.articulated_hand import articulated_hand
 
-    hand = _read(args.file)
+    hand = worn if worn is not None and args.file is None else _read(args.file)
     if args.proportions and args.length is None:
         raise RigError("--proportions says how to scale to a length; give that with --length.")
     try:
@@ -173,4 +185,4 @@ def _lines(fields: dict[str, Any]) -> list[str]:
         lines.append(f"  {len(fields['bodies'])} bodies in {fields['frames']} frames, {fields['state_numbers']} state "
                      f"numbers, {fields['degrees_of_freedom']} degrees of freedom")
         lines.append(f"  bodies: {', '.join(fields['bodies'])}")
-    return lines + ([f"Written: {fields['written']}"] if fields["written"] else [])
+    return lines + [f"Written: {path}" for path in fields["written"]]

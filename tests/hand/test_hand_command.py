@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import cv2
+import msgspec
 import pytest
 
 from rhot_app.__main__ import main
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.anthropometry import hand_length
 from rhot_app.hand.articulated import load_articulated
+from rhot_app.project import load_rig
+from rhot_app.rig_history import versions
 from rhot_node.files import resource_path
 
 DIGITEYES = str(resource_path("hands", "digiteyes.json"))
+RIG = resource_path("rigs", "two_pis.json")
 ADULT = load_hand(resource_path("hands", "right.json"))
 
 
@@ -49,7 +54,19 @@ def test_json_of_an_articulated_file(capsys):
     told = json.loads(capsys.readouterr().out)
     assert (len(told["bodies"]), told["state_numbers"], told["degrees_of_freedom"]) == (16, 28, 27)
     assert told["length_mm"] == pytest.approx(200)
-    assert told["written"] is None
+    assert told["written"] == []
+
+
+def test_a_hand_goes_to_a_rig_which_keeps_the_former(tmp_path):
+    path = tmp_path / "rig.json"
+    shutil.copy(RIG, path)
+    before = load_rig(path)
+    assert main(["hand", "--length", "200", "--proportions", "file", "--rig", str(path)]) == 0
+    rig = load_rig(path)
+    assert hand_length(rig.hand) == pytest.approx(0.2, abs=1e-6)
+    assert rig.hand.side == before.hand.side
+    assert msgspec.structs.replace(rig, hand=before.hand) == before
+    assert load_rig(versions(path)[0].path) == before
 
 
 @pytest.mark.parametrize(("arguments", "complaint"), [
@@ -59,8 +76,9 @@ def test_json_of_an_articulated_file(capsys):
     ([DIGITEYES, "--length", "0"], "positive"),
     ([DIGITEYES, "--length", "200", "--proportions", "table"], "--proportions file"),
     (["--proportions", "file"], "--length"),
+    ([DIGITEYES, "--rig", str(RIG)], "a rig tracks a rhot-hand"),
     (["nowhere.json"], "no such file"),
-    ([str(resource_path("rigs", "two_pis.json"))], 'not a "rhot-hand" file'),
+    ([str(RIG)], 'not a "rhot-hand" file'),
 ])
 def test_mistakes_are_sentences_and_write_nothing(arguments, complaint, tmp_path, capsys):
     out = tmp_path / "mine.json"
