@@ -65,10 +65,12 @@ class Comparison:
         return {quantity: consistency(runs, quantity) for quantity in DEGREES}
 
 
-def orders(scene: Scene, motions: Iterable[str], seeds: Iterable[int], seconds: float) -> list[Order]:
+def orders(scene: Scene, motions: Iterable[str], seeds: Iterable[int], seconds: float, *,
+           sketched: bool = False) -> list[Order]:
     """Every motion with every seed, in scenes like this one."""
     chosen = list(seeds)
-    return [Order(make_scene(scene.settings, seed), motion, seconds) for motion in motions for seed in chosen]
+    return [Order(make_scene(scene.settings, seed), motion, seconds, sketched=sketched)
+            for motion in motions for seed in chosen]
 
 
 def compare(wanted: Sequence[Order], folder: Path, trackers: dict[str, TrackerSettings],

@@ -76,13 +76,14 @@ def _name(run: Run) -> str:
     return f"  {run.motion} {run.seed}"
 
 
-def _heads(width: int, trackers: Sequence[str], columns: Sequence[Column]) -> list[str]:
-    first, second = " " * width, " " * width
+def _heads(margin: int, trackers: Sequence[str], columns: Sequence[Column]) -> list[str]:
+    first, second = " " * margin, " " * margin
     for column in columns:
         under = [*trackers, "ratio"] if _has_ratio(column, trackers) else list(trackers)
         words = "".join(word[:_CELL].rjust(_CELL + 1) for word in under)
-        first += "  " + column.heading[:len(words)].rjust(len(words))
-        second += "  " + words
+        width = _width(column, trackers)
+        first += "  " + column.heading.rjust(width)
+        second += "  " + words.rjust(width)
     return [first, second]
 
 
@@ -93,8 +94,13 @@ def _line(name: str, width: int, figures: Sequence[Figures], columns: Sequence[C
         cells = [cell(value, column.form) for value in values]
         if _has_ratio(column, figures):
             cells.append(cell(ratio(values[-1], values[0]), ".2f"))
-        line += "  " + "".join(text.rjust(_CELL + 1) for text in cells)
+        line += "  " + "".join(text.rjust(_CELL + 1) for text in cells).rjust(_width(column, figures))
     return line
+
+
+def _width(column: Column, trackers: Sequence[object]) -> int:
+    """Of a figure's cells, one for each tracker and perhaps one for the ratio, or of its heading."""
+    return max(len(column.heading), (_CELL + 1) * (len(trackers) + _has_ratio(column, trackers)))
 
 
 def _has_ratio(column: Column, trackers: Sequence[object]) -> bool:

@@ -33,6 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="how many seeds, beginning with --seed (default 5)")
     group.add_argument("--trackers", metavar="T,T,...", default="classic,model",
                        help="which trackers (default classic,model); the ratio is the last one's to the first one's")
+    group.add_argument("--sketched", action="store_true",
+                       help="logs without pictures: exact outlines, noise and bias put on, hidden parts counted; fast")
     group.add_argument("--logs", type=Path, metavar="DIR", default=None,
                        help="where logs are kept and found again (default ~/.cache/rhot/takes)")
 
@@ -82,7 +84,8 @@ def _compare(args: argparse.Namespace) -> int:
         raise SimulatorError(f"give more than {SETTLE_S:g} s to --seconds, and --seeds of 1 or more.")
     motions = [*(MOTIONS if args.motions is None else args.motions.split(",")),
                *([] if args.recording is None else [args.recording])]
-    wanted = orders(scene_of(args), motions, range(args.seed, args.seed + args.seeds), seconds)
+    wanted = orders(scene_of(args), motions, range(args.seed, args.seed + args.seeds), seconds,
+                    sketched=args.sketched)
     folder = args.logs or takes_folder()
     result = compare(wanted, folder, {name: TRACKERS[name] for name in names},
                      lambda title: ProgressLine(f"filming {title}"))

@@ -11,7 +11,7 @@ import functools
 import hashlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
@@ -26,10 +26,12 @@ from rhot_app.simulator.film import TRUTH_NAME, new_folder
 from rhot_app.simulator.node_log import CABLE, Network, NodeVoice, write_node_log
 from rhot_app.simulator.scene import Scene, node_settings
 from rhot_app.simulator.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
+from rhot_app.simulator.sights import sights
 from rhot_app.simulator.truth import FrameTruth, Truth, load_truth, save_truth, true_act
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
 from rhot_node.files import resource_path
+from rhot_node.wire.messages import MarkerObservation
 
 LOG_NAME: Final = "take.rhotlog"
 
@@ -44,12 +46,14 @@ _SOURCES = ("rhot_node/detect/*.py", *(f"rhot_app/simulator/{name}.py" for name 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """What a take shall show: a motion (name or file) in a scene, for how long, and over which network it is sent."""
+    """What a take shall show: a motion (name or file) in a scene, for how long, and over which network it is sent.
+    `sketched`: seen without pictures (`rhot_app.simulator.sights`), a hundred times faster."""
 
     scene: Scene
     motion: str
     seconds: float
     network: Network = CABLE
+    sketched: bool = False
 
     @property
     def title(self) -> str:
@@ -59,9 +63,10 @@ class Order:
     def name(self) -> str:
         """A folder name that differs with the order."""
         facts = [msgspec.to_builtins(self.scene.settings), self.scene.seed, self.seconds, asdict(self.network),
-                 _motion_digest(self.motion)]
+                 self.sketched, _motion_digest(self.motion)]
         digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
-        return f"{Path(self.motion).stem}-{self.seconds:g}s-{self.scene.seed}-{digest[:12]}"
+        kind = "sketched" if self.sketched else self.scene.settings.markers
+        return f"{Path(self.motion).stem}-{self.seconds:g}s-{kind}-{self.scene.seed}-{digest[:12]}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,29 +118,49 @@ def _film(order: Order, place: Path, progress: Progress | None) -> None:
     with new_folder(place) as work:
         save_shot(shot, work)
         rig = load_rig(work / RIG_NAME)
-        streams = for_each_camera(shot, functools.partial(_watch, rig, order.network), progress)
+        if order.sketched:
+            streams = tuple(_sketch(rig, order.network, shot, index) for index in range(len(rig.nodes)))
+        else:
+            streams = for_each_camera(shot, functools.partial(_watch, rig, order.network), progress)
         write_node_log(work / LOG_NAME, rig, {"simulated": shot.act.name, "sources": _source_digest()},
                        [record for records, _ in streams for record in records])
         save_truth(work / TRUTH_NAME, true_act(shot.act, shot.seconds, tuple(truth for _, truth in streams)))
 
 
-def _watch(rig: Rig, network: Network, shot: Shot, index: int, report: Report) -> tuple[list[Record], FrameTruth]:
-    """What one node says of the shot, and what was true of its frames."""
+Stream = tuple[list[Record], FrameTruth]
+"""What one node says of a shot, and what was true of its frames."""
+
+
+def _watch(rig: Rig, network: Network, shot: Shot, index: int, report: Report) -> Stream:
+    """Pictures, and what the detector finds in them."""
     scene, preset = shot.scene, shot.scene.preset
-    voice = NodeVoice(scene, rig, index, np.random.default_rng([scene.seed, index, 0x7A4E]), network)
     detector = make_detector(node_settings(scene, index))
     renderer = make_renderer(shot, index)
-    times_ns = scene.frame_times_ns(index, shot.seconds)
-    records, visible = list(voice.exchanges(1e-9 * times_ns[-1])), []
-    for number, t_ns in enumerate(times_ns):
+    seen, visible = [], []
+    for number, t_ns in enumerate(scene.frame_times_ns(index, shot.seconds)):
         frame, fractions = renderer.render(shot.act.source, 1e-9 * t_ns, number)
-        seen = detector.detect(from_i420(frame, preset.width, preset.height))
+        seen.append(detector.detect(from_i420(frame, preset.width, preset.height)))
         visible.append(fractions.copy())
-        record = voice.datagram(number, t_ns, seen)
-        if record is not None:
-            records.append(record)
         report(number)
-    return records, FrameTruth(1e-9 * np.array(times_ns), np.array(visible))
+    times_s = 1e-9 * np.array(scene.frame_times_ns(index, shot.seconds))
+    return _say(rig, network, shot, index, seen), FrameTruth(times_s, np.array(visible))
+
+
+def _sketch(rig: Rig, network: Network, shot: Shot, index: int) -> Stream:
+    """No pictures."""
+    seen, truth = sights(shot, index)
+    return _say(rig, network, shot, index, seen), truth
+
+
+def _say(rig: Rig, network: Network, shot: Shot, index: int,
+         seen: Sequence[Sequence[MarkerObservation]]) -> list[Record]:
+    """One node's clock exchanges, and a datagram for every frame that is not lost on its way."""
+    rng = np.random.default_rng([shot.scene.seed, index, 0x7A4E])
+    voice = NodeVoice(shot.scene, rig, index, rng, network)
+    times_ns = shot.scene.frame_times_ns(index, shot.seconds)
+    sent = [voice.datagram(number, t_ns, markers) for number, (t_ns, markers) in
+            enumerate(zip(times_ns, seen, strict=True))]
+    return [*voice.exchanges(1e-9 * times_ns[-1]), *(record for record in sent if record is not None)]
 
 
 def _motion_digest(motion: str) -> str:

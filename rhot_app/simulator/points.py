@@ -23,6 +23,7 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.recording.raw_log import Record
 from rhot_app.simulator.camera_workers import Progress
 from rhot_app.simulator.film import TRUTH_NAME, new_folder
+from rhot_app.simulator.marker_rows import at_own_rows
 from rhot_app.simulator.node_log import CABLE, NodeVoice, write_node_log
 from rhot_app.simulator.sheet import Sheet
 from rhot_app.simulator.shot import RIG_NAME, Shot, save_shot
@@ -35,7 +36,6 @@ LOG_NAME: Final = "points.log"
 
 _GRID_HZ = 500.0  # of the splines through the markers' ways
 _RADIUS_M = 8e-3  # where the marker set gives none
-_MARGIN_PX = 4.0  # a marker nearer to the border is cut by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,17 +102,11 @@ class _Stream:
         times, row_time_s = 1e-9 * self._times_ns, 1e-9 * self._scene.row_time_ns
         centres = np.full((len(times), ways.shape[1], 3), np.nan)
         pixels = np.full((len(times), ways.shape[1], 2), np.nan)
-        size = np.array([self._camera.width, self._camera.height])
+        size = self._camera.width, self._camera.height
         for marker in range(ways.shape[1]):
-            if not np.isfinite(ways[:, marker]).all():
-                continue
-            way, rows = CubicSpline(grid, ways[:, marker]), np.full(len(times), 0.5 * self._camera.height)
-            for _ in range(4):
-                centres[:, marker] = way(times + rows * row_time_s)
-                pixels[:, marker] = self._camera.project(centres[:, marker])
-                rows = np.clip(np.nan_to_num(pixels[:, marker, 1]), 0.0, size[1])
-            seen = ((pixels[:, marker] > _MARGIN_PX) & (pixels[:, marker] < size - 1.0 - _MARGIN_PX)).all(axis=1)
-            pixels[~seen, marker] = np.nan
+            if np.isfinite(ways[:, marker]).all():
+                centres[:, marker], pixels[:, marker] = at_own_rows(
+                    CubicSpline(grid, ways[:, marker]), self._camera.project, times, row_time_s, size)
         return centres, pixels
 
     def _marker(self, number: int, index: int) -> MarkerObservation:

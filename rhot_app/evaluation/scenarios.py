@@ -1,0 +1,208 @@
+"""Trials of a tracker on one take, each with a misfortune or a question of its own. Figures' keys end in their unit.
+
+A tracker is given as the rig that asks for it (`Rig.tracker`, `Rig.filters`, `Rig.hand`); the take's log, altered or
+not, goes through the door into it. Figures of several takes are put together by `gather`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.engine.replay_summary import replay_states
+from rhot_app.engine.warm_up import warm_up
+from rhot_app.errors import SimulatorError
+from rhot_app.evaluation import alterations as alter
+from rhot_app.evaluation.accuracy import Figures
+from rhot_app.evaluation.deviations import Deviations, deviations, distances, worn_by
+from rhot_app.evaluation.report import SETTLE_S
+from rhot_app.evaluation.score import count_swaps, rms
+from rhot_app.evaluation.steadiness import found_after, lag, rising, settled_after, spread
+from rhot_app.evaluation.takes import Take
+from rhot_app.evaluation.track import Timed, Track, tracked
+from rhot_app.hand.skeleton import WRIST_ROLE
+from rhot_app.project import Rig
+from rhot_app.recording.raw_log import Record, RecordKind
+from rhot_app.sources.replay import LogDoor
+from rhot_app.tracking.make import make_tracker
+
+Array = NDArray[np.float64]
+
+BLIND_S = (3.0, 4.0)
+SCALE_TOLERANCE = 0.02
+SCALE_TIMES_S = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)
+
+
+def one_camera_blind(take: Take, rig: Rig, *, says_so: bool) -> Figures:
+    """Fingertips while the first camera is covered for a second; `says_so` False: while its node is silent."""
+    node = rig.nodes[0].node_id
+    records = (alter.changed(take.records(), alter.blind(node, *BLIND_S)) if says_so
+               else alter.silent(take.records(), node, *BLIND_S))
+    track = tracked(records, rig)
+    during = track.where((track.times_s >= BLIND_S[0]) & (track.times_s < BLIND_S[1])) if len(track.times_s) else track
+    tips = distances(_off(during, take).tips)
+    span_s = BLIND_S[1] - BLIND_S[0]
+    return {"tips_mm": _mm(rms(tips)), "tips_max_mm": _most_mm(tips), "known_share": float(np.isfinite(tips).mean())
+            if tips.size else 0.0, "states_per_s": len(during.times_s) / span_s}
+
+
+def markers_hidden(take: Take, rig: Rig, *, share: float, together: bool) -> Figures:
+    """Fingertips of every state when each marker is hidden for a share of the time."""
+    change = alter.hidden(share, take.seconds, [node.node_id for node in rig.nodes], len(rig.markers.markers),
+                          _seed(take), together=together)
+    return _all_states(take, rig, alter.changed(take.records(), change))
+
+
+def names_mixed_up(take: Take, rig: Rig, *, pair: tuple[int, int], share: float) -> Figures:
+    """Fingertips and swaps when nodes take one marker for another for a share of the time."""
+    change = alter.mixed_up(pair, share, take.seconds, [node.node_id for node in rig.nodes], _seed(take))
+    return _all_states(take, rig, alter.changed(take.records(), change))
+
+
+def plain(take: Take, rig: Rig) -> Figures:
+    """Fingertips of every state, and swaps, on the log as it is."""
+    return _all_states(take, rig, take.records())
+
+
+def wrist_alone(take: Take, rig: Rig) -> Figures:
+    """What is said of the palm's turn when only the wrist's marker is left, three seconds into the take, and what is
+    true: rms over the states."""
+    wrist = [marker.role for marker in rig.markers.markers].index(WRIST_ROLE)
+    late = BLIND_S[0]
+    records = alter.changed(take.records(), lambda t_s, _, seen: seen if t_s < late else [
+        marker if marker.index == wrist else alter.lost(marker.index) for marker in seen])
+    track = tracked(records, rig)
+    track = track.where(track.times_s >= late + SETTLE_S)
+    turn = distances(_off(track, take).palm[:, 3:])
+    stated = np.sqrt(np.trace(track.palm_covariance[:, 3:, 3:], axis1=1, axis2=2))
+    return {"palm_turn_deg": _deg(rms(turn)), "stated_deg": _deg(rms(stated))}
+
+
+def standing_still(take: Take, rig: Rig) -> Figures:
+    """Spread of a still hand's fingertips, per axis of the rig and in space."""
+    axes, whole = spread(tracked(take.records(), rig), worn_by(rig))
+    return {"sd_x_mm": 1e3 * axes[0], "sd_y_mm": 1e3 * axes[1], "sd_z_mm": 1e3 * axes[2], "sd_mm": 1e3 * whole}
+
+
+def lagging(take: Take, rig: Rig, *, speeding_up: bool) -> Figures:
+    """Lag of the fingertips by best time shift; `speeding_up`: only while the palm gets faster."""
+    worn = worn_by(rig)
+    track = tracked(take.records(), rig)
+    chosen = (track.times_s >= SETTLE_S) & (track.times_s <= take.seconds - 0.1)
+    if speeding_up:
+        chosen &= rising(track.times_s, take.truth)
+    times, tips = track.times_s[chosen], track.fingertip_positions[chosen][:, worn.tip_fingers]
+    off = distances(tips - take.truth.markers_at(times)[:, worn.tips])
+    return {"lag_ms": 1e3 * lag(times, tips, take.truth, worn), "tips_mm": _mm(rms(off))}
+
+
+def growing(take: Take, rig: Rig, true_scale: float) -> Figures:
+    """How the estimated size of the hand nears the truth: its error at SCALE_TIMES_S, and when it stays within
+    SCALE_TOLERANCE. `true_scale`: true length over that of the rig's hand."""
+    track = tracked(take.records(), rig)
+    ratios = track.hand_scale / true_scale
+    at = np.minimum(np.searchsorted(track.times_s, SCALE_TIMES_S), len(ratios) - 1)
+    figures: Figures = {f"error_at_{t:g}s_percent": float(100.0 * (ratios[k] - 1.0))
+                        for t, k in zip(SCALE_TIMES_S, at, strict=True) if t <= track.times_s[-1]}
+    return figures | {"within_2_percent_after_s": settled_after(track.times_s, ratios, SCALE_TOLERANCE)}
+
+
+def starting(take: Take, rig: Rig, starts_s: Sequence[float]) -> list[float | None]:
+    """For each scene time at which datagrams begin to come: time until every visible fingertip is within 5 mm, s."""
+    found = []
+    for start_s in starts_s:
+        records = alter.begun_at(take.records(), start_s)
+        first_s = min(alter.arrival_s(record) for record in records if record.kind is RecordKind.DATAGRAM)
+        try:
+            found.append(found_after(tracked(records, rig), take.truth, worn_by(rig), first_s))
+        except SimulatorError:  # no state at all
+            found.append(None)
+    return found
+
+
+def computing(take: Take, rig: Rig, minutes: float) -> Figures:
+    """Time from a datagram's bytes to its state, and how memory grows after the first lap of a log that is repeated."""
+    records = take.records()
+    laps = max(2, round(60.0 * minutes / take.seconds))
+    tracker = make_tracker(rig)
+    warm_up(tracker, rig)
+    first = _Lap(records)
+    timed = Timed(first.watch(alter.prolonged(records, laps)))
+    for _ in replay_states(timed, LogDoor(rig), tracker):
+        pass
+    spent_us = 1e6 * np.array(timed.compute_s)
+    return {"median_us": float(np.median(spent_us)), "p99_us": float(np.percentile(spent_us, 99.0)),
+            "datagrams": float(len(spent_us)), "rss_growth_mb": (_resident_bytes() - first.resident) / 1e6,
+            "objects_growth": float(sys.getallocatedblocks() - first.blocks)}
+
+
+def gather(runs: Sequence[Figures]) -> Figures:
+    """Figures of several takes: the greatest of maxima, sums of counts, else root mean square (signed ones: mean)."""
+    out: Figures = {}
+    for name in runs[0]:
+        known = np.array([value for figures in runs if (value := figures[name]) is not None])
+        if not known.size or (len(known) < len(runs) and name.endswith("_after_s")):
+            out[name] = None
+        elif "max" in name or name.endswith("_after_s"):
+            out[name] = float(known.max())
+        elif name in ("swaps", "seconds"):
+            out[name] = float(known.sum())
+        elif name.startswith(("lag", "error")) or name.endswith(("share", "per_s")):
+            out[name] = float(known.mean())
+        else:
+            out[name] = rms(known)
+    return out
+
+
+class _Lap:
+    """Notes the memory in use once the first lap of a repeated log is over."""
+
+    def __init__(self, records: Sequence[Record]) -> None:
+        self.resident = self.blocks = 0
+        self._length = len(records)
+
+    def watch(self, records: alter.Iterator[Record]) -> alter.Iterator[Record]:
+        """The same records."""
+        for number, record in enumerate(records):
+            if number == self._length:
+                self.resident, self.blocks = _resident_bytes(), sys.getallocatedblocks()
+            yield record
+
+
+def _resident_bytes() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+
+def _all_states(take: Take, rig: Rig, records: Sequence[Record]) -> Figures:
+    track = tracked(records, rig)
+    track = track.where((track.times_s >= SETTLE_S) & (track.times_s <= take.seconds))
+    tips = distances(_off(track, take).tips)
+    return {"tips_mm": _mm(rms(tips)), "tips_max_mm": _most_mm(tips), "known_share": float(np.isfinite(tips).mean()),
+            "swaps": float(count_swaps(track.marker_positions, take.truth.markers_at(track.times_s))),
+            "seconds": float(track.times_s[-1] - track.times_s[0])}
+
+
+def _off(track: Track, take: Take) -> Deviations:
+    return deviations(track, take.truth, worn_by(take.rig))
+
+
+def _seed(take: Take) -> int:
+    """A number that differs from take to take."""
+    return int.from_bytes(take.folder.name.encode(), "big") % 2**32
+
+
+def _mm(value: float | None) -> float | None:
+    return None if value is None else 1e3 * value
+
+
+def _deg(value: float | None) -> float | None:
+    return None if value is None else float(np.degrees(value))
+
+
+def _most_mm(distances_m: Array) -> float | None:
+    finite = distances_m[np.isfinite(distances_m)]
+    return float(1e3 * finite.max()) if finite.size else None

@@ -1,0 +1,161 @@
+"""What a node would say of a hand, without a picture: for long runs and quick trials.
+
+Each marker's silhouette is where it was at its own row's time; what other fingers and the palm hide is left out of it.
+White noise and a bias that varies slowly, mostly alike in all cameras as limb shading makes it, are added; the stated
+covariance knows of the noise alone, as the real detector's. Colours are never mixed up.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rhot_app.errors import SimulatorError
+from rhot_app.geometry.camera import project_normalised
+from rhot_app.hand.skeleton import WRIST_ROLE
+from rhot_app.simulator.body import HandBody
+from rhot_app.simulator.hidden_parts import spots, visible_parts
+from rhot_app.simulator.marker_rows import at_own_rows
+from rhot_app.simulator.shot import Shot, camera_seed
+from rhot_app.simulator.truth import FrameTruth
+from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
+
+Array = NDArray[np.float64]
+
+_GRID_HZ = 250.0  # of the splines through the markers' ways
+_WHOLE, _ENOUGH = 0.9, 0.4  # visible parts: above the first a marker is in plain view, below the second it is lost
+_BIAS_GRID_S = 0.05
+_RADIUS_M = 8e-3  # where the marker set gives none
+
+
+@dataclass(frozen=True, slots=True)
+class SightNoise:
+    """px per axis. `white`: from frame to frame; `stated`: what the covariance says of it. `common` and `own`: rms of
+    the slow bias that all cameras share, and of each one's own; `slow_s`: how long a bias lasts."""
+
+    white: float = 0.03
+    stated: float = 0.025
+    common: float = 0.05
+    own: float = 0.03
+    slow_s: float = 0.7
+
+
+ORDINARY = SightNoise()
+
+
+def sights(shot: Shot, index: int, noise: SightNoise = ORDINARY) -> tuple[list[list[MarkerObservation]], FrameTruth]:
+    """What camera `index` says of every frame, and what was visible. Raises SimulatorError when no hand is shown."""
+    body = shot.act.thing
+    if not isinstance(body, HandBody):
+        raise SimulatorError(f"a {shot.act.name} is not seen without pictures; show a hand.")
+    eye = _Eye(shot, body, index, noise)
+    frames = [[eye.observation(number, marker) for marker in range(body.marker_count)]
+              for number in range(len(eye.times_s))]
+    return frames, FrameTruth(eye.times_s, np.nan_to_num(eye.seen[:, :, 0]))
+
+
+class _Eye:
+    """One camera's frames: `times_s` (F,), `seen` (F, M, 3) as `visible_parts` fills it."""
+
+    def __init__(self, shot: Shot, body: HandBody, index: int, noise: SightNoise) -> None:
+        scene = shot.scene
+        self.times_s = 1e-9 * np.array(scene.frame_times_ns(index, shot.seconds))
+        self._camera, self._noise = scene.camera(index), noise
+        self._rng = np.random.default_rng([scene.seed, index, 0x516])
+        self._radii = np.array([1e-3 * marker.radius_mm if marker.radius_mm else _RADIUS_M
+                                for marker in scene.markers.markers])
+        row_time_s = 1e-9 * scene.row_time_ns
+        middle_s = self.times_s + 0.5 * self._camera.height * row_time_s
+        transforms, angles = shot.act.source.sample(middle_s)
+        local = self._camera.camera_from_world @ transforms
+        self._shapes = [self._shape(body, marker, role, local) for marker, role in
+                        enumerate(marker.role for marker in scene.markers.markers)]
+        discs = self._discs(shot, body, row_time_s)
+        self.seen = np.empty((len(discs), body.marker_count, 3))
+        groups = np.array([body.group[list(body.marker).index(marker)] for marker in range(body.marker_count)])
+        visible_parts(np.stack([body.kind, body.group], axis=1), body.size, body.place(local, angles), groups, discs,
+                      spots(), self.seen)
+        self._diameters = 2.0 * discs[:, :, 2] * self._camera.intrinsics[0]
+        self._places = self._middles(discs) + self._biases(shot, camera_seed(scene, index))
+
+    def observation(self, number: int, marker: int) -> MarkerObservation:
+        """One marker in one frame; to be asked for in order, because the noise is drawn."""
+        part, place, noise = self.seen[number, marker, 0], self._places[number, marker], self._noise
+        white = self._rng.normal(0.0, noise.white, 2)
+        if not (part >= _ENOUGH and np.isfinite(place).all()):
+            return MarkerObservation(marker, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+        diameter = float(self._diameters[number, marker])
+        doubt = 0.0 if part >= _WHOLE else (1.0 - part) * diameter
+        variance = noise.stated**2 + doubt**2
+        x, y = place + white
+        return MarkerObservation(marker, float(x), float(y), diameter * math.sqrt(part), variance, 0.0, variance,
+                                 float(part), MarkerFlag.PARTIAL if doubt else NO_FLAGS)
+
+    def _shape(self, body: HandBody, marker: int, role: str | None, local: Array) -> Array:
+        """(F, 3, 3) or (3, 3) m^2: the marker's ellipsoid in the camera's axes."""
+        if role != WRIST_ROLE:
+            return self._radii[marker] ** 2 * np.eye(3)
+        half_axes = body.size[list(body.marker).index(marker)]
+        turned = local[:, :3, :3] * half_axes
+        return np.asarray(turned @ turned.transpose(0, 2, 1))
+
+    def _discs(self, shot: Shot, body: HandBody, row_time_s: float) -> Array:
+        """(F, M, 4) as `visible_parts` wants them; NaN for what is not in the picture."""
+        grid = np.arange(-0.1, shot.seconds + 0.2, 1.0 / _GRID_HZ)
+        ways = body.marker_positions(*shot.act.source.sample(grid))
+        size = self._camera.width, self._camera.height
+        discs = np.full((len(self.times_s), body.marker_count, 4), np.nan)
+        for marker in range(body.marker_count):
+            places, pixels = at_own_rows(CubicSpline(grid, ways[:, marker]),
+                                         functools.partial(self._project, marker=marker), self.times_s, row_time_s,
+                                         size)
+            discs[:, marker, :2] = np.where(np.isfinite(pixels), self._silhouette(places, marker), np.nan)
+            depth = self._local(places)[:, 2]
+            discs[:, marker, 2], discs[:, marker, 3] = self._radii[marker] / depth, depth
+        return discs
+
+    def _local(self, places: Array) -> Array:
+        pose = self._camera.camera_from_world
+        return np.asarray(places @ pose[:3, :3].T + pose[:3, 3])
+
+    def _silhouette(self, places: Array, marker: int) -> Array:
+        """(F, 2) normalised middle of the outline (`rhot_app.geometry.silhouette`)."""
+        x, y, z = self._local(places).T
+        shape = self._shapes[marker]
+        below = z**2 - shape[..., 2, 2]
+        return np.stack([(x * z - shape[..., 0, 2]) / below, (y * z - shape[..., 1, 2]) / below], axis=1)
+
+    def _project(self, places: Array, marker: int) -> Array:
+        return np.asarray(project_normalised(self._silhouette(places, marker), self._camera.intrinsics))
+
+    def _middles(self, discs: Array) -> Array:
+        """(F, M, 2) px: the outline's middle, moved as what hides a part of it moves it."""
+        whole = spots().mean(axis=0)
+        moved = self.seen[:, :, 1:] - discs[:, :, :2] - discs[:, :, 2:3] * whole
+        partly = (self.seen[:, :, 0] < 1.0)[:, :, None]
+        middles = discs[:, :, :2] + np.where(partly, np.nan_to_num(moved), 0.0)
+        flat = np.ascontiguousarray(middles.reshape(-1, 2))
+        return np.asarray(project_normalised(flat, self._camera.intrinsics)).reshape(middles.shape)
+
+    def _biases(self, shot: Shot, own_seed: int) -> Array:
+        """(F, M, 2) px, slowly varying."""
+        count, noise = len(self._radii), self._noise
+        return (noise.common * _slow(shot, count, shot.scene.seed, noise.slow_s, self.times_s)
+                + noise.own * _slow(shot, count, own_seed + 0x1000000, noise.slow_s, self.times_s))
+
+
+def _slow(shot: Shot, count: int, seed: int, slow_s: float, times_s: Array) -> Array:
+    """(F, count, 2) of unit variance: a random walk that is drawn back to zero (Ornstein, Uhlenbeck), at times (F,)."""
+    rng = np.random.default_rng([seed, 0xB1A5])
+    grid = np.arange(0.0, shot.seconds + 2.0 * _BIAS_GRID_S, _BIAS_GRID_S)
+    kept = math.exp(-_BIAS_GRID_S / slow_s)
+    kicks = rng.normal(0.0, 1.0, (len(grid), count, 2))
+    walk = kicks.copy()
+    for k in range(1, len(grid)):
+        walk[k] = kept * walk[k - 1] + math.sqrt(1.0 - kept**2) * kicks[k]
+    return np.asarray(CubicSpline(grid, walk)(times_s))
