@@ -14,6 +14,7 @@ from rhot_app.hand.articulated import Box, Capsule
 from rhot_app.hand.articulated_model import ArticulatedModel, Body, PosedObject, forward_state
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Image = NDArray[np.uint8]
 
 SIZE_PX = 480
@@ -98,38 +99,42 @@ class _Canvas:
 
     def _ball(self, centre: Array, radius: float, hue: Array, along: Array) -> None:
         """A ball; between a capsule's ends lit as its side: without what its normals have `along` the axis."""
-        x, y, z = self._pixels(centre)
+        z = self._pixels(centre)[2]
         reach = radius * self.scale
-        rows = np.arange(max(0, math.floor(y - reach)), min(SIZE_PX, math.ceil(y + reach) + 1))
-        columns = np.arange(max(0, math.floor(x - reach)), min(SIZE_PX, math.ceil(x + reach) + 1))
-        across, down = np.meshgrid((columns - x) / reach, (rows - y) / reach)
-        height = 1.0 - across ** 2 - down ** 2
-        normal = np.stack([across, -down, np.sqrt(np.maximum(height, 0.0))], axis=-1)
+        rows, columns, right, up = self._around(centre, reach)
+        across, above = right / reach, up / reach
+        height = 1.0 - across ** 2 - above ** 2
+        normal = np.stack([across, above, np.sqrt(np.maximum(height, 0.0))], axis=-1)
         depth = np.where(height > 0, z + reach * normal[..., 2], -np.inf)
         normal -= (normal @ along)[..., None] * along
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
         self._paint(rows, columns, depth, normal, hue)
 
     def box(self, centre: Array, axes: Array, half: Array, hue: Array) -> None:
-        x, y, z = self._pixels(centre)
-        columns, rows = np.meshgrid(np.arange(SIZE_PX) - x, y - np.arange(SIZE_PX))
+        z = self._pixels(centre)[2]
+        rows, columns, right, up = self._around(centre, float(np.linalg.norm(half)) * self.scale)
         turned = self.view @ axes  # its columns: the box's axes seen from the eye
-        at = np.stack([columns, rows, np.zeros_like(columns)], axis=-1) @ turned
+        at = np.stack([right, up, np.zeros_like(right)], axis=-1) @ turned
         slope = np.where(np.abs(turned[2]) < 1e-9, 1e-9, turned[2])
         ends = np.stack([(-half * self.scale - at) / slope, (half * self.scale - at) / slope])
         leave, enter = ends.max(axis=0), ends.min(axis=0).max(axis=-1)
-        side = np.argmin(leave, axis=-1)
         nearest = np.min(leave, axis=-1)
-        normal = (turned * np.sign(slope)).T[side]
-        everywhere = np.arange(SIZE_PX)
-        self._paint(everywhere, everywhere, np.where(nearest >= enter, z + nearest, -np.inf), normal, hue)
+        normal = (turned * np.sign(slope)).T[np.argmin(leave, axis=-1)]
+        self._paint(rows, columns, np.where(nearest >= enter, z + nearest, -np.inf), normal, hue)
+
+    def _around(self, centre: Array, reach: float) -> tuple[Indices, Indices, Array, Array]:
+        """Rows and columns within `reach` px of a point, and how far right and up of it their pixels are."""
+        x, y, _ = self._pixels(centre)
+        rows = np.arange(max(0, math.floor(y - reach)), min(SIZE_PX, math.ceil(y + reach) + 1))
+        columns = np.arange(max(0, math.floor(x - reach)), min(SIZE_PX, math.ceil(x + reach) + 1))
+        right, up = np.meshgrid(columns - x, y - rows)
+        return rows, columns, right, up
 
     def _pixels(self, point: Array) -> tuple[float, float, float]:
         x, y, z = (self.view @ point - self.middle) * self.scale
         return 0.5 * SIZE_PX + float(x), 0.5 * SIZE_PX - float(y), float(z)
 
-    def _paint(self, rows: NDArray[np.int64], columns: NDArray[np.int64], depth: Array, normal: Array,
-               hue: Array) -> None:
+    def _paint(self, rows: Indices, columns: Indices, depth: Array, normal: Array, hue: Array) -> None:
         place = np.ix_(rows, columns)
         nearer = depth > self.depth[place]
         shade = 0.35 + 0.65 * np.maximum(normal @ LAMP, 0.0)

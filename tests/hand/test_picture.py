@@ -36,9 +36,9 @@ def test_a_hand_has_five_fingers():
     assert tops(seen) == 5
 
 
-def test_each_body_is_in_the_picture():
+def test_boxes_and_capsules_are_in_the_picture():
     whole = painted(draw(build_articulated(HAND))).sum()
-    for name in ("palm", "thumb_metacarpal", "middle_medial", "little_distal"):
+    for name in ("palm", "little_distal"):
         frames = tuple(msgspec.structs.replace(frame, shape=None) if frame.name == name else frame
                        for frame in HAND.frames)
         root = msgspec.structs.replace(HAND.root, shape=None) if name == "palm" else HAND.root
