@@ -9,17 +9,24 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from rhot_app.hand.ik_status import Status, within_reach
+
 Array = NDArray[np.float64]
+
+STILL = 1e-12
+"""An iteration that moves every joint by less than this part of the chain's length moves nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class ChainSolution:
-    """`joints` (n+1, 3) in the unit of the input; `residual`: distance of the last joint from the target."""
+    """`joints` (n+1, 3) in the unit of the input; `residual`: distance of the last joint from the target; `status`:
+    how it ended, STALLED when its last iteration moved nothing."""
 
     joints: Array
     iterations: int
     residual: float
     reached: bool
+    status: Status
 
 
 def solve_chain(joints: ArrayLike, target: ArrayLike, *, tolerance: float = 1e-4,
@@ -30,7 +37,7 @@ def solve_chain(joints: ArrayLike, target: ArrayLike, *, tolerance: float = 1e-4
     (the default means 0.1 mm when that is the metre). A chain already within tolerance is returned as it is. A
     target farther than the chain is long stretches the chain straight towards it, without iterating. Otherwise each
     iteration is a backward pass, from the last joint set on the target, and a forward pass, from the root; then the
-    tolerance is checked. A straight chain whose target lies on its own line cannot bend and is not `reached`.
+    tolerance is checked. A straight chain whose target lies on its own line cannot bend: its status is STALLED.
 
     Raises ValueError for wrong shapes, numbers that are not finite, a negative tolerance or no iterations.
     """
@@ -47,17 +54,19 @@ def solve_chain(joints: ArrayLike, target: ArrayLike, *, tolerance: float = 1e-4
     if max_iterations < 1:
         raise ValueError(f"max_iterations must be at least 1, not {max_iterations}")
     solved = start.copy()
-    iterations = solve_chain_arrays(solved, goal, float(tolerance), int(max_iterations))
+    iterations, moving = solve_chain_arrays(solved, goal, float(tolerance), int(max_iterations))
     residual = float(np.linalg.norm(solved[-1] - goal))
-    return ChainSolution(solved, iterations, residual, residual <= tolerance)
+    lengths = np.linalg.norm(np.diff(start, axis=0), axis=1)
+    return ChainSolution(solved, iterations, residual, residual <= tolerance,
+                         chain_status(lengths, float(np.linalg.norm(goal - start[0])), residual, tolerance, moving))
 
 
 @njit(cache=True)
-def solve_chain_arrays(joints: Array, target: Array, tolerance: float, max_iterations: int) -> int:
-    """`solve_chain` in place, without its checks; returns the iterations done."""
+def solve_chain_arrays(joints: Array, target: Array, tolerance: float, max_iterations: int) -> tuple[int, bool]:
+    """`solve_chain` in place, without its checks; returns the iterations done and whether the last one moved it."""
     bones = joints.shape[0] - 1
     if _distance(joints[bones], target) <= tolerance:
-        return 0
+        return 0, False
     lengths = np.empty(bones)
     directions = np.empty((bones, 3))  # the last one known of each bone, for when its two joints coincide
     total = 0.0
@@ -69,8 +78,8 @@ def solve_chain_arrays(joints: Array, target: Array, tolerance: float, max_itera
     if _distance(joints[0], target) > total:
         for k in range(bones):
             _place(joints[k], target, lengths[k], directions[k], 1.0, joints[k + 1])
-        return 0
-    root = joints[0].copy()
+        return 0, False
+    root, before, moving = joints[0].copy(), joints.copy(), True
     for iteration in range(1, max_iterations + 1):
         _copy(target, joints[bones])
         for k in range(bones - 1, -1, -1):
@@ -78,9 +87,22 @@ def solve_chain_arrays(joints: Array, target: Array, tolerance: float, max_itera
         _copy(root, joints[0])
         for k in range(bones):
             _place(joints[k], joints[k + 1], lengths[k], directions[k], 1.0, joints[k + 1])
+        moving = False
+        for k in range(1, bones + 1):
+            moving |= _distance(joints[k], before[k]) > STILL * total
+            _copy(joints[k], before[k])
         if _distance(joints[bones], target) <= tolerance:
-            return iteration
-    return max_iterations
+            return iteration, moving
+    return max_iterations, moving
+
+
+def chain_status(lengths: Array, away: float, residual: float, tolerance: float, moving: bool) -> Status:
+    """The status of a free chain whose target was this far `away` from its root."""
+    if residual <= tolerance:
+        return Status.REACHED
+    if not within_reach(lengths, away, tolerance):
+        return Status.UNREACHABLE
+    return Status.EXHAUSTED if moving else Status.STALLED
 
 
 @njit(cache=True)

@@ -18,6 +18,12 @@ from rhot_app.hand.limits import clamp_angle, wrap
 
 Array = NDArray[np.float64]
 
+GAIN = 0.02
+"""An iteration of FABRIK that brings the end nearer by less than this part of its distance makes no progress."""
+
+PATIENCE = 10
+"""Iterations in a row without progress, after which FABRIK is stopped."""
+
 PLANE_MARGIN = 0.02
 """A target nearer to the abduction axis than this part of the finger's length does not show the finger's plane."""
 
@@ -74,6 +80,14 @@ def distance(a: Array, b: Array) -> float:
 
 
 @njit(cache=True)
+def miss(angles: Array, lengths: Array, target: Array) -> float:
+    """Distance of the finger's end from `target` (3,)."""
+    joints = np.empty((4, 3))
+    chain_points(angles, lengths, joints, np.empty((3, angles.shape[0])))
+    return distance(joints[3], target)
+
+
+@njit(cache=True)
 def fold_abduction(x: float, y: float, margin: float, fallback: float) -> float:
     """Abduction, within -90..90 degrees, of a plane through z and (x, y); `fallback` when that lies within `margin`."""
     if math.hypot(x, y) < margin:
@@ -83,11 +97,12 @@ def fold_abduction(x: float, y: float, margin: float, fallback: float) -> float:
 
 @njit(cache=True)
 def fabrik_finger(angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
-                  max_iterations: int) -> int:
-    """FABRIK in the finger's plane, in place on `angles`; returns the iterations done.
+                  max_iterations: int) -> tuple[int, bool]:
+    """FABRIK in the finger's plane, in place on `angles`; returns the iterations done and whether it was stopped.
 
     The abduction axis lies in the plane, so the target alone chooses it. In the plane (u outward, w palmar) a bone
-    is its direction F from u; a hinge limits the difference of neighbours' directions in both passes.
+    is its direction F from u; a hinge limits the difference of neighbours' directions in both passes. Stopped means
+    that limits, or a target on the line of a straight finger, let PATIENCE iterations in a row gain nothing.
     """
     reach = lengths[0] + lengths[1] + lengths[2]
     angles[0] = clamp_angle(fold_abduction(target[0], target[1], PLANE_MARGIN * reach, angles[0]),
@@ -98,11 +113,12 @@ def fabrik_finger(angles: Array, lengths: Array, limits: Array, target: Array, t
         angles[1] = clamp_angle(math.atan2(goal_w, goal_u), limits[1, 0], limits[1, 1])
         for k in range(2, 4):
             angles[k] = clamp_angle(0.0, limits[k, 0], limits[k, 1])
-        return 0
+        return 0, False
     u, w = np.zeros(4), np.zeros(4)
     _lay_out(angles, lengths, u, w)
-    if math.hypot(u[3] - goal_u, w[3] - goal_w) <= tolerance:
-        return 0
+    missed, idle = math.hypot(u[3] - goal_u, w[3] - goal_w), 0
+    if missed <= tolerance:
+        return 0, False
     for iteration in range(1, max_iterations + 1):
         u[3], w[3] = goal_u, goal_w
         heading = math.atan2(w[3] - w[2], u[3] - u[2])
@@ -119,9 +135,11 @@ def fabrik_finger(angles: Array, lengths: Array, limits: Array, target: Array, t
             heading += angles[k + 1]
             u[k + 1] = u[k] + lengths[k] * math.cos(heading)
             w[k + 1] = w[k] + lengths[k] * math.sin(heading)
-        if math.hypot(u[3] - goal_u, w[3] - goal_w) <= tolerance:
-            return iteration
-    return max_iterations
+        before, missed = missed, math.hypot(u[3] - goal_u, w[3] - goal_w)
+        idle = idle + 1 if missed > (1.0 - GAIN) * before else 0
+        if missed <= tolerance or idle == PATIENCE:
+            return iteration, idle == PATIENCE
+    return max_iterations, False
 
 
 @njit(cache=True)
@@ -135,9 +153,18 @@ def _lay_out(angles: Array, lengths: Array, u: Array, w: Array) -> None:
 
 
 @njit(cache=True)
+def fabrik_within(angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
+                  max_iterations: int) -> tuple[int, bool]:
+    """`fabrik_finger` or `fabrik_thumb`, by the number of angles."""
+    if angles.shape[0] == 5:
+        return fabrik_thumb(angles, lengths, limits, target, tolerance, max_iterations)
+    return fabrik_finger(angles, lengths, limits, target, tolerance, max_iterations)
+
+
+@njit(cache=True)
 def fabrik_thumb(angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
-                 max_iterations: int) -> int:
-    """FABRIK of the thumb, in place on `angles`; returns the iterations done.
+                 max_iterations: int) -> tuple[int, bool]:
+    """FABRIK of the thumb, in place on `angles`; returns the iterations done and whether it was stopped.
 
     The backward pass is free; the forward pass reads each bone's angles in its parent's frame and clamps them. The
     two bones behind the MCP joint share a plane, which the target chooses as it does for a finger.
@@ -148,7 +175,8 @@ def fabrik_thumb(angles: Array, lengths: Array, limits: Array, target: Array, to
         for k in range(1, 4):
             _copy(target, joints[k])
         _read_thumb(angles, joints, lengths, limits)
-        return 0
+        return 0, False
+    missed, idle = distance(joints[3], target), 0
     for iteration in range(1, max_iterations + 1):
         _copy(target, joints[3])
         for k in range(2, 0, -1):
@@ -158,9 +186,11 @@ def fabrik_thumb(angles: Array, lengths: Array, limits: Array, target: Array, to
                     joints[k, i] = joints[k + 1, i] + lengths[k] / length * (joints[k, i] - joints[k + 1, i])
         _read_thumb(angles, joints, lengths, limits)
         chain_points(angles, lengths, joints, jacobian)
-        if distance(joints[3], target) <= tolerance:
-            return iteration
-    return max_iterations
+        before, missed = missed, distance(joints[3], target)
+        idle = idle + 1 if missed > (1.0 - GAIN) * before else 0
+        if missed <= tolerance or idle == PATIENCE:
+            return iteration, idle == PATIENCE
+    return max_iterations, False
 
 
 @njit(cache=True)

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import chain_points, distance, fabrik_finger, fabrik_thumb
+from rhot_app.hand.finger_chain import chain_points, distance, fabrik_within, miss
+from rhot_app.hand.ik_status import MISSING, Status, status_of
 from rhot_app.hand.linear import solve_in_box
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
@@ -42,7 +43,7 @@ CONTINUITY = 1.0
 @dataclass(frozen=True, slots=True)
 class FingerSolution:
     """`angles` (4,) or for the thumb (5,) rad; `joints` (4, 3) m world, base to tip; `end_effector` (3,) m world: the
-    marker's centre; `residual`: its distance from the target, m; `iterations`: FABRIK's."""
+    marker's centre; `residual`: its distance from the target, m; `iterations`: FABRIK's; `status`: how it ended."""
 
     angles: Array
     joints: Array
@@ -50,17 +51,19 @@ class FingerSolution:
     residual: float
     iterations: int
     reached: bool
+    status: Status
 
 
 @dataclass(frozen=True, slots=True)
 class FingersSolution:
     """All five fingers: `angles` (21,) rad, `residuals` (5,) m (NaN without a target), `iterations` (5,), `reached`
-    (5,) bool."""
+    (5,) bool, `statuses` (5,) of Status."""
 
     angles: Array
     residuals: Array
     iterations: NDArray[np.int64]
     reached: NDArray[np.bool_]
+    statuses: NDArray[np.uint8]
 
 
 def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_angles: Array, target: Array,
@@ -75,15 +78,16 @@ def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_an
     angles = np.array(start_angles, dtype=np.float64)
     rows = ANGLE_SLICES[finger]
     mean, information = model.natural.mean[rows], model.natural.information[rows, rows]
-    residual, iterations = solve_arrays(angles, model.chain[finger], model.limits[rows], local, mean, information,
-                                        tolerance, max_iterations, 0.0)
+    residual, iterations, status = solve_arrays(angles, model.chain[finger], model.limits[rows], local, mean,
+                                                information, tolerance, max_iterations, 0.0)
     points = np.empty((4, 3))
     chain_points(angles, model.chain[finger], points, np.empty((3, len(angles))))
     scale = model.bones[finger, 2] / model.marker[finger]
     points = np.vstack([points, points[2] + scale * (points[3] - points[2])])
     palm = (model.base[finger] + points @ model.base_rotation[finger].T) * [1.0, model.mirror, 1.0]
     world = palm @ world_from_palm[:3, :3].T + world_from_palm[:3, 3]
-    return FingerSolution(angles, world[[0, 1, 2, 4]], world[3], residual, iterations, residual <= tolerance)
+    return FingerSolution(angles, world[[0, 1, 2, 4]], world[3], residual, iterations, residual <= tolerance,
+                          Status(status))
 
 
 def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: float = TOLERANCE,
@@ -94,11 +98,12 @@ def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: f
     curled finger turns a millimetre of noise into tens of degrees; with its `target_sd` known it keeps to the pose
     it starts from as far as the noise allows, and `reached` then says little.
     """
-    angles, residuals, iterations = np.array(pose.angles), np.empty(5), np.empty(5, dtype=np.int64)
+    angles, residuals = np.array(pose.angles), np.empty(5)
+    iterations, statuses = np.empty(5, dtype=np.int64), np.empty(5, dtype=np.uint8)
     solve_fingers_arrays(angles, pose.world_from_palm, model.mirror, model.base, model.base_rotation,
                          model.chain, model.limits, targets, model.natural.mean, model.natural.information,
-                         tolerance, max_iterations, target_sd, residuals, iterations)
-    return FingersSolution(angles, residuals, iterations, residuals <= tolerance)
+                         tolerance, max_iterations, target_sd, residuals, iterations, statuses)
+    return FingersSolution(angles, residuals, iterations, residuals <= tolerance, statuses)
 
 
 @njit(cache=True)
@@ -120,43 +125,41 @@ def to_finger(world_from_palm: Array, mirror: float, base: Array, base_rotation:
 def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, base: Array, base_rotation: Array,
                          lengths: Array, limits: Array, targets: Array, mean: Array, information: Array,
                          tolerance: float, max_iterations: int, target_sd: float, residuals: Array,
-                         iterations: NDArray[np.int64]) -> None:
-    """`solve_fingers` on arrays, in place on `angles`, `residuals` and `iterations`."""
+                         iterations: NDArray[np.int64], statuses: NDArray[np.uint8]) -> None:
+    """`solve_fingers` on arrays, in place on `angles`, `residuals`, `iterations` and `statuses`."""
     local = np.empty(3)
     for finger in range(5):
-        residuals[finger], iterations[finger] = np.nan, 0
+        residuals[finger], iterations[finger], statuses[finger] = np.nan, 0, MISSING
         if math.isnan(targets[finger, 0] + targets[finger, 1] + targets[finger, 2]):
             continue
         to_finger(world_from_palm, mirror, base[finger], base_rotation[finger], targets[finger], local)
         low = 0 if finger == 0 else 1 + 4 * finger
         high = 5 + 4 * finger
-        residuals[finger], iterations[finger] = solve_arrays(
+        residuals[finger], iterations[finger], statuses[finger] = solve_arrays(
             angles[low:high], lengths[finger], limits[low:high], local, mean[low:high],
             information[low:high, low:high], tolerance, max_iterations, target_sd)
 
 
 @njit(cache=True)
 def solve_arrays(angles: Array, lengths: Array, limits: Array, target: Array, mean: Array, information: Array,
-                 tolerance: float, max_iterations: int, target_sd: float) -> tuple[float, int]:
-    """One finger in its base frame, in place on `angles`; returns the residual, m, and FABRIK's iterations.
+                 tolerance: float, max_iterations: int, target_sd: float) -> tuple[float, int, int]:
+    """One finger in its base frame, in place on `angles`; returns the residual, m, FABRIK's iterations and the status.
 
-    `mean` and `information`: the natural pose of these angles.
+    `mean` and `information`: the natural pose of these angles. FABRIK that limits stop leaves off at once.
     """
     count = angles.shape[0]
     for k in range(count):
         angles[k] = min(max(angles[k], limits[k, 0]), limits[k, 1])
     start, iterations, near = angles.copy(), 0, max(tolerance, target_sd)
-    if _miss(angles, lengths, target) > near:
-        if count == 5:
-            iterations = fabrik_thumb(angles, lengths, limits, target, near, max_iterations)
-        else:
-            iterations = fabrik_finger(angles, lengths, limits, target, near, max_iterations)
-    residual = _miss(angles, lengths, target)
+    if miss(angles, lengths, target) > near:
+        iterations, _ = fabrik_within(angles, lengths, limits, target, near, max_iterations)
+    residual = miss(angles, lengths, target)
     if target_sd == 0.0 or residual > FAR * near:
         residual = _meet(angles, start, lengths, limits, target, mean, information, tolerance)
     if target_sd > 0.0:
         residual = _settle(angles, start, lengths, limits, target, information, target_sd)
-    return residual, iterations
+    away = math.sqrt(target[0] ** 2 + target[1] ** 2 + target[2] ** 2)
+    return residual, iterations, status_of(angles, lengths, limits, away, residual, tolerance, False)
 
 
 @njit(cache=True)
@@ -166,7 +169,7 @@ def _meet(angles: Array, start: Array, lengths: Array, limits: Array, target: Ar
 
     Stopped by a limit or a local minimum it tries again: from the middle of the range, from `start`, stretched.
     """
-    least = _miss(angles, lengths, target)
+    least = miss(angles, lengths, target)
     for attempt in range(4):
         trial = start.copy()
         for k in range(angles.shape[0]):
@@ -182,13 +185,6 @@ def _meet(angles: Array, start: Array, lengths: Array, limits: Array, target: Ar
         if residual <= tolerance:
             break
     return least
-
-
-@njit(cache=True)
-def _miss(angles: Array, lengths: Array, target: Array) -> float:
-    joints = np.empty((4, 3))
-    chain_points(angles, lengths, joints, np.empty((3, angles.shape[0])))
-    return distance(joints[3], target)
 
 
 @njit(cache=True)
@@ -221,7 +217,7 @@ def _descend(angles: Array, start: Array, lengths: Array, limits: Array, target:
             angles[i] += step[i]
         if largest < 1e-3 and residual < 1e-6:
             break
-    residual = _miss(angles, lengths, target)
+    residual = miss(angles, lengths, target)
     if residual > max(least, 1e-6):
         angles[:] = best
         return least

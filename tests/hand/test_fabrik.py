@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot_app.hand.fabrik import solve_chain
+from rhot_app.hand.ik_status import Status
 
 
 def published(joints, target, tolerance, iterations):
@@ -77,6 +78,19 @@ def test_unreachable_target_stretches_the_chain_towards_it():
     solution = solve_chain(joints, [1, 0, 10])
     np.testing.assert_allclose(solution.joints, [[1, 0, 0], [1, 0, 1], [1, 0, 3]], atol=1e-12)
     assert not solution.reached and solution.residual == pytest.approx(7)
+    assert solution.status is Status.UNREACHABLE
+
+
+def test_straight_chain_says_that_it_cannot_bend():
+    straight = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]])
+    assert solve_chain(straight, [1, 0, 0]).status is Status.STALLED
+    assert solve_chain(straight, [1, 1e-3, 0], max_iterations=500).status is Status.REACHED
+
+
+def test_target_too_near_is_unreachable_and_few_iterations_are_said_to_be_few():
+    joints = np.array([[0, 0, 0], [3, 0, 0], [3, 1, 0.0]])
+    assert solve_chain(joints, [1, 0, 0]).status is Status.UNREACHABLE
+    assert solve_chain(joints, [2.2, 0, 0], max_iterations=1).status is Status.EXHAUSTED
 
 
 coordinate = st.sampled_from([0.0, 0.0, 1.0, -1.0, 1e-300, 1e-12, 0.5, 1e6])

@@ -10,6 +10,7 @@ from hand_samples import natural_angles, natural_motion, random_pose, random_wor
 
 from rhot_app.hand.finger_chain import chain_points, fabrik_finger, fabrik_thumb
 from rhot_app.hand.finger_ik import solve_finger, solve_fingers, to_finger
+from rhot_app.hand.ik_status import Status
 from rhot_app.hand.joint_angles import angles_from_joints
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.limits import clamp_angle
@@ -77,14 +78,14 @@ def test_unreachable_target_stretches_the_finger_towards_it(right_hand):
     points = forward(right_hand, HandPose(world, straight))
     base, centre = points.joints[5], points.marker_centres[1]
     solution = solve_finger(right_hand, 1, world, neutral_pose().angles[5:9], base + 1.5 * (centre - base))
-    assert not solution.reached
+    assert not solution.reached and solution.status is Status.UNREACHABLE
     assert solution.residual == pytest.approx(0.5 * np.linalg.norm(centre - base), rel=1e-3)
     np.testing.assert_allclose(solution.angles, straight[5:9], atol=0.03)
 
 
 def test_target_behind_the_hand_says_not_reached_and_stays_legal(right_hand):
     solution = solve_finger(right_hand, 2, np.eye(4), neutral_pose().angles[9:13], np.array([0.06, 0.0, 0.06]))
-    assert not solution.reached and np.isfinite(solution.angles).all()
+    assert solution.status is Status.LIMITED and np.isfinite(solution.angles).all()
     assert (solution.angles >= right_hand.limits[9:13, 0]).all()
 
 
@@ -144,7 +145,8 @@ def test_missing_targets_keep_their_angles(right_hand):
     targets[3] = np.nan
     solution = solve_fingers(right_hand, start, targets)
     np.testing.assert_array_equal(solution.angles[13:17], start.angles[13:17])
-    assert np.isnan(solution.residuals[3]) and not solution.reached[3] and solution.reached[[0, 1, 2, 4]].all()
+    assert np.isnan(solution.residuals[3]) and solution.statuses[3] == Status.MISSING
+    assert not solution.reached[3] and solution.reached[[0, 1, 2, 4]].all()
 
 
 def test_narrower_limits_are_kept(right_hand):

@@ -1,0 +1,122 @@
+"""One interface to every solver: a method, five fingers, a solution."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.finger_chain import chain_points
+from rhot_app.hand.ik_status import EXHAUSTED, MISSING, REACHED
+from rhot_app.hand.solvers import inverse
+from rhot_app.hand.solvers.closed_form import solve_coupled
+from rhot_app.hand.solvers.inverse import follow_jacobian
+from rhot_app.hand.solvers.newton import solve_exactly
+from rhot_app.hand.solvers.problem import Problem, Solution
+from rhot_app.hand.solvers.reaching import solve_free, solve_limited
+
+Array = NDArray[np.float64]
+
+
+class Method(IntEnum):
+    """The solvers of RHOT chapter 2.2."""
+
+    TRANSPOSE = inverse.TRANSPOSE
+    """Jacobian transpose (eq. 2.13, 2.15)."""
+    PSEUDO_INVERSE = inverse.PSEUDO_INVERSE
+    """Pseudo-inverse of the Jacobian (eq. 2.16)."""
+    SVD = inverse.SVD
+    """Pseudo-inverse by singular values, the small ones left out (eq. 2.20)."""
+    DAMPED = inverse.DAMPED
+    """Damped least squares (eq. 2.23)."""
+    NEWTON = 4
+    """Newton with the exact Hessian (eq. 2.24), within limits."""
+    LEVENBERG = 5
+    """Levenberg-Marquardt, within limits."""
+    CLOSED_FORM = 6
+    """The planar finger with DIP = 2/3 PIP (eq. 2.4)."""
+    FABRIK_FREE = 7
+    """FABRIK without limits, as published (2.2.7)."""
+    FABRIK = 8
+    """FABRIK within limits; handed over to Levenberg-Marquardt where they stop it."""
+    FABRIK_ALONE = 9
+    """FABRIK within limits, which says what stopped it."""
+
+
+_NEWTON, _LEVENBERG, _CLOSED_FORM = int(Method.NEWTON), int(Method.LEVENBERG), int(Method.CLOSED_FORM)
+_FABRIK_FREE, _FABRIK, _FABRIK_ALONE = int(Method.FABRIK_FREE), int(Method.FABRIK), int(Method.FABRIK_ALONE)
+
+HANDED_OVER_ITERATIONS = 40
+"""Of Levenberg-Marquardt, after FABRIK."""
+
+EXACT = 1e-7
+COARSE = 5e-5
+"""Tolerances, m: of the solvers that converge fast, and of FABRIK, which needs ever more iterations."""
+
+
+class Effort(NamedTuple):
+    """When a method stops: at `tolerance`, m, or after `max_iterations`."""
+
+    tolerance: float
+    max_iterations: int
+
+
+EFFORT = {method: Effort(EXACT, 40) for method in Method} | {
+    Method.TRANSPOSE: Effort(EXACT, 200),
+    Method.FABRIK: Effort(COARSE, 10),
+    Method.FABRIK_FREE: Effort(COARSE, 100),
+    Method.FABRIK_ALONE: Effort(COARSE, 100),
+}
+
+
+def solve(method: Method, problem: Problem, effort: Effort | None = None) -> Solution:
+    """Solve the five fingers of `problem`; `effort` is the method's own from EFFORT unless told.
+
+    Angles keep the problem's limits, but for FABRIK_FREE, which knows none. A target out of reach leaves the finger
+    stretched towards it as far as limits allow; the statuses tell.
+    """
+    tolerance, max_iterations = effort or EFFORT[method]
+    angles, joints = problem.start.copy(), np.empty((5, 4, 3))
+    residuals, iterations = np.empty(5), np.empty(5, dtype=np.int64)
+    statuses, handed_over = np.empty(5, dtype=np.uint8), np.empty(5, dtype=np.bool_)
+    solve_arrays(int(method), angles, problem.lengths, problem.limits, problem.targets, tolerance, max_iterations,
+                 residuals, iterations, statuses, handed_over, joints)
+    return Solution(angles, residuals, iterations, statuses, handed_over, joints)
+
+
+@njit(cache=True)
+def solve_arrays(method: int, angles: Array, lengths: Array, limits: Array, targets: Array, tolerance: float,
+                 max_iterations: int, residuals: Array, iterations: NDArray[np.int64], statuses: NDArray[np.uint8],
+                 handed_over: NDArray[np.bool_], joints: Array) -> None:
+    """`solve` on arrays: `angles` (21,) in place, and every field of `Solution` filled."""
+    for finger in range(5):
+        low = 0 if finger == 0 else 1 + 4 * finger
+        high = 5 + 4 * finger
+        own, bones, box, target = angles[low:high], lengths[finger], limits[low:high], targets[finger]
+        residuals[finger], iterations[finger], statuses[finger] = np.nan, 0, MISSING
+        handed_over[finger] = False
+        if not math.isnan(target[0] + target[1] + target[2]):
+            status = EXHAUSTED
+            if method in (_FABRIK, _FABRIK_ALONE):
+                residual, taken, status = solve_limited(own, bones, box, target, tolerance, max_iterations)
+            elif method == _FABRIK_FREE:
+                residual, taken, status = solve_free(own, bones, target, tolerance, max_iterations, joints[finger])
+            elif method == _CLOSED_FORM:
+                residual, taken, status = solve_coupled(own, bones, box, target, tolerance)
+            elif method < _NEWTON:
+                residual, taken, status = follow_jacobian(method, own, bones, box, target, tolerance, max_iterations)
+            else:
+                residual, taken = np.inf, 0
+            if method in (_NEWTON, _LEVENBERG) or (method == _FABRIK and status != REACHED):
+                handed_over[finger] = method == _FABRIK
+                cap = HANDED_OVER_ITERATIONS if method == _FABRIK else max_iterations
+                residual, more, status = solve_exactly(method == _NEWTON, own, bones, box, target, tolerance, cap)
+                taken += more
+            residuals[finger], iterations[finger], statuses[finger] = residual, taken, status
+        if method != _FABRIK_FREE or statuses[finger] == MISSING:
+            chain_points(own, bones, joints[finger], np.empty((3, high - low)))
+
