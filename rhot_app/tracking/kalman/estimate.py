@@ -39,10 +39,10 @@ GROUP_OF = np.array([LINEAR] * 3 + [TURN] * 3 + [FIRST_FINGER] * 5 + [FIRST_FING
 class Estimate(NamedTuple):
     """The mean and covariance at one instant; arrays are changed in place.
 
-    `world` (4, 4) world_from_palm m; `angles` (21,) rad; `velocity` (27,) m/s and rad/s;
-    `acceleration` (27,) m/s^2 and rad/s^2; `log_scale` (1,); `bias` (M, 3) m. `covariance` (N, N). `agitation` (7,):
-    variance of the acceleration that each group is capable of just now, (m/s^2)^2 or (rad/s^2)^2. `drift` (C, M, 2):
-    leaky mean of each camera's normalised innovations of each marker.
+    `world` (4, 4) world_from_palm m; `angles` (21,) rad; `velocity` (27,) m/s and rad/s; `acceleration` (27,) m/s^2
+    and rad/s^2; `log_scale` (1,); `bias` (M, 3) m. `covariance` (N, N). `agitation` (7,): variance of the acceleration,
+    (m/s^2)^2 or (rad/s^2)^2, that surprised in each group of late; `since` (7,): how long ago it did, s. `drift`
+    (C, M, 2): leaky mean of each camera's normalised innovations of each marker.
     """
 
     world: Array
@@ -53,6 +53,7 @@ class Estimate(NamedTuple):
     bias: Array
     covariance: Array
     agitation: Array
+    since: Array
     drift: Array
 
 
@@ -60,7 +61,8 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     """Room for an estimate; everything zero, the palm at the world's origin."""
     size = BIAS + 3 * markers
     return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
-                    np.zeros((size, size)), np.zeros(GROUPS), np.zeros((cameras, markers, 2)))
+                    np.zeros((size, size)), np.zeros(GROUPS), np.zeros(GROUPS),
+                    np.zeros((cameras, markers, 2)))
 
 
 @njit(cache=True)
@@ -69,6 +71,7 @@ def copy_estimate(source: Estimate, target: Estimate) -> None:
     copy_mean(source, target)
     target.covariance[:] = source.covariance
     target.agitation[:] = source.agitation
+    target.since[:] = source.since
     target.drift[:] = source.drift
 
 

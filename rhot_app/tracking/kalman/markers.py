@@ -27,7 +27,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.motion import ACCELERATION_S
+from rhot_app.tracking.kalman.motion import ACCELERATION_S, liveliness
 from rhot_app.tracking.kalman.rows import Rows
 
 Array = NDArray[np.float64]
@@ -135,7 +135,7 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
     count = worn.part.shape[0]
     points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
     place_markers(worn, estimate, points, jacobian)
-    camera = frame.camera[0]
+    camera, lively = frame.camera[0], liveliness(estimate)
     pixel, slope, place = np.empty(2), np.empty((2, 3)), np.empty(3)
     for sight in range(count):
         if not frame.seen[sight]:
@@ -151,8 +151,8 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
                               cameras.intrinsics[camera], pixel, slope):
             pixel[:] = np.nan
             slope[:] = 0.0
-        strayed = (estimate.agitation[LINEAR] + estimate.agitation[TURN] * _REACH_M**2
-                   + (estimate.agitation[FIRST_FINGER + worn.part[m]] * _FINGER_M**2 if worn.part[m] >= 0 else 0.0))
+        strayed = (lively[LINEAR] + lively[TURN] * _REACH_M**2
+                   + (lively[FIRST_FINGER + worn.part[m]] * _FINGER_M**2 if worn.part[m] >= 0 else 0.0))
         for r in range(2):
             _fill(rows.jacobian[row + r], slope[r], jacobian[m], late, points[m], estimate, m)
             rows.residual[row + r] = frame.pixels[sight, r] - pixel[r]

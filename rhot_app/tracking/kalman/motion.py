@@ -36,17 +36,26 @@ from rhot_app.tracking.kalman.estimate import (
 
 Array = NDArray[np.float64]
 
-STILL = np.array([1e-8, 1e-6, 5e-6, 5e-6, 5e-6, 5e-6, 5e-6])
-"""Agitation of a hand at rest, by group: what tremor and breath leave between two frames."""
+STILL = np.array([3e-4, 3e-3, 1e-2, 1e-2, 1e-2, 1e-2, 1e-2])
+"""Standard deviation of the acceleration of a hand at rest, by group, m/s^2 and rad/s^2."""
+
+AWAKE = np.array([0.5, 5.0, 15.0, 15.0, 15.0, 15.0, 15.0])
+"""The same of one that moves at all."""
+
+SLOW = np.array([0.02, 0.2, 0.5, 0.5, 0.5, 0.5, 0.5])
+"""Speeds, m/s and rad/s, at which a group counts as half awake."""
+
+PER_SPEED = np.array([4.0, 4.0, 6.0, 6.0, 6.0, 6.0, 6.0])
+"""How much more acceleration there is per speed, 1/s: what moves fast will turn hard."""
 
 MOST = np.array([60.0**2, 500.0**2, 1000.0**2, 1000.0**2, 1000.0**2, 1000.0**2, 1000.0**2])
-"""Agitation of the fastest hands."""
+"""Variance of the acceleration of the fastest hands, by group."""
 
 ACCELERATION_S = 0.08
 """Accelerations change with this time constant."""
 
-CALM_S = 0.06
-"""Agitation fades with this time constant once nothing surprises any more."""
+CALM_S = 0.1
+"""What surprised (`surprise.py`) is forgotten with this time constant."""
 
 VELOCITY_S = np.array([1.0] * 6 + [0.3] * 21)
 """(27,) Velocities decay with these time constants: what swings a finger is soon used up."""
@@ -78,12 +87,23 @@ def predict(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array)
     """Carry the estimate on by `dt` >= 0 s. `bias_variance` (M,) m^2 is what each marker's bias tends to."""
     _move_mean(estimate, dt)
     _move_covariance(estimate, dt)
-    agitation = estimate.agitation
-    fade = math.exp(-dt / CALM_S)
-    for group in range(GROUPS):
-        agitation[group] = max(STILL[group], agitation[group] * fade)
-    shake(estimate.covariance, agitation, habits.together, dt)
+    estimate.agitation[:] *= math.exp(-dt / CALM_S)
+    estimate.since[:] += dt
+    shake(estimate.covariance, liveliness(estimate), habits.together, dt)
     _fade_biases(estimate, dt, bias_variance)
+
+
+@njit(cache=True)
+def liveliness(estimate: Estimate) -> Array:
+    """(7,) variance of each group's acceleration: by its speed, as far as that is no noise, and by what surprised."""
+    speed, out = np.zeros(GROUPS), np.empty(GROUPS)
+    for i in range(POSE):
+        speed[GROUP_OF[i]] += estimate.velocity[i] ** 2 - 4.0 * estimate.covariance[VELOCITY + i, VELOCITY + i]
+    for group in range(GROUPS):
+        moving = math.sqrt(max(speed[group], 0.0))
+        usual = STILL[group] + moving * (PER_SPEED[group] + AWAKE[group] / (moving + SLOW[group]))
+        out[group] = min(usual * usual + estimate.agitation[group], MOST[group])
+    return out
 
 
 @njit(cache=True)

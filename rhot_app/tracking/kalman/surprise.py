@@ -1,9 +1,10 @@
-"""How much the hand must be accelerating, and which observations are not to be believed: both read from innovations.
+"""Which groups of the hand move as they were not expected to, and which observations are not to be believed.
 
-A hand at rest is worth long averaging, a hand that starts to move none at all. The innovation itself says which: each
-group of the hand is given just as much white acceleration as makes its observations plausible, the palm first, then
-what is left to each finger, at once when it moves, fading when nothing surprises any more. A slow motion hides in the
-noise of each frame but not in the mean of several, so that mean is watched too.
+A hand at rest is worth long averaging, a hand that starts to move none at all. How it moves says what acceleration to
+expect (`motion.liveliness`); that it starts, only an innovation can say. A group whose observations are far from
+plausible is given the acceleration that makes them so, the palm first, then what is left to each finger. A slow start
+hides in the noise of each frame but not in the mean of several, so that mean is watched too. Both thresholds are
+high: whoever answers every large innovation with a larger gain weighs the worst observations most.
 """
 
 from __future__ import annotations
@@ -14,19 +15,19 @@ from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import FIRST_FINGER, GROUP_OF, GROUPS, LINEAR, POSE, TURN, VELOCITY, Estimate
 from rhot_app.tracking.kalman.gain import expected_noise, spread
-from rhot_app.tracking.kalman.motion import MOST, jerk_gains, shake
+from rhot_app.tracking.kalman.motion import AWAKE, MOST, STILL, jerk_gains, shake
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-PLAUSIBLE = 7.4
-"""Squared normalised innovation (2 degrees of freedom) that 2.5 % of all exceed by chance."""
+PLAUSIBLE = 20.0
+"""Squared normalised innovation (2 degrees of freedom) that 5 in 100,000 exceed by chance."""
 
-ROBUST = 9.0
+ROBUST = 16.0
 """Beyond this an observation's weight falls: its noise is widened until it is no farther off."""
 
-GATE = 25.0
+GATE = 40.0
 """Beyond this, with all acceleration that a hand is capable of, it is something else."""
 
 LEAK = 0.15
@@ -35,12 +36,18 @@ LEAK = 0.15
 ONSET_S = 0.04
 """What surprises began this long ago: it takes until it shows in an image. Agitation is raised as of then."""
 
+AGAIN_S = 0.1
+"""What surprises again within this time is the same onset."""
+
+ESCALATION = 4.0
+"""Unless it is this much stronger."""
+
 _STEP = 3.0
 
 
 @njit(cache=True)
 def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, widening: Array) -> None:
-    """Raise the agitation (and the covariance by what it did since its onset), then fill `believed` and `widening` (L,).
+    """Raise the agitation (and the covariance by what it did since its onset); fill `believed` and `widening` (L,).
 
     `together` as in `Habits`.
     """
@@ -60,14 +67,29 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
     _raise_palm(rows, estimate, noise, per_unit, TURN, added, surprise)
     for finger in range(GROUPS - FIRST_FINGER):
         _raise_finger(rows, estimate, noise, per_unit, finger, added, surprise)
-    for group in range(GROUPS):
-        estimate.agitation[group] += added[group]
+    _wake(estimate, added)
     shake(estimate.covariance, added, together, ONSET_S)
     for observation in range(count):
         value = _squared(rows, observation, noise, per_unit, added)
         believed[observation] = value < GATE
         widening[observation] = max(1.0, value / ROBUST)
         _note_drift(rows, observation, noise, per_unit, added, estimate.drift, believed[observation])
+
+
+@njit(cache=True)
+def _wake(estimate: Estimate, added: Array) -> None:
+    """Take what surprised as the agitation; leave in `added` (7,) what the covariance must still learn of it.
+
+    An onset is told to the covariance once. Told with every frame, it would let each camera in turn shift the hand
+    sideways where the hand's distance is wrong.
+    """
+    for group in range(GROUPS):
+        if added[group] > 0.0:
+            anew = estimate.since[group] > AGAIN_S or added[group] > ESCALATION * estimate.agitation[group]
+            estimate.agitation[group] = max(estimate.agitation[group], added[group], AWAKE[group] ** 2)
+            added[group] = estimate.agitation[group] if anew else 0.0
+            if anew:
+                estimate.since[group] = 0.0
 
 
 @njit(cache=True)
@@ -160,7 +182,7 @@ def _raise_palm(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, g
             if group == TURN or on_palm == 0 or rows.part[observation] == PALM_PART:
                 surprise[chosen] = _surprise(rows, observation, estimate, noise, per_unit, added)
                 chosen += 1
-        if np.median(surprise[:chosen]) <= PLAUSIBLE or not _raise(estimate, added, group):
+        if np.median(surprise[:chosen]) <= PLAUSIBLE or not _raise(added, group):
             return
 
 
@@ -172,16 +194,16 @@ def _raise_finger(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array,
         for observation in range(rows.count[1]):
             if rows.part[observation] == finger:
                 worst = max(worst, _surprise(rows, observation, estimate, noise, per_unit, added))
-        if worst <= PLAUSIBLE or not _raise(estimate, added, FIRST_FINGER + finger):
+        if worst <= PLAUSIBLE or not _raise(added, FIRST_FINGER + finger):
             return
 
 
 @njit(cache=True)
-def _raise(estimate: Estimate, added: Array, group: int) -> bool:
-    """Raise a group by one step; False when it is as agitated as any hand."""
-    if estimate.agitation[group] + added[group] >= MOST[group]:
+def _raise(added: Array, group: int) -> bool:
+    """Raise a group by one step; False when no hand can do more."""
+    if added[group] >= MOST[group]:
         return False
-    added[group] = _STEP * added[group] if added[group] > 0.0 else estimate.agitation[group]
+    added[group] = _STEP * added[group] if added[group] > 0.0 else STILL[group] ** 2
     return True
 
 
