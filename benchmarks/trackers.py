@@ -1,0 +1,216 @@
+"""Trackers in trouble, side by side: the same raw logs of the twin, altered, through the classic and the model tracker.
+
+    python benchmarks/trackers.py [--only NAME ...] [--seeds 5] [--markers rhot6] [--sketched] [--json FILE]
+
+Trials: `blind` and `silent` (one camera, for a second), `hidden` and `hidden-apart` (each marker 30 % of the time, from
+all cameras at once or from each by itself), `mixed` (index and middle taken for each other 30 % of the time), `cross`
+(fingers crossing for ten minutes), `wrist` (only the wrist's marker left), `still`, `ramp` and `fast` (spread and lag),
+`curve` (jitter against lag for several filters), `scale` (a hand file 10 % wrong, the size floating), `start` (from
+nothing) and `compute` (time per datagram, memory over ten minutes). Logs are kept and found again, as by
+`rhot evaluate --compare`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from rhot_app.errors import RhotError
+from rhot_app.evaluation import scenarios
+from rhot_app.evaluation.accuracy import Figures
+from rhot_app.evaluation.compare import TRACKERS
+from rhot_app.evaluation.compare_table import cell
+from rhot_app.evaluation.takes import Order, Take, take, takes_folder
+from rhot_app.evaluation.track import rig_with
+from rhot_app.hand.anthropometry import scaled_hand
+from rhot_app.hand.skeleton import TIP_ROLES
+from rhot_app.progress import ProgressLine
+from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
+from rhot_app.simulator.scene import make_scene, twin_defaults
+
+Results = dict[str, Figures]
+
+RAMP = str(Path(__file__).parent / "motions" / "ramp.json")
+CROSS_S, START_EVERY_S, SCALE_S = 60.0, 1.0, 40.0
+WRONG_SCALES = (1.1, 0.9)
+BETAS = (0.1, 0.4, 1.5, 8.0, 40.0)
+POSITION_PER_PIXEL_BETA = 500.0  # the defaults' own proportion
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What all trials share. `order` gives takes; `rigs` a rig per tracker for a take."""
+
+    seeds: tuple[int, ...]
+    seconds: float
+    markers: str
+    sketched: bool
+    folder: Path
+    minutes: float
+
+    def takes(self, motion: str, seconds: float | None = None, seeds: Iterable[int] | None = None) -> Iterable[Take]:
+        """One take per seed, filmed where it is not there yet."""
+        settings = msgspec.structs.replace(twin_defaults(), markers=self.markers)
+        for seed in self.seeds if seeds is None else seeds:
+            order = Order(make_scene(settings, seed), motion, seconds or self.seconds, sketched=self.sketched)
+            yield take(order, self.folder, lambda title: ProgressLine(f"filming {title}"))
+
+    def each(self, takes: Iterable[Take], trial: Callable[[Take, Rig], Figures],
+             trackers: dict[str, TrackerSettings] = TRACKERS) -> Results:
+        """A trial on every take with every tracker, the takes' figures together."""
+        runs: dict[str, list[Figures]] = {name: [] for name in trackers}
+        for one in takes:
+            for name, settings in trackers.items():
+                runs[name].append(trial(one, rig_with(one.rig, settings)))
+        return {name: scenarios.gather(figures) for name, figures in runs.items()}
+
+
+def blind(bench: Bench, *, says_so: bool) -> Results:
+    """One camera, for a second, in a hand that grasps."""
+    return bench.each(bench.takes("grasp"), partial(scenarios.one_camera_blind, says_so=says_so))
+
+
+def hidden(bench: Bench, *, together: bool) -> Results:
+    """Each marker 30 % of the time."""
+    return bench.each(bench.takes("grasp"), partial(scenarios.markers_hidden, share=0.3, together=together))
+
+
+def mixed(bench: Bench) -> Results:
+    """Index and middle finger wear one colour."""
+    def trial(one: Take, rig: Rig) -> Figures:
+        roles = [marker.role for marker in rig.markers.markers]
+        pair = roles.index(TIP_ROLES[1]), roles.index(TIP_ROLES[2])
+        return scenarios.names_mixed_up(one, rig, pair=pair, share=0.3)
+    return bench.each(bench.takes("grasp"), trial)
+
+
+def cross(bench: Bench) -> Results:
+    """Minutes of crossing fingers, each minute with a seed of its own."""
+    seeds = range(bench.seeds[0], bench.seeds[0] + max(1, round(bench.minutes)))
+    return bench.each(bench.takes("cross", CROSS_S, seeds), scenarios.plain)
+
+
+def curve(bench: Bench) -> Results:
+    """Spread of a still hand against lag on the ramp and in haste: 1-euro filters and the trackers as they are."""
+    stills, ramps, hasty = (list(bench.takes(motion)) for motion in ("still", RAMP, "fast"))
+    results: Results = {}
+    for name, change in _variants().items():
+        parts = [scenarios.gather([trial(one, change(one.rig)) for one in takes]) for takes, trial in (
+            (stills, scenarios.standing_still), (ramps, partial(scenarios.lagging, speeding_up=True)),
+            (hasty, partial(scenarios.lagging, speeding_up=False)))]
+        results[name] = {"still_sd_mm": parts[0]["sd_mm"], "ramp_lag_ms": parts[1]["lag_ms"],
+                         "ramp_tips_mm": parts[1]["tips_mm"], "fast_lag_ms": parts[2]["lag_ms"],
+                         "fast_tips_mm": parts[2]["tips_mm"]}
+    return results
+
+
+def scale(bench: Bench) -> Results:
+    """A hand file 10 % too long and too short, corrected while a hand grasps."""
+    floating = {name: msgspec.structs.replace(settings, float_scale=True) for name, settings in TRACKERS.items()
+                if settings.kind == "model"}
+    results: Results = {}
+    for wrong in WRONG_SCALES:
+        def trial(one: Take, rig: Rig, wrong: float = wrong) -> Figures:
+            other = msgspec.structs.replace(rig, hand=scaled_hand(rig.hand, wrong))
+            return scenarios.growing(one, other, 1.0 / wrong)
+        for name, figures in bench.each(bench.takes("grasp", SCALE_S), trial, floating).items():
+            results[f"{name}, hand x {wrong:g}"] = figures
+    return results
+
+
+def start(bench: Bench) -> Results:
+    """Datagrams that begin in the middle of a movement."""
+    starts: list[float] = np.arange(0.0, bench.seconds - 1.0, START_EVERY_S).tolist()
+    results: Results = {}
+    takes = [one for motion in ("rest", "grasp", "wave") for one in bench.takes(motion)]
+    for name, settings in TRACKERS.items():
+        found = [after for one in takes for after in scenarios.starting(one, rig_with(one.rig, settings), starts)]
+        known = [after for after in found if after is not None]
+        results[name] = {"median_s": float(np.median(known)) if known else None,
+                         "p95_s": float(np.percentile(known, 95.0)) if known else None,
+                         "max_s": max(known, default=None), "never": float(len(found) - len(known)),
+                         "starts": float(len(found))}
+    return results
+
+
+def compute(bench: Bench) -> Results:
+    """Time per datagram, and memory."""
+    first = next(iter(bench.takes("grasp")))
+    return bench.each([first], partial(scenarios.computing, minutes=bench.minutes))
+
+
+TRIALS: dict[str, Callable[[Bench], Results]] = {
+    "blind": partial(blind, says_so=True), "silent": partial(blind, says_so=False),
+    "hidden": partial(hidden, together=True), "hidden-apart": partial(hidden, together=False), "mixed": mixed,
+    "cross": cross, "wrist": lambda bench: bench.each(bench.takes("grasp"), scenarios.wrist_alone),
+    "still": lambda bench: bench.each(bench.takes("still", 12.0), scenarios.standing_still),
+    "ramp": lambda bench: bench.each(bench.takes(RAMP), partial(scenarios.lagging, speeding_up=True)),
+    "fast": lambda bench: bench.each(bench.takes("fast"), partial(scenarios.lagging, speeding_up=False)),
+    "curve": curve, "scale": scale, "start": start, "compute": compute,
+}
+
+
+def main() -> int:
+    """Run the trials, print a table of each as it is done, write JSON."""
+    parser = argparse.ArgumentParser(description="The classic and the model tracker in trouble, on the same raw logs.")
+    parser.add_argument("--only", nargs="*", metavar="NAME", choices=tuple(TRIALS), default=tuple(TRIALS),
+                        help=f"trials: {', '.join(TRIALS)}")
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=1, help="the first one")
+    parser.add_argument("--seconds", type=float, default=8.0, help="length of a take (default 8)")
+    parser.add_argument("--markers", "--marker-set", default="rhot6", metavar="SET")
+    parser.add_argument("--minutes", type=float, default=10.0, help="of crossing, and of computing (default 10)")
+    parser.add_argument("--sketched", action="store_true", help="logs without pictures (rhot_app/simulator/sights.py)")
+    parser.add_argument("--logs", type=Path, metavar="DIR", default=takes_folder())
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    args = parser.parse_args()
+    bench = Bench(tuple(range(args.seed, args.seed + args.seeds)), args.seconds, args.markers, args.sketched, args.logs,
+                  args.minutes)
+    done: dict[str, Results] = {}
+    for name in args.only:
+        try:
+            done[name] = TRIALS[name](bench)
+        except RhotError as exc:
+            print(f"{name}: {exc}", file=sys.stderr)
+            continue
+        print(block(name, done[name]), flush=True)
+        if args.json is not None:
+            args.json.write_text(json.dumps(done, indent=1) + "\n")
+    return 0 if done else 2
+
+
+def block(name: str, results: Results) -> str:
+    """A trial's table: a line per tracker."""
+    keys = list(next(iter(results.values())))
+    width = max(len(row) for row in results)
+    lines = [f"{name}", " " * width + "".join(f"  {key:>8}" for key in keys)]
+    lines += [row.ljust(width) + "".join(f"  {_form(figures[key]):>{max(8, len(key))}}" for key in keys)
+              for row, figures in results.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _form(value: float | None) -> str:
+    return cell(value, ".0f" if value is not None and abs(value) >= 1000.0 else ".3f")
+
+
+def _variants() -> Mapping[str, Callable[[Rig], Rig]]:
+    """Ways to filter: the classic tracker's 1-euro filters from calm to prompt, then every tracker as it is."""
+    def classic(rig: Rig, beta: float) -> Rig:
+        pixel = OneEuroSettings(min_cutoff_hz=1.0, beta=beta, derivative_cutoff_hz=15.0)
+        position = OneEuroSettings(min_cutoff_hz=1.0, beta=POSITION_PER_PIXEL_BETA * beta, derivative_cutoff_hz=15.0)
+        filtered = msgspec.structs.replace(rig, filters=FilterSettings(pixel=pixel, position=position))
+        return rig_with(filtered, TrackerSettings(kind="classic"))
+    return {f"1-euro, beta {beta:g}": partial(classic, beta=beta) for beta in BETAS} | {
+        name: partial(rig_with, settings=settings) for name, settings in TRACKERS.items()}
+
+
+if __name__ == "__main__":
+    sys.exit(main())
