@@ -11,11 +11,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.finger_chain import chain_points
-from rhot_app.hand.ik_status import EXHAUSTED, MISSING, REACHED
-from rhot_app.hand.solvers import inverse
+from rhot_app.hand.ik_status import MISSING, REACHED
+from rhot_app.hand.solvers import exact, inverse
 from rhot_app.hand.solvers.closed_form import solve_coupled
+from rhot_app.hand.solvers.exact import solve_exactly
 from rhot_app.hand.solvers.inverse import follow_jacobian
-from rhot_app.hand.solvers.newton import solve_exactly
 from rhot_app.hand.solvers.problem import Problem, Solution
 from rhot_app.hand.solvers.reaching import solve_free, solve_limited
 
@@ -33,9 +33,9 @@ class Method(IntEnum):
     """Pseudo-inverse by singular values, the small ones left out (eq. 2.20)."""
     DAMPED = inverse.DAMPED
     """Damped least squares (eq. 2.23)."""
-    NEWTON = 4
+    NEWTON = exact.NEWTON
     """Newton with the exact Hessian (eq. 2.24), within limits."""
-    LEVENBERG = 5
+    LEVENBERG = exact.LEVENBERG
     """Levenberg-Marquardt, within limits."""
     CLOSED_FORM = 6
     """The planar finger with DIP = 2/3 PIP (eq. 2.4)."""
@@ -47,8 +47,9 @@ class Method(IntEnum):
     """FABRIK within limits, which says what stopped it."""
 
 
-_NEWTON, _LEVENBERG, _CLOSED_FORM = int(Method.NEWTON), int(Method.LEVENBERG), int(Method.CLOSED_FORM)
-_FABRIK_FREE, _FABRIK, _FABRIK_ALONE = int(Method.FABRIK_FREE), int(Method.FABRIK), int(Method.FABRIK_ALONE)
+_SVD, _LEVENBERG = int(Method.SVD), int(Method.LEVENBERG)
+_CLOSED_FORM, _FABRIK_FREE, _FABRIK = int(Method.CLOSED_FORM), int(Method.FABRIK_FREE), int(Method.FABRIK)
+_FABRIK_ALONE = int(Method.FABRIK_ALONE)
 
 HANDED_OVER_ITERATIONS = 40
 """Of Levenberg-Marquardt, after FABRIK."""
@@ -100,21 +101,20 @@ def solve_arrays(method: int, angles: Array, lengths: Array, limits: Array, targ
         residuals[finger], iterations[finger], statuses[finger] = np.nan, 0, MISSING
         handed_over[finger] = False
         if not math.isnan(target[0] + target[1] + target[2]):
-            status = EXHAUSTED
             if method in (_FABRIK, _FABRIK_ALONE):
                 residual, taken, status = solve_limited(own, bones, box, target, tolerance, max_iterations)
             elif method == _FABRIK_FREE:
                 residual, taken, status = solve_free(own, bones, target, tolerance, max_iterations, joints[finger])
             elif method == _CLOSED_FORM:
                 residual, taken, status = solve_coupled(own, bones, box, target, tolerance)
-            elif method < _NEWTON:
+            elif method <= _SVD:
                 residual, taken, status = follow_jacobian(method, own, bones, box, target, tolerance, max_iterations)
             else:
-                residual, taken = np.inf, 0
-            if method in (_NEWTON, _LEVENBERG) or (method == _FABRIK and status != REACHED):
-                handed_over[finger] = method == _FABRIK
-                cap = HANDED_OVER_ITERATIONS if method == _FABRIK else max_iterations
-                residual, more, status = solve_exactly(method == _NEWTON, own, bones, box, target, tolerance, cap)
+                residual, taken, status = solve_exactly(method, own, bones, box, target, tolerance, max_iterations)
+            if method == _FABRIK and status != REACHED:
+                handed_over[finger] = True
+                residual, more, status = solve_exactly(_LEVENBERG, own, bones, box, target, tolerance,
+                                                       HANDED_OVER_ITERATIONS)
                 taken += more
             residuals[finger], iterations[finger], statuses[finger] = residual, taken, status
         if method != _FABRIK_FREE or statuses[finger] == MISSING:

@@ -13,9 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.ik_status import REACHED, UNREACHABLE, status_of
+from rhot_app.hand.ik_status import status_of
 from rhot_app.hand.linear import solve_in_box
-from rhot_app.hand.solvers.closed_form import solve_coupled
 from rhot_app.hand.solvers.problem import assign, clamp, linearise, norm
 
 Array = NDArray[np.float64]
@@ -29,41 +28,14 @@ STILL = 1e-10
 FLOOR = 1e-9
 """Least damping, as a part of the mean diagonal of J^T J: a finger has more joints than its target has coordinates."""
 
-RESTARTS = (0.5, 0.5, 0.25, 0.05)
-"""Parts of the joints' ranges from which to begin again; the first gives way to the closed form."""
-
-
-@njit(cache=True)
-def solve_exactly(second_order: bool, angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
-                  max_iterations: int) -> tuple[float, int, int]:
-    """One finger, in place on `angles` (4,) or (5,); returns residual, m, iterations in all, and status.
-
-    A descent that limits or a local minimum stop begins again: from the closed form of the coupled finger, the
-    middle of the range, its relaxed and its stretched end. The nearest end of all is the result.
-    """
-    residual, iterations, status = descend(second_order, angles, lengths, limits, target, tolerance, max_iterations)
-    trial = np.empty(angles.shape[0])
-    for attempt in range(len(RESTARTS)):
-        if status in (REACHED, UNREACHABLE):
-            break
-        for k in range(angles.shape[0]):
-            share = RESTARTS[attempt]
-            trial[k] = limits[k, 0] + share * (limits[k, 1] - limits[k, 0])
-        if attempt == 0:
-            assign(angles, trial)
-            solve_coupled(trial, lengths, limits, target, tolerance)
-        again, taken, ended = descend(second_order, trial, lengths, limits, target, tolerance, max_iterations)
-        iterations += taken
-        if again < residual:
-            residual, status = again, ended
-            assign(trial, angles)
-    return residual, iterations, status
-
 
 @njit(cache=True)
 def descend(second_order: bool, angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
             max_iterations: int) -> tuple[float, int, int]:
-    """`solve_exactly` without its new beginnings."""
+    """One finger, in place on `angles` (4,) or (5,); returns residual, m, iterations, and status.
+
+    Newton with the `second_order`, Levenberg-Marquardt without.
+    """
     count = angles.shape[0]
     clamp(angles, limits)
     joints, jacobian, error = np.empty((4, 3)), np.empty((3, count)), np.empty(3)
