@@ -24,7 +24,7 @@ from rhot_app.tracking.kalman.gain import contract, solve
 from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.motion import MOST, Habits, forget, predict
 from rhot_app.tracking.kalman.rows import ResidualBlock, clear, empty_rows
-from rhot_app.tracking.kalman.surprise import appraise
+from rhot_app.tracking.kalman.surprise import appraise, note_trend
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -60,13 +60,13 @@ class HandFilter:
     `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance` (M,) m^2.
     """
 
-    def __init__(self, cameras: int, markers: int, habits: Habits, limits: Array, bias_variance: Array, *,
+    def __init__(self, markers: int, habits: Habits, limits: Array, bias_variance: Array, *,
                  float_scale: bool = False) -> None:
         size = BIAS + 3 * markers
-        self.estimate = empty_estimate(cameras, markers)
+        self.estimate = empty_estimate(markers)
         self._habits, self._limits, self._bias_variance = habits, limits, bias_variance
         self._float_scale = float_scale
-        self._trial = empty_estimate(cameras, markers)
+        self._trial = empty_estimate(markers)
         self._rows = empty_rows(ROWS_MAX, size)
         self._gains = np.empty((ROWS_MAX, size))
         self._step = np.empty(size)
@@ -77,7 +77,7 @@ class HandFilter:
         """Begin at a pose (4, 4) m and (21,) rad that something rougher has found, knowing little else."""
         estimate, covariance = self.estimate, self.estimate.covariance
         estimate.world[:], estimate.angles[:] = world_from_palm, np.clip(angles, *self._limits.T)
-        for array in (estimate.velocity, estimate.acceleration, estimate.log_scale, estimate.bias, estimate.drift,
+        for array in (estimate.velocity, estimate.acceleration, estimate.log_scale, estimate.bias, estimate.trend,
                       covariance):
             array[:] = 0.0
         estimate.agitation[:] = START_AGITATION
@@ -130,6 +130,7 @@ def _improve(estimate: Estimate, rows: object, believed: Mask, widening: Array, 
 def _conclude(estimate: Estimate, trial: Estimate, gains: Array, count: int, dt: float, habits: Habits, limits: Array,
               step: Array) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
+    note_trend(estimate, step, gains, count)
     contract(estimate.covariance, gains, count)
     copy_mean(trial, estimate)
     forget(estimate, dt, habits, step)

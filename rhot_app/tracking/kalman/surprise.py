@@ -3,11 +3,14 @@
 A hand at rest is worth long averaging, a hand that starts to move none at all. How it moves says what acceleration to
 expect (`motion.liveliness`); that it starts, only an innovation can say. A group whose observations are far from
 plausible is given the acceleration that makes them so, the palm first, then what is left to each finger. A slow start
-hides in the noise of each frame but not in the mean of several, so that mean is watched too. Both thresholds are
-high: whoever answers every large innovation with a larger gain weighs the worst observations most.
+hides in the noise of each frame, but it corrects the same velocity in the same direction again and again, which a hand
+that moves as expected does not. All thresholds are high: whoever answers every large innovation with a larger gain
+weighs the worst observations most.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import njit
@@ -30,8 +33,11 @@ ROBUST = 16.0
 GATE = 40.0
 """Beyond this, with all acceleration that a hand is capable of, it is something else."""
 
-LEAK = 0.15
-"""Weight of the newest innovation in the leaky mean."""
+LEAK = 0.1
+"""Weight of the newest correction in the trend."""
+
+TREND = 14.0
+"""Squared normalised trend of one velocity that 2 in 10,000 exceed by chance."""
 
 ONSET_S = 0.04
 """What surprises began this long ago: it takes until it shows in an image. Agitation is raised as of then."""
@@ -67,13 +73,27 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
     _raise_palm(rows, estimate, noise, per_unit, TURN, added, surprise)
     for finger in range(GROUPS - FIRST_FINGER):
         _raise_finger(rows, estimate, noise, per_unit, finger, added, surprise)
+    _follow_trends(estimate, added)
     _wake(estimate, added)
     shake(estimate.covariance, added, together, ONSET_S)
     for observation in range(count):
         value = _squared(rows, observation, noise, per_unit, added)
         believed[observation] = value < GATE
         widening[observation] = max(1.0, value / ROBUST)
-        _note_drift(rows, observation, noise, per_unit, added, estimate.drift, believed[observation])
+
+
+@njit(cache=True)
+def _follow_trends(estimate: Estimate, added: Array) -> None:
+    """Wake the groups whose velocities were corrected the same way for long; a new trend begins."""
+    total = np.zeros(GROUPS)
+    for i in range(POSE):
+        total[GROUP_OF[i]] = max(total[GROUP_OF[i]], estimate.trend[i] ** 2 * (2.0 - LEAK) / LEAK)
+    for group in range(GROUPS):
+        if total[group] > TREND:
+            added[group] = max(added[group], AWAKE[group] ** 2)
+    for i in range(POSE):
+        if total[GROUP_OF[i]] > TREND:
+            estimate.trend[i] = 0.0
 
 
 @njit(cache=True)
@@ -144,29 +164,6 @@ def _squared(rows: Rows, observation: int, noise: Array, per_unit: Array, added:
 
 
 @njit(cache=True)
-def _surprise(rows: Rows, observation: int, estimate: Estimate, noise: Array, per_unit: Array, added: Array) -> float:
-    """The larger of this innovation's square and that of the leaky mean with this one, in the same scale."""
-    squared = _squared(rows, observation, noise, per_unit, added)
-    if rows.source[observation, 0] < 0:
-        return squared
-    u, v = _drifted(rows, observation, estimate.drift, noise, per_unit, added)
-    return max(squared, (u * u + v * v) * (2.0 - LEAK) / LEAK)
-
-
-@njit(cache=True)
-def _drifted(rows: Rows, observation: int, drift: Array, noise: Array, per_unit: Array,
-             added: Array) -> tuple[float, float]:
-    """The leaky mean of normalised innovations with this one. Past ones count as if the acceleration that is `added`
-    now had been known then: else no acceleration could explain them, and the more would be added."""
-    camera, marker = rows.source[observation]
-    uu, _, vv = _total(rows, observation, noise, per_unit, added)
-    row = rows.first[observation]
-    u = (1.0 - LEAK) * drift[camera, marker, 0] * np.sqrt(noise[observation, 0] / uu)
-    v = (1.0 - LEAK) * drift[camera, marker, 1] * np.sqrt(noise[observation, 2] / vv)
-    return u + LEAK * rows.residual[row] / np.sqrt(uu), v + LEAK * rows.residual[row + 1] / np.sqrt(vv)
-
-
-@njit(cache=True)
 def _raise_palm(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, group: int, added: Array,
                 surprise: Array) -> None:
     """Raise one of the palm's groups until the median of the observations that show it is plausible.
@@ -180,7 +177,7 @@ def _raise_palm(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, g
         chosen = 0
         for observation in range(rows.count[1]):
             if group == TURN or on_palm == 0 or rows.part[observation] == PALM_PART:
-                surprise[chosen] = _surprise(rows, observation, estimate, noise, per_unit, added)
+                surprise[chosen] = _squared(rows, observation, noise, per_unit, added)
                 chosen += 1
         if np.median(surprise[:chosen]) <= PLAUSIBLE or not _raise(added, group):
             return
@@ -193,7 +190,7 @@ def _raise_finger(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array,
         worst = 0.0
         for observation in range(rows.count[1]):
             if rows.part[observation] == finger:
-                worst = max(worst, _surprise(rows, observation, estimate, noise, per_unit, added))
+                worst = max(worst, _squared(rows, observation, noise, per_unit, added))
         if worst <= PLAUSIBLE or not _raise(added, FIRST_FINGER + finger):
             return
 
@@ -208,12 +205,13 @@ def _raise(added: Array, group: int) -> bool:
 
 
 @njit(cache=True)
-def _note_drift(rows: Rows, observation: int, noise: Array, per_unit: Array, added: Array, drift: Array,
-                believed: bool) -> None:
-    camera, marker = rows.source[observation]
-    if camera < 0:
+def note_trend(estimate: Estimate, step: Array, gains: Array, count: int) -> None:
+    """Remember how an update corrects the velocities: `step` (N,), and the `count` rows of `gains` by which."""
+    if count == 0:
         return
-    if believed:
-        drift[camera, marker, 0], drift[camera, marker, 1] = _drifted(rows, observation, drift, noise, per_unit, added)
-    else:
-        drift[camera, marker] = 0.0
+    for i in range(POSE):
+        variance = 0.0
+        for k in range(count):
+            variance += gains[k, VELOCITY + i] ** 2
+        if variance > 0.0:
+            estimate.trend[i] += LEAK * (step[VELOCITY + i] / math.sqrt(variance) - estimate.trend[i])

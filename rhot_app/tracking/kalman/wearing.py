@@ -22,7 +22,7 @@ from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]
 
-PLACE_SD_M = 0.3e-3
+PLACE_SD_M = 0.15e-3
 """How far a marker's seen middle lies from where the hand file has it: paint, its shading, and the hand's skin."""
 
 _COUPLED_SD_RAD = np.radians(0.02)
