@@ -27,7 +27,7 @@ sys.path.insert(0, str(ROOT / "tests" / "detect"))
 
 from chroma_bound import place_bound  # noqa: E402
 from marker_rendering import SKIN, Canvas, disc, to_yuv  # noqa: E402
-from painted_hand import Pose, held_poses, twin_scene  # noqa: E402
+from twin_frames import Pose, held_poses, twin_scene  # noqa: E402
 
 from rhot_node.detect.detector import Detector  # noqa: E402
 from rhot_node.detect.fast import FastDetector  # noqa: E402

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from painted_hand import twin_scene
+from twin_frames import twin_scene
 
 from rhot_app.simulator.shot import make_renderer, make_shot
 from rhot_node.detect.fast import FastDetector

@@ -29,15 +29,16 @@ SUM_COLUMNS = 16  # of the summed-area table, see `_sum_areas`
 
 
 @njit(cache=True)
-def unmix(y, u, v, region, level, kind, colour, sums, coverage, gain):
-    """Write `coverage` and its noise `gain` (d coverage / d grey level, 0 where it is fixed) over `region`.
+def unmix(y, u, v, region, level, kind, colour, sums, coverage, gain, paint):
+    """Write `coverage` and its noise `gain` (d coverage / d grey level, 0 where it is fixed) over `region`, and the
+    `paint` (3, 3): by channel (Y, U, V) the mean of its interior, or of its edge when it has none, and its slopes
+    along x and y.
 
-    Returns the paint's mean colour (Y, U, V), of its interior, or of its edge when it has none.
     Scratch: `colour`, (..., 3) of the chroma planes' size, mean luma and chroma of the region's pixels; `sums`, one
     larger both ways and SUM_COLUMNS deep, their summed-area table.
     """
     _gather_colour(y, u, v, region, colour)
-    paint = np.zeros((3, 3))  # per channel: mean, slope along x, slope along y
+    paint[:] = 0.0
     origin = _paint_plane(region, kind, colour, paint)
     backdrop = np.zeros(3)
     _mean_outside(region, kind, colour, backdrop)
@@ -67,7 +68,6 @@ def unmix(y, u, v, region, level, kind, colour, sums, coverage, gain):
                 value += weight[channel] * (colour[row, column, channel] - near[MEAN + channel])
             coverage[row, column] = min(max(value, -CLIP), 1.0 + CLIP)
             gain[row, column] = slope
-    return paint[0, 0], paint[1, 0], paint[2, 0]
 
 
 @njit(cache=True)

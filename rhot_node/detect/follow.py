@@ -17,10 +17,11 @@ import numpy as np
 from numba import njit
 
 from rhot_node.detect import contour_columns as c
+from rhot_node.detect import stated as st
 from rhot_node.detect import track as t
 from rhot_node.detect.contour import fit
 from rhot_node.detect.contour_pixels import project
-from rhot_node.detect.followed_band import IS_BAND, READY, SAG, mend_band
+from rhot_node.detect.followed_band import IS_BAND, LIMB_LEFT, LIMB_TAKEN, READY, SAG, mend_band
 
 AREA_LEAST = 22.0  # px^2: a smaller marker has too little inside
 NOISE_MOST = 0.12  # of the contrast
@@ -74,7 +75,7 @@ def follow(y, u, v, tracks, looks, radii, rims, marks, noise_variance, precise, 
                 continue
         else:
             _take_soft(track, look, soft, fitted)
-        _state(track, fitted, look, noise, marks[index, IS_BAND] > 0.0, precise, out[index])
+        _state(track, fitted, look, noise, marks[index], precise, out[index])
         _learn_noise_inside(u, v, fitted, noise_variance)
         marks[index, READY] = 1.0
         out[index, DONE] = 1.0
@@ -199,21 +200,27 @@ def _take_soft(track, look, soft, fitted):
 
 
 @njit(**c.FAST)
-def _state(track, fitted, look, noise, is_band, precise, out):
+def _state(track, fitted, look, noise, mark, precise, out):
     """Write the observation and take the result into the track."""
     area = fitted[c.AREA]
     ratio = area / track[t.AREA]
     extent = math.sqrt(6.0 * (fitted[c.M_XX] + fitted[c.M_YY]
                               + math.hypot(fitted[c.M_XX] - fitted[c.M_YY], 2.0 * fitted[c.M_XY])))
-    bias = t.hidden_bias(ratio, max(extent, track[t.EXTENT]))
+    bias = math.hypot(st.hidden_bias(ratio, max(extent, track[t.EXTENT]), area, st.SHARP), st.smear_bias(look[c.BLUR]))
     level = track[t.LEVEL] * fitted[c.LEVEL]
     varied = (look[c.W_U] ** 2 * look[c.C_UU] + 2.0 * look[c.W_U] * look[c.W_V] * look[c.C_UV]
               + look[c.W_V] ** 2 * look[c.C_VV] - (look[c.GAIN] * noise) ** 2)
-    floor = t.OUTLINE_FLOOR_VARIANCE + t.AROUND_VARIANCE * max(varied, 0.0)
+    floor = st.OUTLINE_FLOOR_VARIANCE + st.AROUND_VARIANCE * max(varied, 0.0)
     if not precise:
-        floor += t.SOFT_FLOOR_VARIANCE
-    if is_band:
-        floor += t.BAND_FLOOR_VARIANCE
-    t.luma_values(fitted[c.X], fitted[c.Y], area, fitted[c.V_XX], fitted[c.V_XY], fitted[c.V_YY], floor, bias, level,
-                  noise, out)
+        floor += st.SOFT_FLOOR_VARIANCE
+    elif mark[IS_BAND] == 0.0:
+        bright = 1.0 / look[c.INSIDE]
+        limb_x, limb_y, limb = st.outline_limb_shift(bright * look[c.SLOPE_X], bright * look[c.SLOPE_Y], area)
+        fitted[c.X] -= mark[LIMB_TAKEN] * limb_x
+        fitted[c.Y] -= mark[LIMB_TAKEN] * limb_y
+        bias = math.hypot(bias, mark[LIMB_LEFT] * limb)
+    st.luma_values(fitted[c.X], fitted[c.Y], area, fitted[c.V_XX], fitted[c.V_XY], fitted[c.V_YY], floor, bias, level,
+                   noise, out)
+    if mark[IS_BAND] > 0.0:
+        st.widen_band(look[c.AXIS_X], look[c.AXIS_Y], extent, out)
     t.take(track, fitted[c.X], fitted[c.Y], area, extent, level, False)

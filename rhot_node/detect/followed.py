@@ -11,8 +11,9 @@ from rhot_node.detect import contour_columns as c
 from rhot_node.detect import position as p
 from rhot_node.detect.begin import start
 from rhot_node.detect.follow import DONE, OUT_COLUMNS, follow, noise_level
-from rhot_node.detect.followed_band import IS_BAND, MARK_COLUMNS, READY, SAG_VARIANCE
+from rhot_node.detect.followed_band import IS_BAND, LIMB_LEFT, LIMB_TAKEN, MARK_COLUMNS, READY, SAG_VARIANCE
 from rhot_node.detect.image import YuvImage
+from rhot_node.detect.stated import LIMB_OF_SHAPE
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import MarkerObservation
 
@@ -30,6 +31,7 @@ class Followed:
         self._radii, self._rims = np.zeros((count, c.NODES + 1)), np.zeros((count, 2, c.NODES + 1))
         self._marks = np.zeros((count, MARK_COLUMNS))
         self._marks[:, IS_BAND] = [shape == "band" for shape in shapes]
+        self._marks[:, LIMB_TAKEN:LIMB_LEFT + 1] = [LIMB_OF_SHAPE[shape] for shape in shapes]
         self._pixels, self._work = np.zeros((c.PIXELS_MAX, c.PIXEL_COLUMNS)), np.zeros((c.NODES + 1, c.WORK_COLUMNS))
         self._soft, self._fitted = np.zeros(3), np.zeros(c.FIT_COLUMNS)
         self._seen = np.zeros((count, OUT_COLUMNS))

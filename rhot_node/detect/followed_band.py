@@ -22,8 +22,9 @@ GAUSS_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
 GAUSS_WEIGHT = 0.5 * np.polynomial.legendre.leggauss(4)[1]
 
 # Columns of `marks`: how a marker is followed.
-READY, IS_BAND, SAG, SAG_VARIANCE, SAG_ZERO, SAG_FRAMES = range(6)
-MARK_COLUMNS = 6
+# LIMB_TAKEN, LIMB_LEFT: `stated.LIMB_OF_SHAPE`.
+READY, IS_BAND, SAG, SAG_VARIANCE, SAG_ZERO, SAG_FRAMES, LIMB_TAKEN, LIMB_LEFT = range(8)
+MARK_COLUMNS = 8
 
 
 @njit(**c.FAST)
@@ -51,7 +52,8 @@ def mend_band(look, radius, mark, noise, fitted, track):
     fitted[c.X] += ay * rest
     fitted[c.Y] -= ax * rest
     track[t.SAG_X], track[t.SAG_Y] = -ay * sag, ax * sag
-    along = 0.6 * mark[SAG_VARIANCE] * SAG_GAIN  # (pi / 4)^2 of the smoothed sag's
+    # (pi / 4)^2 of the smoothed sag's, and of that which was there at first, which no later frame tells anew.
+    along = 0.6 * mark[SAG_VARIANCE] * (1.0 + 1.0 / SAG_SETTLE + SAG_GAIN)
     fitted[c.V_XX] += ay * ay * along
     fitted[c.V_XY] -= ax * ay * along
     fitted[c.V_YY] += ax * ax * along

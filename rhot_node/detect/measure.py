@@ -32,7 +32,8 @@ REQUEST_COLUMNS = 8
 # The paint: how many pixels are all paint, and its mean luma and chroma (minus 128).
 LEVEL, AT_BORDER, FRAGMENTS, COST, RIVAL_COST, NOISE_SUM, NOISE_COUNT = range(RESULT_COLUMNS, RESULT_COLUMNS + 7)
 PAINT_PIXELS, PAINT_Y, PAINT_CB, PAINT_CR = range(RESULT_COLUMNS + 7, RESULT_COLUMNS + 11)
-MEASURE_COLUMNS = RESULT_COLUMNS + 11
+SLOPE_X, SLOPE_Y = range(RESULT_COLUMNS + 11, RESULT_COLUMNS + 13)  # of the paint's chroma, of itself per px
+MEASURE_COLUMNS = RESULT_COLUMNS + 13
 
 ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
 LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed one is used for another attempt
@@ -114,8 +115,9 @@ def _place(y, u, v, window, count, level, request, scratch, result):
     area, interior = classify(region, own, mask, kind, stack)
     if interior == 0 and area >= SEAM:
         return False
-    luma, cb, cr = unmix(y, u, v, region, level, kind, colour, sums, coverage, gain)
-    result[PAINT_PIXELS], result[PAINT_Y], result[PAINT_CB], result[PAINT_CR] = interior, luma, cb - 128.0, cr - 128.0
+    paint = np.empty((3, 3))
+    unmix(y, u, v, region, level, kind, colour, sums, coverage, gain, paint)
+    _note_paint(paint, interior, result)
     if not centroid(region, coverage, gain, result):
         return False
     at_border = x0 == 0 or y0 == 0 or x1 == u.shape[1] - 1 or y1 == u.shape[0] - 1
@@ -125,6 +127,15 @@ def _place(y, u, v, window, count, level, request, scratch, result):
     result[AT_BORDER] = 1.0 if at_border else 0.0
     result[NOISE_SUM], result[NOISE_COUNT] = chroma_noise(u, v, region, kind)
     return True
+
+
+@njit(cache=True)
+def _note_paint(paint, interior, result):
+    luma, cb, cr = paint[0, 0], paint[1, 0] - 128.0, paint[2, 0] - 128.0
+    result[PAINT_PIXELS], result[PAINT_Y], result[PAINT_CB], result[PAINT_CR] = interior, luma, cb, cr
+    square = max(cb * cb + cr * cr, 1.0)
+    result[SLOPE_X] = (cb * paint[1, 1] + cr * paint[2, 1]) / square
+    result[SLOPE_Y] = (cb * paint[1, 2] + cr * paint[2, 2]) / square
 
 
 @njit(cache=True)

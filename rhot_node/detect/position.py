@@ -12,8 +12,8 @@ BLUR_VARIANCE = 0.2  # px^2: point spread of about 0.7 luma px and the 2x2 chrom
 BAND_HALF_WIDTH_MIN = 3.5  # px; a narrower band shows no curvature
 
 # Columns of the result row.
-X, Y, AREA, COV_XX, COV_XY, COV_YY, VAR_MAJOR, VAR_MINOR, AXIS_X, AXIS_Y, SAG, SAG_VARIANCE, FIT = range(13)
-RESULT_COLUMNS = 13
+X, Y, AREA, COV_XX, COV_XY, COV_YY, VAR_MAJOR, VAR_MINOR, AXIS_X, AXIS_Y, SAG, SAG_VARIANCE, FIT, SOFT = range(14)
+RESULT_COLUMNS = 14
 
 
 @njit(cache=True)
@@ -31,7 +31,7 @@ def centroid(region, coverage, gain, result):
         return False
     center_x = sum_x / area + x0
     center_y = sum_y / area + y0
-    m_xx = m_xy = m_yy = v_xx = v_xy = v_yy = 0.0
+    m_xx = m_xy = m_yy = v_xx = v_xy = v_yy = soft = 0.0
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
             dx = column - center_x
@@ -40,6 +40,7 @@ def centroid(region, coverage, gain, result):
             m_xx += a * dx * dx
             m_xy += a * dx * dy
             m_yy += a * dy * dy
+            soft += max(a * (1.0 - a), 0.0)
             g2 = gain[row, column] ** 2
             v_xx += g2 * dx * dx
             v_xy += g2 * dx * dy
@@ -48,6 +49,7 @@ def centroid(region, coverage, gain, result):
     result[COV_XX], result[COV_XY], result[COV_YY] = v_xx / area**2, v_xy / area**2, v_yy / area**2
     _principal_axes(m_xx / area, m_xy / area, m_yy / area, result)
     result[SAG] = result[SAG_VARIANCE] = result[FIT] = 0.0
+    result[SOFT] = soft / area
     return True
 
 

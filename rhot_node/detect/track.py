@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
 from rhot_node.detect import position as p
+from rhot_node.detect import stated as st
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
@@ -22,23 +23,12 @@ AREA_GAIN, RATE_GAIN = 0.4, 0.1  # per frame, of the expected log area and its t
 RATE_MAX = 0.08  # of log area per frame: 2 m/s of approach at 1 m, or a finger bending fast, at 40 frames/s
 HIDDEN_DECAY = 0.99  # per frame: what looks hidden for long is believed to be that small
 PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
-STEADY_AREA = 0.04  # relative change against the expectation beyond which the covariance covers what hiding,
-# uncovering or joining that much would do
 LITTER_AREA, LITTER_LEVEL = 0.25, 0.75  # of what is expected: less of both at once is no paint
 SLIVER_AREA = 0.15  # of the expected area: too little to be believed without the gate of a search
 JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
-FLOOR_VARIANCE = 4e-4  # px^2: sampling and shading leave about 0.02 px
-OUTLINE_FLOOR_VARIANCE = 1.5e-4  # px^2: of a fitted outline
-SOFT_FLOOR_VARIANCE = 0.01  # px^2: of a soft centroid, which shading and surroundings draw
-AROUND_VARIANCE = 0.09  # px^2 per squared contrast that the surroundings vary by, which they may do right beside it
-BAND_FLOOR_VARIANCE = 3e-3  # px^2: the fit of a band's curvature magnifies them
-SMALL_AREA, SMALL_VARIANCE = 22.0, 0.01  # chroma px^2, px^2: too few inner pixels to see the shading
-NOISE_INFLATION = 1.2  # paint and surroundings are themselves means of few noisy pixels
+SAG_STALE, SAG_HIDDEN = 0.15, 0.5  # of a band's last sag: what it may be off by, whole and partly hidden
 MARGIN = 5.0  # chroma px around a resting marker
-
-CHROMA_TO_LUMA = 2.0
-SITING = 0.5  # chroma (x, y) lies at luma 2 (x, y) + 0.5
 
 
 # Columns of a track's state; chroma pixels. VX, VY: px per frame. AREA: expected in the next frame; RATE: the trend of
@@ -124,11 +114,17 @@ class Track:
         ratio = row[p.AREA] / self.area if known else 1.0
         extent = math.sqrt(12.0 * row[p.VAR_MAJOR])
         flags |= self._judge(row, ratio, known)
-        x, y = row[p.X], row[p.Y]
-        bias = self._plausible_bias(row, ratio, extent, flags)
+        width = st.edge_width(row[p.SOFT], row[p.AREA], row[p.VAR_MAJOR], row[p.VAR_MINOR])
+        limb_x, limb_y, limb = st.limb_shift(row[m.SLOPE_X], row[m.SLOPE_Y], row[p.AREA])
+        taken, left = st.LIMB_OF_SHAPE[self.shape]
+        taken *= st.limb_shows(width)
+        x, y = row[p.X] - taken * limb_x, row[p.Y] - taken * limb_y
+        bias = math.hypot(self._plausible_bias(row, ratio, extent, width, flags), st.smear_bias(width),
+                          left * limb)
         if self.shape == "band" and not row[p.FIT]:
             x, y = x - self.sag_x, y - self.sag_y
-            bias = math.hypot(bias, 0.5 * math.hypot(self.sag_x, self.sag_y) if self.fitted else 0.3 * extent)
+            stale = SAG_STALE if not flags & MarkerFlag.PARTIAL else SAG_HIDDEN
+            bias = math.hypot(bias, stale * math.hypot(self.sag_x, self.sag_y) if self.fitted else 0.3 * extent)
         self._update(row, x, y, extent, ratio, known, flags)
         return _observation(index, row, x, y, bias, noise, ratio, flags)
 
@@ -144,10 +140,13 @@ class Track:
             flags |= MarkerFlag.AMBIGUOUS
         return flags
 
-    def _plausible_bias(self, row: Row, ratio: float, extent: float, flags: MarkerFlag) -> float:
+    def _plausible_bias(self, row: Row, ratio: float, extent: float, width: float, flags: MarkerFlag) -> float:
         """Standard deviation, chroma px, of how far what is hidden or mistaken may have drawn the centroid."""
         whole = max(extent, self.extent)
-        bias = hidden_bias(ratio, whole)
+        if row[p.FIT] and not flags & MarkerFlag.PARTIAL:  # a band's rims are those of a whole one, and its ends across are there
+            bias = st.hidden_bias(math.sqrt(ratio), math.sqrt(12.0 * row[p.VAR_MINOR]), row[p.AREA], width)
+        else:
+            bias = st.hidden_bias(ratio, whole, row[p.AREA], width)
         if flags & MarkerFlag.PARTIAL:
             bias = max(bias, 0.05 * whole)
         if flags & MarkerFlag.EDGE:
@@ -192,37 +191,13 @@ def take(state, x, y, area, extent, level, hidden):
     state[ALIVE], state[MISSED] = 1.0, 0.0
 
 
-@njit(cache=True)
-def hidden_bias(ratio, whole):
-    """Standard deviation, chroma px, of how far hiding or uncovering may have drawn the centroid of a marker.
-
-    `ratio`: of its area to what was expected; `whole`: its length.
-    """
-    change = 1.0 - min(ratio, 1.0 / ratio)
-    return 0.5 * change * whole if change > STEADY_AREA else 0.0
-
-
-@njit(cache=True)
-def luma_values(x, y, area, cov_xx, cov_xy, cov_yy, floor, bias, level, noise, out):
-    """Write x, y, diameter, the covariance (xx, xy, yy) and the quality of an observation, luma px.
-
-    Given in chroma px, the covariance per unit variance of the noise; `floor`, luma px^2, is what sampling leaves.
-    """
-    scale = CHROMA_TO_LUMA**2 * NOISE_INFLATION * noise**2
-    if area < SMALL_AREA:
-        floor += SMALL_VARIANCE
-    widened = floor + (CHROMA_TO_LUMA * bias) ** 2
-    out[0], out[1] = CHROMA_TO_LUMA * x + SITING, CHROMA_TO_LUMA * y + SITING
-    out[2] = CHROMA_TO_LUMA * math.sqrt(4.0 * area / math.pi)
-    out[3], out[4], out[5] = scale * cov_xx + widened, scale * cov_xy, scale * cov_yy + widened
-    out[6] = min(1.0, level / (15.0 * noise)) * min(1.0, area / 12.0)
-
-
 def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: float, ratio: float,
                  flags: MarkerFlag) -> MarkerObservation:
     out = np.empty(7)
-    floor = BAND_FLOOR_VARIANCE if row[p.FIT] else FLOOR_VARIANCE
-    luma_values(x, y, row[p.AREA], row[p.COV_XX], row[p.COV_XY], row[p.COV_YY], floor, bias, row[m.LEVEL], noise, out)
+    st.luma_values(x, y, row[p.AREA], row[p.COV_XX], row[p.COV_XY], row[p.COV_YY], st.FLOOR_VARIANCE, bias,
+                   row[m.LEVEL], noise, out)
+    if row[p.FIT]:
+        st.widen_band(row[p.AXIS_X], row[p.AXIS_Y], math.sqrt(12.0 * row[p.VAR_MAJOR]), out)
     x, y, diameter, cov_xx, cov_xy, cov_yy, quality = out.tolist()
     if flags & MarkerFlag.PARTIAL:
         quality *= min(ratio, 0.8)

@@ -27,7 +27,7 @@ def measured(image: YuvImage, inside: NDArray[np.bool_]) -> tuple[Array, Array, 
     height, width = inside.shape
     cover, gain = np.zeros(inside.shape, dtype=np.float32), np.zeros(inside.shape, dtype=np.float32)
     c.unmix(image.y, image.u, image.v, region, 80.0, kind, np.zeros((height, width, 3), dtype=np.float32),
-            np.zeros((height + 1, width + 1, c.SUM_COLUMNS)), cover, gain)
+            np.zeros((height + 1, width + 1, c.SUM_COLUMNS)), cover, gain, np.empty((3, 3)))
     return cover.astype(np.float64), gain.astype(np.float64), kind
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tracemalloc
 
+import msgspec
 import numpy as np
 import pytest
 from marker_rendering import SKIN, Canvas, Rgb, disc
@@ -33,7 +34,7 @@ def tips(shift: tuple[float, float] = (0.0, 0.0)) -> Canvas:
 
 def single(name: str, x: float, y: float, edge: bool = False) -> tuple[FastDetector, Canvas]:
     """A disc of 20 px on grey, or across the edge of skin and desk."""
-    marker = RHOT6.markers[RHOT6.ids.index(name)]
+    marker = msgspec.structs.replace(RHOT6.markers[RHOT6.ids.index(name)], shape="disc")
     canvas = Canvas(112, 96, (142, 104, 70) if edge else GREY)
     if edge:
         canvas.paint(lambda px, py: px + 0.0 * py < 50.0, SKIN, (0, 48), 120)
