@@ -26,7 +26,8 @@ def model() -> HandModel:
 
 
 def test_the_named_motions_are_there() -> None:
-    assert {"still", "rest", "wave", "grasp", "pinch", "point", "spread", "fast", "sweep", "cross"} <= set(motion_names())
+    expected = {"still", "rest", "wave", "grasp", "pinch", "point", "spread", "fast", "sweep", "cross"}
+    assert expected <= set(motion_names())
 
 
 @pytest.mark.parametrize("name", motion_names())

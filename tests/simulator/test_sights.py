@@ -99,6 +99,6 @@ def test_a_board_cannot_be_sketched() -> None:
 
 def _offsets(taken: Shot, camera: int, noise: SightNoise) -> np.ndarray:
     """(F, 5, 2) px of the fingertips: with noise, less without."""
-    noisy, exact = (np.array([[(marker.x, marker.y) for marker in frame[:5]] for frame in sights(taken, camera, one)[0]])
-                    for one in (noise, EXACT))
-    return noisy - exact
+    def places(one: SightNoise) -> np.ndarray:
+        return np.array([[(marker.x, marker.y) for marker in frame[:5]] for frame in sights(taken, camera, one)[0]])
+    return places(noise) - places(EXACT)
