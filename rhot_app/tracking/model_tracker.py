@@ -49,7 +49,7 @@ class ModelTracker:
     def __init__(self, rig: Rig) -> None:
         self._rig, self._wearing = compile_rig(rig), compile_wearing(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
-        self._hand = HandFilter(markers, self._wearing.habits, self._wearing.limits,
+        self._hand = HandFilter(self._wearing.worn, self._wearing.habits, self._wearing.limits,
                                 self._wearing.bias_variance, float_scale=rig.tracker.float_scale)
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)

@@ -20,9 +20,11 @@ from rhot_app.tracking.kalman.estimate import (
     displace,
     empty_estimate,
 )
+from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import contract, solve
 from rhot_app.tracking.kalman.limits import project
-from rhot_app.tracking.kalman.motion import MOST, Habits, forget, predict
+from rhot_app.tracking.kalman.markers import Worn, place_markers
+from rhot_app.tracking.kalman.motion import MOST, Habits, predict
 from rhot_app.tracking.kalman.rows import ResidualBlock, clear, empty_rows
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
 
@@ -57,14 +59,15 @@ class Outcome:
 class HandFilter:
     """An iterated extended Kalman filter on the hand's pose, velocity, size and markers' biases.
 
-    `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance` (M,) m^2.
+    `worn`: the markers; `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance` (M,) m^2.
     """
 
-    def __init__(self, markers: int, habits: Habits, limits: Array, bias_variance: Array, *,
+    def __init__(self, worn: Worn, habits: Habits, limits: Array, bias_variance: Array, *,
                  float_scale: bool = False) -> None:
+        markers = len(worn.part)
         size = BIAS + 3 * markers
         self.estimate = empty_estimate(markers)
-        self._habits, self._limits, self._bias_variance = habits, limits, bias_variance
+        self._worn, self._habits, self._limits, self._bias_variance = worn, habits, limits, bias_variance
         self._float_scale = float_scale
         self._trial = empty_estimate(markers)
         self._rows = empty_rows(ROWS_MAX, size)
@@ -87,7 +90,7 @@ class HandFilter:
             np.sqrt(START_AGITATION)[GROUP_OF], [SCALE_SD if self._float_scale else 0.0],
             np.repeat(np.sqrt(self._bias_variance), 3)])
         np.fill_diagonal(covariance, diagonal**2)
-        covariance[ANGLES:POSE, ANGLES:POSE] = np.linalg.inv(self._habits.rows.T @ self._habits.rows)
+        covariance[ANGLES:POSE, ANGLES:POSE] = self._habits.usual[ANGLES:, ANGLES:]
 
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""
@@ -107,7 +110,7 @@ class HandFilter:
             clear(rows)
             for block in blocks:
                 block.linearise(trial, rows)
-        _conclude(estimate, trial, self._gains, count, dt, self._habits, self._limits, step)
+        _conclude(estimate, trial, self._gains, count, dt, self._worn, self._habits, self._limits, step)
         observations = int(rows.count[1])
         return Outcome(self._believed[:observations], rows.source[:observations])
 
@@ -127,12 +130,14 @@ def _improve(estimate: Estimate, rows: object, believed: Mask, widening: Array, 
 
 
 @njit(cache=True)
-def _conclude(estimate: Estimate, trial: Estimate, gains: Array, count: int, dt: float, habits: Habits, limits: Array,
+def _conclude(estimate: Estimate, trial: Estimate, gains: Array, count: int, dt: float, worn: Worn, habits: Habits, limits: Array,
               step: Array) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
     note_trend(estimate, step, gains, count)
     contract(estimate.covariance, gains, count)
     copy_mean(trial, estimate)
-    forget(estimate, dt, habits, step)
+    points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
+    place_markers(worn, estimate, points, jacobian)
+    forget(estimate, dt, habits, jacobian, step)
     project(estimate.angles, estimate.velocity, estimate.covariance, gains, 0, limits, step)
     displace(estimate, step, estimate)

@@ -1,15 +1,10 @@
-"""How a hand moves between two observations, and what is forgotten meanwhile.
+"""How a hand moves between two observations.
 
 Accelerations are nearly constant over a frame and forgotten within a tenth of a second (Singer 1970): muscles change
 their pull smoothly. This matters with cameras that take turns. One camera alone does not see depth; were any
 acceleration possible from one frame to the next, a wrong depth would pass for a hand that trembles sideways in time
 with the cameras. How strong accelerations are differs between the palm's translation, its rotation and each finger,
 and with time (`surprise.py`).
-
-Two ways of forgetting keep the covariance honest where nothing is seen. Velocities decay to rest. What is known of the
-joint angles fades exponentially towards the natural pose, in every direction of the state at its own time (stabilised
-forgetting, Kulhavy and Zarrop 1993): a joint that markers show loses nothing that the next frame does not bring back,
-one that none shows becomes as uncertain as the natural pose says, no more and no less, however long it is out of sight.
 """
 
 from __future__ import annotations
@@ -29,7 +24,6 @@ from rhot_app.tracking.kalman.estimate import (
     GROUPS,
     POSE,
     ROTATION,
-    SCALE,
     VELOCITY,
     Estimate,
 )
@@ -60,25 +54,20 @@ CALM_S = 0.1
 VELOCITY_S = np.array([1.0] * 6 + [0.3] * 21)
 """(27,) Velocities decay with these time constants: what swings a finger is soon used up."""
 
-FORGET_S = 2.0
-"""What is known of a pose fades with this time constant; see above."""
-
 BIAS_S = 3.0
 """Markers' biases change with this time constant: they turn with the hand and its light."""
-
-_WIDEST = 0.7
-"""Standard deviation, m and rad, beyond which a palm's place is not worth knowing."""
-
 
 class Habits(NamedTuple):
     """What is known of a hand that is not seen.
 
-    `rows` (K, 21) of factors and `values` (K,): beliefs about the angles, in standard deviations. `together` (27, 27):
-    how the pose's numbers accelerate together, 1 for the liveliest of a group: fingers bend all their joints at once.
+    `rows` (K, 21) of factors and `values` (K,): beliefs about the angles, in standard deviations; `usual` (27, 27): the
+    covariance of the pose that follows from them, with a palm that may be anywhere. `together` (27, 27): how the pose's
+    numbers accelerate together, 1 for the liveliest of a group: fingers bend all their joints at once.
     """
 
     rows: Array
     values: Array
+    usual: Array
     together: Array
 
 
@@ -208,49 +197,3 @@ def _fade_biases(estimate: Estimate, dt: float, variance: Array) -> None:
             covariance[i, j] *= fade
             covariance[j, i] *= fade
         covariance[i, i] += (1.0 - fade * fade) * variance[marker]
-
-
-@njit(cache=True)
-def forget(estimate: Estimate, dt: float, habits: Habits, step: Array) -> None:
-    """Let knowledge of the pose fade for `dt` s, the angles towards the prior. `step` (N,) is what the mean moves by.
-
-    The information of the pose shrinks by exp(-dt / FORGET_S) and that of the prior comes in for the difference; each
-    of its rows is one scalar observation, exact because it is linear.
-    """
-    covariance = estimate.covariance
-    size = covariance.shape[0]
-    grow = math.exp(0.5 * dt / FORGET_S)
-    for i in range(POSE):
-        for j in range(size):
-            covariance[i, j] *= grow
-            covariance[j, i] *= grow
-    for i in range(ANGLES):
-        if covariance[i, i] > _WIDEST * _WIDEST:
-            shrink = _WIDEST / math.sqrt(covariance[i, i])
-            for j in range(size):
-                covariance[i, j] *= shrink
-                covariance[j, i] *= shrink
-    noise = 1.0 / -math.expm1(-dt / FORGET_S)
-    step[:] = 0.0
-    gain = np.empty(size)
-    for k in range(habits.rows.shape[0]):
-        row = habits.rows[k]
-        gain[:] = 0.0
-        expected = 0.0
-        for a in range(21):
-            if row[a] != 0.0:
-                expected += row[a] * (estimate.angles[a] + step[ANGLES + a])
-                for j in range(size):
-                    gain[j] += row[a] * covariance[ANGLES + a, j]
-        variance = noise
-        for a in range(21):
-            if row[a] != 0.0:
-                variance += row[a] * gain[ANGLES + a]
-        pull = (habits.values[k] - expected) / variance
-        for i in range(size):
-            step[i] += gain[i] * pull
-            factor = gain[i] / variance
-            for j in range(size):
-                covariance[i, j] -= factor * gain[j]
-    if estimate.covariance[SCALE, SCALE] <= 0.0:
-        step[SCALE] = 0.0

@@ -15,6 +15,7 @@ from rhot_app.hand.skeleton import ANGLE_SLICES
 from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
+from rhot_app.tracking.kalman.forgetting import WIDEST
 from rhot_app.tracking.kalman.markers import Cameras, Worn
 from rhot_app.tracking.kalman.motion import Habits
 from rhot_app.tracking.rig_arrays import band_axes
@@ -84,7 +85,10 @@ def habits_of(model: HandModel, variant: VariantName) -> Habits:
     basis = chosen.basis
     bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
     bound = bound[np.abs(bound).max(axis=1) > 1e-9]
-    return Habits(np.vstack([rows, bound]), np.concatenate([values, bound @ chosen.mean]), _together(model))
+    rows, values = np.vstack([rows, bound]), np.concatenate([values, bound @ chosen.mean])
+    usual = np.diag([WIDEST**2] * POSE)
+    usual[ANGLES:, ANGLES:] = np.linalg.inv(rows.T @ rows)
+    return Habits(rows, values, usual, _together(model))
 
 
 def _together(model: HandModel) -> Array:
