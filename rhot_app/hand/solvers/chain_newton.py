@@ -80,7 +80,9 @@ def _descend(joints: Array, base: Array, target: Array, lengths: Array, shapes: 
     jacobian, error = np.empty((3, size)), np.empty(3)
     matrix, right, step = np.empty((size, size)), np.empty(size), np.empty(size)
     low, high, before = np.empty(size), np.empty(size), np.empty((bones, 2))
-    reach = lengths.sum()
+    reach = 0.0
+    for k in range(bones):
+        reach += lengths[k]
     missed, damping, moving, taken = distance(joints[bones], target), 1e-3, True, 0
     while moving and missed > tolerance and taken < STEPS:
         taken += 1

@@ -19,6 +19,7 @@ from rhot_app.hand.finger_chain import GAIN, PATIENCE, distance
 from rhot_app.hand.ik_status import EXHAUSTED, LIMITED, REACHED, STALLED, UNREACHABLE, Status, within_reach
 from rhot_app.hand.solvers.chain_newton import finish_arrays, lay_out
 from rhot_app.hand.solvers.joint_shapes import BOX, CONE, HINGE, Shape, clamp_joint, direction_angles, excess
+from rhot_app.hand.solvers.problem import assign
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -103,12 +104,13 @@ def solve_limited_arrays(joints: Array, base: Array, target: Array, lengths: Arr
                          bounds: Array, angles: Array, frames: Array, tolerance: float,
                          max_iterations: int) -> tuple[int, int]:
     """FABRIK in place on `joints` (n+1, 3), `angles` (n, 2) and `frames` (n, 3, 3); returns iterations and status."""
-    bones = lengths.shape[0]
+    bones, reach, aim = lengths.shape[0], tolerance, np.empty(3)
+    for k in range(bones):
+        reach += lengths[k]
     away, missed, idle, iteration = distance(joints[0], target), distance(joints[bones], target), 0, 0
-    aim = np.empty(3)
-    if away > lengths.sum() + tolerance:
+    if away > reach:
         for k in range(1, bones + 1):
-            joints[k] = target
+            assign(target, joints[k])
         read_angles(joints, base, lengths, shapes, bounds, angles, frames)
         return 0, UNREACHABLE
     while missed > tolerance and idle < PATIENCE and iteration < max_iterations:
@@ -151,8 +153,7 @@ def _aim_plane(joints: Array, base: Array, target: Array, lengths: Array, shapes
     turning, last = lengths.shape[0] - 1, lengths.shape[0] - 1
     while turning >= 0 and shapes[turning] == HINGE:
         turning -= 1
-    for i in range(3):
-        aim[i] = target[i]
+    assign(target, aim)
     if turning == last:
         return
     if turning >= 0:
