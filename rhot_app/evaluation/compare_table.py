@@ -24,7 +24,8 @@ COLUMNS = (
     Column("tip_visible_mm", "tips visible mm", ".2f"), Column("tip_measured_mm", "tips measured mm", ".2f"),
     Column("tip_display_mm", "tips displayed mm", ".2f"), Column("marker_mm", "markers mm", ".2f"),
     Column("angles_deg", "angles deg", ".1f"), Column("palm_turn_deg", "palm turn deg", ".1f"),
-    Column("swaps", "swaps", ".0f", compared=False), Column("states_per_s", "states/s", ".0f", compared=False),
+    Column("swaps", "swaps", ".0f", compared=False), Column("measured_share", "measured", ".3f", compared=False),
+    Column("states_per_s", "states/s", ".0f", compared=False),
 )
 _CELL = 7
 

@@ -1,0 +1,87 @@
+"""Trials of the classic tracker on a short take without pictures: each figure is there and means what it says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot_app.evaluation import scenarios
+from rhot_app.evaluation.takes import Order, Take, take
+from rhot_app.evaluation.track import rig_with
+from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
+from rhot_app.simulator.scene import make_scene, twin_defaults
+
+CLASSIC = TrackerSettings(kind="classic")
+
+
+def sketch(folder: Path, motion: str, seconds: float) -> Take:
+    return take(Order(make_scene(twin_defaults(), 1), motion, seconds, sketched=True), folder)
+
+
+@pytest.fixture(scope="module")
+def grasp(tmp_path_factory: pytest.TempPathFactory) -> Take:
+    return sketch(tmp_path_factory.mktemp("takes"), "grasp", 5.0)
+
+
+@pytest.fixture(scope="module")
+def rig(grasp: Take) -> Rig:
+    return rig_with(grasp.rig, CLASSIC)
+
+
+def test_a_camera_that_is_blind_makes_fingertips_worse(grasp: Take, rig: Rig) -> None:
+    good = scenarios.plain(grasp, rig)
+    assert good["tips_mm"] is not None and good["tips_mm"] < 1.0 and good["known_share"] == 1.0
+    for says_so in (True, False):
+        bad = scenarios.one_camera_blind(grasp, rig, says_so=says_so)
+        assert bad["tips_mm"] is not None and bad["tips_max_mm"] is not None
+        assert bad["tips_mm"] > 5.0 * good["tips_mm"] and bad["tips_max_mm"] > bad["tips_mm"]
+
+
+def test_hidden_and_mixed_up_markers_make_fingertips_worse(grasp: Take, rig: Rig) -> None:
+    good = scenarios.plain(grasp, rig)["tips_mm"]
+    for bad in (scenarios.markers_hidden(grasp, rig, share=0.3, together=True),
+                scenarios.names_mixed_up(grasp, rig, pair=(1, 2), share=0.3)):
+        assert good is not None and bad["tips_mm"] is not None and bad["tips_mm"] > 2.0 * good
+        assert bad["seconds"] == pytest.approx(4.0, abs=0.1)
+
+
+def test_a_tracker_that_states_nothing_of_the_palm_is_not_quoted(grasp: Take, rig: Rig) -> None:
+    figures = scenarios.wrist_alone(grasp, rig)
+    assert figures["stated_deg"] is None and figures["palm_turn_deg"] is not None and figures["palm_turn_deg"] > 3.0
+
+
+def test_a_calm_filter_is_late_and_a_prompt_one_is_not(grasp: Take, rig: Rig) -> None:
+    calm = OneEuroSettings(min_cutoff_hz=1.0, beta=0.1, derivative_cutoff_hz=15.0)
+    slow = scenarios.lagging(grasp, msgspec.structs.replace(rig, filters=FilterSettings(pixel=calm, position=calm)),
+                             speeding_up=False)["lag_ms"]
+    quick = scenarios.lagging(grasp, rig, speeding_up=False)["lag_ms"]
+    assert slow is not None and quick is not None and slow > 20.0 and abs(quick) < 2.0
+
+
+def test_a_hand_is_found_soon_wherever_the_log_begins(grasp: Take, rig: Rig) -> None:
+    found = scenarios.starting(grasp, rig, (0.0, 2.0))
+    assert all(after is not None and 0.0 < after < 0.2 for after in found)
+
+
+def test_a_tracker_that_does_not_estimate_the_size_never_finds_it(grasp: Take, rig: Rig) -> None:
+    figures = scenarios.growing(grasp, rig, 1.0 / 1.1)
+    assert figures["error_at_1s_percent"] == pytest.approx(10.0) and figures["within_2_percent_after_s"] is None
+
+
+def test_computing_says_how_long_and_how_much(tmp_path: Path, rig: Rig) -> None:
+    short = sketch(tmp_path, "rest", 1.0)
+    figures = scenarios.computing(short, rig, minutes=0.1)
+    assert figures["datagrams"] == 6 * 80
+    assert all((value := figures[key]) is not None and value > 0.0 for key in ("median_us", "cpu_median_us"))
+    assert figures["p99_us"] is not None and figures["median_us"] is not None
+    assert figures["p99_us"] >= figures["median_us"] and np.isfinite(figures["objects_growth"] or 0.0)
+
+
+def test_figures_are_gathered_each_in_its_way() -> None:
+    keys = ("tips_mm", "tips_max_mm", "swaps", "lag_ms", "error_at_1s_percent", "x_after_s")
+    runs = [dict(zip(keys, values, strict=True)) for values in ((3.0, 9.0, 1.0, -1.0, -5.0, 3.0),
+                                                                (4.0, 7.0, 2.0, 3.0, 4.0, None))]
+    assert list(scenarios.gather(runs).values()) == [pytest.approx(np.sqrt(12.5)), 9.0, 3.0, 1.0, -5.0, None]
