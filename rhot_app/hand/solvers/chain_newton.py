@@ -22,7 +22,7 @@ STEP_MAX = 0.8
 ROUNDS = 10
 """Dampings tried for one step."""
 
-RESTARTS = (0.4, 0.15, 0.7, 0.02)
+RESTARTS = (0.4, 0.15, 0.7, 0.02, 0.95)
 """Parts of the flexions' ranges, from which to begin again."""
 
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 NEWTON, LEVENBERG = 4, 5
 """With inverse.DAMPED the descents to choose from."""
 
-RESTARTS = (0.5, 0.5, 0.25, 0.05)
+RESTARTS = (0.5, 0.5, 0.25, 0.05, 0.95)
 """Parts of the joints' ranges from which to begin again; the first gives way to the closed form."""
 
 
@@ -27,7 +27,7 @@ def solve_exactly(rule: int, angles: Array, lengths: Array, limits: Array, targe
     """One finger, in place on `angles` (4,) or (5,); returns residual, m, iterations in all, and status.
 
     `rule`: DAMPED, NEWTON or LEVENBERG. What stops short of a target within the finger's length begins again: from
-    the closed form of the coupled finger, the middle of the range, and towards its stretched end. The nearest end of
+    the closed form of the coupled finger, the middle of the range, and near both its ends. The nearest end of
     all is the result.
     """
     trial = np.empty(angles.shape[0])
