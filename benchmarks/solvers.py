@@ -42,8 +42,9 @@ from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint
 from rhot_app.hand.solvers.knuckles import shape_knuckles
 from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
 from rhot_app.hand.solvers.methods import COARSE, EFFORT, Method, solve, solve_arrays
-from rhot_app.hand.solvers.neighbours import NEIGHBOURS, share_out, solve_neighbours
+from rhot_app.hand.solvers.neighbours import differences_of, share_out, solve_neighbours
 from rhot_app.hand.solvers.problem import Problem, make_problem
+from rhot_app.hand.variants import inter_finger
 from rhot_node.files import resource_path
 
 Array = NDArray[Any]
@@ -174,16 +175,17 @@ def show(name: str, of: dict[str, dict[str, float]]) -> None:
 
 
 def neighbours(model: HandModel, hands: int) -> dict[str, float]:
-    """Hands that keep the bounds between neighbouring fingers, often at one of them, solved with these bounds."""
+    """Hands whose knuckles stay behind their neighbours' by no more than 25 degrees, solved with that bound."""
     rng, times, reached = np.random.default_rng(3), [], []
-    bounds = np.array(NEIGHBOURS, dtype=np.float64)
+    differences = differences_of(*inter_finger(np.radians(25.0)))
+    bounds = np.array(differences)
     for _ in range(hands):
         angles = rng.uniform(*model.limits.T)
         share_out(angles, model.limits.copy(), bounds)
         targets = forward(model, HandPose(np.eye(4), angles)).marker_centres
         problem = make_problem(model, neutral_pose(), targets)
         before = time.perf_counter_ns()
-        solution = solve_neighbours(Method.LEVENBERG, problem)
+        solution = solve_neighbours(Method.LEVENBERG, problem, differences=differences)
         times.append(1e-3 * (time.perf_counter_ns() - before))
         reached.append(solution.statuses == Status.REACHED)
     return {"median_us": float(np.median(times)), "p99_us": float(np.percentile(times, 99)),

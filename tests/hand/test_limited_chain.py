@@ -18,8 +18,16 @@ from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, excess, slice
 from rhot_app.hand.solvers.knuckles import shape_knuckles
 from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
 from rhot_app.hand.solvers.methods import Method, solve
-from rhot_app.hand.solvers.neighbours import NEIGHBOURS, Difference, share_out, solve_neighbours, violation
+from rhot_app.hand.solvers.neighbours import (
+    NEIGHBOURS,
+    Difference,
+    differences_of,
+    share_out,
+    solve_neighbours,
+    violation,
+)
 from rhot_app.hand.solvers.problem import make_problem
+from rhot_app.hand.variants import inter_finger
 
 BOUNDS = np.radians([[-20.0, 35.0], [-30.0, 80.0]])
 ROUND = (Shape.CONE, Shape.PARABOLA)
@@ -179,7 +187,8 @@ def test_knuckle_whose_range_leaves_out_the_straight_pose_is_refused(right_hand)
 
 @pytest.mark.parametrize("method", [Method.LEVENBERG, Method.FABRIK])
 def test_neighbours_bend_one_another(right_hand, method):
-    rng, table = np.random.default_rng(6), np.array(NEIGHBOURS, dtype=float)
+    rng, tight = np.random.default_rng(6), differences_of(*inter_finger(np.radians(25.0)))
+    table = np.array(tight)
     broken, reached = 0, []
     for legal in (True, False) * 15:
         angles = random_pose(right_hand, rng, np.eye(4)).angles
@@ -187,13 +196,22 @@ def test_neighbours_bend_one_another(right_hand, method):
             assert share_out(angles, right_hand.limits.copy(), table)
         targets = forward(right_hand, HandPose(np.eye(4), angles)).marker_centres
         problem = make_problem(right_hand, neutral_pose(), targets)
-        broken += violation(solve(method, problem).angles) > 0.0
-        solution = solve_neighbours(method, problem)
-        assert violation(solution.angles) <= np.radians(0.1)
+        broken += violation(solve(method, problem).angles, tight) > 0.0
+        solution = solve_neighbours(method, problem, differences=tight)
+        assert violation(solution.angles, tight) <= np.radians(0.1)
         assert (solution.angles >= right_hand.limits[:, 0]).all() and (solution.angles <= right_hand.limits[:, 1]).all()
         if legal:
             reached.append((solution.statuses == Status.REACHED).all())
     assert broken > 5 and np.mean(reached) > 0.9
+
+
+def test_bent_index_finger_bends_the_middle_one(right_hand):
+    angles = neutral_pose().angles.copy()
+    angles[[6, 10]] = np.radians([85.0, 5.0])
+    problem = make_problem(right_hand, neutral_pose(), forward(right_hand, HandPose(np.eye(4), angles)).marker_centres)
+    assert violation(angles) == pytest.approx(np.radians(15.0)) and len(NEIGHBOURS) == 4
+    solution = solve_neighbours(Method.LEVENBERG, problem)
+    assert solution.angles[6] - solution.angles[10] <= np.radians(65.0) + 1e-9
 
 
 def test_neighbours_that_limits_tear_apart_are_refused(right_hand):

@@ -17,10 +17,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.linear import solve_in_box
-from rhot_app.hand.skeleton import ANGLES
 from rhot_app.hand.solvers.methods import Effort, Method, solve
 from rhot_app.hand.solvers.newton import STEP_MAX
 from rhot_app.hand.solvers.problem import Problem, Solution, assign, linearise
+from rhot_app.hand.variants import inter_finger
 
 Array = NDArray[np.float64]
 
@@ -34,15 +34,14 @@ class Difference(NamedTuple):
     high: float
 
 
-def _knuckles(first: str, second: str, low_deg: float, high_deg: float) -> Difference:
-    return Difference(ANGLES.index(f"{first}_mcp_flexion"), ANGLES.index(f"{second}_mcp_flexion"),
-                    math.radians(low_deg), math.radians(high_deg))
+def differences_of(rows: Array, bounds: Array) -> tuple[Difference, ...]:
+    """The bounds of `variants.inter_finger`, rows @ angles <= bounds, each row one angle less another."""
+    return tuple(Difference(int(np.argmax(row)), int(np.argmin(row)), -math.inf, float(bound))
+                 for row, bound in zip(rows, bounds, strict=True))
 
 
-NEIGHBOURS: tuple[Difference, ...] = (_knuckles("index", "middle", -54.0, 25.0),
-                                      _knuckles("middle", "ring", -45.0, 20.0),
-                                      _knuckles("ring", "little", -44.0, 48.0))
-"""How far neighbouring knuckles follow each other (Lee and Kunii 1995)."""
+NEIGHBOURS = differences_of(*inter_finger())
+"""How far neighbouring knuckles follow each other, as all of this room has it."""
 
 STEPS = 40
 WEIGHT = 2.5e-3
