@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
 from rhot_node.detect.candidates import Blobs, ranked_by, request_of, worth_of
+from rhot_node.detect.company import Company
 from rhot_node.detect.follow import learn_noise, noise_level
 from rhot_node.detect.followed import Followed
 from rhot_node.detect.gate import ColourGate, Labels
@@ -29,6 +30,7 @@ NOISE_START, NOISE_START_BLOCKS = 1.5, 20.0  # grey levels of chroma noise, unti
 SUDDENLY = 2  # markers fewer in plain view than in the last frame: was a lamp switched?
 GUESS_EVERY = 20  # frames without all markers in plain view until the light is guessed anew
 STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
+LARGEST = 0.12  # of the picture: no worn marker is nearer than that
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
 PALE = 0.5  # of the least chroma that a search takes for paint: a tracked marker in shade has more
@@ -60,19 +62,23 @@ class FastDetector:
         self._followed = Followed([marker.shape for marker in self._markers], self._states, self._noise_variance)
         self._precise = precise
         self._until_glance = 0
+        self._company = Company(self._markers)
+        self._sure_warmth: float | None = None  # the light before a guess that no markers in company have confirmed
+        self._unsure = 0  # frames since that guess
         self._paint = np.zeros((len(self._markers), 3))
         self._paint_pixels = np.zeros(len(self._markers))
         self.reset()
 
     def reset(self) -> None:
         """Forget all tracks and the light: the next frame is searched as a whole."""
-        self._forget_tracks()
-        self._light.warmth = 0.0
+        self.lose_all()
+        self._light.warmth, self._sure_warmth = 0.0, None
         self._fresh = True
 
     def lose_all(self) -> None:
         """Forget all tracks, but not the light: the next frame is searched as a whole."""
         self._forget_tracks()
+        self._company.forget()
 
     def paint_colours(self) -> NDArray[np.float64]:
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was found last."""
@@ -102,14 +108,28 @@ class FastDetector:
         else:
             self._followed.follow(image, self._precise)
             if self._followed.count == len(self._markers):
-                return self._glance(image)
+                seen = self._glance(image)
+                return seen if self._company.complete else self._company.judge(seen)
             seen = self._find(image)
             if self._light_in_doubt(seen):
                 seen = self._find_in_guessed_light(image, seen)
             if self._read_light(seen, STEADY) >= SWITCHED:  # somebody switched a lamp
                 seen = self._find_in_new_light(image)
         self._fresh, self._plain = False, len(self._plainly(seen))
+        seen = self._company.judge(seen)
+        self._doubt_light()
         return seen
+
+    def _doubt_light(self) -> None:
+        """Take a guessed light back when no markers in company have shown it to be right for long."""
+        if self._sure_warmth is None:
+            return
+        self._unsure += 1
+        if self._company.vouched >= MARKERS_LEAST:
+            self._sure_warmth = None
+        elif self._unsure >= GUESS_EVERY:
+            self._light.warmth, self._sure_warmth = self._sure_warmth, None
+            self._forget_tracks()
 
     def _find_at_first(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """Find the markers in a picture of which nothing is known: by the light of the calibration, if that shows all
@@ -155,6 +175,8 @@ class FastDetector:
             guessed = self._find_in_new_light(image)
             plain = self._plainly(guessed)
             if np.count_nonzero(self._light.strong(plain, self._paint[plain])) >= MARKERS_LEAST:
+                if self._sure_warmth is None:
+                    self._sure_warmth, self._unsure = known, 0
                 return guessed
             self._light.warmth = known
             seen = ()
@@ -291,9 +313,11 @@ class FastDetector:
         return bool(level < PALE * self._markers[index].chroma.magnitude_min)
 
     def _is_elsewhere(self, index: int, blob: Blobs, hand: Whereabouts | None) -> bool:
-        """Whether a blob is where the hand, which wears the marker, cannot reach."""
-        return (hand is not None and self._markers[index].role is not None
-                and hand.beyond(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA]))
+        """Whether a blob is where the hand, which wears the marker, cannot reach, or larger than anything it wears."""
+        if self._markers[index].role is None:
+            return False
+        return bool(blob[AREA] > LARGEST * self._scratch.mask.size
+                    or (hand is not None and hand.beyond(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA])))
 
     def _strays(self, found: dict[int, MarkerObservation]) -> list[int]:
         """Tracked markers that are none: too pale, or worn where no hand can reach from the others."""

@@ -143,7 +143,7 @@ class Track:
     def _plausible_bias(self, row: Row, ratio: float, extent: float, width: float, flags: MarkerFlag) -> float:
         """Standard deviation, chroma px, of how far what is hidden or mistaken may have drawn the centroid."""
         whole = max(extent, self.extent)
-        if row[p.FIT] and not flags & MarkerFlag.PARTIAL:  # a band's rims are those of a whole one, and its ends across are there
+        if row[p.FIT] and not flags & MarkerFlag.PARTIAL:  # a band's rims are those of a whole one
             bias = st.hidden_bias(math.sqrt(ratio), math.sqrt(12.0 * row[p.VAR_MINOR]), row[p.AREA], width)
         else:
             bias = st.hidden_bias(ratio, whole, row[p.AREA], width)
