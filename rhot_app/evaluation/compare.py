@@ -13,6 +13,7 @@ from rhot_app.evaluation.report import SETTLE_S
 from rhot_app.evaluation.takes import Order, Take, Told, take
 from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.project import TrackerSettings
+from rhot_app.simulator.node_log import CABLE, Network
 from rhot_app.simulator.scene import Scene, make_scene
 
 MOTIONS = ("rest", "wave", "grasp", "pinch", "fast")
@@ -66,10 +67,10 @@ class Comparison:
 
 
 def orders(scene: Scene, motions: Iterable[str], seeds: Iterable[int], seconds: float, *,
-           sketched: bool = False) -> list[Order]:
+           network: Network = CABLE, sketched: bool = False) -> list[Order]:
     """Every motion with every seed, in scenes like this one."""
     chosen = list(seeds)
-    return [Order(make_scene(scene.settings, seed), motion, seconds, sketched=sketched)
+    return [Order(make_scene(scene.settings, seed), motion, seconds, network, sketched)
             for motion in motions for seed in chosen]
 
 

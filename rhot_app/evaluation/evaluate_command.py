@@ -74,18 +74,21 @@ def _compare(args: argparse.Namespace) -> int:
     from rhot_app.evaluation.report import SETTLE_S
     from rhot_app.evaluation.takes import takes_folder
     from rhot_app.progress import ProgressLine
+    from rhot_app.simulator.node_log import Network
 
+    if args.frames is not None or args.detector != "fast":
+        raise SimulatorError("--compare films its own logs with the fast detector: leave out --frames and --detector.")
     names = args.trackers.split(",")
     unknown = [name for name in names if name not in TRACKERS]
     if unknown:
         raise SimulatorError(f"there is no tracker {unknown[0]!r}; --trackers takes some of {', '.join(TRACKERS)}.")
     seconds = 8.0 if args.seconds is None else args.seconds
-    if seconds <= SETTLE_S or args.seeds < 1:
-        raise SimulatorError(f"give more than {SETTLE_S:g} s to --seconds, and --seeds of 1 or more.")
+    if seconds <= SETTLE_S or args.seeds < 1 or not 0.0 <= args.loss < 1.0:
+        raise SimulatorError(f"--seconds is more than {SETTLE_S:g}, --seeds 1 or more, --loss from 0 to below 1.")
     motions = [*(MOTIONS if args.motions is None else args.motions.split(",")),
                *([] if args.recording is None else [args.recording])]
     wanted = orders(scene_of(args), motions, range(args.seed, args.seed + args.seeds), seconds,
-                    sketched=args.sketched)
+                    network=Network(loss=args.loss), sketched=args.sketched)
     folder = args.logs or takes_folder()
     result = compare(wanted, folder, {name: TRACKERS[name] for name in names},
                      lambda title: ProgressLine(f"filming {title}"))

@@ -7,7 +7,8 @@ not, goes through the door into it. Figures of several takes are put together by
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -43,11 +44,12 @@ def one_camera_blind(take: Take, rig: Rig, *, says_so: bool) -> Figures:
     records = (alter.changed(take.records(), alter.blind(node, *BLIND_S)) if says_so
                else alter.silent(take.records(), node, *BLIND_S))
     track = tracked(records, rig)
-    during = track.where((track.times_s >= BLIND_S[0]) & (track.times_s < BLIND_S[1])) if len(track.times_s) else track
+    during = track.where((track.times_s >= BLIND_S[0]) & (track.times_s < BLIND_S[1]))
     tips = distances(_off(during, take).tips)
     span_s = BLIND_S[1] - BLIND_S[0]
-    return {"tips_mm": _mm(rms(tips)), "tips_max_mm": _most_mm(tips), "known_share": float(np.isfinite(tips).mean())
-            if tips.size else 0.0, "states_per_s": len(during.times_s) / span_s}
+    return {"tips_mm": _mm(rms(tips)), "tips_max_mm": _most_mm(tips),
+            "known_share": float(np.isfinite(tips).mean()) if tips.size else 0.0,
+            "states_per_s": len(during.times_s) / span_s}
 
 
 def markers_hidden(take: Take, rig: Rig, *, share: float, together: bool) -> Figures:
@@ -170,7 +172,7 @@ class _Lap:
         self.resident = self.blocks = 0
         self._length = len(records)
 
-    def watch(self, records: alter.Iterator[Record]) -> alter.Iterator[Record]:
+    def watch(self, records: Iterable[Record]) -> Iterator[Record]:
         """The same records."""
         for number, record in enumerate(records):
             if number == self._length:
@@ -200,7 +202,7 @@ def _off(track: Track, take: Take) -> Deviations:
 
 def _seed(take: Take) -> int:
     """A number that differs from take to take."""
-    return int.from_bytes(take.folder.name.encode(), "big") % 2**32
+    return zlib.crc32(take.folder.name.encode())
 
 
 def _mm(value: float | None) -> float | None:

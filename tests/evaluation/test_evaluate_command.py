@@ -1,0 +1,33 @@
+"""`rhot evaluate --compare` on takes without pictures, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rhot_app.__main__ import main
+
+QUICK = ("evaluate", "--compare", "--sketched", "--trackers", "classic", "--motions", "rest,pinch", "--seeds", "2",
+         "--seconds", "1.6")
+
+
+def test_a_comparison_prints_tables_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*QUICK, "--logs", str(tmp_path / "logs")]) == 0
+    table, honesty = capsys.readouterr().out.split("\n\n")
+    assert [line.split()[0] for line in table.splitlines()[2:]] == ["rest"] * 3 + ["pinch"] * 3
+    assert honesty.startswith("NEES")
+    assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["outdated"] == 0 and len(found["runs"]) == 4
+    assert 0.0 < found["motions"]["rest"]["classic"]["tip_visible_mm"] < 2.0
+    assert found["honesty"]["rest"]["classic"]["tips"]["average"] is None
+
+
+@pytest.mark.parametrize("wrong", [("--trackers", "magic"), ("--seconds", "0.5"), ("--seeds", "0"), ("--loss", "1"),
+                                   ("--frames", "somewhere"), ("--detector", "reference"), ("--motions", "flight")])
+def test_what_cannot_be_compared_is_said(wrong: tuple[str, str], tmp_path: Path,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*QUICK, "--logs", str(tmp_path), *wrong]) == 2
+    assert capsys.readouterr().err.startswith("rhot: ") and list(tmp_path.iterdir()) == []
