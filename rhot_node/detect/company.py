@@ -2,7 +2,7 @@
 
 A lone thing of a marker's hue is as good a marker as any to a search. What tells a hand from a desk: its markers come
 together, are of like size, and move. A worn marker is vouched for while it is tracked, once it was seen with enough
-others of which some have moved, or with so many that no desk shows them by chance, or once it has travelled by
+others that have moved, or with so many that no desk shows them by chance, or once it has travelled by
 itself. Until then it is ambiguous and has a quality and a covariance to match.
 
 All coordinates are luma pixels.
@@ -23,6 +23,8 @@ from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 STILL_ENOUGH = 5  # worn markers together that need not have moved
 MOVED = 1.0  # px from where a marker was found: neither noise nor a neighbour's shadow
 TRAVELLED = 2.0  # diameters: a lone thing that went as far is no part of a desk
+TRAVEL_FRAMES = 8  # that it takes at least: what a passing hand uncovers jumps
+SAME_SIZE = 0.25  # of the logarithm of the diameter: what is partly hidden seems to move
 LEFT_BEHIND = 8.0  # px that the hand may move while a marker of it does not
 ALIKE = 0.2  # of the greatest likeness in size (`Whereabouts.likeness`): nine times larger or smaller
 STATED_QUALITY, STATED_SPREAD = 0.5, 0.3  # of the quality, and of the diameter as a standard deviation, while in doubt
@@ -37,7 +39,8 @@ class Company:
         self._worn = [index for index, marker in enumerate(self._markers) if marker.role is not None]
         self._needed = MARKERS_LEAST if len(self._worn) >= MARKERS_LEAST else 0
         self._enough = min(STILL_ENOUGH, len(self._worn))
-        self._origin = np.zeros((len(self._markers), 4))  # where it was found, and where the hand was then
+        self._origin = np.zeros((len(self._markers), 5))  # where it was found, the hand then, its diameter
+        self._frames = np.zeros(len(self._markers))  # since then
         self._moved = np.zeros(len(self._markers), dtype=np.bool_)
         self._vouched = np.zeros(len(self._markers), dtype=np.bool_)
         self._known = np.zeros(len(self._markers), dtype=np.bool_)
@@ -65,7 +68,7 @@ class Company:
         self._follow(seen, hand)
         together = [mark.index for mark in worn if hand is not None and self._belongs(mark, hand)]
         moving = np.count_nonzero((self._moved | self._vouched)[together])
-        if len(together) >= self._enough or (len(together) >= self._needed and moving >= self._needed - 1):
+        if len(together) >= self._enough or (len(together) >= self._needed and moving >= self._needed):
             self._vouched[together] = True
         return tuple([mark if not mark.found or self._vouched[mark.index] or self._markers[mark.index].role is None
                       else _in_doubt(mark) for mark in seen])
@@ -78,19 +81,28 @@ class Company:
                 self._known[index] = self._vouched[index] = False
             elif not self._known[index] or mark.flags & MarkerFlag.ACQUIRED:
                 self._known[index], self._moved[index], self._vouched[index] = True, False, False
-                self._origin[index] = (mark.x, mark.y, *((hand.x, hand.y) if hand else (math.nan, math.nan)))
+                middle = (hand.x, hand.y) if hand else (math.nan, math.nan)
+                self._origin[index] = (mark.x, mark.y, *middle, mark.diameter)
+                self._frames[index] = 0.0
             elif not mark.flags & DOUBTFUL:
-                x, y = self._origin[index, :2]
-                way = math.hypot(mark.x - x, mark.y - y)
-                self._moved[index] |= way > MOVED
-                self._vouched[index] |= way > TRAVELLED * mark.diameter
+                self._note_way(mark)
+
+    def _note_way(self, mark: MarkerObservation) -> None:
+        """Note how far a marker in plain view has come."""
+        x, y, _, _, diameter = self._origin[mark.index]
+        self._frames[mark.index] += 1.0
+        if abs(math.log(mark.diameter / diameter)) > SAME_SIZE:
+            return
+        way = math.hypot(mark.x - x, mark.y - y)
+        self._moved[mark.index] |= way > MOVED
+        self._vouched[mark.index] |= way > TRAVELLED * mark.diameter and self._frames[mark.index] >= TRAVEL_FRAMES
 
     def _belongs(self, mark: MarkerObservation, hand: Whereabouts) -> bool:
         """Whether a marker is where the hand's others are, as large as they are, and not left behind by them."""
         shape = self._markers[mark.index].shape
         if hand.beyond(mark.x, mark.y) or hand.likeness(np.array([_area(mark)]), shape)[0] < ALIKE:
             return False
-        _, _, x, y = self._origin[mark.index]
+        _, _, x, y, _ = self._origin[mark.index]
         if shape != "band" and not self._moved[mark.index] and math.hypot(hand.x - x, hand.y - y) > LEFT_BEHIND:
             self._vouched[mark.index] = False
             return False

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from marker_rendering import Canvas, disc
 
-from rhot_node.detect.company import STATED_SPREAD, TRAVELLED, Company
+from rhot_node.detect.company import STATED_SPREAD, TRAVEL_FRAMES, TRAVELLED, Company
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.track import lost_observation
 from rhot_node.files import resource_path
@@ -61,7 +61,10 @@ def test_a_lone_thing_is_stated_with_little_quality_and_a_wide_covariance() -> N
 def test_a_lone_marker_that_travels_is_believed_until_it_is_lost() -> None:
     company = Company(RHOT6.markers)
     company.judge(frame(2, new=True))
-    assert doubted(company.judge(frame(2, shift=16.0 * TRAVELLED - 1.0))) == {2}
+    for _ in range(TRAVEL_FRAMES):
+        assert doubted(company.judge(frame(2, shift=16.0 * TRAVELLED - 1.0))) == {2}
+    smaller = mark(2, HAND[2][0] + 40.0, HAND[2][1], 10.0)
+    assert doubted(company.judge(frame(others=(smaller,)))) == {2}  # half hidden, it only seems to move
     assert doubted(company.judge(frame(2, shift=16.0 * TRAVELLED + 1.0))) == set()
     company.judge(frame())
     assert doubted(company.judge(frame(2, new=True))) == {2}
