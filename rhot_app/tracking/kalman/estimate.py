@@ -42,7 +42,7 @@ class Estimate(NamedTuple):
     `world` (4, 4) world_from_palm m; `angles` (21,) rad; `velocity` (27,) m/s and rad/s; `acceleration` (27,) m/s^2
     and rad/s^2; `log_scale` (1,); `bias` (M, 3) m. `covariance` (N, N). `agitation` (7,): variance of the acceleration,
     (m/s^2)^2 or (rad/s^2)^2, that surprised in each group of late; `since` (7,): how long ago it did, s. `trend`
-    (27,): leaky mean of the normalised corrections of each velocity.
+    (27,): leaky mean of the normalised corrections of each velocity. `unfaded` (1,): s since knowledge last faded.
     """
 
     world: Array
@@ -55,13 +55,14 @@ class Estimate(NamedTuple):
     agitation: Array
     since: Array
     trend: Array
+    unfaded: Array
 
 
 def empty_estimate(markers: int) -> Estimate:
     """Room for an estimate; everything zero, the palm at the world's origin."""
     size = BIAS + 3 * markers
     return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
-                    np.zeros((size, size)), np.zeros(GROUPS), np.zeros(GROUPS), np.zeros(POSE))
+                    np.zeros((size, size)), np.zeros(GROUPS), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1))
 
 
 @njit(cache=True)
@@ -72,6 +73,7 @@ def copy_estimate(source: Estimate, target: Estimate) -> None:
     target.agitation[:] = source.agitation
     target.since[:] = source.since
     target.trend[:] = source.trend
+    target.unfaded[:] = source.unfaded
 
 
 @njit(cache=True)

@@ -1,15 +1,15 @@
 """What a filter must forget to stay honest.
 
-Two things are forgotten, in the manner of stabilised forgetting (Kulhavy and Zarrop 1993): information is given up and
-that of the natural pose comes in for it, so that a joint which nothing shows becomes as uncertain as habits say, no
-more and no less.
+What no worn marker can show fades fast. Six markers leave nine of a hand's 27 freedoms open: directions in which it can
+move with every marker in its place. They turn with the pose. A filter that linearises anew with every frame, each time
+about a slightly other pose, sees each time a slightly other subspace left open, and takes the sum of what it saw for
+knowledge of everything, which it is not (Huang et al. 2010 call it inconsistency). So within these directions, and only
+there, the pose returns to habit: an Ornstein-Uhlenbeck process whose mean is the natural pose and whose covariance is
+what habit leaves to a hand with its markers in their places.
 
-Everything about the pose fades slowly: what markers show is there again with the next frame.
-
-What no worn marker can show, now or ever, fades fast. Six markers leave nine of a hand's 27 freedoms open: directions
-in which it can move with every marker in its place. They turn with the pose. A filter that linearises anew with every
-frame, each time about a slightly other pose, sees each time a slightly other subspace left open, and takes the sum of
-what it saw for knowledge of everything, which it is not (Huang et al. 2010 call it inconsistency).
+Everything about the pose fades slowly, in the manner of stabilised forgetting (Kulhavy and Zarrop 1993): information is
+given up and that of the natural pose comes in for it. What markers show is there again with the next frame; a joint
+that none shows becomes as uncertain as habit says, no more and no less.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
-from rhot_app.tracking.kalman.estimate import ANGLES, POSE, Estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, POSE, Estimate
 from rhot_app.tracking.kalman.motion import Habits
 
 Array = NDArray[np.float64]
@@ -29,50 +29,90 @@ Array = NDArray[np.float64]
 FADE_S = 2.0
 """Time constant of what is known of a pose."""
 
-OPEN_S = 0.15
+OPEN_S = 0.05
 """Time constant of what seems to be known of directions that no marker shows."""
 
 SHARPNESS_M = 3e-5
 """What moves no marker by more than this counts as open."""
+
+FADING_S = 0.04
+"""Fading is done in steps of this: it is as good, and costs less."""
 
 WIDEST = 0.7
 """Standard deviation, m and rad, beyond which a palm's place is not worth knowing."""
 
 
 @njit(cache=True)
-def open_directions(jacobian: Array, usual: Array, out: Array) -> None:
-    """Fill `out` (27, 27) with the covariance that habits leave to a pose whose markers all stay in their places.
+def open_directions(jacobian: Array, usual: Array, bias_variance: Array) -> Array:
+    """(27 + 3 M, 27 + 3 M): the covariance that habit leaves to the pose and the biases of markers that are all seen
+    to stay in their places.
 
-    `jacobian` (M, 3, 27) of the markers' places per pose number; `usual` (27, 27) as in `Habits`.
+    `jacobian` (M, 3, 27) of the markers' places per pose number; `usual` (27, 27) as in `Habits`; `bias_variance` (M,).
     """
     rows = 3 * jacobian.shape[0]
-    flat = jacobian.reshape(rows, POSE)
-    gains = flat @ usual
-    total = gains @ flat.T
+    size = POSE + rows
+    out, gains = np.zeros((size, size)), np.zeros((rows, size))
+    out[:POSE, :POSE] = usual
+    gains[:, :POSE] = jacobian.reshape(rows, POSE) @ usual
+    total = np.ascontiguousarray(gains[:, :POSE]) @ jacobian.reshape(rows, POSE).T
     for k in range(rows):
-        total[k, k] += SHARPNESS_M * SHARPNESS_M
+        out[POSE + k, POSE + k] = bias_variance[k // 3]
+        gains[k, POSE + k] = bias_variance[k // 3]
+        total[k, k] += bias_variance[k // 3] + SHARPNESS_M * SHARPNESS_M
     factorise(total)
     for k in range(rows):  # gains becomes L^-1 J Sigma
         for other in range(k):
-            for i in range(POSE):
+            for i in range(size):
                 gains[k, i] -= total[k, other] * gains[other, i]
-        for i in range(POSE):
+        for i in range(size):
             gains[k, i] /= total[k, k]
-    out[:] = usual - gains.T @ gains
+    out -= gains.T @ gains
+    return out
 
 
 @njit(cache=True)
-def forget(estimate: Estimate, dt: float, habits: Habits, jacobian: Array, step: Array) -> None:
-    """Let knowledge fade for `dt` s. `jacobian` as in `open_directions`; fills `step` (N,), what the mean moves by."""
+def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, jacobian: Array, step: Array) -> None:
+    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. Others as in `open_directions`."""
+    step[:] = 0.0
+    estimate.unfaded[0] += dt
+    if estimate.unfaded[0] >= FADING_S:
+        _open_up(estimate, -math.expm1(-estimate.unfaded[0] / OPEN_S), habits, bias_variance, jacobian, step)
+        _fade(estimate.covariance, estimate.unfaded[0])
+        _return_to_habits(estimate, -math.expm1(-estimate.unfaded[0] / FADE_S), habits, step)
+        estimate.unfaded[0] = 0.0
+
+
+@njit(cache=True)
+def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Array, jacobian: Array,
+             step: Array) -> None:
+    """A `share` of the way back to habit, within the open directions."""
     covariance = estimate.covariance
-    _fade(covariance, dt)
-    left_open = np.empty((POSE, POSE))
-    open_directions(jacobian, habits.usual, left_open)
-    share = -math.expm1(-dt / OPEN_S)
-    for i in range(POSE):
-        for j in range(POSE):
-            covariance[i, j] += share * 0.5 * (left_open[i, j] + left_open[j, i])
-    _return_to_habits(estimate, share - math.expm1(-dt / FADE_S), habits, step)
+    left_open = open_directions(jacobian, habits.usual, bias_variance)
+    size, chosen = left_open.shape[0], left_open.shape[0] - POSE
+    back = np.zeros((size, size))  # how far each number goes back, per how far each is from its habit
+    back[:, ANGLES:POSE] = share * (np.ascontiguousarray(left_open[:, ANGLES:POSE]) @ habits.information)
+    away = np.zeros(size)
+    away[ANGLES:POSE] = estimate.angles - habits.mean
+    for k in range(chosen):
+        back[:, POSE + k] = share / bias_variance[k // 3] * left_open[:, POSE + k]
+        away[POSE + k] = estimate.bias[k // 3, k % 3]
+    moved = back @ away
+    step[:POSE] = -moved[:POSE]
+    step[BIAS:] = -moved[POSE:]
+    part = np.empty((size, covariance.shape[0]))
+    part[:POSE], part[POSE:] = covariance[:POSE], covariance[BIAS:]
+    part -= back @ part
+    covariance[:POSE], covariance[BIAS:] = part[:POSE], part[POSE:]
+    across = np.empty((covariance.shape[0], size))
+    across[:, :POSE], across[:, POSE:] = covariance[:, :POSE], covariance[:, BIAS:]
+    across -= across.copy() @ back.T
+    covariance[:, :POSE], covariance[:, BIAS:] = across[:, :POSE], across[:, POSE:]
+    kept = share * (2.0 - share)
+    for i in range(size):
+        row = i if i < POSE else BIAS + i - POSE
+        for j in range(size):
+            column = j if j < POSE else BIAS + j - POSE
+            covariance[row, column] += 0.5 * kept * (left_open[i, j] + left_open[j, i])
 
 
 @njit(cache=True)
@@ -95,7 +135,6 @@ def _return_to_habits(estimate: Estimate, share: float, habits: Habits, step: Ar
     """Weigh a `share` of what habits say: every row is one scalar observation, exact because it is linear."""
     covariance = estimate.covariance
     size = covariance.shape[0]
-    step[:] = 0.0
     gain = np.empty(size)
     for k in range(habits.rows.shape[0]):
         row = habits.rows[k]

@@ -59,7 +59,8 @@ class Outcome:
 class HandFilter:
     """An iterated extended Kalman filter on the hand's pose, velocity, size and markers' biases.
 
-    `worn`: the markers; `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance` (M,) m^2.
+    `worn`: the markers; `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance`
+    (M,) m^2.
     """
 
     def __init__(self, worn: Worn, habits: Habits, limits: Array, bias_variance: Array, *,
@@ -110,7 +111,8 @@ class HandFilter:
             clear(rows)
             for block in blocks:
                 block.linearise(trial, rows)
-        _conclude(estimate, trial, self._gains, count, dt, self._worn, self._habits, self._limits, step)
+        _conclude(estimate, trial, self._gains, count, dt, self._worn, self._habits, self._bias_variance,
+                  self._limits, step)
         observations = int(rows.count[1])
         return Outcome(self._believed[:observations], rows.source[:observations])
 
@@ -130,14 +132,14 @@ def _improve(estimate: Estimate, rows: object, believed: Mask, widening: Array, 
 
 
 @njit(cache=True)
-def _conclude(estimate: Estimate, trial: Estimate, gains: Array, count: int, dt: float, worn: Worn, habits: Habits, limits: Array,
-              step: Array) -> None:
+def _conclude(estimate: Estimate, trial: Estimate, gains: Array, count: int, dt: float, worn: Worn, habits: Habits,
+              bias_variance: Array, limits: Array, step: Array) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
     note_trend(estimate, step, gains, count)
     contract(estimate.covariance, gains, count)
     copy_mean(trial, estimate)
     points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
     place_markers(worn, estimate, points, jacobian)
-    forget(estimate, dt, habits, jacobian, step)
+    forget(estimate, dt, habits, bias_variance, jacobian, step)
     project(estimate.angles, estimate.velocity, estimate.covariance, gains, 0, limits, step)
     displace(estimate, step, estimate)

@@ -33,13 +33,13 @@ Array = NDArray[np.float64]
 STILL = np.array([3e-4, 3e-3, 1e-2, 1e-2, 1e-2, 1e-2, 1e-2])
 """Standard deviation of the acceleration of a hand at rest, by group, m/s^2 and rad/s^2."""
 
-AWAKE = np.array([0.5, 5.0, 15.0, 15.0, 15.0, 15.0, 15.0])
+AWAKE = np.array([0.4, 4.0, 15.0, 15.0, 15.0, 15.0, 15.0])
 """The same of one that moves at all."""
 
 SLOW = np.array([0.02, 0.2, 0.5, 0.5, 0.5, 0.5, 0.5])
 """Speeds, m/s and rad/s, at which a group counts as half awake."""
 
-PER_SPEED = np.array([4.0, 4.0, 6.0, 6.0, 6.0, 6.0, 6.0])
+PER_SPEED = np.array([5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0])
 """How much more acceleration there is per speed, 1/s: what moves fast will turn hard."""
 
 MOST = np.array([60.0**2, 500.0**2, 1000.0**2, 1000.0**2, 1000.0**2, 1000.0**2, 1000.0**2])
@@ -60,13 +60,16 @@ BIAS_S = 3.0
 class Habits(NamedTuple):
     """What is known of a hand that is not seen.
 
-    `rows` (K, 21) of factors and `values` (K,): beliefs about the angles, in standard deviations; `usual` (27, 27): the
-    covariance of the pose that follows from them, with a palm that may be anywhere. `together` (27, 27): how the pose's
-    numbers accelerate together, 1 for the liveliest of a group: fingers bend all their joints at once.
+    `rows` (K, 21) of factors and `values` (K,): beliefs about the angles, in standard deviations; `mean` (21,) and
+    `information` (21, 21): the same as one Gaussian; `usual` (27, 27): the covariance of a pose that follows from it,
+    with a palm that may be anywhere. `together` (27, 27): how the pose's numbers accelerate together, 1 for the
+    liveliest of a group: fingers bend all their joints at once.
     """
 
     rows: Array
     values: Array
+    mean: Array
+    information: Array
     usual: Array
     together: Array
 

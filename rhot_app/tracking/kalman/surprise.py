@@ -27,7 +27,7 @@ Mask = NDArray[np.bool_]
 PLAUSIBLE = 20.0
 """Squared normalised innovation (2 degrees of freedom) that 5 in 100,000 exceed by chance."""
 
-ROBUST = 16.0
+ROBUST = 8.0
 """Beyond this an observation's weight falls: its noise is widened until it is no farther off."""
 
 GATE = 40.0

@@ -23,8 +23,9 @@ from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]
 
-PLACE_SD_M = 0.15e-3
-"""How far a marker's seen middle lies from where the hand file has it: paint, its shading, and the hand's skin."""
+PLACE_SD_M = {"capsule": 0.15e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3}
+"""How far a marker's seen middle lies from where the hand file has it, by its shape: paint, its shading, and the skin
+under it. A blob is paint on a knuckle that nobody measured."""
 
 _COUPLED_SD_RAD = np.radians(0.02)
 
@@ -56,7 +57,7 @@ def compile_wearing(rig: Rig) -> Wearing:
                 np.array([camera.intrinsics for camera in models])),
         habits_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
         tuple(marker.role or "" for marker in rig.markers.markers), places,
-        np.full(len(places), PLACE_SD_M**2))
+        np.array([PLACE_SD_M[marker.shape] ** 2 for marker in rig.markers.markers]))
 
 
 def points_on(dh: DhArrays, places: tuple[Place, ...]) -> DhArrays:
@@ -81,14 +82,15 @@ def habits_of(model: HandModel, variant: VariantName) -> Habits:
     """What is believed of the angles: the natural pose, and the variant's couplings as good as exactly."""
     rows = np.linalg.cholesky(model.natural.information).T
     values = rows @ model.natural.mean
-    chosen = make_variant(variant)
+    chosen = make_variant(variant, model.anatomy.couplings)
     basis = chosen.basis
     bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
     bound = bound[np.abs(bound).max(axis=1) > 1e-9]
     rows, values = np.vstack([rows, bound]), np.concatenate([values, bound @ chosen.mean])
     usual = np.diag([WIDEST**2] * POSE)
-    usual[ANGLES:, ANGLES:] = np.linalg.inv(rows.T @ rows)
-    return Habits(rows, values, usual, _together(model))
+    information = rows.T @ rows
+    usual[ANGLES:, ANGLES:] = np.linalg.inv(information)
+    return Habits(rows, values, np.linalg.solve(information, rows.T @ values), information, usual, _together(model))
 
 
 def _together(model: HandModel) -> Array:
