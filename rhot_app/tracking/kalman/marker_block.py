@@ -17,11 +17,6 @@ from rhot_node.wire.messages import MarkerFlag
 Array = NDArray[np.float64]
 
 _LOST = int(MarkerFlag.LOST)
-_AMBIGUOUS = int(MarkerFlag.AMBIGUOUS)
-
-AMBIGUOUS_PX = 2.0
-"""Standard deviation added to a sight of which another is as plausible."""
-
 
 class MarkerBlock:
     """The markers that one camera saw in one frame. `t_ns`: the mean time of its sights, or of its middle row."""
@@ -30,7 +25,7 @@ class MarkerBlock:
         count = len(observations.pixels)
         self.observations = observations
         self.frame = Frame(np.array([observations.camera]), np.empty(count, np.bool_), observations.pixels,
-                           observations.covariances.copy(), np.empty(count), np.arange(count))
+                           observations.covariances, np.empty(count), np.arange(count))
         self._wearing = wearing
         middle = 0.5 * (wearing.cameras.intrinsics[observations.camera, 3])
         self.t_ns = observations.t_row0_master_ns + int(
@@ -52,7 +47,7 @@ class MarkerBlock:
 
 @njit(cache=True)
 def _read(frame: Frame, flags: NDArray[np.uint16], row_time_s: float, middle_row: float) -> float:
-    """Fill `seen`, `late_s` and the covariances; returns the mean time of the sights after row 0, ns."""
+    """Fill `seen` and `late_s`; returns the mean time of the sights after row 0, ns."""
     total, count = 0.0, 0
     for m in range(frame.seen.shape[0]):
         x, y = frame.pixels[m]
@@ -61,9 +56,6 @@ def _read(frame: Frame, flags: NDArray[np.uint16], row_time_s: float, middle_row
             frame.late_s[m] = y * row_time_s
             total += frame.late_s[m]
             count += 1
-            if flags[m] & _AMBIGUOUS:
-                frame.covariances[m, 0, 0] += AMBIGUOUS_PX**2
-                frame.covariances[m, 1, 1] += AMBIGUOUS_PX**2
     mean = total / count if count else middle_row * row_time_s
     for m in range(frame.seen.shape[0]):
         frame.late_s[m] -= mean

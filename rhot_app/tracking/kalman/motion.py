@@ -33,22 +33,22 @@ Array = NDArray[np.float64]
 STILL = np.array([3e-4, 3e-3, 1e-2, 1e-2, 1e-2, 1e-2, 1e-2])
 """Standard deviation of the acceleration of a hand at rest, by group, m/s^2 and rad/s^2."""
 
-AWAKE = np.array([0.4, 4.0, 15.0, 15.0, 15.0, 15.0, 15.0])
+AWAKE = np.array([0.5, 5.0, 15.0, 15.0, 15.0, 15.0, 15.0])
 """The same of one that moves at all."""
 
 SLOW = np.array([0.02, 0.2, 0.5, 0.5, 0.5, 0.5, 0.5])
 """Speeds, m/s and rad/s, at which a group counts as half awake."""
 
-PER_SPEED = np.array([5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0])
+PER_SPEED = np.array([5.0, 5.0, 6.0, 6.0, 6.0, 6.0, 6.0])
 """How much more acceleration there is per speed, 1/s: what moves fast will turn hard."""
 
 MOST = np.array([60.0**2, 500.0**2, 1000.0**2, 1000.0**2, 1000.0**2, 1000.0**2, 1000.0**2])
 """Variance of the acceleration of the fastest hands, by group."""
 
-ACCELERATION_S = 0.08
+ACCELERATION_S = 0.12
 """Accelerations change with this time constant."""
 
-CALM_S = 0.1
+CALM_S = 0.15
 """What surprised (`surprise.py`) is forgotten with this time constant."""
 
 VELOCITY_S = np.array([1.0] * 6 + [0.3] * 21)
@@ -87,14 +87,15 @@ def predict(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array)
 
 @njit(cache=True)
 def liveliness(estimate: Estimate) -> Array:
-    """(7,) variance of each group's acceleration: by its speed, as far as that is no noise, and by what surprised."""
+    """(7,) variance of each group's acceleration: of one that is awake, and by its speed as far as that is no noise."""
     speed, out = np.zeros(GROUPS), np.empty(GROUPS)
     for i in range(POSE):
         speed[GROUP_OF[i]] += estimate.velocity[i] ** 2 - 4.0 * estimate.covariance[VELOCITY + i, VELOCITY + i]
     for group in range(GROUPS):
         moving = math.sqrt(max(speed[group], 0.0))
-        usual = STILL[group] + moving * (PER_SPEED[group] + AWAKE[group] / (moving + SLOW[group]))
-        out[group] = min(usual * usual + estimate.agitation[group], MOST[group])
+        awake = (moving / (moving + SLOW[group]) * AWAKE[group]) ** 2
+        estimate.agitation[group] = max(estimate.agitation[group], awake)
+        out[group] = min(STILL[group] ** 2 + estimate.agitation[group] + (PER_SPEED[group] * moving) ** 2, MOST[group])
     return out
 
 

@@ -30,7 +30,7 @@ PLAUSIBLE = 20.0
 ROBUST = 8.0
 """Beyond this an observation's weight falls: its noise is widened until it is no farther off."""
 
-GATE = 40.0
+GATE = 100.0
 """Beyond this, with all acceleration that a hand is capable of, it is something else."""
 
 LEAK = 0.1
@@ -42,11 +42,8 @@ TREND = 14.0
 ONSET_S = 0.04
 """What surprises began this long ago: it takes until it shows in an image. Agitation is raised as of then."""
 
-AGAIN_S = 0.1
-"""What surprises again within this time is the same onset."""
-
-ESCALATION = 4.0
-"""Unless it is this much stronger."""
+ASLEEP = 0.25
+"""A group with less agitation than this part of what it has awake is woken by a surprise."""
 
 _STEP = 3.0
 
@@ -98,18 +95,17 @@ def _follow_trends(estimate: Estimate, added: Array) -> None:
 
 @njit(cache=True)
 def _wake(estimate: Estimate, added: Array) -> None:
-    """Take what surprised as the agitation; leave in `added` (7,) what the covariance must still learn of it.
+    """Wake what surprised; leave in `added` (7,) what the covariance must learn of it.
 
     An onset is told to the covariance once. Told with every frame, it would let each camera in turn shift the hand
     sideways where the hand's distance is wrong.
     """
     for group in range(GROUPS):
         if added[group] > 0.0:
-            anew = estimate.since[group] > AGAIN_S or added[group] > ESCALATION * estimate.agitation[group]
-            estimate.agitation[group] = max(estimate.agitation[group], added[group], AWAKE[group] ** 2)
-            added[group] = estimate.agitation[group] if anew else 0.0
-            if anew:
-                estimate.since[group] = 0.0
+            awake = AWAKE[group] ** 2
+            asleep = estimate.agitation[group] < ASLEEP * awake
+            estimate.agitation[group] = min(max(2.0 * estimate.agitation[group], awake), MOST[group])
+            added[group] = max(added[group], awake) if asleep else 0.0
 
 
 @njit(cache=True)
