@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from rhot_app.errors import RigError
 from rhot_app.project import Rig
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.model_tracker import ModelTracker
 from rhot_app.tracking.tracker import Tracker
+from rhot_app.tracking.two_hands import TwoHands
 
 
 def make_tracker(rig: Rig) -> Tracker:
-    """A new tracker for `rig`. Raises RigError when the model tracker cannot work with its markers."""
-    return ModelTracker(rig) if rig.tracker.kind == "model" else ClassicTracker(rig)
+    """A new tracker for `rig`. Raises RigError when the model tracker cannot work with its markers or cameras."""
+    if rig.tracker.kind == "classic":
+        return ClassicTracker(rig)
+    if rig.depth.mode == "disparity":
+        raise RigError(f"rig {rig.name!r}: the model tracker needs calibrated cameras, but depth.mode is "
+                       "\"disparity\"; calibrate lenses and poses and set it to \"stereo\", or set tracker.kind to "
+                       "\"classic\".")
+    return ModelTracker(rig) if rig.other_hand is None else TwoHands(rig)

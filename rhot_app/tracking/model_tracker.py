@@ -49,12 +49,12 @@ class ModelTracker:
     def __init__(self, rig: Rig) -> None:
         self._rig, self._wearing = compile_rig(rig), compile_wearing(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
-        self._hand = HandFilter(self._wearing.worn, self._wearing.habits, self._wearing.limits,
+        self._hand = HandFilter(self._wearing.worn, self._wearing.cameras, self._wearing.habits, self._wearing.limits,
                                 self._wearing.bias_variance, float_scale=rig.tracker.float_scale)
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)
         self._sights = Sights(cameras, markers)
-        self._ahead = empty_estimate(markers)
+        self._ahead = empty_estimate(cameras, markers)
         self._sequence = 0
         self.reset()
 
@@ -97,7 +97,7 @@ class ModelTracker:
             return None
         copy_estimate(self._hand.estimate, self._ahead)
         ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
-        predict(self._ahead, ahead, self._wearing.habits, self._wearing.bias_variance)
+        predict(self._ahead, ahead, self._wearing.cameras, self._wearing.habits, self._wearing.bias_variance)
         return self._describe(self._ahead, self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
 
     def _take(self, observations: CameraObservations) -> bool:
@@ -113,7 +113,7 @@ class ModelTracker:
             assert isinstance(weighed, MarkerBlock)
             self._learn(weighed, outcome)
         if self._timeline.t_ns - self._believed_ns > LOST_AFTER_NS or (
-                self._timeline.t_ns - self._plausible_ns > WRONG_AFTER_NS):
+                self._timeline.t_ns - self._plausible_ns > WRONG_AFTER_NS) or self._hand.astray:
             self._give_up()
         return True
 

@@ -80,3 +80,4 @@ class HandState:
     hand_scale: float  # factor on every length of the rig's hand
     hand_scale_sd: float
     latency_s: dict[str, float]  # by LATENCY_STAGES
+    other: HandState | None = None  # of the rig's other hand at the same instant, with its own markers only

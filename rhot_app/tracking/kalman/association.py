@@ -11,7 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import BIAS, POSE, Estimate
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, place_markers, project_marker
+from rhot_app.tracking.kalman.markers import Frame, Worn, place_markers, project_marker
+from rhot_app.tracking.kalman.motion import Cameras
 
 Array = NDArray[np.float64]
 

@@ -24,8 +24,8 @@ from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import contract, solve
 from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Worn, place_markers
-from rhot_app.tracking.kalman.motion import MOST, Habits, predict
-from rhot_app.tracking.kalman.rows import ResidualBlock, clear, empty_rows
+from rhot_app.tracking.kalman.motion import MOST, Cameras, Habits, predict
+from rhot_app.tracking.kalman.rows import ResidualBlock, Rows, clear, empty_rows
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
 
 Array = NDArray[np.float64]
@@ -42,6 +42,12 @@ START_SD = (0.03, 0.4, 1.0, 3.0, 6.0)
 
 START_AGITATION = 0.01 * MOST
 """Where nobody knows yet how the hand moves."""
+
+ASTRAY_M = 0.3
+"""Standard deviation of a palm's place beyond which it must be looked for."""
+
+FASTEST = 12.0
+"""No palm is faster, m/s: a boxer's fist peaks near 10."""
 
 SCALE_SD = 0.1
 """Of the hand's size at the start, when it may float."""
@@ -63,14 +69,15 @@ class HandFilter:
     (M,) m^2.
     """
 
-    def __init__(self, worn: Worn, habits: Habits, limits: Array, bias_variance: Array, *,
+    def __init__(self, worn: Worn, cameras: Cameras, habits: Habits, limits: Array, bias_variance: Array, *,
                  float_scale: bool = False) -> None:
         markers = len(worn.part)
         size = BIAS + 3 * markers
-        self.estimate = empty_estimate(markers)
-        self._worn, self._habits, self._limits, self._bias_variance = worn, habits, limits, bias_variance
+        self.estimate = empty_estimate(len(cameras.pose), markers)
+        self._worn, self._cameras, self._habits = worn, cameras, habits
+        self._limits, self._bias_variance = limits, bias_variance
         self._float_scale = float_scale
-        self._trial = empty_estimate(markers)
+        self._trial = empty_estimate(len(cameras.pose), markers)
         self._rows = empty_rows(ROWS_MAX, size)
         self._gains = np.empty((ROWS_MAX, size))
         self._step = np.empty(size)
@@ -85,6 +92,7 @@ class HandFilter:
                       covariance):
             array[:] = 0.0
         estimate.agitation[:] = START_AGITATION
+        estimate.unseeing[:] = np.inf
         place, turn, speed, spin, bend = START_SD
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),
@@ -93,10 +101,17 @@ class HandFilter:
         np.fill_diagonal(covariance, diagonal**2)
         covariance[ANGLES:POSE, ANGLES:POSE] = self._habits.usual[ANGLES:, ANGLES:]
 
+    @property
+    def astray(self) -> bool:
+        """Whether the estimate is worth nothing any more: nobody's hand is so fast or so lost."""
+        covariance, velocity = self.estimate.covariance, self.estimate.velocity
+        return not (float(covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) < ASTRAY_M**2
+                    and float(velocity[:3] @ velocity[:3]) < FASTEST**2)
+
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""
         estimate, trial, rows, step = self.estimate, self._trial, self._rows, self._step
-        predict(estimate, dt, self._habits, self._bias_variance)
+        predict(estimate, dt, self._cameras, self._habits, self._bias_variance)
         clear(rows)
         for block in blocks:
             block.associate(estimate)
@@ -111,14 +126,14 @@ class HandFilter:
             clear(rows)
             for block in blocks:
                 block.linearise(trial, rows)
-        _conclude(estimate, trial, self._gains, count, dt, self._worn, self._habits, self._bias_variance,
-                  self._limits, step)
+        _conclude(estimate, trial, rows, self._believed, self._gains, count, dt, self._worn, self._habits,
+                  self._bias_variance, self._limits, step)
         observations = int(rows.count[1])
         return Outcome(self._believed[:observations], rows.source[:observations])
 
 
 @njit(cache=True)
-def _improve(estimate: Estimate, rows: object, believed: Mask, widening: Array, step: Array, gains: Array,
+def _improve(estimate: Estimate, rows: Rows, believed: Mask, widening: Array, step: Array, gains: Array,
              limits: Array, trial: Estimate) -> tuple[int, bool]:
     """One iteration; `trial` becomes the new mean. Returns the rows used and whether it moved only little."""
     before = step.copy()
@@ -132,9 +147,12 @@ def _improve(estimate: Estimate, rows: object, believed: Mask, widening: Array, 
 
 
 @njit(cache=True)
-def _conclude(estimate: Estimate, trial: Estimate, gains: Array, count: int, dt: float, worn: Worn, habits: Habits,
-              bias_variance: Array, limits: Array, step: Array) -> None:
+def _conclude(estimate: Estimate, trial: Estimate, rows: Rows, believed: Mask, gains: Array, count: int, dt: float,
+              worn: Worn, habits: Habits, bias_variance: Array, limits: Array, step: Array) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
+    for observation in range(rows.count[1]):
+        if believed[observation] and rows.source[observation, 0] >= 0:
+            estimate.unseeing[rows.source[observation, 0]] = 0.0
     note_trend(estimate, step, gains, count)
     contract(estimate.covariance, gains, count)
     copy_mean(trial, estimate)

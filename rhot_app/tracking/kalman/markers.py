@@ -27,7 +27,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.motion import ACCELERATION_S, liveliness
+from rhot_app.tracking.kalman.motion import ACCELERATION_S, Cameras, liveliness
 from rhot_app.tracking.kalman.rows import Rows
 
 Array = NDArray[np.float64]
@@ -52,13 +52,6 @@ class Worn(NamedTuple):
     dh: DhArrays
     part: Indices
     half_axes: Array
-
-
-class Cameras(NamedTuple):
-    """C cameras: `pose` (C, 3, 4) camera_from_world m and `intrinsics` (C, 9) as in `CameraModel`."""
-
-    pose: Array
-    intrinsics: Array
 
 
 class Frame(NamedTuple):

@@ -1,0 +1,123 @@
+"""Two hands at once: a model tracker for each, fed with its own markers, and one state of both at the same instant.
+
+Nothing but the cameras is common to the hands, so nothing is gained by estimating them together: names of markers are
+confirmed within each hand, and a hand that is lost does not disturb the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.project import OTHER_HAND, FilterSettings, Rig
+from rhot_app.tracking.model_tracker import ModelTracker
+from rhot_app.tracking.state import Condition, HandState
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.markers import Marker
+
+Indices = NDArray[np.intp]
+Column = NDArray[Any]
+
+_PER_SIGHT = ("pixels", "covariances", "diameters", "qualities", "flags")
+_PER_MARKER = ("marker_positions", "marker_raw_positions", "marker_covariances", "marker_knowledge",
+               "epipolar_error_px")
+_PER_CAMERA = ("camera_pixels", "camera_flags")
+_WORK = ("triangulate", "filter", "solve")
+"""Stages that are gone through for one hand after the other."""
+
+_JUMP_NS = 1_000_000_000
+
+
+class TwoHands:
+    """Implements `Tracker` for a rig with an `other_hand`: states of its `hand`, whose `other` is of the other one.
+
+    The arrays of a state's markers are those of the whole rig; its `other` has its own markers only.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        """Raises RigError as `ModelTracker` does."""
+        assert rig.other_hand is not None
+        markers = rig.markers.markers
+        others = [(marker.role or "").startswith(OTHER_HAND) for marker in markers]
+        self._ids = rig.markers.ids
+        self._own: tuple[Indices, Indices] = np.flatnonzero(np.logical_not(others)), np.flatnonzero(others)
+        self._order = np.argsort(np.concatenate(self._own))
+        self._hand = ModelTracker(rig_of_hand(rig, rig.hand, [markers[m] for m in self._own[0]]))
+        self._other = ModelTracker(rig_of_hand(rig, rig.other_hand, [markers[m] for m in self._own[1]]))
+        self._sequence = 0
+        self._newest: list[CameraObservations | None] = [None] * len(rig.nodes)
+        self._last: tuple[HandState, HandState] | None = None
+
+    def reset(self) -> None:
+        """Forget everything but the count of states."""
+        self._newest = [None] * len(self._newest)
+        self._last = None
+        self._hand.reset()
+        self._other.reset()
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in; each hand gets the sights of its own markers."""
+        last = self._newest[observations.camera]
+        if last is None or not 0 <= last.t_row0_master_ns - observations.t_row0_master_ns < _JUMP_NS:
+            self._newest[observations.camera] = observations
+        for tracker, own in zip((self._hand, self._other), self._own, strict=True):
+            tracker.ingest(replace(observations, **{name: getattr(observations, name)[own] for name in _PER_SIGHT}))
+
+    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
+        """Each camera's newest frame, of all markers, None before its first."""
+        return tuple(self._newest)
+
+    def solve(self) -> HandState | None:
+        """The state after the frames since the last one, None without any."""
+        hand, other = self._hand.solve(), self._other.solve()
+        if hand is None or other is None:  # both or neither: they see the same frames
+            return None
+        self._last = hand, other
+        t_ns = max([state.t_master_ns for state in self._last if _is_there(state)] or [hand.t_master_ns])
+        return self._merge(_at(t_ns, hand, self._hand), _at(t_ns, other, self._other))
+
+    def state_at(self, t_ns: int) -> HandState | None:
+        """Both hands as `ModelTracker.state_at` has them; None while neither is there."""
+        hand, other = self._hand.state_at(t_ns), self._other.state_at(t_ns)
+        if self._last is None or (hand is None and other is None):
+            return None
+        return self._merge(hand or replace(self._last[0], t_master_ns=t_ns),
+                           other or replace(self._last[1], t_master_ns=t_ns))
+
+    def _merge(self, hand: HandState, other: HandState) -> HandState:
+        """The state of `hand` with the markers of both."""
+        self._sequence += 1
+        arrays: dict[str, Any] = {name: self._gather(getattr(hand, name), getattr(other, name), axis)
+                                 for axis, names in enumerate((_PER_MARKER, _PER_CAMERA)) for name in names}
+        latency = hand.latency_s | {stage: hand.latency_s[stage] + other.latency_s[stage] for stage in _WORK}
+        return replace(hand, sequence=self._sequence - 1, marker_ids=self._ids, latency_s=latency,
+                       other=replace(other, sequence=self._sequence - 1), **arrays)
+
+    def _gather(self, hand: Column, other: Column, axis: int) -> Column:
+        """An array of both hands' markers in the rig's order; `axis` is that of the markers."""
+        return np.concatenate([hand, other], axis=axis).take(self._order, axis=axis)
+
+
+def rig_of_hand(rig: Rig, hand: HandAnatomy, markers: Sequence[Marker]) -> Rig:
+    """The rig as if this hand with these of its markers were alone; the filters are not a model tracker's."""
+    alone = tuple(msgspec.structs.replace(marker, role=(marker.role or "").removeprefix(OTHER_HAND) or None)
+                  for marker in markers)
+    return msgspec.structs.replace(rig, markers=msgspec.structs.replace(rig.markers, markers=alone), hand=hand,
+                                   other_hand=None, filters=FilterSettings())
+
+
+def _at(t_ns: int, state: HandState, tracker: ModelTracker) -> HandState:
+    """The newest `state` of a hand, brought to `t_ns` where another hand was seen a little later."""
+    if _is_there(state) and state.t_master_ns < t_ns:
+        return tracker.state_at(t_ns) or state
+    return replace(state, t_master_ns=t_ns)
+
+
+def _is_there(state: HandState) -> bool:
+    return state.condition in (Condition.TRACKING, Condition.PARTIAL)
