@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.project import Rig
-from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, copy_estimate, empty_estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
-from rhot_app.tracking.kalman.timeline import Timeline
+from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.locate import locate_all
 from rhot_app.tracking.model_output import bring_together, describe, empty_report
@@ -100,6 +100,17 @@ class ModelTracker:
         predict(self._ahead, ahead, self._wearing.cameras, self._wearing.habits, self._wearing.bias_variance)
         return self._describe(self._ahead, self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
 
+    def observe(self, block: TimedBlock) -> None:
+        """Weigh anything that tells about the hand, where it belongs in time; without a hand it is lost.
+
+        Markers come this way, and so may an edge, a template or an object in the hand: the filter sees only rows.
+        """
+        if not self._tracking:
+            return
+        for weighed, outcome in self._timeline.add(block):
+            if isinstance(weighed, MarkerBlock):
+                self._learn(weighed, outcome)
+
     def _take(self, observations: CameraObservations) -> bool:
         """Weigh one frame; False when it is a double or too late."""
         block = MarkerBlock(self._wearing, observations)
@@ -109,9 +120,7 @@ class ModelTracker:
             return False
         if not self._tracking:
             return self._look_for_hand(observations)
-        for weighed, outcome in self._timeline.add(block):
-            assert isinstance(weighed, MarkerBlock)
-            self._learn(weighed, outcome)
+        self.observe(block)
         if self._timeline.t_ns - self._believed_ns > LOST_AFTER_NS or (
                 self._timeline.t_ns - self._plausible_ns > WRONG_AFTER_NS) or self._hand.astray:
             self._give_up()
@@ -128,9 +137,7 @@ class ModelTracker:
         self._tracking = self._ever = True
         self._believed_ns = self._plausible_ns = t_ns
         for block in self._sights.recent(t_ns):
-            for weighed, outcome in self._timeline.add(block):
-                assert isinstance(weighed, MarkerBlock)
-                self._learn(weighed, outcome)
+            self.observe(block)
         return True
 
     def _give_up(self) -> None:
@@ -151,7 +158,7 @@ class ModelTracker:
             return self._nothing(newest, begun)
         return self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
 
-    def _describe(self, estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:  # type: ignore
+    def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
         wearing, rig = self._wearing, self._rig
         cameras, markers = len(rig.camera_names), len(rig.marker_ids)
         pixels, used = np.empty((cameras, markers, 2)), np.empty((cameras, markers), np.bool_)

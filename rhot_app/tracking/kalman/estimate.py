@@ -41,9 +41,9 @@ class Estimate(NamedTuple):
 
     `world` (4, 4) world_from_palm m; `angles` (21,) rad; `velocity` (27,) m/s and rad/s; `acceleration` (27,) m/s^2
     and rad/s^2; `log_scale` (1,); `bias` (M, 3) m. `covariance` (N, N). `agitation` (7,): variance of the acceleration,
-    (m/s^2)^2 or (rad/s^2)^2, that surprised in each group of late; `since` (7,): how long ago it did, s. `trend`
-    (27,): leaky mean of the normalised corrections of each velocity. `unfaded` (1,): s since knowledge last faded.
-    `unseeing` (C,): s since each camera was last believed to see any marker.
+    (m/s^2)^2 or (rad/s^2)^2, that surprised in each group of late. `trend` (27,): leaky mean of the normalised
+    corrections of each velocity. `unfaded` (1,): s since knowledge last faded. `unseeing` (C,): s since each camera was
+    last believed to see any marker.
     """
 
     world: Array
@@ -54,7 +54,6 @@ class Estimate(NamedTuple):
     bias: Array
     covariance: Array
     agitation: Array
-    since: Array
     trend: Array
     unfaded: Array
     unseeing: Array
@@ -64,7 +63,7 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     """Room for an estimate; everything zero, the palm at the world's origin."""
     size = BIAS + 3 * markers
     return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
-                    np.zeros((size, size)), np.zeros(GROUPS), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1),
+                    np.zeros((size, size)), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1),
                     np.full(cameras, np.inf))
 
 
@@ -74,7 +73,6 @@ def copy_estimate(source: Estimate, target: Estimate) -> None:
     copy_mean(source, target)
     target.covariance[:] = source.covariance
     target.agitation[:] = source.agitation
-    target.since[:] = source.since
     target.trend[:] = source.trend
     target.unfaded[:] = source.unfaded
     target.unseeing[:] = source.unseeing

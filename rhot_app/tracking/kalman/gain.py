@@ -21,7 +21,7 @@ Mask = NDArray[np.bool_]
 def spread(rows: Rows, covariance: Array, out: Array) -> None:
     """Fill `out` (K, N) with H P. Zeros of the Jacobian cost nothing."""
     size = covariance.shape[0]
-    for k in range(rows.count[0]):
+    for k in range(rows.used[0]):
         target = out[k]
         target[:] = 0.0
         for j in range(size):
@@ -61,11 +61,11 @@ def solve(rows: Rows, covariance: Array, believed: Mask, widening: Array, step: 
     be. `widening` (L,): factor on each observation's noise. Fills the first rows of `gains` (K, N) with the factor G
     of the posterior covariance P - G^T G, and returns how many.
     """
-    size, capacity = covariance.shape[0], rows.count[0]
+    size, capacity = covariance.shape[0], rows.used[0]
     chosen = np.empty(capacity, np.int64)
     owner = np.empty(capacity, np.int64)
     count = 0
-    for observation in range(rows.count[1]):
+    for observation in range(rows.used[1]):
         if believed[observation]:
             for row in range(rows.first[observation], rows.first[observation + 1]):
                 chosen[count], owner[count] = row, observation

@@ -128,7 +128,7 @@ class HandFilter:
                 block.linearise(trial, rows)
         _conclude(estimate, trial, rows, self._believed, self._gains, count, dt, self._worn, self._habits,
                   self._bias_variance, self._limits, step)
-        observations = int(rows.count[1])
+        observations = int(rows.used[1])
         return Outcome(self._believed[:observations], rows.source[:observations])
 
 
@@ -150,7 +150,7 @@ def _improve(estimate: Estimate, rows: Rows, believed: Mask, widening: Array, st
 def _conclude(estimate: Estimate, trial: Estimate, rows: Rows, believed: Mask, gains: Array, count: int, dt: float,
               worn: Worn, habits: Habits, bias_variance: Array, limits: Array, step: Array) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
-    for observation in range(rows.count[1]):
+    for observation in range(rows.used[1]):
         if believed[observation] and rows.source[observation, 0] >= 0:
             estimate.unseeing[rows.source[observation, 0]] = 0.0
     note_trend(estimate, step, gains, count)

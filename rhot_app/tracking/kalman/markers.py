@@ -138,7 +138,7 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
             place[i] = points[m, i] + estimate.bias[m, i]
             for j in range(POSE):
                 place[i] += jacobian[m, i, j] * late * (estimate.velocity[j] + 0.5 * late * estimate.acceleration[j])
-        row, observation = rows.count[0], rows.count[1]
+        row, observation = rows.used[0], rows.used[1]
         rows.jacobian[row:row + 2] = 0.0
         if not project_marker(place, estimate.world, worn.half_axes[m], cameras.pose[camera],
                               cameras.intrinsics[camera], pixel, slope):
@@ -156,7 +156,7 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
         rows.part[observation] = worn.part[m]
         rows.source[observation, 0], rows.source[observation, 1] = camera, sight
         rows.first[observation + 1] = row + 2
-        rows.count[0], rows.count[1] = row + 2, observation + 1
+        rows.used[0], rows.used[1] = row + 2, observation + 1
 
 
 @njit(cache=True)

@@ -94,7 +94,6 @@ def predict(estimate: Estimate, dt: float, cameras: Cameras, habits: Habits, bia
     _move_mean(estimate, dt)
     _move_covariance(estimate, dt)
     estimate.agitation[:] *= math.exp(-dt / CALM_S)
-    estimate.since[:] += dt
     estimate.unseeing[:] += dt
     together = habits.together
     eye = single_eye(estimate)

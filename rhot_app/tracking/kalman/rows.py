@@ -24,14 +24,14 @@ PALM_PART = -1
 class Rows(NamedTuple):
     """Room for K rows in up to L observations.
 
-    `count` (2,): rows and observations in use. `residual` (K,): seen minus expected, in any unit; `jacobian` (K, N):
+    `used` (2,): rows and observations in use. `residual` (K,): seen minus expected, in any unit; `jacobian` (K, N):
     change of what is expected per error state; `noise` (K, 2): of each row, its variance and its covariance with the
     row before or after it in the same observation of two. `first` (L + 1,): the rows of observation l are
     first[l] .. first[l + 1] - 1, one or two of them; `part` (L,): PALM_PART or the finger; `source` (L, 2): camera and
     marker, or -1.
     """
 
-    count: Indices
+    used: Indices
     residual: Array
     jacobian: Array
     noise: Array
@@ -64,5 +64,5 @@ def empty_rows(rows: int, size: int) -> Rows:
 @njit(cache=True)
 def clear(rows: Rows) -> None:
     """Begin anew."""
-    rows.count[:] = 0
+    rows.used[:] = 0
     rows.first[0] = 0

@@ -54,10 +54,10 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
 
     `together` as in `Habits`.
     """
-    count, size = rows.count[1], estimate.covariance.shape[0]
+    count, size = rows.used[1], estimate.covariance.shape[0]
     if count == 0:
         return
-    gains, grown = np.empty((rows.count[0], size)), jerk_gains(ONSET_S)
+    gains, grown = np.empty((rows.used[0], size)), jerk_gains(ONSET_S)
     spread(rows, estimate.covariance, gains)
     noise, per_unit, surprise = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count)
     for observation in range(count):
@@ -167,11 +167,11 @@ def _raise_palm(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, g
     Markers on the palm show its translation; the others, and all of them together, its rotation.
     """
     on_palm = 0
-    for observation in range(rows.count[1]):
+    for observation in range(rows.used[1]):
         on_palm += rows.part[observation] == PALM_PART
     while True:
         chosen = 0
-        for observation in range(rows.count[1]):
+        for observation in range(rows.used[1]):
             if group == TURN or on_palm == 0 or rows.part[observation] == PALM_PART:
                 surprise[chosen] = _squared(rows, observation, noise, per_unit, added)
                 chosen += 1
@@ -184,7 +184,7 @@ def _raise_finger(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array,
                   surprise: Array) -> None:
     while True:
         worst = 0.0
-        for observation in range(rows.count[1]):
+        for observation in range(rows.used[1]):
             if rows.part[observation] == finger:
                 worst = max(worst, _squared(rows, observation, noise, per_unit, added))
         if worst <= PLAUSIBLE or not _raise(added, FIRST_FINGER + finger):

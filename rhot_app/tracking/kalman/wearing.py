@@ -80,17 +80,18 @@ def _half_axes(marker: Marker, model: HandModel) -> Array:
 
 def habits_of(model: HandModel, variant: VariantName) -> Habits:
     """What is believed of the angles: the natural pose, and the variant's couplings as good as exactly."""
-    rows = np.linalg.cholesky(model.natural.information).T
-    values = rows @ model.natural.mean
+    natural = np.linalg.cholesky(model.natural.information).T
     chosen = make_variant(variant, model.anatomy.couplings)
     basis = chosen.basis
     bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
     bound = bound[np.abs(bound).max(axis=1) > 1e-9]
-    rows, values = np.vstack([rows, bound]), np.concatenate([values, bound @ chosen.mean])
+    rows: Array = np.vstack([natural, bound])
+    values: Array = np.concatenate([natural @ model.natural.mean, bound @ chosen.mean])
     usual = np.diag([WIDEST**2] * POSE)
     information = rows.T @ rows
     usual[ANGLES:, ANGLES:] = np.linalg.inv(information)
-    return Habits(rows, values, np.linalg.solve(information, rows.T @ values), information, usual, _together(model))
+    mean = np.asarray(np.linalg.solve(information, rows.T @ values), dtype=np.float64)
+    return Habits(rows, values, mean, information, usual, _together(model))
 
 
 def _together(model: HandModel) -> Array:
