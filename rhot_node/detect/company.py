@@ -22,13 +22,14 @@ from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
 STILL_ENOUGH = 5  # worn markers together that need not have moved
 MOVED = 1.0  # px from where a marker was found: neither noise nor a neighbour's shadow
-TRAVELLED = 2.0  # diameters: a lone thing that went as far is no part of a desk
+TRAVELLED = 2.0  # diameters: a lone thing that is as far away twice in succession is no part of a desk
 TRAVEL_FRAMES = 8  # that it takes at least: what a passing hand uncovers jumps
 SAME_SIZE = 0.25  # of the logarithm of the diameter: what is partly hidden seems to move
 LEFT_BEHIND = 8.0  # px that the hand may move while a marker of it does not
 ALIKE = 0.2  # of the greatest likeness in size (`Whereabouts.likeness`): nine times larger or smaller
 STATED_QUALITY, STATED_SPREAD = 0.5, 0.3  # of the quality, and of the diameter as a standard deviation, while in doubt
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE
+UNPROVEN = DOUBTFUL | MarkerFlag.ACQUIRED  # a hand passes things: what joins a known one must be followed and in view
 
 
 class Company:
@@ -42,6 +43,7 @@ class Company:
         self._origin = np.zeros((len(self._markers), 5))  # where it was found, the hand then, its diameter
         self._frames = np.zeros(len(self._markers))  # since then
         self._moved = np.zeros(len(self._markers), dtype=np.bool_)
+        self._afar = np.zeros(len(self._markers), dtype=np.bool_)  # in the last frame it was where it must travel to
         self._vouched = np.zeros(len(self._markers), dtype=np.bool_)
         self._known = np.zeros(len(self._markers), dtype=np.bool_)
 
@@ -57,7 +59,7 @@ class Company:
 
     def forget(self) -> None:
         """Nothing is known of any marker."""
-        self._known[:] = self._moved[:] = self._vouched[:] = False
+        self._known[:] = self._moved[:] = self._afar[:] = self._vouched[:] = False
 
     def judge(self, seen: tuple[MarkerObservation, ...]) -> tuple[MarkerObservation, ...]:
         """The observations of one frame, as they can be believed."""
@@ -69,7 +71,8 @@ class Company:
         together = [mark.index for mark in worn if hand is not None and self._belongs(mark, hand)]
         moving = np.count_nonzero((self._moved | self._vouched)[together])
         if len(together) >= self._enough or (len(together) >= self._needed and moving >= self._needed):
-            self._vouched[together] = True
+            joined = self.vouched >= self._needed
+            self._vouched[[index for index in together if not (joined and seen[index].flags & UNPROVEN)]] = True
         return tuple([mark if not mark.found or self._vouched[mark.index] or self._markers[mark.index].role is None
                       else _in_doubt(mark) for mark in seen])
 
@@ -80,7 +83,8 @@ class Company:
             if not mark.found:
                 self._known[index] = self._vouched[index] = False
             elif not self._known[index] or mark.flags & MarkerFlag.ACQUIRED:
-                self._known[index], self._moved[index], self._vouched[index] = True, False, False
+                self._known[index] = True
+                self._moved[index] = self._afar[index] = self._vouched[index] = False
                 middle = (hand.x, hand.y) if hand else (math.nan, math.nan)
                 self._origin[index] = (mark.x, mark.y, *middle, mark.diameter)
                 self._frames[index] = 0.0
@@ -95,7 +99,9 @@ class Company:
             return
         way = math.hypot(mark.x - x, mark.y - y)
         self._moved[mark.index] |= way > MOVED
-        self._vouched[mark.index] |= way > TRAVELLED * mark.diameter and self._frames[mark.index] >= TRAVEL_FRAMES
+        afar = way > TRAVELLED * mark.diameter and self._frames[mark.index] >= TRAVEL_FRAMES
+        self._vouched[mark.index] |= afar and self._afar[mark.index]
+        self._afar[mark.index] = afar
 
     def _belongs(self, mark: MarkerObservation, hand: Whereabouts) -> bool:
         """Whether a marker is where the hand's others are, as large as they are, and not left behind by them."""

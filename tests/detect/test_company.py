@@ -65,7 +65,9 @@ def test_a_lone_marker_that_travels_is_believed_until_it_is_lost() -> None:
         assert doubted(company.judge(frame(2, shift=16.0 * TRAVELLED - 1.0))) == {2}
     smaller = mark(2, HAND[2][0] + 40.0, HAND[2][1], 10.0)
     assert doubted(company.judge(frame(others=(smaller,)))) == {2}  # half hidden, it only seems to move
-    assert doubted(company.judge(frame(2, shift=16.0 * TRAVELLED + 1.0))) == set()
+    afar = frame(2, shift=16.0 * TRAVELLED + 1.0)
+    assert doubted(company.judge(afar)) == {2} and doubted(company.judge(frame(2))) == {2}  # there and back: a jump
+    assert doubted(company.judge(afar)) == {2} and doubted(company.judge(afar)) == set()
     company.judge(frame())
     assert doubted(company.judge(frame(2, new=True))) == {2}
 
@@ -86,6 +88,18 @@ def test_what_stays_behind_when_the_hand_moves_is_doubted() -> None:
     for shift in np.arange(0.0, 30.0, 2.0):
         seen = company.judge(frame(0, 1, 2, 3, shift=float(shift), others=(thing,)))
     assert doubted(seen) == {4}
+
+
+@pytest.mark.parametrize("flags", [MarkerFlag.ACQUIRED, MarkerFlag.PARTIAL, MarkerFlag.ACQUIRED | MarkerFlag.PARTIAL])
+def test_what_a_known_hand_passes_joins_it_only_when_followed_in_plain_view(flags: MarkerFlag) -> None:
+    company = Company(RHOT6.markers)
+    for shift in (0.0, 2.0, 4.0):
+        company.judge(frame(0, 1, 2, 3, 4, shift=shift))
+    thing = mark(WRIST, 170.0, 220.0, 40.0, flags)
+    for _ in range(5):
+        assert doubted(company.judge(frame(0, 1, 2, 3, 4, shift=4.0, others=(thing,)))) == {WRIST}
+    followed = mark(WRIST, 170.0, 220.0, 40.0)
+    assert doubted(company.judge(frame(0, 1, 2, 3, 4, shift=4.0, others=(followed,)))) == set()
 
 
 def test_sets_of_one_or_two_worn_markers_and_free_ones_are_taken_as_they_are() -> None:
