@@ -108,13 +108,8 @@ def fit(y, u, v, cx, cy, look, radius, rim, steps, pixels, work, result):
 @njit(**FAST)
 def _step(look, radius, rim, pixels, count, work, learns, result):
     """One Gauss-Newton step of the radii, which may learn the rim and the blur as well. Returns the squared misfit."""
-    blur, level, slope_x, slope_y = look[BLUR], look[INSIDE], look[SLOPE_X], look[SLOPE_Y]
-    for j in range(NODES):
-        work[j, :RING_SUM] = 0.0
-        work[j, RADIUS], work[j, OUT] = radius[j], work[j, RING_SUM] + rim[1, j]
-        work[j, CONTRAST] = level + rim[0, j] - work[j, OUT]
-    work[NODES, :RING_SUM] = 0.0
-    work[NODES, RADIUS], work[NODES, OUT], work[NODES, CONTRAST] = radius[0], work[0, OUT], work[0, CONTRAST]
+    _set_levels(look[INSIDE], radius, rim, work)
+    blur, slope_x, slope_y = look[BLUR], look[SLOPE_X], look[SLOPE_Y]
     sharp = 1.0 / blur
     to_table = _TABLE_STEPS * sharp
     middle = _TABLE_HALF * _TABLE_STEPS + 0.5
@@ -146,14 +141,33 @@ def _step(look, radius, rim, pixels, count, work, learns, result):
             h = contrast * peak * d * sharp * sharp
             blur_e += h * e
             blur_2 += h * h
+    # At a band's corners levels and bends would be confused.
+    gain = max(SLOW, 0.5 / (look[AGE] + 1.0)) if learns and look[WIDTH] == 0.0 else 0.0
+    if gain > 0.0 and blur_2 > 0.0:
+        look[BLUR] = min(max(blur + 0.5 * gain * blur_e / blur_2, BLUR_LEAST), BLUR_MOST)
+    return misfit - _move(radius, rim, gain, work, result)
+
+
+@njit(**FAST)
+def _set_levels(level, radius, rim, work):
+    """Empty a step's sums; set the level outside and the contrast at every node."""
+    for j in range(NODES):
+        work[j, :RING_SUM] = 0.0
+        work[j, RADIUS], work[j, OUT] = radius[j], work[j, RING_SUM] + rim[1, j]
+        work[j, CONTRAST] = level + rim[0, j] - work[j, OUT]
+    work[NODES, :RING_SUM] = 0.0
+    work[NODES, RADIUS], work[NODES, OUT], work[NODES, CONTRAST] = radius[0], work[0, OUT], work[0, CONTRAST]
+
+
+@njit(**FAST)
+def _move(radius, rim, gain, work, result):
+    """Move the radii, and the rim's levels by `gain`, as the step's sums say. Returns by how much the misfit falls."""
     for k in range(RING_SUM):
         work[0, k] += work[NODES, k]
     mean = 0.0
     for j in range(NODES):
         mean += work[j, G2] / NODES
-    # At a band's corners levels and bends would be confused.
-    gain = max(SLOW, 0.5 / (look[AGE] + 1.0)) if learns and look[WIDTH] == 0.0 else 0.0
-    shift = 0.0
+    shift = fall = 0.0
     for j in range(NODES):
         work[j, G2] += BARE * mean
         work[j, GE] /= work[j, G2]
@@ -162,13 +176,11 @@ def _step(look, radius, rim, pixels, count, work, learns, result):
         shift += work[j, GE] / NODES
     for j in range(NODES):
         move = work[j, GE]
-        misfit -= move * move * work[j, G2]
+        fall += move * move * work[j, G2]
         result[DENT] = max(result[DENT], abs(move - shift))
         radius[j] += min(max(move - work[j, PE], -1.5), 1.5)
     radius[NODES], rim[0, NODES], rim[1, NODES] = radius[0], rim[0, 0], rim[1, 0]
-    if gain > 0.0 and blur_2 > 0.0:
-        look[BLUR] = min(max(blur + 0.5 * gain * blur_e / blur_2, BLUR_LEAST), BLUR_MOST)
-    return misfit
+    return fall
 
 
 @njit(**FAST)

@@ -87,20 +87,19 @@ def _turn(u, v):
 
 @njit(**FAST)
 def gather(y, u, v, cx, cy, look, radius, pixels, work):
-    """Sort the pixels about the outline: the paint's inside and the surroundings are summed, those near it listed."""
+    """Sort the pixels about the outline: the paint's inside and the surroundings are summed, those near it listed.
+
+    Returns how many are listed; 0 when there are too few to fit anything, or more than `pixels` holds.
+    """
     work[:] = 0.0
+    least, most = _slopes(look, radius, work)
     ax, ay, long, high = look[AXIS_X], look[AXIS_Y], 1.0 / look[LONG], 1.0 / look[HIGH]
     bend, width = look[BEND], 1.0 / max(look[WIDTH], 1.0)
     wu, wv, bu, bv = look[W_U], look[W_V], look[AROUND_U], look[AROUND_V]
-    least, most = _slopes(look, radius, work)
-    short = max(long, high)
-    deep, beyond = least - (BAND + 0.2) * short, most + RING_FAR * short
-    reach_x = beyond * math.sqrt((ax / long) ** 2 + (ay / high) ** 2) + abs(ay * bend)
-    reach_y = beyond * math.sqrt((ay / long) ** 2 + (ax / high) ** 2) + abs(ax * bend)
-    x0, x1 = max(int(cx - reach_x), 0), min(int(cx + reach_x) + 1, u.shape[1] - 1)
-    y0, y1 = max(int(cy - reach_y), 0), min(int(cy + reach_y) + 1, u.shape[0] - 1)
-    with_luma = look[AGE] % RESTING == 0.0
+    deep, beyond = least - (BAND + 0.2) * max(long, high), most + RING_FAR * max(long, high)
     deep2, beyond2 = deep * deep if deep > 0.0 else 0.0, beyond * beyond
+    x0, x1, y0, y1 = _box(cx, cy, look, beyond, u.shape)
+    with_luma = look[AGE] % RESTING == 0.0
     count = 0
     n = s_a = s_x = s_y = s_ax = s_ay = s_xx = s_xy = s_yy = s_u = s_v = s_l = 0.0
     r_n = r_u = r_v = r_uu = r_uv = r_vv = 0.0
@@ -123,22 +122,13 @@ def gather(y, u, v, cx, cy, look, radius, pixels, work):
                 turn = _turn(un, vn)
                 node = np.uint64(turn)
                 part = turn - node
-                after = node + ONE
-                d = ((rho - work[node, RADIUS] - part * (work[after, RADIUS] - work[node, RADIUS]))
-                     * (work[node, SCALE] + part * (work[after, SCALE] - work[node, SCALE])))
+                d = _outside(work, node, part, rho)
                 if d > RING_FAR:
                     continue
                 if d > RING_NEAR:
-                    work[node, RING_SUM] += (1.0 - part) * a
-                    work[node, RING_COUNT] += 1.0 - part
-                    work[after, RING_SUM] += part * a
-                    work[after, RING_COUNT] += part
-                    r_n += 1.0
-                    r_u += pu
-                    r_v += pv
-                    r_uu += pu * pu
-                    r_uv += pu * pv
-                    r_vv += pv * pv
+                    _add_around(work, node, part, a)
+                    r_n, r_u, r_v = r_n + 1.0, r_u + pu, r_v + pv
+                    r_uu, r_uv, r_vv = r_uu + pu * pu, r_uv + pu * pv, r_vv + pv * pv
                 if abs(d) <= BAND:
                     if count == pixels.shape[0]:
                         return 0
@@ -147,21 +137,50 @@ def gather(y, u, v, cx, cy, look, radius, pixels, work):
                     count += 1
                 inside = d < -BAND
             if inside:
-                n += 1.0
-                s_a += a
-                s_x += dx
-                s_y += dy
-                s_ax += a * dx
-                s_ay += a * dy
-                s_xx += dx * dx
-                s_xy += dx * dy
-                s_yy += dy * dy
-                s_u += pu
-                s_v += pv
+                n, s_a, s_x, s_y, s_u, s_v = n + 1.0, s_a + a, s_x + dx, s_y + dy, s_u + pu, s_v + pv
+                s_ax, s_ay = s_ax + a * dx, s_ay + a * dy
+                s_xx, s_xy, s_yy = s_xx + dx * dx, s_xy + dx * dy, s_yy + dy * dy
                 if with_luma:
                     s_l += y[2 * row, 2 * column]
     if n < INSIDE_MIN or r_n < NODES:
         return 0
+    _learn_slope(look, n, s_a, s_x, s_y, s_ax, s_ay, s_xx, s_xy, s_yy)
+    _learn_colours(look, n, s_u, s_v, r_n, r_u, r_v, r_uu, r_uv, r_vv)
+    if with_luma:
+        look[PAINT_Y] = s_l / n
+    return count
+
+
+@njit(**FAST)
+def _box(cx, cy, look, beyond, shape):
+    """First and last column, first and last row that may lie within `beyond` units of radius."""
+    ax, ay, bend = look[AXIS_X], look[AXIS_Y], look[BEND]
+    reach_x = beyond * math.sqrt((ax * look[LONG]) ** 2 + (ay * look[HIGH]) ** 2) + abs(ay * bend)
+    reach_y = beyond * math.sqrt((ay * look[LONG]) ** 2 + (ax * look[HIGH]) ** 2) + abs(ax * bend)
+    return (max(int(cx - reach_x), 0), min(int(cx + reach_x) + 1, shape[1] - 1),
+            max(int(cy - reach_y), 0), min(int(cy + reach_y) + 1, shape[0] - 1))
+
+
+@njit(**FAST)
+def _outside(work, node, part, rho):
+    """How far outside the outline, px square to it, a radius between two nodes ends."""
+    after = node + ONE
+    return ((rho - work[node, RADIUS] - part * (work[after, RADIUS] - work[node, RADIUS]))
+            * (work[node, SCALE] + part * (work[after, SCALE] - work[node, SCALE])))
+
+
+@njit(**FAST)
+def _add_around(work, node, part, a):
+    after = node + ONE
+    work[node, RING_SUM] += (1.0 - part) * a
+    work[node, RING_COUNT] += 1.0 - part
+    work[after, RING_SUM] += part * a
+    work[after, RING_COUNT] += part
+
+
+@njit(**FAST)
+def _learn_slope(look, n, s_a, s_x, s_y, s_ax, s_ay, s_xx, s_xy, s_yy):
+    """Set the paint's slope, slowly, and its level, carried to the outline's origin, from the sums over n pixels."""
     gain = max(SLOW, 1.0 / (look[AGE] + 1.0))
     xx, xy, yy = s_xx - s_x * s_x / n, s_xy - s_x * s_y / n, s_yy - s_y * s_y / n
     xa, ya = s_ax - s_x * s_a / n, s_ay - s_y * s_a / n
@@ -169,15 +188,16 @@ def gather(y, u, v, cx, cy, look, radius, pixels, work):
     if determinant > 0.05 * xx * yy:
         look[SLOPE_X] += gain * ((yy * xa - xy * ya) / determinant - look[SLOPE_X])
         look[SLOPE_Y] += gain * ((xx * ya - xy * xa) / determinant - look[SLOPE_Y])
-    # The paint's level, carried to the outline's origin.
     look[INSIDE] = (s_a - look[SLOPE_X] * s_x - look[SLOPE_Y] * s_y) / n
-    look[PAINT_U], look[PAINT_V] = bu + s_u / n, bv + s_v / n
-    if with_luma:
-        look[PAINT_Y] = s_l / n
+
+
+@njit(**FAST)
+def _learn_colours(look, n, s_u, s_v, r_n, r_u, r_v, r_uu, r_uv, r_vv):
+    """Set the paint's chroma and that of the surroundings, with its spread, from sums about the last one."""
     m_u, m_v = r_u / r_n, r_v / r_n
-    look[AROUND_U], look[AROUND_V] = bu + m_u, bv + m_v
+    look[PAINT_U], look[PAINT_V] = look[AROUND_U] + s_u / n, look[AROUND_V] + s_v / n
+    look[AROUND_U], look[AROUND_V] = look[AROUND_U] + m_u, look[AROUND_V] + m_v
     look[C_UU], look[C_UV], look[C_VV] = r_uu / r_n - m_u * m_u, r_uv / r_n - m_u * m_v, r_vv / r_n - m_v * m_v
-    return count
 
 
 @njit(**FAST)
