@@ -23,6 +23,14 @@ from rhot_node.wire.messages import (
     StartEntry,
     Stop,
 )
+from rhot_node.wire.plausible import (
+    expect_everybody,
+    expect_length,
+    expect_node,
+    expect_session,
+    expect_time,
+    expect_zeros,
+)
 from rhot_node.wire.seal import TAG_LENGTH, Seal
 
 MAGIC = b"RHOT"
@@ -39,7 +47,6 @@ TYPE_HERE = 7
 
 MARKERS_MAX = 64
 IMAGE_SIZE_MAX = 16384  # px
-TIME_MAX_NS = 1 << 62  # the difference of two times must fit 64 bits
 FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
 
 _HEADER = Struct("<4sBBHIQI")
@@ -192,37 +199,6 @@ def _encode_start(message: Start) -> bytes:
     return b"".join(parts)
 
 
-def _expect_length(payload: memoryview, expected: int) -> None:
-    if len(payload) != expected:
-        raise WireError("length", f"payload of {len(payload)} bytes where {expected} belong")
-
-
-def _expect_node(node_id: int) -> None:
-    if node_id == 0:
-        raise WireError("header", "node id 0 in a message of or to one node")
-
-
-def _expect_everybody(node_id: int) -> None:
-    if node_id != 0:
-        raise WireError("header", f"node id {node_id} in a message to all nodes")
-
-
-def _expect_session(session: int) -> None:
-    if session == 0:
-        raise WireError("header", "session 0 names no session")
-
-
-def _expect_zeros(reserved: bytes) -> None:
-    if reserved != _ZEROS:
-        raise WireError("reserved", "reserved bytes are not zero")
-
-
-def _expect_time(*times_ns: int) -> None:
-    for time_ns in times_ns:
-        if not -TIME_MAX_NS < time_ns < TIME_MAX_NS:
-            raise WireError("time", f"{time_ns} ns")
-
-
 def _decode_observations(payload: memoryview, node_id: int, session: int, sequence: int) -> Observations:
     if len(payload) < _OBSERVATIONS.size:
         raise WireError("length", f"payload of {len(payload)} bytes, observations begin with {_OBSERVATIONS.size}")
@@ -230,11 +206,11 @@ def _decode_observations(payload: memoryview, node_id: int, session: int, sequen
      reserved) = _OBSERVATIONS.unpack_from(payload)
     if count > MARKERS_MAX:
         raise WireError("count", f"{count} markers, at most {MARKERS_MAX}")
-    _expect_length(payload, _OBSERVATIONS.size + count * _MARKER.size)
-    _expect_node(node_id)
-    _expect_session(session)
-    _expect_zeros(reserved)
-    _expect_time(t_frame, t_send)
+    expect_length(payload, _OBSERVATIONS.size + count * _MARKER.size)
+    expect_node(node_id)
+    expect_session(session)
+    expect_zeros(reserved)
+    expect_time(t_frame, t_send)
     if not 0 <= t_send - t_frame <= FRAME_AGE_MAX_NS:
         raise WireError("time", f"sent {(t_send - t_frame) / 1e9:.3f} s after its exposure")
     if not (0 < width <= IMAGE_SIZE_MAX and 0 < height <= IMAGE_SIZE_MAX):
@@ -245,19 +221,19 @@ def _decode_observations(payload: memoryview, node_id: int, session: int, sequen
 
 
 def _decode_clock_request(payload: memoryview, node_id: int, session: int, sequence: int) -> ClockRequest:
-    _expect_length(payload, _CLOCK_REQUEST.size)
-    _expect_node(node_id)
+    expect_length(payload, _CLOCK_REQUEST.size)
+    expect_node(node_id)
     (t1,) = _CLOCK_REQUEST.unpack(payload)
-    _expect_time(t1)
+    expect_time(t1)
     return ClockRequest(node_id, session, sequence, t1)
 
 
 def _decode_clock_reply(payload: memoryview, node_id: int, session: int, sequence: int) -> ClockReply:
-    _expect_length(payload, _CLOCK_REPLY.size)
-    _expect_node(node_id)
+    expect_length(payload, _CLOCK_REPLY.size)
+    expect_node(node_id)
     t1, t2, t3, boot_id, state, reserved = _CLOCK_REPLY.unpack(payload)
-    _expect_zeros(reserved)
-    _expect_time(t1, t2, t3)
+    expect_zeros(reserved)
+    expect_time(t1, t2, t3)
     if t3 < t2:
         raise WireError("time", "replied before the request came")
     if state not in _STATES:
@@ -269,14 +245,14 @@ def _decode_start(payload: memoryview, node_id: int, session: int, sequence: int
     if len(payload) < _START.size:
         raise WireError("length", f"payload of {len(payload)} bytes, a start begins with {_START.size}")
     count, reserved = _START.unpack_from(payload)
-    _expect_length(payload, _START.size + count * _START_ENTRY.size)
-    _expect_everybody(node_id)
-    _expect_session(session)
-    _expect_zeros(reserved)
+    expect_length(payload, _START.size + count * _START_ENTRY.size)
+    expect_everybody(node_id)
+    expect_session(session)
+    expect_zeros(reserved)
     entries = []
     for entry_id, port, zero, t_start in _START_ENTRY.iter_unpack(payload[_START.size:]):
-        _expect_node(entry_id)
-        _expect_time(t_start)
+        expect_node(entry_id)
+        expect_time(t_start)
         if port == 0 or zero != 0:
             raise WireError("range", f"entry of node {entry_id}: port {port}, reserved {zero}")
         entries.append(StartEntry(entry_id, port, t_start))
@@ -286,8 +262,8 @@ def _decode_start(payload: memoryview, node_id: int, session: int, sequence: int
 
 
 def _decode_stop(payload: memoryview, node_id: int, session: int, sequence: int) -> Stop:
-    _expect_length(payload, 0)
-    _expect_everybody(node_id)
+    expect_length(payload, 0)
+    expect_everybody(node_id)
     return Stop(session, sequence)
 
 

@@ -9,6 +9,7 @@ from struct import Struct
 
 from rhot_node.errors import WireError
 from rhot_node.wire.messages import Find, Here, NodeState, TrustState
+from rhot_node.wire.plausible import expect_length, expect_no_session, expect_node, expect_zeros
 
 NAME_MAX = 64  # characters
 NAME_BYTES_MAX = 4 * NAME_MAX  # UTF-8
@@ -28,11 +29,9 @@ def encode_find(message: Find) -> bytes:
 
 def decode_find(payload: memoryview, node_id: int, session: int, sequence: int) -> Find:
     """Raises WireError: length, header, reserved."""
-    if len(payload) != _FIND.size + len(_PADDING):
-        raise WireError("length", f"payload of {len(payload)} bytes where {_FIND.size + len(_PADDING)} belong")
-    _expect_no_session(session)
-    if payload[_FIND.size:] != _PADDING:
-        raise WireError("reserved", "reserved bytes are not zero")
+    expect_length(payload, _FIND.size + len(_PADDING))
+    expect_no_session(session)
+    expect_zeros(payload[_FIND.size:])
     return Find(node_id, sequence, *_FIND.unpack_from(payload))
 
 
@@ -48,11 +47,9 @@ def decode_here(payload: memoryview, node_id: int, session: int, sequence: int) 
     if len(payload) < _HERE.size:
         raise WireError("length", f"payload of {len(payload)} bytes, an answer begins with {_HERE.size}")
     nonce, boot_id, *ports, state, trust, length = _HERE.unpack_from(payload)
-    if len(payload) != _HERE.size + length:
-        raise WireError("length", f"payload of {len(payload)} bytes where {_HERE.size + length} belong")
-    if node_id == 0:
-        raise WireError("header", "node id 0 in a message of one node")
-    _expect_no_session(session)
+    expect_length(payload, _HERE.size + length)
+    expect_node(node_id)
+    expect_no_session(session)
     if 0 in ports:
         raise WireError("range", "port 0")
     if state not in _STATES or trust not in _TRUSTS:
@@ -71,8 +68,3 @@ def _read_name(data: bytes) -> str:
     if not 0 < len(name) <= NAME_MAX or not name.isprintable():
         raise WireError("range", f"name {name[:NAME_MAX]!r}")
     return name
-
-
-def _expect_no_session(session: int) -> None:
-    if session != 0:
-        raise WireError("header", f"session {session} in a message of no session")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 from rhot_node.wire.messages import (
     NO_FLAGS,
@@ -21,9 +22,15 @@ from rhot_node.wire.messages import (
     TrustState,
 )
 
+PACKETS = Path(__file__).parents[1] / "packets"
 SESSION = 0x1122334455667788
 FRAME_NS = 3_600_000_000_000
 RHOT6_CHECKSUM = 0xC0FFEE01
+
+
+def packet(name: str) -> bytes:
+    """The golden packet of that name."""
+    return (PACKETS / f"{name}.bin").read_bytes()
 
 
 def lost(index: int) -> MarkerObservation:

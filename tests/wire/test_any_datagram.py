@@ -1,0 +1,117 @@
+"""Any message there and back; any bytes refused or taken for something plausible."""
+
+from __future__ import annotations
+
+import math
+import random
+import struct
+
+import msgspec
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from wire_samples import RHOT6_CHECKSUM, SAMPLES, lost, packet
+
+from rhot_node.errors import WireError
+from rhot_node.wire.codec import decode, encode
+from rhot_node.wire.messages import (
+    ClockReply,
+    ClockRequest,
+    Find,
+    Here,
+    MarkerFlag,
+    MarkerObservation,
+    Message,
+    NodeState,
+    Observations,
+    Start,
+    StartEntry,
+    Stop,
+    TrustState,
+)
+
+f32 = st.floats(width=32, allow_nan=False, allow_infinity=False)
+u32 = st.integers(0, 2**32 - 1)
+u64 = st.integers(0, 2**64 - 1)
+times = st.integers(-(2**62) + 1, 2**62 - 1)
+
+
+@st.composite
+def markers(draw: st.DrawFn, index: int) -> MarkerObservation:
+    flags = MarkerFlag(draw(st.integers(0, 63)))
+    if flags & MarkerFlag.LOST:
+        return msgspec.structs.replace(lost(index), flags=flags)
+    xx, yy = (draw(st.floats(0.0009765625, 64.0, width=32)) for _ in range(2))
+    correlation = draw(st.floats(-0.99, 0.99))
+    (xy,) = struct.unpack("<f", struct.pack("<f", correlation * math.sqrt(xx * yy)))
+    return MarkerObservation(index, draw(st.floats(-64, 703, width=32)), draw(st.floats(-64, 543, width=32)),
+                             draw(st.floats(0.5, 1280, width=32)), xx, xy, yy, draw(st.floats(0, 1, width=32)), flags)
+
+
+@st.composite
+def messages(draw: st.DrawFn) -> Message:
+    node_id, session, sequence = draw(st.integers(1, 2**32 - 1)), draw(st.integers(1, 2**64 - 1)), draw(u32)
+    match draw(st.integers(1, 7)):
+        case 1:
+            t_frame = draw(st.integers(-(2**61), 2**61))
+            count = draw(st.integers(0, 12))
+            return Observations(node_id, session, sequence, t_frame, t_frame + draw(st.integers(0, 60 * 10**9)),
+                                draw(u32), draw(u32), draw(u32), 640, 480, draw(u32), RHOT6_CHECKSUM,
+                                tuple(draw(markers(i)) for i in range(count)))
+        case 2:
+            return ClockRequest(node_id, session, sequence, draw(times))
+        case 3:
+            t2 = draw(st.integers(-(2**61), 2**61))
+            return ClockReply(node_id, session, sequence, draw(times), t2, t2 + draw(st.integers(0, 10**12)),
+                              draw(u32), draw(st.sampled_from(NodeState)))
+        case 4:
+            ids = draw(st.lists(st.integers(1, 2**32 - 1), unique=True, max_size=16))
+            return Start(session, sequence, tuple(StartEntry(i, draw(st.integers(1, 65535)), draw(times)) for i in ids))
+        case 5:
+            return Find(draw(u32), sequence, draw(u64))
+        case 6:
+            name = draw(st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=64))
+            return Here(node_id, sequence, draw(u64), draw(u32), *(draw(st.integers(1, 65535)) for _ in range(4)),
+                        draw(st.sampled_from(NodeState)), draw(st.sampled_from(TrustState)), name)
+        case _:
+            return Stop(session, sequence)
+
+
+@settings(max_examples=300, deadline=None)
+@given(messages())
+def test_every_message_survives_the_way(message: Message) -> None:
+    data = encode(message)
+    assert decode(data) == message
+    assert encode(decode(data)) == data
+
+
+def assert_sound(data: bytes) -> None:
+    """Whatever the bytes: a WireError or a plausible message that encodes to the same bytes."""
+    try:
+        message = decode(data)
+    except WireError:
+        return
+    again = encode(message)
+    assert decode(again) == message
+    if isinstance(message, Observations):
+        for m in message.markers:
+            assert m.found == math.isfinite(m.x) == math.isfinite(m.y)
+            assert math.isfinite(m.diameter + m.cov_xx + m.cov_xy + m.cov_yy) and 0 <= m.quality <= 1
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.binary(max_size=400))
+def test_random_bytes_never_raise_anything_else(data: bytes) -> None:
+    assert_sound(data)
+    assert_sound(b"RHOT\x01" + data)
+
+
+def test_mutated_packets_never_raise_anything_else() -> None:
+    rng = random.Random(5)
+    originals = [packet(name) for name in SAMPLES]
+    for _ in range(20_000):
+        data = bytearray(rng.choice(originals))
+        for _ in range(rng.choice((1, 1, 2, 8))):
+            data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        if rng.random() < 0.2:
+            del data[rng.randrange(len(data)):]
+        assert_sound(bytes(data))
