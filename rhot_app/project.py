@@ -19,6 +19,9 @@ from rhot_node.markers import MarkerSet
 FORMAT: Final = "rhot-rig"
 VERSION: Final = 1
 
+OTHER_HAND: Final = "other_"
+"""Begins the role of a marker that sits on the rig's `other_hand`: ``other_index_tip``."""
+
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
 Port = Annotated[int, Meta(ge=0, le=65535)]
@@ -141,6 +144,7 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tracker: TrackerSettings = TrackerSettings()
     up: Literal["-y", "z"] = "-y"  # which axis of the rig frame points up: the left camera's, or a table's frame
     broadcast: Broadcast = Broadcast()
+    other_hand: HandAnatomy | None = None  # a second one at the same time
     format: Literal["rhot-rig"] = FORMAT
     version: Literal[1] = VERSION
 
@@ -155,11 +159,23 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ValueError(f"two nodes have the same {what} {doubled[0]!r}; each node needs its own")
         if self.depth.mode == "disparity" and len(self.nodes) != 2:
             raise ValueError(f"depth.mode is \"disparity\", which needs two cameras; the rig has {len(self.nodes)}")
+        self._check_hands()
         known = set(self.markers.ids)
         for field in ("pixel_markers", "position_markers"):
             unknown = sorted(set(getattr(self.filters, field)) - known)
             if unknown:
                 raise ValueError(f"filters.{field} names a marker {unknown[0]!r} that the marker set does not have")
+
+    def _check_hands(self) -> None:
+        """Each hand of the rig has markers, and each marker a hand of the rig."""
+        other = [(marker.role or "").startswith(OTHER_HAND) for marker in self.markers.markers]
+        if self.other_hand is None and any(other):
+            marker = self.markers.markers[other.index(True)]
+            raise ValueError(f"marker {marker.id!r} has the role {marker.role!r}, which is on another hand; give the "
+                             "rig that hand as other_hand, or the marker another role")
+        if self.other_hand is not None and not 0 < sum(other) < len(other):
+            raise ValueError("the rig has a hand and an other_hand, but not both wear markers; those of other_hand "
+                             f"have roles that begin with \"{OTHER_HAND}\"")
 
 
 def load_rig(path: Path) -> Rig:

@@ -82,6 +82,14 @@ def moved_advice(rig: Rig, moved: Mapping[int, str]) -> list[Advice]:
             for node in rig.nodes if moved.get(node.node_id, node.address) != node.address]
 
 
+def hands_advice(rig: Rig) -> list[Advice]:
+    """One sentence when the rig has a hand that its tracker does not follow."""
+    if rig.other_hand is None or rig.tracker.kind == "model":
+        return []
+    return [Advice("info", "The classic tracker follows the first hand only and takes the markers of the other one "
+                           "for free points. Choose the model tracker for two hands at once.")]
+
+
 def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     status = facts.status
     name = status.name
