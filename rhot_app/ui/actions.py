@@ -8,8 +8,15 @@ from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton,
 
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
+from rhot_app.ui.scene.ellipsoid_mesh import LARGER
+from rhot_app.ui.scene.page import SceneBar
 from rhot_app.ui.shapes import shape_icon
 from rhot_app.ui.wizards.catalogue import WIZARDS
+
+CLOUD_KINDS = (("joints", "Of the hand's inner joints; the model tracker estimates them."),
+               ("fingertips", "Of the fingertips; the model tracker estimates them."),
+               ("markers", "Of the markers, as far as they are not the fingertips drawn already."))
+"""Whose uncertainty can be drawn; the words are the settings' names too."""
 
 _CALM_MS = 100  # the system may report the mouse over the button once more when the menu above it has gone
 
@@ -32,6 +39,7 @@ class Actions(QObject):
         self.wizards = [self._make(f"{wizard.title} …", "", wizard.meaning) for wizard in WIZARDS]
         self.earlier = self._make("Bring back an earlier calibration …", "", "Every calibration keeps what it "
                                   "replaced; choose one by date and reason.")
+        self.tracker = self._make("Tracker …", "", "Which tracker makes a hand of the markers, and what it may assume.")
         self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
         self.markers = self._make("Markers …", "", "The marker set that the rig file says.")
         self.hand = self._make("Hand …", "", "The hand's bones that the rig file says.")
@@ -39,17 +47,23 @@ class Actions(QObject):
         self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene (F).")
         self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
         self.names = self._make("Marker names", "", "Names beside the markers in the scene.", checkable=True)
-        self.clouds = self._make("Covariance clouds", "", "How well each marker's place is known: three sigma.",
-                                 checkable=True)
+        self.clouds = self._make("Uncertainty", "U", "How well places are known, as ellipsoids: the true place lies "
+                                 "inside in 97 of 100 cases (three sigma) (U).", checkable=True)
+        self.cloud_kinds = [self._make(f"of {kind}", "", meaning, checkable=True) for kind, meaning in CLOUD_KINDS]
+        self.cloud_sizes = [
+            self._make("1 ×", "", "Ellipsoids in true size.", checkable=True),
+            self._make(f"{LARGER} ×", "", f"Ellipsoids {LARGER} times as large, because a good place is known to a "
+                       "millimetre.", checkable=True)]
         self.alone = self._make("Scene alone", "6", "Hide every panel, to look from afar; again brings them back (6).",
                                 checkable=True)
         self.dark = self._make("Dark", "", "Light text on dark ground.", checkable=True)
         self.light = self._make("Light", "", "Dark text on light ground.", checkable=True)
         self.reset = self._make("Reset layout and settings", "", "Forget layout, last rig and switches.")
         self.guide = self._make("Guide", "F1", "The page of the guide that explains the panel in use (F1).")
-        group = QActionGroup(self)
-        group.addAction(self.dark)
-        group.addAction(self.light)
+        for alternatives in ([self.dark, self.light], self.cloud_sizes):
+            group = QActionGroup(self)
+            for action in alternatives:
+                group.addAction(action)
 
     def _make(self, text: str, key: str, meaning: str, *, checkable: bool = False) -> QAction:
         action = QAction(text, self)
@@ -62,6 +76,11 @@ class Actions(QObject):
     def all(self) -> list[QAction]:
         """Every action, so that the window knows their keys."""
         return [child for child in self.children() if isinstance(child, QAction)]
+
+
+    def scene_bar(self) -> SceneBar:
+        """The scene's own toolbar."""
+        return SceneBar(self.clouds, self.cloud_kinds, self.cloud_sizes, [self.names])
 
 
 class MainToolBar(QToolBar):
@@ -80,8 +99,8 @@ class MainToolBar(QToolBar):
         self.addSeparator()
         a = actions
         self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.save_rig, a.close_rig, None, a.quit])
-        self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.cameras, a.markers,
-                                                             a.hand, None, a.files])
+        self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
+                                                             a.markers, a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, None,
                                                    a.dark, a.light, None, a.reset])
         self.addAction(actions.guide)

@@ -1,16 +1,21 @@
-"""Dark or light, names and clouds in the scene: the switches of the View menu, as they were left."""
+"""Dark or light, names and uncertainty in the scene: the switches of the View menu, as they were left."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication
 
-from rhot_app.ui.actions import Actions
+from rhot_app.ui.actions import CLOUD_KINDS, Actions
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.advice_bar import AdviceBar
+from rhot_app.ui.scene.ellipsoid_mesh import LARGER, EllipsoidChoice
 from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
 from rhot_app.ui.theme import apply_theme, scheme_named
+
+_LARGER = "clouds larger"
+_CLOUD_FLAGS = {"clouds": True, **{f"clouds of {kind}": True for kind, _ in CLOUD_KINDS}, _LARGER: False}
+"""The switches of the ellipsoids by their names in the settings, with what they are at first."""
 
 
 class Appearance(QObject):
@@ -25,7 +30,8 @@ class Appearance(QObject):
         self._actions, self._parts, self._advice = actions, parts, advice
         self.scheme: Scheme = scheme_named(settings.scheme)
         actions.names.toggled.connect(self._show_names)
-        actions.clouds.toggled.connect(self._show_clouds)
+        for action in (actions.clouds, *actions.cloud_kinds, actions.cloud_sizes[-1]):
+            action.toggled.connect(self._choose_ellipsoids)
         actions.dark.triggered.connect(lambda: self.set_scheme("dark"))
         actions.light.triggered.connect(lambda: self.set_scheme("light"))
 
@@ -34,9 +40,12 @@ class Appearance(QObject):
         a, s = self._actions, self._settings
         (a.light if s.scheme == "light" else a.dark).setChecked(True)
         a.names.setChecked(s.flag("names"))
-        a.clouds.setChecked(s.flag("clouds"))
         self._parts.scene.show_names(s.flag("names"))
-        self._parts.scene.show_clouds(s.flag("clouds"))
+        wanted = {name: s.flag(name, default) for name, default in _CLOUD_FLAGS.items()}
+        for action, name in zip((a.clouds, *a.cloud_kinds), _CLOUD_FLAGS, strict=False):
+            action.setChecked(wanted[name])
+        a.cloud_sizes[wanted[_LARGER]].setChecked(True)
+        self._choose_ellipsoids()
 
     def set_scheme(self, name: str) -> None:
         """Dark or light."""
@@ -53,6 +62,13 @@ class Appearance(QObject):
         self._settings.set_flag("names", on)
         self._parts.scene.show_names(on)
 
-    def _show_clouds(self, on: bool) -> None:
-        self._settings.set_flag("clouds", on)
-        self._parts.scene.show_clouds(on)
+    def _choose_ellipsoids(self) -> None:
+        a = self._actions
+        shown = [action.isChecked() for action in (a.clouds, *a.cloud_kinds, a.cloud_sizes[-1])]
+        for name, on in zip(_CLOUD_FLAGS, shown, strict=True):
+            self._settings.set_flag(name, on)
+        on, joints, fingertips, markers, larger = shown
+        for action in (*a.cloud_kinds, *a.cloud_sizes):
+            action.setEnabled(on)
+        choice = EllipsoidChoice(joints, fingertips, markers, LARGER if larger else 1)
+        self._parts.scene.show_ellipsoids(choice if on else None)

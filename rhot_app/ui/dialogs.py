@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from rhot_app.project import Rig
+from rhot_app.ui.controller import Controller
 from rhot_app.ui.guide import GuideViewer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.nodes_dialog import NodesDialog
 from rhot_app.ui.rig_dialog import RigDialog
+from rhot_app.ui.tracker_dialog import TrackerDialog
 
 
 class Dialogs:
@@ -20,6 +23,7 @@ class Dialogs:
     def __init__(self, parent: QWidget) -> None:
         self._parent = parent
         self.guide: GuideViewer | None = None
+        self.tracker: TrackerDialog | None = None
 
     def choose_rig(self, last_rig: str) -> Path | None:
         """A rig file, looked for beside the one opened last; None when the person thought better of it."""
@@ -40,6 +44,35 @@ class Dialogs:
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.open()
 
+    def choose_tracker(self, controller: Controller, rig_used: Callable[[], None]) -> None:
+        """The choice of the tracker, beside the window so that the hand is seen; `rig_used` after each change."""
+        opened = controller.opened
+        if opened is None:
+            return
+        if self.tracker is None:
+            path = Path(opened.rig_path) if opened.rig_path else None
+            self.tracker = TrackerDialog(opened.rig, path, controller.backend.asker,
+                                         lambda: controller.live.state if controller.running else None, self._parent)
+            self.tracker.rig_used.connect(lambda rig: rig_used())
+            self.tracker.finished.connect(self._forget_tracker)
+        self.tracker.show()
+        self.tracker.raise_()
+        self.tracker.activateWindow()
+
+    def follow_rig(self, controller: Controller) -> None:
+        """Another rig is open, or none."""
+        if self.tracker is not None:
+            if controller.opened is None:
+                self.tracker.close()
+            else:
+                path = controller.opened.rig_path
+                self.tracker.follow(controller.opened.rig, Path(path) if path else None)
+
+    def _forget_tracker(self) -> None:
+        if self.tracker is not None:
+            self.tracker.deleteLater()
+            self.tracker = None
+
     def open_guide(self, page: str) -> None:
         """A page of the guide beside the window."""
         if self.guide is None:
@@ -53,5 +86,6 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        if self.guide is not None:
-            self.guide.close()
+        for window in (self.guide, self.tracker):
+            if window is not None:
+                window.close()

@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QWidget
 
 _AREAS = {"left": Qt.DockWidgetArea.LeftDockWidgetArea, "right": Qt.DockWidgetArea.RightDockWidgetArea,
           "bottom": Qt.DockWidgetArea.BottomDockWidgetArea}
-LEFT_PX, RIGHT_PX, BOTTOM_PX = 216, 440, 220
-_SHARES = {"left": (216, 260), "right": (270, 200), "bottom": (1,)}
+LEFT_PX, RIGHT_PX, BOTTOM_PX = 264, 440, 220
+_SHARES = {"left": (216, 260), "right": (240, 230), "bottom": (1,)}
 
 
 class Docks:

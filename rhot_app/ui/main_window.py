@@ -27,6 +27,7 @@ from rhot_app.ui.models.passing import PassingNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.recordings import SHOW_FOLDER, Recordings
 from rhot_app.ui.rig_watch import RigWatch
+from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
 from rhot_app.ui.theme import scheme_named
@@ -67,7 +68,7 @@ class MainWindow(QMainWindow):
         self.welcome = WelcomePage(settings.motion)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.welcome)
-        self.pages.addWidget(self.screen_parts.scene)
+        self.pages.addWidget(ScenePage(self.screen_parts.scene, self.actions_.scene_bar()))
         self.setCentralWidget(self.pages)
         self.docks = Docks(self)
         self._add_docks()
@@ -107,6 +108,7 @@ class MainWindow(QMainWindow):
         a.quit.triggered.connect(self.close)
         for action, page in ((a.cameras, "cameras"), (a.markers, "markers"), (a.hand, "hand")):
             action.triggered.connect(lambda checked=False, page=page: self.show_rig_file(page))
+        a.tracker.triggered.connect(lambda: self.dialogs.choose_tracker(c, self.rig_watch.look_soon))
         self._connect_wizards()
         a.files.triggered.connect(lambda: self.open_guide("calibration"))
         a.frame.triggered.connect(self.screen_parts.scene.frame_hand)
@@ -258,6 +260,7 @@ class MainWindow(QMainWindow):
     def _show_rig(self) -> None:
         rig, opened = self.controller.rig, self.controller.opened
         self.screen_parts.show_rig(rig)
+        self.dialogs.follow_rig(self.controller)
         self.pages.setCurrentIndex(0 if rig is None else 1)
         self.docks.put_away("no rig", rig is None)
         self._show_rig_name()
@@ -276,7 +279,8 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [*a.wizards, a.earlier, a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home, a.names, a.clouds]
+        return [*a.wizards, a.earlier, a.tracker, a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home, a.names,
+                a.clouds]
 
     def _show_busy(self) -> None:
         if self.controller.opened is None:

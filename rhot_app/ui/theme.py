@@ -100,6 +100,14 @@ def style_sheet(s: Scheme) -> str:
     QLineEdit, QComboBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
         padding: 4px 8px; min-height: 20px; }}
     QLineEdit:focus, QComboBox:focus {{ border-color: {s.accent}; }}
+    SceneBar {{ padding: 2px 4px; }}
+    SceneBar QToolButton {{ padding: 3px 10px; }}
+    SceneBar QToolButton[popupMode="1"] {{ padding-right: 26px; }}
+    SceneBar QToolButton::menu-button {{ border: none; width: 18px; }}
+    QRadioButton::indicator {{ width: 12px; height: 12px; border: 2px solid {s.muted}; border-radius: 8px; }}
+    QRadioButton::indicator:disabled {{ border-color: {s.border}; }}
+    QRadioButton::indicator:checked {{ border-color: {s.accent}; background: qradialgradient(cx: 0.5, cy: 0.5,
+        radius: 0.5, fx: 0.5, fy: 0.5, stop: 0 {s.accent}, stop: 0.6 {s.accent}, stop: 0.7 {s.panel}); }}
     QProgressBar {{ border: 1px solid {s.border}; border-radius: 4px; background: {s.panel}; height: 8px; }}
     QProgressBar::chunk {{ background: {s.accent}; border-radius: 3px; }}
     """

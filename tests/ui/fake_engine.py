@@ -23,7 +23,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, parse_rig
 from rhot_app.rig_history import accept
 from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 from rhot_node.files import resource_path
@@ -84,6 +84,8 @@ class FakeEngine:
         self.dead = False
         self.log_path = ""
         self.rig_path = ""
+        self.refuse_rig = ""  # why the engine takes no other rig
+        self.scale = (1.03, 0.008)  # what a floating hand's size is estimated to be
         self.commands: list[tuple[str, dict[str, Any]]] = []
         self.sequence = 0
         self.session = 1
@@ -109,11 +111,7 @@ class FakeEngine:
         raw = truth + NOISE_M * self._random.standard_normal((count, 3))
         pixels, flags, knowledge = self._sights(raw)
         unseen = knowledge == Knowledge.UNKNOWN
-        joint_knowledge = np.full(len(JOINTS), Knowledge.INFERRED, np.uint8)
-        joint_knowledge[[4, 8, 12, 16, 20]] = np.where(knowledge[:5] == Knowledge.MEASURED, Knowledge.MEASURED,
-                                                       Knowledge.GUESSED)
-        angle_knowledge = np.full(len(ANGLES), Knowledge.INFERRED, np.uint8)
-        angle_knowledge[[5, 9, 13, 17]] = Knowledge.GUESSED
+        joint_knowledge, angle_knowledge, palm_knowledge = self._kinds(knowledge)
         latency = {stage: value * (1 + 0.25 * abs(self._random.standard_normal()))
                    for stage, value in zip(LATENCY_STAGES, _STAGE_S, strict=True)}
         return HandState(
@@ -125,8 +123,33 @@ class FakeEngine:
             camera_names=tuple(node.name for node in self.rig.nodes), camera_pixels=pixels, camera_flags=flags,
             joint_positions=points.joints, joint_knowledge=joint_knowledge,
             fingertip_positions=points.marker_centres, angles=pose.angles, angle_knowledge=angle_knowledge,
-            world_from_palm=pose.world_from_palm, palm_knowledge=Knowledge.GUESSED,
-            epipolar_error_px=np.full(count, 0.12), **UNESTIMATED, latency_s=latency)
+            world_from_palm=pose.world_from_palm, palm_knowledge=palm_knowledge,
+            epipolar_error_px=np.full(count, 0.12), **self._estimated(), latency_s=latency)
+
+    def _estimated(self) -> dict[str, Any]:
+        """What the model tracker adds: fingers that grow less certain from the thumb on, and the hand's size."""
+        if self.rig.tracker.kind == "classic":
+            return UNESTIMATED
+        spread = np.repeat([1.0, 1.0, 1.5, 3.0, 8.0, 20.0], [1, 4, 4, 4, 4, 4])
+        scale = {"hand_scale": self.scale[0], "hand_scale_sd": self.scale[1]} if self.rig.tracker.float_scale else {
+            "hand_scale": 1.0, "hand_scale_sd": 0.0}
+        return {"joint_covariances": np.diag(NOISE_M**2) * (spread**2)[:, None, None],
+                "fingertip_covariances": np.diag(NOISE_M**2) * (spread[4::4]**2)[:, None, None],
+                "angle_sd": np.radians(np.repeat([1.0, 1.0, 3.0, 8.0, 20.0], [5, 4, 4, 4, 4])),
+                "palm_covariance": np.diag([4e-4, 4e-4, 5e-4, 0.01, 0.01, 0.02]) ** 2, **scale}
+
+    def _kinds(self, knowledge: np.ndarray) -> tuple[np.ndarray, np.ndarray, Knowledge]:
+        """How joints, angles and palm are known, from how the markers are."""
+        if self.rig.tracker.kind == "classic":
+            joints = np.full(len(JOINTS), Knowledge.INFERRED, np.uint8)
+            joints[[4, 8, 12, 16, 20]] = np.where(knowledge[:5] == Knowledge.MEASURED, Knowledge.MEASURED,
+                                                  Knowledge.GUESSED)
+            angles = np.full(len(ANGLES), Knowledge.INFERRED, np.uint8)
+            angles[[5, 9, 13, 17]] = Knowledge.GUESSED
+            return joints, angles, Knowledge.GUESSED
+        fingers = [Knowledge.MEASURED] * 3 + [Knowledge.INFERRED, Knowledge.GUESSED]
+        joints = np.repeat([Knowledge.MEASURED, *fingers], [1, 4, 4, 4, 4, 4]).astype(np.uint8)
+        return joints, np.repeat(fingers, [5, 4, 4, 4, 4]).astype(np.uint8), Knowledge.MEASURED
 
     def _sights(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         pixels = np.full((len(self.rig.nodes), len(positions), 2), np.nan)
@@ -221,6 +244,10 @@ class FakeClient:
         self.engine.commands.append((name, args))
         if name in ("start", "stop"):
             self.engine.running = name == "start"
+        if name == "set_rig":
+            if self.engine.refuse_rig:
+                raise EngineError(self.engine.refuse_rig)
+            self.engine.rig = parse_rig(msgspec.json.encode(args["document"]), "the new rig")
         if name == "record":
             Path(args["path"]).write_bytes(bytes(120_000))
             self.engine.log_path = args["path"]

@@ -10,10 +10,19 @@ from fake_engine import FakeEngine, synthetic_rig
 
 from rhot_app.project import CameraPose
 from rhot_app.tracking.state import Knowledge
+from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.scene import stage
-from rhot_app.ui.scene.frames import DISPLAY_FROM_RIG, camera_like_state, frustum_lines, rotation_of, to_display
+from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice, EllipsoidMesh
+from rhot_app.ui.scene.frames import (
+    DISPLAY_FROM_RIG,
+    camera_like,
+    camera_like_state,
+    frustum_lines,
+    rotation_of,
+    to_display,
+)
 from rhot_app.ui.scene.hand_mesh import HandMesh, SkeletonMesh, palm_hull
-from rhot_app.ui.scene.marker_mesh import CloudMesh, MarkerMesh
+from rhot_app.ui.scene.marker_mesh import MarkerMesh
 from rhot_app.ui.scene.meshes import capsule_template, elliptic_band, pose_capsules, sphere
 
 
@@ -76,7 +85,22 @@ def test_the_skin_covers_the_joints(engine):
     joints = to_display(state.joint_positions)
     assert (joints >= low - 4e-3).all() and (joints <= high + 4e-3).all()  # the tips end under the paint
     assert np.isfinite(posed.vertices).all()
-    assert set(np.unique(posed.knowledge)) == {Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED}
+
+
+def test_a_bone_is_as_known_as_its_less_known_end(engine):
+    joints = np.full(21, Knowledge.MEASURED, np.uint8)
+    joints[7], joints[12] = Knowledge.INFERRED, Knowledge.GUESSED  # index DIP, middle tip
+    state = replace(engine.state(2.0), joint_knowledge=joints, palm_knowledge=Knowledge.GUESSED)
+    skin = HandMesh(engine.rig.hand).pose(state)
+    count = len(capsule_template(12, 3).directions)
+    segments = skin.knowledge[:15 * count].reshape(15, count)
+    assert (segments == segments[:, :1]).all()
+    inferred, guessed = int(Knowledge.INFERRED), int(Knowledge.GUESSED)
+    assert segments[:, 0].tolist() == [0, 0, 0, 0, inferred, inferred, 0, 0, guessed, 0, 0, 0, 0, 0, 0]
+    assert (skin.knowledge[15 * count:] == guessed).all()
+    bones = SkeletonMesh().pose(state).knowledge.reshape(36, -1)[:, 0]  # 15 bones, 5 rays, 16 balls
+    assert bones[:15].tolist() == segments[:, 0].tolist() and not bones[15:20].any()
+    assert bones[20:].tolist().count(inferred) == 1
 
 
 def test_what_is_unknown_is_not_drawn_and_nothing_is_nan(engine):
@@ -88,8 +112,9 @@ def test_what_is_unknown_is_not_drawn_and_nothing_is_nan(engine):
     blank = replace(state, joint_positions=joints, marker_positions=positions,
                     marker_covariances=np.full((6, 3, 3), np.nan), world_from_palm=np.full((4, 4), np.nan))
     rig = engine.rig
-    for mesh in (HandMesh(rig.hand), SkeletonMesh(), MarkerMesh(rig.markers, rig.hand), CloudMesh(rig.markers)):
-        posed = mesh.pose(blank)
+    ellipsoids = EllipsoidMesh(rig.markers, DARK).pose(blank, EllipsoidChoice())
+    posers = (HandMesh(rig.hand), SkeletonMesh(), MarkerMesh(rig.markers, rig.hand))
+    for posed in (*(mesh.pose(blank) for mesh in posers), ellipsoids):
         assert np.isfinite(posed.vertices).all() and np.isfinite(posed.normals).all()
     index = HandMesh(rig.hand).pose(blank).vertices.reshape(-1, 3)
     count = len(capsule_template(12, 3).directions)
@@ -105,12 +130,37 @@ def test_markers_lie_where_they_were_measured_in_their_own_colours(engine):
     assert middle == pytest.approx(to_display(state.marker_positions[0]), abs=1e-3)
 
 
-def test_clouds_show_three_sigma(engine):
-    state = engine.state(2.0)
-    covariances = np.tile(np.diag([1e-6, 4e-6, 9e-6]), (6, 1, 1))
-    posed = CloudMesh(engine.rig.markers).pose(replace(state, marker_covariances=covariances))
-    first = posed.vertices.reshape(6, -1, 3)[0]
-    assert np.ptp(first, axis=0) == pytest.approx([0.006, 0.018, 0.012], rel=0.05)  # x, z (depth), y of the rig
+def spans(mesh, state, choice):
+    """(27, 3) m: how far each ellipsoid reaches along the scene's axes; 16 joints, 5 tips, 6 markers."""
+    posed = mesh.pose(state, choice)
+    assert np.linalg.norm(posed.normals, axis=1) == pytest.approx(1.0)
+    return np.ptp(posed.vertices.reshape(27, -1, 3), axis=1)
+
+
+@pytest.fixture
+def estimated(engine):
+    """A state whose places are all known to 1, 2 and 3 mm along x, y and z of the rig."""
+    known = np.diag([1e-6, 4e-6, 9e-6])
+    return replace(engine.state(2.0), marker_covariances=np.tile(known, (6, 1, 1)),
+                   joint_covariances=np.tile(known, (21, 1, 1)), fingertip_covariances=np.tile(known, (5, 1, 1)))
+
+
+def test_ellipsoids_show_three_sigma(engine, estimated):
+    mesh = EllipsoidMesh(engine.rig.markers, DARK)
+    found = spans(mesh, estimated, EllipsoidChoice())
+    assert found[[0, 20, 26]] == pytest.approx(np.tile([0.006, 0.018, 0.012], (3, 1)), rel=0.06)
+    assert found[21:26].max() == 0.0, "a painted fingertip has one ellipsoid, not two that flicker"
+    assert not mesh.cut
+
+
+def test_ellipsoids_can_be_chosen_and_are_cut_where_they_hide_everything(engine, estimated):
+    mesh = EllipsoidMesh(engine.rig.markers, DARK)
+    only = spans(mesh, estimated, EllipsoidChoice(joints=False, fingertips=False))
+    assert only[:21].max() == 0.0 and (only[21:].min(axis=1) > 0.005).all()
+    larger = spans(mesh, estimated, EllipsoidChoice(factor=10))
+    assert larger[0] == pytest.approx([0.06, 0.12, 0.12], rel=0.06) and mesh.cut
+    unknown = spans(mesh, replace(estimated, joint_covariances=np.full((21, 3, 3), np.nan)), EllipsoidChoice())
+    assert unknown[:16].max() == 0.0 and unknown[16:21].min() > 0.0
 
 
 def test_the_floor_has_ticks_in_millimetres():
@@ -129,6 +179,7 @@ def test_a_rig_on_a_table_stands_on_the_floor_with_z_up(engine):
     assert to_display(palm[:3, :3] @ up_in_palm) == pytest.approx([0.0, 0.0, 1.0])
     spread = np.trace(shown.marker_covariances[0])
     assert spread == pytest.approx(np.trace(state.marker_covariances[0]))
+    assert shown.fingertip_positions == pytest.approx(camera_like(state.fingertip_positions, "z"))
     assert camera_like_state(state, "-y") is state
 
 

@@ -3,11 +3,14 @@ something, and the pictures must be there."""
 
 from __future__ import annotations
 
+import msgspec
 import pytest
-from fake_engine import FakeEngine
+from fake_backend import FakeBackend
+from fake_engine import FakeEngine, synthetic_rig
 from screen_pictures import SIZE, UPDATE, check, colours_in, picture_of
 
 from rhot_app.engine.status import Advice
+from rhot_app.project import TrackerSettings
 from rhot_app.sources.discovery import Search, conflicts, together
 from rhot_app.sources.find_socket import Sighting
 from rhot_app.sources.pairing import Introduction, NodeAddress
@@ -89,6 +92,21 @@ def test_scene_alone(shown):
     shown.window.screen_parts.scene.frame_hand()
     shown.run(0.7)
     check("scene", picture_of(shown.window), 60)
+
+
+def test_what_is_real(make_bench):
+    rig = msgspec.structs.replace(synthetic_rig(), tracker=TrackerSettings(kind="model", float_scale=True))
+    bench = make_bench(FakeBackend(FakeEngine(rig, running=False)))
+    bench.window.resize(SIZE)
+    bench.track()
+    bench.window.actions_.cloud_sizes[1].trigger()
+    bench.window.screen_parts.scene.frame_hand()
+    bench.run(0.7)
+    check("uncertainty", picture_of(bench.window), 80)
+    bench.window.actions_.tracker.trigger()
+    dialog = bench.window.dialogs.tracker
+    bench.until(dialog.size_button.isEnabled)
+    check("tracker", dialog.grab().toImage(), 12)
 
 
 def connecting() -> NodesDialog:

@@ -38,7 +38,10 @@ TERMS: dict[str, str] = {
     "PIP": "Proximal interphalangeal joint: the middle joint of a finger.",
     "DIP": "Distal interphalangeal joint: the last joint of a finger.",
     "IP": "Interphalangeal joint: the last joint of the thumb.",
-    "covariance": "The cloud around a marker holds its true place with 99 % probability (three sigma).",
+    "covariance": "An ellipsoid of three sigma holds the true place with 97 % probability.",
+    "worst axis": "Standard deviation (one sigma) of the place along the axis in which it is known worst, in mm.",
+    "palm": "How well the palm's place and turn are known: standard deviations along the worst axes.",
+    "hand size": "Estimated size of the hand as a factor on every length of the rig's hand (Calibrate, Tracker).",
     "epipolar error": "How far the two cameras' rays miss each other, in pixels. Above one pixel, check calibration.",
 }
 

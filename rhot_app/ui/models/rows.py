@@ -9,6 +9,7 @@ import numpy as np
 
 from rhot_app.engine.status import NodeStatus
 from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.ui.models.spread import sd_number, sd_text, worst_sd
 from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look
 
 DASH = "–"
@@ -65,16 +66,19 @@ class MarkerRow:
     look: Look
     knowledge: Look
     position: str
+    spread: str  # mm, one sigma along the worst axis; "" when it is not known
     detail: str
 
 
 def marker_rows(state: HandState) -> list[MarkerRow]:
     """Rows of all markers, in the rig's order."""
     rows = []
+    placed = np.isfinite(state.marker_positions).all(axis=1)
+    spreads = np.where(placed, worst_sd(state.marker_covariances), np.nan)
     for index, name in enumerate(state.marker_ids):
         known = KNOWLEDGE[Knowledge(int(state.marker_knowledge[index]))]
         rows.append(MarkerRow(name, marker_look(state, index), known, position_text(state.marker_positions[index]),
-                              marker_detail(state, index)))
+                              sd_number(float(spreads[index])), marker_detail(state, index)))
     return rows
 
 
@@ -96,9 +100,19 @@ def marker_detail(state: HandState, marker: int) -> str:
     return "\n".join(lines)
 
 
-def angle_text(angle_rad: float) -> str:
-    """Angle in whole degrees with its sign, e.g. "-12°"."""
-    return f"{round(math.degrees(angle_rad))}°" if math.isfinite(angle_rad) else DASH
+def angle_text(angle_rad: float, sd_rad: float = math.nan) -> str:
+    """Angle in whole degrees with its sign, e.g. "-12°", and with its standard deviation, e.g. "-12 ±3°"."""
+    if not math.isfinite(angle_rad):
+        return DASH
+    spread = f" ±{max(round(math.degrees(sd_rad)), 1)}" if math.isfinite(sd_rad) else ""
+    return f"{round(math.degrees(angle_rad))}{spread}°"
+
+
+def palm_text(state: HandState) -> str:
+    """How well the palm is known, e.g. "± 0.40 mm, ± 1.2°", worst axes; "" when that is not estimated."""
+    place = sd_text(float(worst_sd(state.palm_covariance[:3, :3])))
+    turn = math.degrees(float(worst_sd(state.palm_covariance[3:, 3:])))
+    return f"{place}, ± {turn:.1f}°" if place and math.isfinite(turn) else ""
 
 
 def short_name(marker: str) -> str:

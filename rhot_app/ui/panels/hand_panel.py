@@ -1,6 +1,8 @@
-"""The hand's joint angles as a table, each with how it is known."""
+"""The hand's joint angles as a table, each with how and how well it is known, and the palm."""
 
 from __future__ import annotations
+
+import math
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QPainter
@@ -10,7 +12,8 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.ui.models.glossary import tip
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.models.rows import DASH, angle_text
+from rhot_app.ui.models.rows import DASH, angle_text, palm_text
+from rhot_app.ui.models.tracker_words import scale_text, size_known
 from rhot_app.ui.models.words import KNOWLEDGE
 from rhot_app.ui.shapes import ShapeMark
 
@@ -29,9 +32,9 @@ class AngleCell(QLabel):
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.setContentsMargins(4, 1, 4, 1)
 
-    def show_angle(self, angle_rad: float, knowledge: Knowledge) -> None:
-        """Another value."""
-        text = angle_text(angle_rad)
+    def show_angle(self, angle_rad: float, sd_rad: float, knowledge: Knowledge) -> None:
+        """Another value with its standard deviation, NaN when that is not known."""
+        text = angle_text(angle_rad, sd_rad)
         if text == self.text() and knowledge == self._knowledge:
             return
         self.setText(text)
@@ -65,11 +68,13 @@ class HandPanel(QWidget):
         self._grid = QGridLayout()
         self._grid.setHorizontalSpacing(2)
         self._grid.setVerticalSpacing(1)
+        self._whole = QHBoxLayout()
         self._key = QHBoxLayout()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 4, 8, 8)
         layout.setSpacing(6)
         layout.addLayout(self._grid)
+        layout.addLayout(self._whole)
         layout.addLayout(self._key)
         layout.addStretch(1)
         self._fill()
@@ -77,7 +82,7 @@ class HandPanel(QWidget):
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
         self._scheme = scheme
-        for box in (self._grid, self._key):
+        for box in (self._grid, self._whole, self._key):
             while (item := box.takeAt(0)) is not None:
                 if (widget := item.widget()) is not None:
                     widget.deleteLater()
@@ -97,6 +102,7 @@ class HandPanel(QWidget):
         self._add_heads(6, THUMB_HEADS)
         self._add_row(7, "thumb", cells["thumb"])
         self._grid.setRowMinimumHeight(5, 6)
+        self._fill_whole()
         for knowledge in (Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED):
             look = KNOWLEDGE[knowledge]
             mark, word = ShapeMark(12), QLabel(look.word)
@@ -106,6 +112,14 @@ class HandPanel(QWidget):
             self._key.addWidget(mark)
             self._key.addWidget(word)
             self._key.addStretch(1)
+
+    def _fill_whole(self) -> None:
+        self._palm_mark, self.palm = ShapeMark(12), QLabel(DASH)
+        self.palm.setToolTip(f"{tip('palm')}\n{tip('hand size')}")
+        self._whole.addWidget(QLabel("palm"))
+        self._whole.addSpacing(8)
+        self._whole.addWidget(self._palm_mark)
+        self._whole.addWidget(self.palm, 1)
 
     def _add_heads(self, row: int, heads: tuple[tuple[str, str], ...]) -> None:
         for column, (head, term) in enumerate(heads, start=1):
@@ -126,6 +140,22 @@ class HandPanel(QWidget):
         """The angles of `state`; None shows dashes."""
         for k, cell in enumerate(self.cells):
             if state is None:
-                cell.show_angle(float("nan"), Knowledge.UNKNOWN)
+                cell.show_angle(math.nan, math.nan, Knowledge.UNKNOWN)
             else:
-                cell.show_angle(float(state.angles[k]), Knowledge(int(state.angle_knowledge[k])))
+                cell.show_angle(float(state.angles[k]), float(state.angle_sd[k]),
+                                Knowledge(int(state.angle_knowledge[k])))
+        self._show_palm(state)
+
+    def _show_palm(self, state: HandState | None) -> None:
+        """The line about the whole hand: how the palm is known, and its size where that is estimated."""
+        knowledge = Knowledge.UNKNOWN if state is None else state.palm_knowledge
+        if state is None:
+            text = DASH
+        else:
+            text = ", ".join(part for part in (KNOWLEDGE[knowledge].word, palm_text(state)) if part)
+            if size_known(state):
+                text += f"; size {scale_text(state)}"
+        if text != self.palm.text():
+            self.palm.setText(text)
+            look = KNOWLEDGE[knowledge]
+            self._palm_mark.set_shape(look.shape, self._scheme.tone(look.tone))

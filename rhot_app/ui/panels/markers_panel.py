@@ -1,4 +1,4 @@
-"""The markers: own colour with the name beside it, and in words who sees them."""
+"""The markers: own colour with the name beside it, how well its place is known, and in words who sees them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Swatch(QWidget):
 
 
 class MarkersPanel(QWidget):
-    """One line per marker of the rig: swatch, name, shape, word."""
+    """One line per marker of the rig: swatch, name, standard deviation, word, shape."""
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -52,13 +52,13 @@ class MarkersPanel(QWidget):
         self.setToolTip(tip("marker"))
         self._scheme = scheme
         self._rig: Rig | None = None
-        self._lines: list[tuple[ShapeMark, QLabel]] = []
+        self._lines: list[tuple[ShapeMark, QLabel, QLabel]] = []
         self._shown: list[MarkerRow | None] = []
         self.empty = EmptyState("No rig is open.")
         self._body = QWidget()
         self._grid = QGridLayout(self._body)
         self._grid.setContentsMargins(8, 0, 8, 0)
-        self._grid.setHorizontalSpacing(8)
+        self._grid.setHorizontalSpacing(6)
         self._grid.setVerticalSpacing(4)
         self._grid.setColumnStretch(1, 1)
         layout = QVBoxLayout(self)
@@ -80,15 +80,17 @@ class MarkersPanel(QWidget):
                 widget.deleteLater()
         self._lines = []
         self.empty.setVisible(rig is None)
-        for row, marker in enumerate(rig.markers.markers if rig is not None else ()):
-            mark, word = ShapeMark(12), QLabel()
-            word.setAlignment(Qt.AlignmentFlag.AlignRight)
-            word.setProperty("muted", True)
+        if rig is not None:
+            self._grid.addWidget(_muted("± mm", tip("worst axis")), 0, 2)
+        for row, marker in enumerate(rig.markers.markers if rig is not None else (), start=1):
+            mark, spread, word = ShapeMark(12), _muted("", tip("worst axis")), _muted("", "")
+            spread.setMinimumWidth(spread.fontMetrics().horizontalAdvance("0.00"))
             self._grid.addWidget(Swatch(hex_of(marker.display_rgb), self._scheme.muted), row, 0)
             self._grid.addWidget(QLabel(short_name(marker.id)), row, 1)
-            self._grid.addWidget(word, row, 2)
-            self._grid.addWidget(mark, row, 3)
-            self._lines.append((mark, word))
+            self._grid.addWidget(spread, row, 2)
+            self._grid.addWidget(word, row, 3)
+            self._grid.addWidget(mark, row, 4)
+            self._lines.append((mark, spread, word))
         self._shown = [None] * len(self._lines)
         self.show_state(None, running=False)
 
@@ -97,7 +99,7 @@ class MarkersPanel(QWidget):
         are not."""
         absent = _UNSEEN if running else _IDLE
         rows = marker_rows(state) if state is not None else []
-        for k, (mark, word) in enumerate(self._lines):
+        for k, (mark, spread, word) in enumerate(self._lines):
             row = rows[k] if k < len(rows) else None
             if row is not None and row == self._shown[k]:
                 continue
@@ -105,9 +107,23 @@ class MarkersPanel(QWidget):
             look = row.look if row is not None else absent
             mark.set_shape(look.shape, self._scheme.tone(look.tone))
             word.setText(look.word)
+            spread.setText(row.spread if row is not None else "")
             word.setToolTip(f"{look.meaning}\n{row.detail}" if row is not None else look.meaning)
 
     @property
     def words(self) -> list[str]:
         """The words shown, in the rig's order."""
-        return [word.text() for _, word in self._lines]
+        return [word.text() for *_, word in self._lines]
+
+    @property
+    def spreads(self) -> list[str]:
+        """The standard deviations shown, mm, in the rig's order."""
+        return [spread.text() for _, spread, _ in self._lines]
+
+
+def _muted(text: str, meaning: str) -> QLabel:
+    label = QLabel(text)
+    label.setAlignment(Qt.AlignmentFlag.AlignRight)
+    label.setProperty("muted", True)
+    label.setToolTip(meaning)
+    return label

@@ -40,8 +40,11 @@ def camera_like_state(state: HandState, up: Up) -> HandState:
     palm[:3, :3] = turn @ palm[:3, :3]
     palm[:3, 3] = camera_like(palm[:3, 3], up)
     return replace(state, marker_positions=camera_like(state.marker_positions, up), world_from_palm=palm,
+                   joint_positions=camera_like(state.joint_positions, up),
+                   fingertip_positions=camera_like(state.fingertip_positions, up),
                    marker_covariances=turn @ state.marker_covariances @ turn.T,
-                   joint_positions=camera_like(state.joint_positions, up))
+                   joint_covariances=turn @ state.joint_covariances @ turn.T,
+                   fingertip_covariances=turn @ state.fingertip_covariances @ turn.T)
 
 
 def to_display(points: Array) -> Array:

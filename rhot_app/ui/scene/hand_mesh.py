@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import FINGERS, JOINTS
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.tracking.state import HandState
 from rhot_app.ui.scene.frames import to_display
 from rhot_app.ui.scene.meshes import Faces, Mesh, capsule_template, hull_of_spheres, pose_capsules, repeat_faces
 
@@ -40,6 +40,11 @@ class PosedMesh:
     vertices: Array
     normals: Array
     knowledge: Codes
+
+
+def bone_knowledge(joint_knowledge: Codes, near: NDArray[np.intp], far: NDArray[np.intp]) -> Codes:
+    """How bones between joints `near` and `far` (B,) are known: no better than the less known end."""
+    return np.maximum(joint_knowledge[near], joint_knowledge[far]).astype(np.uint8)
 
 
 def mirrored(points: Array, anatomy: HandAnatomy) -> Array:
@@ -94,7 +99,7 @@ class HandMesh:
         starts, stops = np.where(known[:, None], starts, 0.0), np.where(known[:, None], stops, 0.0)
         vertices, normals = pose_capsules(self._template, starts, stops, self._radii * known[:, None])
         count = len(self._template.directions)
-        knowledge = np.repeat(state.joint_knowledge[far].astype(np.uint8), count)
+        knowledge = np.repeat(bone_knowledge(state.joint_knowledge, near, far), count)
         palm, palm_normals = self._pose_palm(state.world_from_palm)
         return PosedMesh(np.concatenate([vertices, palm]), np.concatenate([normals, palm_normals]),
                          np.concatenate([knowledge, np.full(len(palm), int(state.palm_knowledge), np.uint8)]))
@@ -121,7 +126,7 @@ class SkeletonMesh:
         self.faces: Faces = repeat_faces(self._template.faces, count, len(self._pairs))
 
     def pose(self, state: HandState) -> PosedMesh:
-        """The skeleton at `state`; parts with an unknown end are not drawn."""
+        """The skeleton at `state`; parts with an unknown end are not drawn. A ball is as known as its joint."""
         joints = to_display(state.joint_positions)
         near, far = self._pairs.T
         starts = joints[near]
@@ -129,4 +134,5 @@ class SkeletonMesh:
         known = np.isfinite(starts).all(axis=1) & np.isfinite(stops).all(axis=1)
         starts, stops = np.where(known[:, None], starts, 0.0), np.where(known[:, None], stops, 0.0)
         vertices, normals = pose_capsules(self._template, starts, stops, self._radii * known[:, None])
-        return PosedMesh(vertices, normals, np.full(len(vertices), int(Knowledge.MEASURED), np.uint8))
+        count = len(self._template.directions)
+        return PosedMesh(vertices, normals, np.repeat(bone_knowledge(state.joint_knowledge, near, far), count))

@@ -25,6 +25,17 @@ class TextStyle:
     plate: str = ""
 
 
+def pixels_of(places: Array, matrix: QMatrix4x4, size: tuple[int, int]) -> Array:
+    """Where `places` (N, 3) m appear, (N, 2) device-independent px; NaN behind the eye or without a place.
+
+    `matrix` is projection times view, `size` the widget's in device-independent px.
+    """
+    rows = np.array(matrix.copyDataTo()).reshape(4, 4)
+    clip = np.column_stack([places, np.ones(len(places))]) @ rows.T
+    depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)
+    return np.column_stack([(clip[:, 0] / depth + 1) * 0.5 * size[0], (1 - clip[:, 1] / depth) * 0.5 * size[1]])
+
+
 class LabelPainter:
     """Paints labels at places of the scene, centred, `lift` px above the place."""
 
@@ -43,24 +54,19 @@ class LabelPainter:
         """
         if not texts:
             return
-        rows = np.array(matrix.copyDataTo()).reshape(4, 4)
-        clip = np.column_stack([places, np.ones(len(places))]) @ rows.T
-        for (x, y, _, w), text in zip(clip, texts, strict=True):
-            if not w > 0.0:
+        for (x, y), text in zip(pixels_of(places, matrix, size), texts, strict=True):
+            if not np.isfinite(x):
                 continue
             picture = self._picture(text, style, painter)
             width, height = picture.deviceIndependentSize().width(), picture.deviceIndependentSize().height()
-            at = QPointF((x / w + 1) * 0.5 * size[0] - 0.5 * width, (1 - y / w) * 0.5 * size[1] - 0.5 * height - lift)
-            painter.drawPixmap(at, picture)
+            painter.drawPixmap(QPointF(x - 0.5 * width, y - 0.5 * height - lift), picture)
 
     def paint_apart(self, painter: QPainter, matrix: QMatrix4x4, size: tuple[int, int], places: Array,
                     texts: list[str], style: TextStyle) -> None:
         """As `paint`, but each beside its place and clear of the others, with a line from label to place."""
-        rows = np.array(matrix.copyDataTo()).reshape(4, 4)
-        clip = np.column_stack([places, np.ones(len(places))]) @ rows.T
-        shown = [k for k in range(len(texts)) if clip[k, 3] > 0.0]
-        anchors = [((clip[k, 0] / clip[k, 3] + 1) * 0.5 * size[0], (1 - clip[k, 1] / clip[k, 3]) * 0.5 * size[1])
-                   for k in shown]
+        pixels = pixels_of(places, matrix, size)
+        shown = [k for k in range(len(texts)) if np.isfinite(pixels[k, 0])]
+        anchors = [(float(pixels[k, 0]), float(pixels[k, 1])) for k in shown]
         pictures = [self._picture(texts[k], style, painter) for k in shown]
         sizes = [(p.deviceIndependentSize().width(), p.deviceIndependentSize().height()) for p in pictures]
         boxes = place_labels(anchors, sizes, (float(size[0]), float(size[1])), _GAP_PX)

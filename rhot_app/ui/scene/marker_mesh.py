@@ -1,4 +1,4 @@
-"""The markers as one posed mesh in their own colours, and the clouds that say how well their places are known."""
+"""The markers as one posed mesh in their own colours."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rhot_app.hand.skeleton import JOINTS, TIP_ROLES
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.scene.frames import to_display
 from rhot_app.ui.scene.hand_mesh import PosedMesh
-from rhot_app.ui.scene.meshes import Faces, capsule_template, elliptic_band, pose_capsules, repeat_faces, sphere
+from rhot_app.ui.scene.meshes import Faces, capsule_template, elliptic_band, pose_capsules, repeat_faces
 from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]
@@ -20,8 +20,6 @@ Colours = NDArray[np.uint8]
 
 _DEFAULT_RADIUS_M = 0.008
 _PROUD_M = 0.001  # markers stand this far out of the skin, so that the two surfaces do not flicker
-_CLOUD_SIGMAS = 3.0
-_CLOUD_LIMIT_M = 0.06
 
 
 def colour_rows(markers: Sequence[Marker], counts: list[int], alpha: int) -> Colours:
@@ -78,28 +76,3 @@ class MarkerMesh:
         bones = np.where((self._tips >= 0)[:, None], joints[self._tips] - joints[self._tips - 1], 0.0)
         length = np.linalg.norm(bones, axis=1, keepdims=True)
         return np.where(length > 1e-6, bones / np.maximum(length, 1e-6), 0.0)
-
-
-class CloudMesh:
-    """Three-sigma ellipsoids of the markers' covariances."""
-
-    def __init__(self, markers: MarkerSet) -> None:
-        self._sphere = sphere(12, 4)
-        count = len(self._sphere.vertices)
-        self.faces: Faces = repeat_faces(self._sphere.faces, count, len(markers.markers))
-        self.colours = colour_rows(markers.markers, [count] * len(markers.markers), 70)
-
-    def pose(self, state: HandState) -> PosedMesh:
-        """The ellipsoids at `state`, no larger than 6 cm; unknown ones are not drawn."""
-        covariances = state.marker_covariances
-        known = np.asarray(np.isfinite(covariances).all(axis=(1, 2)) & np.isfinite(state.marker_positions).all(axis=1))
-        values, axes = np.linalg.eigh(np.where(known[:, None, None], covariances, np.eye(3)))
-        semi = np.minimum(_CLOUD_SIGMAS * np.sqrt(np.maximum(values, 1e-12)), _CLOUD_LIMIT_M) * known[:, None]
-        local = self._sphere.vertices
-        offsets = local[None] @ (axes * semi[:, None, :]).transpose(0, 2, 1)
-        places = np.where(known[:, None], state.marker_positions, 0.0)
-        tilted = local[None] @ (axes / np.maximum(semi, 1e-9)[:, None, :]).transpose(0, 2, 1)
-        tilted /= np.linalg.norm(tilted, axis=2, keepdims=True)
-        vertices = to_display((places[:, None] + offsets).reshape(-1, 3))
-        knowledge = np.repeat(state.marker_knowledge.astype(np.uint8), len(local))
-        return PosedMesh(vertices, to_display(tilted.reshape(-1, 3)), knowledge)

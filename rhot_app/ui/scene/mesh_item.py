@@ -22,9 +22,13 @@ Colours = NDArray[np.uint8]
 
 HATCH_PERIOD_PX = 7.0
 
+_NEAREST = 0.02
+"""Share of the depth range, nearest to the eye, into which what is drawn over everything is brought."""
+
 _VERTEX = """
 uniform mat4 u_mvp;
 uniform mat3 u_normal;
+uniform float u_depth;
 attribute vec3 a_position;
 attribute vec3 a_normal;
 attribute vec4 a_colour;
@@ -37,6 +41,7 @@ void main() {
     v_colour = a_colour;
     v_hatched = a_hatched;
     gl_Position = u_mvp * vec4(a_position, 1.0);
+    gl_Position.z = mix(-gl_Position.w, gl_Position.z, u_depth);
 }
 """
 
@@ -92,14 +97,17 @@ def _build_program() -> int:
 class MeshItem(GLGraphicsItem):
     """`faces` are set once; `set_vertices` every frame. Nothing is drawn before the first vertices.
 
-    `lit` False draws flat colours; `behind` True draws under everything drawn later, whatever its depth (shadows).
+    `lit` False draws flat colours; `behind` True draws under everything drawn later, whatever its depth (shadows);
+    `through` True draws over everything drawn before, whatever its depth, but itself in the right order.
     """
 
-    def __init__(self, faces: Faces, *, lit: bool = True, behind: bool = False) -> None:
+    def __init__(self, faces: Faces, *, lit: bool = True, behind: bool = False,
+                 through: bool = False) -> None:
         super().__init__()
         self._faces = np.ascontiguousarray(faces, dtype=np.uint32)
         self._lit = lit
         self._behind = behind
+        self._through = through
         self._arrays: list[NDArray[np.generic]] | None = None
         self._dirty = False
         self._see_through = False
@@ -183,6 +191,7 @@ class MeshItem(GLGraphicsItem):
         scale = self.view().devicePixelRatioF()
         GL.glUniform1f(GL.glGetUniformLocation(self._program, "u_period"), HATCH_PERIOD_PX * scale)
         GL.glUniform1f(GL.glGetUniformLocation(self._program, "u_lit"), 1.0 if self._lit else 0.0)
+        GL.glUniform1f(GL.glGetUniformLocation(self._program, "u_depth"), _NEAREST if self._through else 1.0)
 
     def _enable_attributes(self) -> None:
         kinds = ((3, GL.GL_FLOAT, False), (3, GL.GL_FLOAT, False), (4, GL.GL_UNSIGNED_BYTE, True),

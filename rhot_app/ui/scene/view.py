@@ -6,9 +6,9 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from pyqtgraph.opengl import GLLinePlotItem, GLViewWidget
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeyEvent, QPainter, QResizeEvent, QVector3D
-from PySide6.QtWidgets import QPushButton, QWidget
+from PySide6.QtCore import QEvent, QPoint, Qt
+from PySide6.QtGui import QHelpEvent, QKeyEvent, QMatrix4x4, QPainter, QResizeEvent, QVector3D
+from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
@@ -16,8 +16,11 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.scene import stage
 from rhot_app.ui.scene.actors import Actors
-from rhot_app.ui.scene.frames import Up, camera_like_state, frustum_lines, to_display
-from rhot_app.ui.scene.labels import LabelPainter, TextStyle
+from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
+from rhot_app.ui.scene.frames import Up, camera_like, camera_like_state, frustum_lines, to_display
+from rhot_app.ui.scene.labels import LabelPainter, TextStyle, pixels_of
+from rhot_app.ui.scene.legend import Legend, ellipsoid_text
+from rhot_app.ui.scene.pick import nearest, spots
 
 Array = NDArray[np.float64]
 
@@ -34,7 +37,8 @@ _FIRST_DISTANCE_M = 0.56  # with room around the hand for what it will do next
 class SceneView(GLViewWidget):
     """`show_rig` sets what does not move, `show_state` poses the rest.
 
-    Left drag turns, middle drag or Ctrl + left drag moves, the wheel zooms, the arrow keys turn.
+    Left drag turns, middle drag or Ctrl + left drag moves, the wheel zooms, the arrow keys turn. The mouse held still
+    over a marker or joint tells how well it is known.
     """
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
@@ -46,10 +50,12 @@ class SceneView(GLViewWidget):
         self._scheme = scheme
         self._rig: Rig | None = None
         self._state: HandState | None = None
+        self._in_rig: HandState | None = None
         self._actors: Actors | None = None
         self._labels = LabelPainter()
+        self._legend = Legend()
         self._show_labels = True
-        self._show_clouds = True
+        self._ellipsoids: EllipsoidChoice | None = EllipsoidChoice()
         self._cameras: list[tuple[str, Array]] = []
         self.start_button = QPushButton("Start tracking", self)
         self.start_button.setProperty("primary", True)
@@ -66,11 +72,12 @@ class SceneView(GLViewWidget):
     def show_rig(self, rig: Rig | None) -> None:
         """Another rig: other cameras, markers and hand. None shows the empty floor."""
         self._rig = rig
-        self._state = None
+        self._state = self._in_rig = None
         self._rebuild()
 
     def show_state(self, state: HandState | None) -> None:
         """Pose hand and markers; None hides them."""
+        self._in_rig = state
         self._state = None if state is None else camera_like_state(state, self._up)
         self._pose()
         self.update()
@@ -80,11 +87,11 @@ class SceneView(GLViewWidget):
         self._show_labels = visible
         self.update()
 
-    def show_clouds(self, visible: bool) -> None:
-        """Clouds of the markers' covariance, or not."""
-        self._show_clouds = visible
+    def show_ellipsoids(self, choice: EllipsoidChoice | None) -> None:
+        """Which ellipsoids of uncertainty are drawn, None for none."""
+        self._ellipsoids = choice
         if self._actors is not None:
-            self._actors.show_clouds = visible
+            self._actors.ellipsoids = choice
         self._pose()
         self.update()
 
@@ -138,6 +145,26 @@ class SceneView(GLViewWidget):
         else:
             ev.ignore()
 
+    def event(self, event: QEvent) -> bool:
+        """The mouse has been held still: what lies there, or nothing."""
+        if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
+            QToolTip.showText(event.globalPos(), self.told_at(event.pos()), self)
+            return True
+        return bool(super().event(event))
+
+    def told_at(self, at: QPoint) -> str:
+        """What is known of the marker or joint nearest to a place in the widget, "" when none is near."""
+        found = spots(self._in_rig) if self._in_rig is not None else []
+        if not found:
+            return ""
+        places = to_display(camera_like(np.array([spot.place for spot in found]), self._up))
+        pixels = pixels_of(places, self._projection(), (self.width(), self.height()))
+        number = nearest(pixels, (at.x(), at.y()))
+        return "" if number is None else found[number].text
+
+    def _projection(self) -> QMatrix4x4:
+        return self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()
+
     def paintGL(self) -> None:  # noqa: N802
         """The scene, then the labels over it in one painter."""
         super().paintGL()
@@ -157,7 +184,7 @@ class SceneView(GLViewWidget):
         if self._rig is not None:
             self._add_cameras(self._rig)
             self._actors = Actors(self._rig, self._scheme)
-            self._actors.show_clouds = self._show_clouds
+            self._actors.ellipsoids = self._ellipsoids
             for item in self._actors.items:
                 self.addItem(item)
         self._pose()
@@ -194,7 +221,7 @@ class SceneView(GLViewWidget):
         self._cameras = [(node.name, lines[-2]) for node, lines in zip(rig.nodes, frusta, strict=True)]
 
     def _paint_labels(self, painter: QPainter) -> None:
-        matrix = self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()
+        matrix = self._projection()
         size = (self.width(), self.height())
         muted, plain = TextStyle(self._scheme.muted), TextStyle(self._scheme.text)
         on_table = self._up == "z"
@@ -208,3 +235,6 @@ class SceneView(GLViewWidget):
             style = TextStyle(self._scheme.text, small=False, plate=self._scheme.scene)
             self._labels.paint_apart(painter, matrix, size, to_display(self._state.marker_positions),
                                      [short_name(name) for name in self._state.marker_ids], style)
+        if self._actors is not None:
+            text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self._actors.cut)
+            self._legend.paint(painter, self.height(), self._scheme, text)

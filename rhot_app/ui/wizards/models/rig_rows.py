@@ -8,6 +8,7 @@ import numpy as np
 
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode
+from rhot_app.ui.models.tracker_words import settings_text
 from rhot_app.ui.wizards.models.proposal import Row
 
 Figures = dict[str, str]
@@ -23,7 +24,7 @@ def rig_rows(before: Rig, after: Rig) -> tuple[Row, ...]:
 
 def figures(rig: Rig) -> Figures:
     """Every figure of a rig by its name."""
-    return dict([*_cameras(rig), *_markers(rig), *_hand(rig), *_filters(rig.filters)])
+    return dict([*_cameras(rig), *_markers(rig), *_hand(rig), *_filters(rig.filters), *_solving(rig)])
 
 
 def lens_figures(node: RigNode) -> Figures:
@@ -73,6 +74,13 @@ def _filters(filters: FilterSettings) -> Iterator[tuple[str, str]]:
     for kind, own in (("pixels", filters.pixel_markers), ("positions", filters.position_markers)):
         for marker, settings in own.items():
             yield f"{marker}: filter of {kind}", one_euro_text(settings)
+
+
+def _solving(rig: Rig) -> Iterator[tuple[str, str]]:
+    depth = rig.depth
+    law = f", D = {depth.k:.4g} |x|^{depth.z:.3f}" if depth.k is not None and depth.z is not None else ""
+    yield "depth", f"{depth.mode}{law}"
+    yield "tracker", settings_text(rig.tracker)
 
 
 def one_euro_text(settings: OneEuroSettings) -> str:

@@ -1,0 +1,179 @@
+"""The choice of the tracker: clicked, seen in the engine and in the file, taken back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import pytest
+from fake_engine import FakeClient, FakeEngine, synthetic_rig
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from rhot_app.hand.anthropometry import hand_length
+from rhot_app.project import DepthSettings, TrackerSettings, load_rig, save_rig
+from rhot_app.rig_history import versions
+from rhot_app.ui.models.tracker_words import obstacle, scale_text, size_text
+from rhot_app.ui.tracker_dialog import TrackerDialog
+from rhot_app.ui.wizards.models.rig_rows import rig_rows
+
+MODEL = TrackerSettings(kind="model")
+FLOATING = TrackerSettings(kind="model", float_scale=True)
+
+
+def with_tracker(tracker):
+    return msgspec.structs.replace(synthetic_rig(), tracker=tracker)
+
+
+@dataclass
+class Desk:
+    """The dialog on a rig file and a fake engine, without the window around it."""
+
+    dialog: TrackerDialog
+    engine: FakeEngine
+    path: Path
+    qtbot: object
+
+    def until(self, condition):
+        """Let time pass until it holds."""
+        self.qtbot.waitUntil(condition, timeout=8000)
+
+    def settled(self, sentence):
+        """Wait until a change is through, and see what is said of it."""
+        self.until(lambda: self.dialog.sentence.text() == sentence)
+
+
+@pytest.fixture
+def opened(qtbot, themed, tmp_path):
+    """A function that opens the dialog on a rig."""
+    def open_on(rig):
+        engine, path = FakeEngine(rig), tmp_path / "desk.json"
+        save_rig(path, rig)
+        dialog = TrackerDialog(rig, path, lambda: FakeClient(engine),
+                               lambda: engine.state(1.0) if engine.running else None)
+        qtbot.addWidget(dialog)
+        dialog.show()
+        dialog.activateWindow()
+        assert QTest.qWaitForWindowActive(dialog)
+        return Desk(dialog, engine, path, qtbot)
+    return open_on
+
+
+def click_on_word(button):
+    """Of a radio button or a box to tick, whose middle may lie beyond its word."""
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+                     QPoint(12, button.height() // 2))
+
+
+def test_the_model_tracker_is_one_click_away_and_taken_back_with_one_key(opened):
+    desk = opened(synthetic_rig())
+    dialog, path = desk.dialog, desk.path
+    assert dialog.kinds["classic"].isChecked() and not dialog.details.isVisible()
+    assert not dialog.undo_button.isEnabled()
+    click_on_word(dialog.kinds["model"])
+    desk.settled("In force.")
+    assert desk.engine.rig.tracker == MODEL and load_rig(path).tracker == MODEL
+    assert [version.replaced_by for version in versions(path)] == ["choosing the tracker model full anatomical limits"]
+    assert dialog.details.isVisible()
+    QTest.keyClick(dialog, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    desk.settled("Taken back.")
+    assert load_rig(path).tracker.kind == "classic" and desk.engine.rig.tracker.kind == "classic"
+    assert dialog.kinds["classic"].isChecked() and not dialog.undo_button.isEnabled()
+
+
+def test_fingers_and_limits_are_chosen_from_lists(opened):
+    desk = opened(with_tracker(MODEL))
+    dialog = desk.dialog
+    for box in (dialog.variant_box, dialog.limits_box):
+        before = load_rig(desk.path)
+        QTest.keyClick(box, Qt.Key.Key_Down)
+        desk.until(lambda before=before: load_rig(desk.path) != before and dialog.close_button.isEnabled()
+              and dialog.details.isEnabled())
+    assert load_rig(desk.path).tracker == TrackerSettings(kind="model", variant="coupled", limits="thesis")
+    assert "DIP = 2/3 PIP" in dialog.variant_words.text()
+    QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
+    desk.settled("Taken back.")
+    assert load_rig(desk.path).tracker == TrackerSettings(kind="model", variant="coupled")
+    assert dialog.limits_box.currentData() == "anatomical"
+
+
+def test_the_estimated_size_is_shown_and_put_into_the_hand(opened):
+    desk = opened(with_tracker(MODEL))
+    dialog, path, before = desk.dialog, desk.path, load_rig(desk.path)
+    assert not dialog.size_button.isVisible()
+    click_on_word(dialog.size_check)
+    desk.until(lambda: dialog.size_label.text().startswith("1.03 ± 0.01 of the rig's hand"))
+    assert load_rig(path).tracker.float_scale
+    desk.until(dialog.size_button.isEnabled)
+    QTest.mouseClick(dialog.size_button, Qt.MouseButton.LeftButton)
+    desk.until(lambda: load_rig(path).hand != before.hand and dialog.undo_button.isEnabled())
+    assert hand_length(load_rig(path).hand) == pytest.approx(1.03 * hand_length(before.hand), rel=1e-6)
+    assert versions(path)[0].replaced_by == "hand 1 030 times as large"
+    QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
+    desk.settled("Taken back.")
+    assert load_rig(path).hand == before.hand and load_rig(path).tracker.float_scale
+
+
+def test_a_size_that_is_not_certain_cannot_be_used(opened):
+    desk = opened(with_tracker(FLOATING))
+    desk.until(desk.dialog.size_button.isEnabled)
+    desk.engine.scale = (1.08, 0.05)
+    desk.until(lambda: not desk.dialog.size_button.isEnabled())
+    assert "not certain yet" in desk.dialog.size_label.text()
+    desk.engine.running = False
+    desk.until(lambda: desk.dialog.size_label.text() == "No size yet: start, and show the hand.")
+
+
+def test_what_stands_in_the_way_is_said(opened):
+    dialog = opened(msgspec.structs.replace(synthetic_rig(), depth=DepthSettings(mode="disparity"))).dialog
+    assert not dialog.kinds["model"].isEnabled() and dialog.obstacle_label.isVisible()
+    assert "distance from disparity" in dialog.obstacle_label.text()
+
+
+def test_nodes_that_send_text_have_no_times():
+    rig = synthetic_rig()
+    left = msgspec.structs.replace(rig.nodes[0], text_datagrams=True)
+    assert "node left sends text" in obstacle(msgspec.structs.replace(rig, nodes=(left, rig.nodes[1])))
+    assert obstacle(rig) == ""
+
+
+def test_a_refusal_changes_nothing(opened):
+    desk = opened(synthetic_rig())
+    desk.engine.refuse_rig = "marker 'nose' sits nowhere on the hand."
+    click_on_word(desk.dialog.kinds["model"])
+    desk.settled("marker 'nose' sits nowhere on the hand.")
+    assert desk.dialog.kinds["classic"].isChecked() and load_rig(desk.path).tracker.kind == "classic"
+    assert not desk.dialog.undo_button.isEnabled() and versions(desk.path) == []
+
+
+def test_the_window_follows_and_somebody_elses_change_is_not_taken_back(bench, tmp_path):
+    path = tmp_path / "desk.json"
+    save_rig(path, synthetic_rig())
+    bench.window.open_rig(path)
+    bench.until(lambda: bench.controller.rig is not None)
+    bench.window.actions_.tracker.trigger()
+    dialog = bench.window.dialogs.tracker
+    click_on_word(dialog.kinds["model"])
+    bench.until(lambda: bench.controller.rig.tracker == MODEL and dialog.undo_button.isEnabled())
+    bench.backend.engine.rig = with_tracker(TrackerSettings(kind="model", variant="coupled"))
+    bench.window.rig_watch.look_soon()
+    bench.until(lambda: dialog.variant_box.currentData() == "coupled")
+    assert not dialog.undo_button.isEnabled()
+    bench.window.actions_.close_rig.trigger()
+    bench.until(lambda: bench.window.dialogs.tracker is None)
+
+
+def test_a_size_is_written_with_the_digits_that_mean_something():
+    engine = FakeEngine(with_tracker(FLOATING))
+    engine.scale = (1.0304, 0.0021)
+    assert scale_text(engine.state(1.0)) == "1.030 ± 0.002"
+    engine.scale = (1.004, 0.01)
+    assert "it fits" in size_text(engine.state(1.0), engine.rig)
+    assert size_text(engine.state(1.0), synthetic_rig()) == "", "nobody estimates it"
+
+
+def test_earlier_versions_tell_of_the_tracker():
+    rows = rig_rows(synthetic_rig(), with_tracker(FLOATING))
+    assert [(row.what, row.before, row.after) for row in rows] == [
+        ("tracker", "classic", "model, full, anatomical limits, size estimated")]

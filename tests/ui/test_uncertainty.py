@@ -1,0 +1,90 @@
+"""What the window tells of how well things are known: toolbar of the scene, hover, key, panels."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from fake_backend import FakeBackend
+from fake_engine import FakeEngine, synthetic_rig
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QHelpEvent
+from PySide6.QtWidgets import QApplication, QToolButton, QToolTip
+from test_tracker_dialog import FLOATING
+
+from rhot_app.ui.models.spread import sd_number, worst_sd
+from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
+from rhot_app.ui.scene.frames import to_display
+from rhot_app.ui.scene.labels import pixels_of
+from rhot_app.ui.scene.legend import ellipsoid_text
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return msgspec.structs.replace(synthetic_rig(), tracker=FLOATING)
+
+
+@pytest.fixture
+def estimating(make_bench, rig):
+    """The window on a rig with the model tracker, tracking."""
+    bench = make_bench(FakeBackend(FakeEngine(rig, running=False)))
+    bench.track()
+    return bench
+
+
+def button_for(bench, action):
+    """The button of the scene's toolbar that triggers an action."""
+    buttons = bench.window.pages.currentWidget().bar.findChildren(QToolButton)
+    return next(button for button in buttons if button.defaultAction() is action)
+
+
+def test_ellipsoids_are_switched_in_the_scenes_toolbar_and_remembered(estimating, make_bench):
+    actions, scene = estimating.window.actions_, estimating.window.screen_parts.scene
+    assert scene._ellipsoids == EllipsoidChoice()
+    estimating.click(button_for(estimating, actions.cloud_sizes[1]))
+    assert scene._ellipsoids == EllipsoidChoice(factor=10)
+    actions.cloud_kinds[0].trigger()
+    assert scene._ellipsoids == EllipsoidChoice(joints=False, factor=10)
+    estimating.press(Qt.Key.Key_U)
+    assert scene._ellipsoids is None and not actions.cloud_sizes[0].isEnabled()
+    estimating.press(Qt.Key.Key_U)
+    again = make_bench()
+    assert again.window.screen_parts.scene._ellipsoids == EllipsoidChoice(joints=False, factor=10)
+
+
+def test_the_mouse_over_a_joint_tells_how_well_it_is_known(estimating):
+    scene, engine = estimating.window.screen_parts.scene, estimating.backend.engine
+    scene.frame_hand()
+    engine.running = False  # so that the hand stands still
+    estimating.until(lambda: estimating.window.toolbar.badge.word == "IDLE")
+    scene.show_state(engine.state(1.0))
+    matrix, size = scene._projection(), (scene.width(), scene.height())
+    x, y = pixels_of(to_display(scene._in_rig.joint_positions[14:15]), matrix, size)[0]
+    at = QPoint(round(x), round(y))
+    assert scene.told_at(at).startswith("ring PIP joint: inferred\n± 4.8 mm along the worst axis (one sigma)")
+    QApplication.sendEvent(scene, QHelpEvent(QHelpEvent.Type.ToolTip, at, scene.mapToGlobal(at)))
+    estimating.until(lambda: QToolTip.text().startswith("ring PIP joint"))
+    assert scene.told_at(QPoint(2, 2)) == ""
+    QToolTip.hideText()
+
+
+def test_panels_tell_standard_deviations(estimating):
+    parts = estimating.window.screen_parts
+    estimating.until(lambda: parts.markers.spreads == ["1.8"] * 6)
+    assert [parts.hand.cells[last].text().partition(" ")[2] for last in (4, 8, 12, 16, 20)] == [
+        "±1°", "±1°", "±3°", "±8°", "±20°"]
+    estimating.until(lambda: parts.hand.palm.text() == "measured, ± 0.50 mm, ± 1.1°; size 1.03 ± 0.01")
+
+
+def test_the_key_says_how_large_ellipsoids_are_drawn():
+    assert ellipsoid_text(None, cut=False) == "" == ellipsoid_text(EllipsoidChoice(False, False, False), cut=False)
+    assert ellipsoid_text(EllipsoidChoice(), cut=False) == "3 sigma, true size"
+    assert ellipsoid_text(EllipsoidChoice(factor=10), cut=True) == "3 sigma, drawn 10 × larger, cut at 60 mm"
+
+
+def test_the_worst_axis_may_lie_anywhere():
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    covariance = turn @ np.diag([1e-6, 4e-6, 9e-6]) @ turn.T
+    found = worst_sd(np.stack([covariance, np.full((3, 3), np.nan)]))
+    assert found[0] == pytest.approx(3e-3) and np.isnan(found[1])
+    assert [sd_number(sd) for sd in (0.000314, 0.0024, 0.0181, np.nan)] == ["0.31", "2.4", "18", ""]
