@@ -1,4 +1,4 @@
-"""What holds for all tests: the master's keys lie in a folder of their own, never in the user's."""
+"""What holds for all tests: keys in a folder of their own, one thread for small matrices, and no test by the clock."""
 
 from __future__ import annotations
 
@@ -6,13 +6,23 @@ import os
 import shutil
 import tempfile
 
-import pytest
+# Before numpy loads. A second thread only waits for the first one, busily, where matrices are as small as here: the
+# shape of a hand then takes five times the processor's time. Programs that a test starts inherit it.
+for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")
+
+import pytest  # noqa: E402
+from hypothesis import settings  # noqa: E402
+
+# An example takes what it takes: compiling, or a machine that does other things, is no fault of what is tested.
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")
 
 _folder = pytest.StashKey[str]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Programs that a test starts inherit the place."""
+    """Programs that a test starts inherit the place of the master's keys, which are never the user's."""
     config.stash[_folder] = tempfile.mkdtemp(prefix="rhot-test-keys-")
     os.environ["RHOT_KEYS"] = f"{config.stash[_folder]}/keys.json"
 

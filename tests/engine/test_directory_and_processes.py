@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -85,11 +84,9 @@ def test_started_processes_are_ended_and_only_they(tmp_path: Path) -> None:
     for child, role in zip(children[:2], ("engine", "node left"), strict=True):
         processes.remember_process(place, child.pid, role)
     assert [process.role for process in processes.started_processes(place)] == ["engine", "node left"]
-    begun = time.monotonic()
     processes.end_started(place, roles=["engine"])
     assert [process.role for process in processes.started_processes(place)] == ["node left"]
     processes.end_processes(processes.started_processes(place), timeout_s=0.3)
-    assert time.monotonic() - begun < 5.0
     assert processes.started_processes(place) == []
     assert children[2].poll() is None
     children[2].kill()

@@ -1,6 +1,5 @@
 """The engine over synthetic nodes: states out, figures, recording and replay, rigs changed while it runs."""
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -8,10 +7,12 @@ import msgspec
 import numpy as np
 import pytest
 from fake_tracker import FakeTracker
+from patience import eventually, settled
 
 from rhot_app.engine import codec
 from rhot_app.engine.core import Engine
 from rhot_app.engine.replay_summary import replay_states, summarise
+from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import EngineError, RecordingError, RhotError, RigError
 from rhot_app.project import OneEuroSettings, Rig, load_rig
 from rhot_app.recording.raw_log import LogReader
@@ -35,17 +36,13 @@ class Bench:
         self.trackers.append(FakeTracker(rig))
         return self.trackers[-1]
 
-    def run_until(self, condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
-        deadline = time.monotonic() + timeout_s
-        while not condition():
-            assert time.monotonic() < deadline, self.engine.status()
-            time.sleep(0.01)
+    def run_until(self, condition: Callable[[], bool]) -> None:
+        eventually(condition, told=self.engine.status)
 
-    def run_for(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            time.sleep(0.01)
-            self.engine.status()
+    def until_published(self, more: int) -> None:
+        """Run until so many more states were published."""
+        count = len(self.published)
+        self.run_until(lambda: len(self.published) >= count + more)
 
 
 @pytest.fixture
@@ -84,12 +81,14 @@ def test_status_says_how_it_goes(bench: Bench, nodes: list[SyntheticNode]) -> No
     assert bench.engine.status().condition == "IDLE"
     bench.engine.start()
     assert bench.engine.status().condition == "SEARCHING"
-    bench.run_for(1.6)
+
+    def in_full_swing(status: EngineStatus) -> bool:
+        return (status.condition == "TRACKING" and 80 < status.state_rate_hz < 115
+                and all(node.state == "streaming" and 85 < node.rate_hz < 110 for node in status.nodes))
+
+    bench.run_until(lambda: in_full_swing(bench.engine.status()))
     status = bench.engine.status()
-    assert status.running and status.condition == "TRACKING"
-    assert [node.state for node in status.nodes] == ["streaming", "streaming"]
-    assert all(85 < node.rate_hz < 110 for node in status.nodes), status.nodes
-    assert 80 < status.state_rate_hz < 115
+    assert status.running
     assert 0.0 < status.latency["receive_to_state"].p50_s <= status.latency["receive_to_state"].p99_s
     assert [advice for advice in status.advice if advice.level == "error"] == []
     bench.engine.stop()
@@ -98,9 +97,8 @@ def test_status_says_how_it_goes(bench: Bench, nodes: list[SyntheticNode]) -> No
 
 def test_silent_node_is_named_and_forgotten_when_it_answers(rig: Rig, bench: Bench) -> None:
     bench.engine.start()
-    bench.run_for(0.3)
-    texts = [advice.text for advice in bench.engine.status().advice]
-    assert any("Node left does not answer at 127.0.0.1:" in text for text in texts)
+    bench.run_until(lambda: any("Node left does not answer at 127.0.0.1:" in advice.text
+                                for advice in bench.engine.status().advice))
     node = SyntheticNode(rig, 0)
     node.start()
     bench.run_until(lambda: not any("Node left does not" in a.text for a in bench.engine.status().advice))
@@ -128,7 +126,7 @@ def test_log_replays_to_the_same_states(tmp_path: Path, rig: Rig, bench: Bench, 
     with pytest.raises(EngineError, match="already recording"):
         bench.engine.record(tmp_path / "b.log")
     first = len(bench.published)
-    bench.run_for(0.7)
+    bench.until_published(60)
     assert bench.engine.status().log_bytes > 0
     bench.engine.record_stop()
     live = np.array([_decode_state(payload).t_master_ns for payload in bench.published[first:]])
@@ -159,16 +157,11 @@ def test_replay_source_serves_like_nodes(tmp_path: Path, rig: Rig, bench: Bench,
         engine = Engine(rig, None, lambda rig, speed=speed: LogReplay(tmp_path / "a.log", rig, speed),
                         FakeTracker, published.append)
         engine.start()
-        deadline = time.monotonic() + 10.0
-        while not any("over" in advice.text for advice in engine.status().advice):
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        eventually(lambda engine=engine: any("over" in advice.text for advice in engine.status().advice))
         count = len(published)
         assert count > 25 and "receive_to_state" not in engine.status().latency
         engine.start()  # once more from the beginning
-        while len(published) < count + 20:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        eventually(lambda published=published, count=count: len(published) >= count + 20)
         with pytest.raises(RecordingError):
             engine.record(tmp_path / "c.log")
         engine.close()
@@ -188,11 +181,10 @@ def test_filter_change_keeps_the_session(rig: Rig, bench: Bench, nodes: list[Syn
 def test_fewer_markers_while_streaming(rig: Rig, bench: Bench, nodes: list[SyntheticNode]) -> None:
     bench.engine.start()
     bench.run_until(lambda: len(bench.published) > 3)
-    time.sleep(0.1)  # frames of the old marker set wait
+    bench.until_published(10)  # frames of the old marker set are on their way
     fewer = msgspec.structs.replace(rig.markers, markers=rig.markers.markers[:4])
     bench.engine.set_rig(msgspec.structs.replace(rig, markers=fewer))
-    bench.run_for(0.3)
-    assert bench.trackers[-1].ingested == []
+    assert settled(lambda: bench.trackers[-1].ingested == [], 0.3)
     bench.run_until(lambda: any("another marker set" in a.text for a in bench.engine.status().advice))
     bench.engine.set_rig(rig)
     count = len(bench.published)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import zmq
 from fake_tracker import FakeTracker
-from streaming_node import Setup, eventually
+from patience import eventually
+from streaming_node import Setup
 
 from rhot_app.engine.core import Engine
 from rhot_app.engine.node_control import NodeControl
@@ -60,10 +60,8 @@ def test_tracking_and_control_follow_a_node_that_moves(setup: Setup, tmp_path: P
 
         control.follow(engine.rig)
         control.ask(b"client", "node", {"node_id": 1, "request": {"request": "state"}})
-        answers = []
-        end = time.monotonic() + 3.0
-        while not answers and time.monotonic() < end:
-            answers = control.answers()
+        answers: list[object] = []
+        eventually(lambda: answers.extend(control.answers()) or answers)
         assert answers == [(b"client", ({"ok": True, "answer": {"state": "ready"}}, None))]
 
         engine.save_rig(None)

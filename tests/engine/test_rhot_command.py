@@ -5,10 +5,10 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from patience import eventually
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import ensure_engine, running_engine, started_processes, stop_engine
@@ -115,10 +115,7 @@ def test_background_engine_is_killed_found_dead_and_started_again(tmp_path: Path
     (started,) = started_processes(directory)
     assert (started.pid, started.role) == (pid, "engine")
     os.kill(pid, signal.SIGKILL)
-    deadline = time.monotonic() + 5.0
-    while running_engine(place) is not None:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    eventually(lambda: running_engine(place) is None)
     again = ensure_engine(rig_path, place)
     assert again != pid
     with EngineClient(place) as client:

@@ -1,14 +1,14 @@
 """Client and server over real sockets: commands, refusals, streams, a node's control channel, a vanished engine."""
 
 import threading
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import msgspec
 import pytest
 import zmq
 from fake_tracker import FakeTracker
+from patience import PATIENCE_S, eventually
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
@@ -34,7 +34,8 @@ class ControlPeer:
         self.previews = self.context.socket(zmq.XPUB)
         self.preview_port = self.previews.bind_to_random_port("tcp://127.0.0.1")
         self.heard: list[dict[str, object]] = []
-        self.delay_s = 0.0
+        self.hold = threading.Event()
+        self.hold.set()
         self.subscribed = False
         self.ending = False
         self.thread = threading.Thread(target=self.run, daemon=True)
@@ -45,7 +46,7 @@ class ControlPeer:
             if self.requests.poll(20):
                 request = msgspec.json.decode(self.requests.recv())
                 self.heard.append(request)
-                time.sleep(self.delay_s)
+                self.hold.wait(PATIENCE_S)
                 self.requests.send_multipart(self.answer(request))
             if self.previews.poll(0):
                 self.subscribed = self.previews.recv()[:1] == b"\x01"
@@ -114,13 +115,24 @@ def client(bench: Bench, tmp_path: Path) -> Iterator[EngineClient]:
         yield client
 
 
-def collect(client: EngineClient, kind: type, timeout_s: float = 3.0) -> object:
-    deadline = time.monotonic() + timeout_s
-    while time.monotonic() < deadline:
-        for message in client.poll(0.05):
-            if isinstance(message, kind):
-                return message
-    raise AssertionError(f"no {kind.__name__} came")
+def collect(client: EngineClient, kind: type) -> object:
+    came: list[object] = []
+    eventually(lambda: came.extend(message for message in client.poll(0.05) if isinstance(message, kind)) or came,
+               told=lambda: f"no {kind.__name__} came")
+    return came[0]
+
+
+def status_when(client: EngineClient, condition: Callable[[EngineStatus], object]) -> EngineStatus:
+    """The first status of which something is true."""
+    statuses: list[EngineStatus] = []
+
+    def came() -> bool:
+        statuses[:] = [message for message in client.poll(0.05) if isinstance(message, EngineStatus)]
+        statuses[:] = [status for status in statuses if condition(status)]
+        return bool(statuses)
+
+    eventually(came, told=lambda: f"never; the last was {client.status}")
+    return statuses[0]
 
 
 def test_states_and_status_reach_the_client(rig: Rig, client: EngineClient) -> None:
@@ -181,7 +193,7 @@ def test_broken_bytes_are_refused_and_the_engine_lives(client: EngineClient, dat
     socket.linger = 0
     socket.connect(client.directory.commands)
     socket.send(data)
-    assert socket.poll(2000)
+    assert socket.poll(round(1e3 * PATIENCE_S))
     answer = msgspec.json.decode(socket.recv())
     assert answer["ok"] is False and "command" in answer["error"]
     socket.close()
@@ -199,13 +211,12 @@ def test_requests_go_to_the_node_and_back(client: EngineClient, peer: ControlPee
 
 
 def test_a_slow_node_delays_nobody_else(client: EngineClient, peer: ControlPeer, tmp_path: Path) -> None:
-    peer.delay_s = 0.6
     slow = threading.Thread(target=lambda: EngineClient(tmp_path / "e").command("still", node_id=1))
+    peer.hold.clear()
     slow.start()
-    time.sleep(0.1)
-    begun = time.monotonic()
-    client.command("hello")
-    assert time.monotonic() - begun < 0.3
+    eventually(lambda: peer.heard)
+    assert client.command("hello")["pid"] and slow.is_alive(), "answered while the node still thinks"
+    peer.hold.set()
     slow.join()
 
 
@@ -218,41 +229,27 @@ def test_previews_only_when_asked(client: EngineClient, peer: ControlPeer) -> No
     assert (preview.camera, preview.width, preview.height) == ("left", 640, 480)
     assert preview.jpeg.startswith(b"\xff\xd8")
     client.command("preview", on=False)
-    deadline = time.monotonic() + 2.0
-    while peer.subscribed and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert not peer.subscribed
+    eventually(lambda: not peer.subscribed)
 
 
 def test_a_nodes_own_words_reach_the_status(rig: Rig, client: EngineClient) -> None:
     node = SyntheticNode(rig, 0, state=NodeState.FAULT)
     node.start()
-    deadline = time.monotonic() + 3.0
-    while time.monotonic() < deadline:
-        status = collect(client, EngineStatus)
-        assert isinstance(status, EngineStatus)
-        if status.nodes[0].message:
-            break
+    status = status_when(client, lambda status: status.nodes[0].message)
     node.close()
     assert status.nodes[0].state == "fault"
     assert any("Node left: the camera is gone" in advice.text for advice in status.advice)
 
 
 def test_a_hot_node_is_told_until_it_is_silent(rig: Rig, client: EngineClient) -> None:
-    def told(wanted: bool) -> bool:
-        deadline = time.monotonic() + 5.0
-        while time.monotonic() < deadline:
-            status = collect(client, EngineStatus)
-            assert isinstance(status, EngineStatus)
-            if wanted == any("Node left: its processor is too hot." in advice.text for advice in status.advice):
-                return True
-        return False
+    def told(status: EngineStatus) -> bool:
+        return any("Node left: its processor is too hot." in advice.text for advice in status.advice)
 
     node = SyntheticNode(rig, 0, state=NodeState.READY)
     node.start()
-    assert told(True)
+    assert told(status_when(client, told))
     node.close()
-    assert told(False), "a node that is gone says nothing any more"
+    assert not told(status_when(client, lambda status: not told(status))), "a node that is gone says nothing any more"
 
 
 def test_a_vanished_engine_is_noticed(rig: Rig, tmp_path: Path) -> None:
@@ -261,9 +258,7 @@ def test_a_vanished_engine_is_noticed(rig: Rig, tmp_path: Path) -> None:
         collect(client, EngineStatus)
         assert client.connected
         bench.close()
-        time.sleep(1.05)
-        client.poll()
-        assert not client.connected
+        eventually(lambda: not client.poll() and not client.connected)
         with pytest.raises(EngineError, match="rhot engine --rig"):
             client.command("hello", timeout_s=0.2)
         again = Bench(rig, tmp_path / "f")  # at the same place: the client comes back by itself

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 import zmq
 from node_fakes import grey_image
+from patience import PATIENCE_S, eventually
 
 from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
@@ -182,7 +182,7 @@ def test_previews_are_small_and_only_for_those_who_look(served: Served) -> None:
     viewer.rcvtimeo = 3000
     viewer.connect(f"tcp://127.0.0.1:{served.server.preview_port}")
     viewer.subscribe(b"")
-    wait_for(lambda: pictures.wanted)
+    eventually(lambda: pictures.wanted)
     pictures.offer(noisy_frame(8))
     head, jpeg = viewer.recv_multipart()
     assert json.loads(head) == {"node_id": 3, "number": 8, "t_node_ns": 1008, "width": 640, "height": 480,
@@ -190,14 +190,7 @@ def test_previews_are_small_and_only_for_those_who_look(served: Served) -> None:
     image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
     assert image is not None and image.shape == (240, 320, 3)
     viewer.close(linger=0)
-    wait_for(lambda: not pictures.wanted)
-
-
-def wait_for(condition: Any) -> None:
-    deadline = time.monotonic() + 3.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    eventually(lambda: not pictures.wanted)
 
 
 def test_nothing_is_copied_when_nobody_looks() -> None:
@@ -239,7 +232,7 @@ def test_an_open_node_says_so_and_has_no_keys(served: Served) -> None:
     answer = served.ask(request="link")
     assert not answer["ok"] and "open to everybody" in answer["error"]
     stranger = served.context.socket(zmq.REQ)
-    stranger.rcvtimeo = 3000
+    stranger.rcvtimeo = round(1e3 * PATIENCE_S)
     stranger.connect(f"tcp://127.0.0.1:{served.server.pairing_port}")
     stranger.send(b'{"request": "hello"}')
     assert json.loads(stranger.recv()) == {"ok": True, "name": "left", "trust": "open"}

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
+from patience import PATIENCE_S
 
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
@@ -58,7 +59,7 @@ def master() -> Iterator[socket.socket]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         sock.bind(("127.0.0.1", 0))
-        sock.settimeout(2.0)
+        sock.settimeout(PATIENCE_S)
         yield sock
 
 

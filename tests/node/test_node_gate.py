@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import zmq
 from node_fakes import grey_image
+from patience import PATIENCE_S, eventually
 from trusted_node import TrustedNode
 
 from rhot_node.capture.camera import Frame
@@ -24,13 +24,6 @@ def node(tmp_path: Path) -> Iterator[TrustedNode]:
     node = TrustedNode(tmp_path)
     yield node
     node.close()
-
-
-def eventually(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 4.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def test_a_paired_master_is_answered(node: TrustedNode) -> None:
@@ -68,7 +61,7 @@ def test_only_masters_see_previews(node: TrustedNode) -> None:
     master.subscribe(b"")
     eventually(lambda: node.server.pictures.wanted)
     node.server.pictures.offer(Frame(grey_image(), 1, 0, 0, 0, 0))
-    assert master.poll(3000) and not stranger.poll(0) and not plain.poll(0)
+    assert master.poll(round(1e3 * PATIENCE_S)) and not stranger.poll(0) and not plain.poll(0)
 
 
 def test_a_node_that_forgets_its_masters_ends_their_connections_and_streams(node: TrustedNode) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import zmq
+from patience import PATIENCE_S
 
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, save_settings
@@ -73,7 +74,7 @@ class TrustedNode:
         sock.connect(f"tcp://{self.address}:{port}")
         return sock
 
-    def ask(self, sock: zmq.Socket[bytes], timeout_s: float = 3.0, **request: Any) -> dict[str, Any] | None:
+    def ask(self, sock: zmq.Socket[bytes], timeout_s: float = PATIENCE_S, **request: Any) -> dict[str, Any] | None:
         """The answer to one request; None when none comes in time."""
         sock.send(json.dumps(request).encode())
         if not sock.poll(round(1e3 * timeout_s)):

@@ -4,6 +4,7 @@ import time
 from pathlib import Path
 
 import pytest
+from patience import eventually
 
 from rhot_app.errors import RecordingError, RhotError
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
@@ -101,9 +102,7 @@ def test_full_disk_ends_the_recording_with_a_sentence() -> None:
     path = Path(f"/tmp/rhot-full-{time.monotonic_ns()}.log")
     recorder = FullDisk(path)
     recorder.put(RecordKind.DATAGRAM, 1, 1, b"datagram")
-    deadline = time.monotonic() + 3.0
-    while recorder.recording and time.monotonic() < deadline:
-        time.sleep(0.01)
+    eventually(lambda: not recorder.recording)
     assert "No space left" in recorder.failure
     recorder.put(RecordKind.DATAGRAM, 1, 2, b"datagram")  # taken no more, and nothing raises
     recorder.close()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
 from findable_nodes import free_udp_port, presence
+from patience import eventually
 from trusted_node import TrustedNode
 
 from rhot_app.project import Broadcast, Rig
@@ -34,6 +33,7 @@ class StreamingNode(TrustedNode):
                  broadcast_port: int | None = None) -> None:
         super().__init__(folder, address)
         self.sequence = 0
+        self.boot_id = boot_id
         self.broadcast_port = broadcast_port
         self.open_link(udp_port, boot_id)
 
@@ -52,7 +52,8 @@ class StreamingNode(TrustedNode):
         self.sessions.stop(0)
         self.keys = LinkKeys()
         self.responder._keys = self.keys
-        self.open_link(port, boot_id=2)
+        self.boot_id += 1
+        self.open_link(port, self.boot_id)
 
     def frame(self, rig: Rig) -> Observations:
         stream = self.sessions.current
@@ -136,11 +137,3 @@ class Setup:
     def close(self) -> None:
         self.source.close()
         self.node.close()
-
-
-def eventually(condition: Callable[[], bool], timeout_s: float = 4.0) -> float:
-    begun = time.monotonic()
-    while not condition():
-        assert time.monotonic() - begun < timeout_s, "did not happen in time"
-        time.sleep(0.005)
-    return time.monotonic() - begun

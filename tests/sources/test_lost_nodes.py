@@ -9,7 +9,8 @@ from pathlib import Path
 import msgspec
 import pytest
 from findable_nodes import findable, free_udp_port, presence
-from streaming_node import Setup, eventually
+from patience import eventually
+from streaming_node import Setup
 
 from rhot_app.simulator.synthetic_node import synthetic_rig
 from rhot_app.sources import lost_nodes

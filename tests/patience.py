@@ -1,0 +1,45 @@
+"""Waiting in tests for what other threads and processes do: however busy the machine is, and never for a fixed time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+PATIENCE_S = 40.0  # only a broken program takes it all; a machine with ten times too much to do does not
+LOOK_S = 0.005
+
+
+def eventually(condition: Callable[[], Any], timeout_s: float = PATIENCE_S,
+               told: Callable[[], Any] | None = None) -> float:
+    """Wait until `condition` holds; returns the seconds that took. Fails with what `told` gives when it never does."""
+    begun = time.monotonic()
+    while not condition():
+        assert time.monotonic() < begun + timeout_s, told() if told is not None else f"not within {timeout_s:g} s"
+        time.sleep(LOOK_S)
+    return time.monotonic() - begun
+
+
+def settled(condition: Callable[[], Any], seconds: float = 0.3) -> bool:
+    """Whether `condition` stays true for a while: for what must not happen. A slow machine only makes this kinder."""
+    end = time.monotonic() + seconds
+    while condition():
+        if time.monotonic() >= end:
+            return True
+        time.sleep(LOOK_S)
+    return False
+
+
+def quickest(call: Callable[[], Any], enough_s: float = 0.0, times: int = 5) -> float:
+    """Seconds that `call` took at its quickest: whatever else a machine does, it only makes things longer.
+
+    Ends as soon as a call took less than `enough_s`, which is what the test demands of it.
+    """
+    best = float("inf")
+    for _ in range(times):
+        begun = time.perf_counter()
+        call()
+        best = min(best, time.perf_counter() - begun)
+        if best < enough_s:
+            break
+    return best
