@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 PATIENCE_S = 40.0  # only a broken program takes it all; a machine with ten times too much to do does not
+PATIENCE_MS = round(1e3 * PATIENCE_S)  # as Qt and ZeroMQ count
 LOOK_S = 0.005
 
 

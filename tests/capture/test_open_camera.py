@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from patience import quickest
 
 from rhot_node.capture.camera import Camera, EndOfRecording, Frame
 from rhot_node.capture.open import open_camera, takes_settings
@@ -66,7 +67,7 @@ def test_a_folder_plays_at_the_settings_rate(tmp_path: Path) -> None:
 
 
 def test_a_late_reader_of_a_file_gets_the_newest_frame(tmp_path: Path) -> None:
-    camera = open_camera(str(write_images(tmp_path / "images", 30)), SETTINGS, CLOCK)
+    camera = open_camera(str(write_images(tmp_path / "images", 120)), SETTINGS, CLOCK)
     camera.read(1.0)
     time.sleep(0.11)
     frame = camera.read(1.0)
@@ -74,11 +75,15 @@ def test_a_late_reader_of_a_file_gets_the_newest_frame(tmp_path: Path) -> None:
 
 
 def test_as_fast_as_possible_delivers_every_frame(tmp_path: Path) -> None:
-    camera = open_camera(f"{write_images(tmp_path / 'images', 20)}?rate=max", SETTINGS, CLOCK)
-    began = time.monotonic()
-    frames = read_all(camera)
-    assert [frame.number for frame in frames] == list(range(20))
-    assert time.monotonic() - began < 20 * PERIOD_NS * 1e-9
+    spec = f"{write_images(tmp_path / 'images', 20)}?rate=max"
+    frames: list[Frame] = []
+
+    def play() -> None:
+        frames[:] = read_all(open_camera(spec, SETTINGS, CLOCK))
+        assert [frame.number for frame in frames] == list(range(20))
+
+    own_rate_s = 20 * PERIOD_NS * 1e-9
+    assert quickest(play, own_rate_s) < own_rate_s
     assert abs(frames[-1].t_available_node_ns - CLOCK.now_ns()) < 10**9
 
 

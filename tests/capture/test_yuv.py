@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patience import quickest
 
 from rhot_node.capture.camera import EndOfRecording, Frame
 from rhot_node.capture.yuv import FRAMES_NAME, HEADER_NAME, YuvRecording, YuvWriter
@@ -57,20 +58,18 @@ def test_frames_come_at_their_time_with_their_pixels(tmp_path: Path) -> None:
 
 
 def test_a_late_reader_gets_the_newest_frame_and_sees_the_gap(tmp_path: Path) -> None:
-    camera = YuvRecording(record(tmp_path, 30), NodeClock())
-    assert read(camera).number == 0
+    camera = YuvRecording(record(tmp_path, 250), NodeClock())
+    first = read(camera).number
     time.sleep(5.5 * PERIOD_NS * 1e-9)
     late = read(camera)
-    assert 4 <= late.number <= 8
+    assert late.number >= first + 4
     assert int(late.image.y[0, 0]) == late.number
 
 
 def test_read_returns_none_when_nothing_is_due_in_time(tmp_path: Path) -> None:
-    camera = YuvRecording(record(tmp_path, 3, period_ns=10**9), NodeClock())
+    camera = YuvRecording(record(tmp_path, 3, period_ns=100 * 10**9), NodeClock())
     read(camera)
-    began = time.monotonic()
-    assert camera.read(0.02) is None
-    assert time.monotonic() - began < 0.2
+    assert quickest(lambda: camera.read(0.02) is None or pytest.fail("a frame came"), 0.2, times=3) < 0.2
 
 
 def test_stands_still_until_the_start_file_says_when(tmp_path: Path) -> None:

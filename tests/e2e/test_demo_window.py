@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 import pytest
 from bench import START_S, TEST_S, Bench, ends, kill_hard, states_of, wait_until
+from patience import PATIENCE_S, eventually
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.directory import EngineDirectory
@@ -93,7 +94,10 @@ def test_the_demo_shows_a_moving_hand_and_survives_crashes(bench: Bench) -> None
         assert {process.role for process in started} >= {"engine"}
         assert sum("rhot_node" in line for line in running_in(bench.folder)) == 2
         kill_hard(window)
-        assert states_of(client, 2.0), "states go on without the window"
+        client.poll(0.0)
+        last_ns = client.state.t_master_ns
+        wait_until(client, lambda: client.state.t_master_ns > last_ns + 500_000_000, PATIENCE_S,
+                   "states go on without the window")
         assert len(alive(started)) == len(started), "engine and nodes outlive the window"
 
         second_window = bench.start(["rhot_app", *options], "second window")
@@ -105,8 +109,5 @@ def test_the_demo_shows_a_moving_hand_and_survives_crashes(bench: Bench) -> None
         wait_until(client, lambda: tracks(client), START_S, "the nodes join the new engine")
 
     second_window.terminate()
-    assert ends(second_window, 20.0), bench.log("second window")
-    deadline = time.monotonic() + 5.0
-    while running_in(bench.folder) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert running_in(bench.folder) == [], "nothing is left running"
+    assert ends(second_window, PATIENCE_S), bench.log("second window")
+    eventually(lambda: not running_in(bench.folder), told=lambda: running_in(bench.folder))  # nothing is left running

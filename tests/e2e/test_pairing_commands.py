@@ -6,14 +6,13 @@ import json
 import re
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
 import pytest
 import zmq
 from bench import START_S, TEST_S, Bench
+from patience import eventually
 from scene import Scene
 
 from rhot_app.keys import load_master_keys
@@ -24,15 +23,8 @@ from rhot_node.trust import keys_path
 
 
 def command(module: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", module, *arguments], capture_output=True, text=True, timeout=60,
+    return subprocess.run([sys.executable, "-m", module, *arguments], capture_output=True, text=True, timeout=120,
                           stdin=subprocess.DEVNULL)
-
-
-def eventually(condition: Callable[[], bool], timeout_s: float) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 class UnpairedNode:
@@ -87,7 +79,7 @@ def test_from_shipped_to_paired_and_back(bench: Bench) -> None:
 
     reset = command("rhot_node", "unpair", "--settings", str(node.settings))
     assert reset.returncode == 0 and "forgets" in reset.stdout
-    eventually(lambda: (now := node.who()) is not None and now.public_key != who.public_key, 3.0)
+    eventually(lambda: (now := node.who()) is not None and now.public_key != who.public_key)
     assert not node.answers()
     again = node.who()
     assert again is not None and again.trust == "unpaired" and not again.nonce

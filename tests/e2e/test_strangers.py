@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import zmq
 from bench import START_S, TEST_S, Bench, node_status, wait_until
+from patience import PATIENCE_S
 from scene import Scene
 
 from rhot_app.engine.client import EngineClient
@@ -140,15 +141,20 @@ def test_it_stops_no_node_and_takes_none_over(attack: Attack) -> None:
         attack.udp.recv(2048)
     answers = attack.answers(request="stop") + attack.answers(request="start", session=9, host="127.0.0.1", port=port)
     assert not any(json.loads(part)["ok"] for part in answers)
-    wait_until(attack.client, attack.tracks, 1.0, "everything goes on")
-    counters = attack.client.command("node", node_id=1, request={"request": "counters"})["answer"]["counters"]
-    assert counters["dropped"]["untagged"] >= 4 and counters["dropped"]["tag"] >= 4 and counters["strangers"] >= 2
+    wait_until(attack.client, attack.tracks, PATIENCE_S, "everything goes on")
+
+    def all_counted() -> bool:
+        counters = attack.client.command("node", node_id=1, request={"request": "counters"})["answer"]["counters"]
+        dropped = counters["dropped"]
+        return dropped.get("untagged", 0) >= 4 and dropped.get("tag", 0) >= 4 and counters["strangers"] >= 2
+
+    wait_until(attack.client, all_counted, PATIENCE_S, "every attempt is counted")
     assert attack.client.status is not None and attack.client.status.session == status.session
 
 
 def test_it_moves_no_marker(attack: Attack) -> None:
     client, rig = attack.client, attack.bench.rig
-    wait_until(client, attack.tracks, 2.0, "states from both nodes")
+    wait_until(client, attack.tracks, PATIENCE_S, "states from both nodes")
     status, node = client.status, node_status(client, "left")
     assert status is not None and node is not None and node.clock_offset_s is not None and client.state is not None
     clock = NodeClock(round(1e9 * node.clock_offset_s))
@@ -166,7 +172,7 @@ def test_it_moves_no_marker(attack: Attack) -> None:
     for state in states:
         measured = state.marker_knowledge == Knowledge.MEASURED
         np.testing.assert_allclose(state.marker_positions[measured], before[measured], atol=0.004)
-    wait_until(client, lambda: sum(attack.dropped().values()) >= refused + 200, 2.0, "all forgeries are counted")
+    wait_until(client, lambda: sum(attack.dropped().values()) >= refused + 200, PATIENCE_S, "all forgeries are counted")
     dropped = attack.dropped()
     assert (dropped["untagged"], dropped["tag"]) == (100, 100) and sum(dropped.values()) == refused + 200
 

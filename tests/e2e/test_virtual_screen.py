@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+from patience import eventually
 
 RUN = Path(__file__).resolve().parents[2] / "run"
 FUNCTIONS = ("say", "fail", "on_virtual_screen", "close_screen")
@@ -96,8 +97,5 @@ def test_a_killed_run_takes_window_and_screen_along(script):
     process.kill()
     out, err = process.communicate(timeout=10)
     assert (out, err) == ("ended well\n", "")
-    deadline = time.monotonic() + 5.0
-    while screens(folder) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert screens(folder) == []
+    eventually(lambda: screens(folder) == [])
     shutil.rmtree(folder)

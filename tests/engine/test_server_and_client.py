@@ -8,7 +8,7 @@ import msgspec
 import pytest
 import zmq
 from fake_tracker import FakeTracker
-from patience import PATIENCE_S, eventually
+from patience import PATIENCE_MS, PATIENCE_S, eventually
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
@@ -193,7 +193,7 @@ def test_broken_bytes_are_refused_and_the_engine_lives(client: EngineClient, dat
     socket.linger = 0
     socket.connect(client.directory.commands)
     socket.send(data)
-    assert socket.poll(round(1e3 * PATIENCE_S))
+    assert socket.poll(PATIENCE_MS)
     answer = msgspec.json.decode(socket.recv())
     assert answer["ok"] is False and "command" in answer["error"]
     socket.close()

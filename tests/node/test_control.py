@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import zmq
 from node_fakes import grey_image
-from patience import PATIENCE_S, eventually
+from patience import PATIENCE_MS, eventually
 
 from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
@@ -232,7 +232,7 @@ def test_an_open_node_says_so_and_has_no_keys(served: Served) -> None:
     answer = served.ask(request="link")
     assert not answer["ok"] and "open to everybody" in answer["error"]
     stranger = served.context.socket(zmq.REQ)
-    stranger.rcvtimeo = round(1e3 * PATIENCE_S)
+    stranger.rcvtimeo = PATIENCE_MS
     stranger.connect(f"tcp://127.0.0.1:{served.server.pairing_port}")
     stranger.send(b'{"request": "hello"}')
     assert json.loads(stranger.recv()) == {"ok": True, "name": "left", "trust": "open"}

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import zmq
 from node_fakes import grey_image
-from patience import PATIENCE_S, eventually
+from patience import PATIENCE_MS, eventually
 from trusted_node import TrustedNode
 
 from rhot_node.capture.camera import Frame
@@ -61,7 +61,7 @@ def test_only_masters_see_previews(node: TrustedNode) -> None:
     master.subscribe(b"")
     eventually(lambda: node.server.pictures.wanted)
     node.server.pictures.offer(Frame(grey_image(), 1, 0, 0, 0, 0))
-    assert master.poll(round(1e3 * PATIENCE_S)) and not stranger.poll(0) and not plain.poll(0)
+    assert master.poll(PATIENCE_MS) and not stranger.poll(0) and not plain.poll(0)
 
 
 def test_a_node_that_forgets_its_masters_ends_their_connections_and_streams(node: TrustedNode) -> None:
