@@ -1,0 +1,102 @@
+"""What fades, and what it fades to."""
+
+import numpy as np
+import pytest
+from known_hand import MARKERS, SIZE, WEARING, moved, moving_estimate
+
+from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, POSE
+from rhot_app.tracking.kalman.forgetting import SHARPNESS_M, WIDEST, forget, open_directions
+from rhot_app.tracking.kalman.markers import place_markers
+
+HABITS, BIAS_VARIANCE = WEARING.habits, WEARING.bias_variance
+KEPT = np.r_[0:POSE, BIAS:SIZE]  # pose and biases among the estimate's numbers
+NATURAL = np.sqrt(np.diag(HABITS.usual)[ANGLES:])
+
+
+def marker_jacobian(estimate):
+    points, jacobian = np.empty((MARKERS, 3)), np.empty((MARKERS, 3, POSE))
+    place_markers(WEARING.worn, estimate, points, jacobian)
+    return jacobian
+
+
+def seen(estimate):
+    """(3 M, 27 + 3 M) how pose and biases move the markers."""
+    return np.hstack([marker_jacobian(estimate).reshape(3 * MARKERS, POSE), np.eye(3 * MARKERS)])
+
+
+def prior():
+    out = np.zeros((POSE + 3 * MARKERS,) * 2)
+    out[:POSE, :POSE] = HABITS.usual
+    out[POSE:, POSE:] = np.diag(np.repeat(BIAS_VARIANCE, 3))
+    return out
+
+
+def faded(estimate, seconds, dt=0.05):
+    """The estimate after `seconds` of forgetting alone."""
+    for _ in range(round(seconds / dt)):
+        step = np.zeros(SIZE)
+        forget(estimate, dt, HABITS, BIAS_VARIANCE, marker_jacobian(estimate), step)
+        estimate = moved(estimate, step)
+    return estimate
+
+
+def confident():
+    estimate = moving_estimate()
+    estimate.covariance[:] = 1e-8 * np.eye(SIZE)
+    return estimate
+
+
+def test_open_directions_leave_every_marker_in_its_place():
+    estimate = moving_estimate()
+    left = open_directions(marker_jacobian(estimate), HABITS.usual, BIAS_VARIANCE)
+    np.testing.assert_allclose(left, left.T, atol=1e-10)
+    values = np.linalg.eigvalsh(0.5 * (left + left.T))
+    assert values.min() > -1e-9
+    assert values[-8:].min() > 1e-3  # six markers leave much of 27 freedoms open
+    strayed = seen(estimate) @ left @ seen(estimate).T
+    assert np.sqrt(np.diag(strayed).max()) < 1.1 * SHARPNESS_M
+
+
+def test_open_directions_are_what_habit_leaves_when_markers_are_seen():
+    estimate = moving_estimate()
+    view, before = seen(estimate), prior()
+    total = view @ before @ view.T + SHARPNESS_M**2 * np.eye(3 * MARKERS)
+    expected = before - before @ view.T @ np.linalg.solve(total, view @ before)
+    left = open_directions(marker_jacobian(estimate), HABITS.usual, BIAS_VARIANCE)
+    np.testing.assert_allclose(left, expected, atol=1e-8)
+
+
+def test_what_nothing_shows_returns_to_the_natural_pose_and_its_spread():
+    estimate = confident()
+    estimate.covariance[BIAS:, BIAS:] = prior()[POSE:, POSE:]
+    estimate.angles[:] += 0.2
+    end = faded(estimate, 20.0)
+    np.testing.assert_allclose(np.sqrt(np.diag(end.covariance)[ANGLES:POSE]), NATURAL, rtol=0.1)
+    np.testing.assert_allclose(end.angles, HABITS.mean, atol=0.05 * NATURAL.max())
+    assert np.sqrt(np.diag(end.covariance)[:ANGLES]).max() <= 1.001 * WIDEST
+    assert np.linalg.eigvalsh(end.covariance[:POSE, :POSE]).min() > -1e-9
+
+
+def test_habit_is_where_forgetting_comes_to_rest():
+    estimate = moving_estimate()
+    estimate.angles[:], estimate.bias[:], estimate.covariance[:] = HABITS.mean, 0.0, 0.0
+    estimate.covariance[np.ix_(KEPT, KEPT)] = prior()
+    end = faded(estimate, 1.0)
+    np.testing.assert_allclose(end.angles, HABITS.mean, atol=1e-6)
+    np.testing.assert_allclose(np.sqrt(np.diag(end.covariance)[ANGLES:POSE]), NATURAL, rtol=0.02)
+
+
+def test_a_tenth_of_a_second_takes_what_no_marker_shows_and_moves_no_marker():
+    estimate = confident()
+    end = faded(estimate, 0.1)
+    view = seen(end)
+    strayed = view @ end.covariance[np.ix_(KEPT, KEPT)] @ view.T
+    assert np.sqrt(np.diag(strayed).max()) < 4e-4
+    assert np.sqrt(np.diag(end.covariance)[ANGLES:POSE].max()) > 0.05
+
+
+@pytest.mark.parametrize("dt", [0.008, 0.02])
+def test_forgetting_adds_up_over_short_frames(dt):
+    together, apart = faded(confident(), 0.4, 0.04), faded(confident(), 0.4, dt)
+    a, b = (np.sqrt(np.diag(end.covariance)[ANGLES:POSE]) for end in (together, apart))
+    np.testing.assert_allclose(a, b, rtol=0.05)

@@ -1,0 +1,79 @@
+"""The update against the textbook's, in plain numpy."""
+
+import numpy as np
+import pytest
+
+from rhot_app.tracking.kalman.gain import contract, expected_noise, solve, spread
+from rhot_app.tracking.kalman.rows import empty_rows
+
+SIZE = 40
+SIZES = (2, 2, 1, 2, 1, 2)  # rows of each observation
+
+
+def case(seed=3):
+    """Rows, covariance, and the block-diagonal noise of the rows."""
+    rng = np.random.default_rng(seed)
+    count = sum(SIZES)
+    rows, noise = empty_rows(32, SIZE), np.zeros((count, count))
+    rows.used[:] = count, len(SIZES)
+    rows.first[:len(SIZES) + 1] = np.concatenate([[0], np.cumsum(SIZES)])
+    rows.residual[:count] = rng.normal(size=count)
+    rows.jacobian[:count] = rng.normal(size=(count, SIZE)) * (rng.random((count, SIZE)) < 0.4)
+    for observation, size in enumerate(SIZES):
+        own = slice(rows.first[observation], rows.first[observation] + size)
+        root = rng.normal(size=(size, size)) + 2.0 * np.eye(size)
+        noise[own, own] = root @ root.T
+        rows.noise[own, 0] = noise[own, own].diagonal()
+        rows.noise[own, 1] = noise[own, own][0, -1]
+    root = rng.normal(size=(SIZE, SIZE))
+    return rows, root @ root.T / SIZE, noise
+
+
+def textbook(rows, covariance, noise, believed, widening, step):
+    """Where the mean goes and the covariance it leaves."""
+    owner = np.repeat(np.arange(len(SIZES)), SIZES)
+    kept = believed[owner]
+    jacobian = rows.jacobian[:len(owner)][kept]
+    noise = (noise * widening[owner][:, None])[np.ix_(kept, kept)]
+    innovation = rows.residual[:len(owner)][kept] + jacobian @ step
+    total = jacobian @ covariance @ jacobian.T + noise
+    gain = covariance @ jacobian.T @ np.linalg.inv(total)
+    return gain @ innovation, covariance - gain @ total @ gain.T
+
+
+@pytest.mark.parametrize("believed", [(1, 1, 1, 1, 1, 1), (1, 0, 1, 1, 0, 0), (0, 0, 0, 0, 1, 0)])
+def test_update_is_the_textbooks(believed):
+    rows, covariance, noise = case()
+    believed = np.array(believed, dtype=bool)
+    rng = np.random.default_rng(5)
+    widening, step = 1.0 + rng.random(len(SIZES)), 0.1 * rng.normal(size=SIZE)
+    mean, posterior = textbook(rows, covariance, noise, believed, widening, step)
+    gains = np.empty((32, SIZE))
+    count = solve(rows, covariance, believed, widening, step, gains)
+    contract(covariance, gains, count)
+    assert count == sum(np.array(SIZES)[believed])
+    np.testing.assert_allclose(step, mean, atol=1e-10)
+    np.testing.assert_allclose(covariance, posterior, atol=1e-10)
+
+
+def test_nothing_believed_changes_nothing():
+    rows, covariance, _ = case()
+    before, step, gains = covariance.copy(), np.zeros(SIZE), np.empty((32, SIZE))
+    count = solve(rows, covariance, np.zeros(len(SIZES), bool), np.ones(len(SIZES)), step, gains)
+    contract(covariance, gains, count)
+    assert count == 0 and not step.any()
+    np.testing.assert_array_equal(covariance, before)
+
+
+def test_expected_noise_is_the_innovations_covariance():
+    rows, covariance, noise = case()
+    gains = np.empty((32, SIZE))
+    spread(rows, covariance, gains)
+    jacobian = rows.jacobian[:sum(SIZES)]
+    total = jacobian @ covariance @ jacobian.T + noise
+    for observation, size in enumerate(SIZES):
+        row = rows.first[observation]
+        expected = total[row:row + size, row:row + size]
+        uu, uv, vv = expected_noise(rows, gains, observation)
+        assert uu == pytest.approx(expected[0, 0])
+        assert (uv, vv) == (pytest.approx((expected[0, 1], expected[1, 1])) if size == 2 else (0.0, 1.0))

@@ -1,0 +1,59 @@
+"""Frames that arrive in another order than they were taken."""
+
+import numpy as np
+from known_hand import blocks, difference, filter_of_hand, moving_estimate, settled, twin
+
+from rhot_app.tracking.kalman.estimate import copy_estimate
+from rhot_app.tracking.kalman.timeline import LENGTH, Timeline
+
+
+def follow(frames):
+    """The timeline and its filter after the frames, in the order given, from a hand that is known well."""
+    hand = filter_of_hand()
+    timeline, start = Timeline(hand), moving_estimate()
+    hand.start(start.world, start.angles)
+    known, last = settled()
+    copy_estimate(known, hand.estimate)
+    timeline.begin(last.t_ns)
+    outcomes = [timeline.add(block) for block in frames]
+    return timeline, twin(hand.estimate), outcomes
+
+
+def frames_to_come():
+    """Those after the settled hand's last."""
+    return [block for block in blocks() if block.t_ns > settled()[1].t_ns]
+
+
+def assert_same(a, b):
+    """Equal but for a hundredth of what is uncertain."""
+    assert (np.abs(difference(a, b)) <= 0.01 * np.sqrt(np.diag(b.covariance)) + 1e-12).all()
+    np.testing.assert_allclose(np.sqrt(np.diag(a.covariance)), np.sqrt(np.diag(b.covariance)), rtol=0.01, atol=1e-12)
+
+
+def test_late_frames_give_the_estimate_of_frames_in_order():
+    frames = frames_to_come()
+    ordered, expected, _ = follow(frames)
+    late = frames.copy()
+    late.insert(12, late.pop(7))  # five frames late
+    late[20], late[21] = late[21], late[20]
+    shuffled, estimate, outcomes = follow(late)
+    assert shuffled.t_ns == ordered.t_ns and shuffled.dropped == 0
+    assert len(outcomes[12]) == 6 and outcomes[12][0][0] is frames[7]
+    assert_same(estimate, expected)
+
+
+def test_what_comes_too_late_is_dropped_and_counted():
+    frames = frames_to_come()
+    without, expected, _ = follow([frames[0], *frames[2:LENGTH + 4]])
+    timeline, estimate, outcomes = follow([frames[0], *frames[2:LENGTH + 4], frames[1]])
+    assert timeline.dropped == 1 and outcomes[-1] == []
+    assert without.dropped == 0 and timeline.t_ns == without.t_ns
+    assert_same(estimate, expected)
+
+
+def test_a_new_beginning_forgets_the_past():
+    frames = frames_to_come()
+    timeline, _, _ = follow(frames[:10])
+    timeline.begin(frames[12].t_ns)
+    assert timeline.add(frames[5]) == [] and timeline.dropped == 1
+    assert len(timeline.add(frames[13])) == 1
