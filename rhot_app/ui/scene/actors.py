@@ -31,6 +31,7 @@ class Actors:
         self._markers = MarkerMesh(rig.markers, rig.hand)
         self._ellipsoids = EllipsoidMesh(rig.markers, scheme)
         self.ellipsoids: EllipsoidChoice | None = EllipsoidChoice()
+        self._shade = np.tile(np.array([*rgb_of(scheme.shadow), 255], np.uint8), (1 + int(self._hand.faces.max()), 1))
         self._shadow_item = MeshItem(self._hand.faces, lit=False, behind=True)
         self._skeleton_item = MeshItem(self._skeleton.faces)
         self._marker_item = MeshItem(self._markers.faces)
@@ -75,5 +76,4 @@ class Actors:
     def _pose_shadow(self, skin: PosedMesh) -> None:
         flat = skin.vertices.copy()
         flat[:, 2] = FLOOR_M
-        colours = np.tile(np.array([*rgb_of(self._scheme.shadow), 255], np.uint8), (len(flat), 1))
-        self._shadow_item.set_vertices(flat, skin.normals, colours, np.zeros(len(flat), bool))
+        self._shadow_item.set_vertices(flat, skin.normals, self._shade, np.zeros(len(flat), bool))

@@ -54,7 +54,7 @@ class EllipsoidMesh:
     """
 
     def __init__(self, markers: MarkerSet, scheme: Scheme) -> None:
-        self._sphere = sphere(10, 3)
+        self._sphere = sphere(10, 2)
         roles = [marker.role for marker in markers.markers]
         self._tip_markers = np.array([role in TIP_ROLES for role in roles], bool)
         painted = {marker.role: marker.display_rgb for marker in markers.markers}

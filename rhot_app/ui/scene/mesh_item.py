@@ -66,6 +66,7 @@ void main() {
 }
 """
 
+_UNIFORMS = ("u_mvp", "u_normal", "u_period", "u_lit", "u_depth")
 _ATTRIBUTES = ("a_position", "a_normal", "a_colour", "a_hatched")
 
 
@@ -112,6 +113,7 @@ class MeshItem(GLGraphicsItem):
         self._dirty = False
         self._see_through = False
         self._program = 0
+        self._uniforms: dict[str, int] = {}
         self._buffers: list[QOpenGLBuffer] = []
         self._indices = QOpenGLBuffer(QOpenGLBuffer.Type.IndexBuffer)
 
@@ -125,6 +127,7 @@ class MeshItem(GLGraphicsItem):
     def initializeGL(self) -> None:  # noqa: N802 (Qt's name)
         """Make program and buffers in the current context, which may be a new one after the window moved."""
         self._program = _build_program()
+        self._uniforms = {name: GL.glGetUniformLocation(self._program, name) for name in _UNIFORMS}
         self._buffers = [QOpenGLBuffer(QOpenGLBuffer.Type.VertexBuffer) for _ in _ATTRIBUTES]
         self._indices = QOpenGLBuffer(QOpenGLBuffer.Type.IndexBuffer)
         self._indices.create()
@@ -186,12 +189,12 @@ class MeshItem(GLGraphicsItem):
     def _set_uniforms(self) -> None:
         mvp = np.array(self.mvpMatrix().data(), dtype=np.float32)
         normal = np.array(self.modelViewMatrix().normalMatrix().data(), dtype=np.float32)
-        GL.glUniformMatrix4fv(GL.glGetUniformLocation(self._program, "u_mvp"), 1, False, mvp)
-        GL.glUniformMatrix3fv(GL.glGetUniformLocation(self._program, "u_normal"), 1, False, normal)
-        scale = self.view().devicePixelRatioF()
-        GL.glUniform1f(GL.glGetUniformLocation(self._program, "u_period"), HATCH_PERIOD_PX * scale)
-        GL.glUniform1f(GL.glGetUniformLocation(self._program, "u_lit"), 1.0 if self._lit else 0.0)
-        GL.glUniform1f(GL.glGetUniformLocation(self._program, "u_depth"), _NEAREST if self._through else 1.0)
+        at = self._uniforms
+        GL.glUniformMatrix4fv(at["u_mvp"], 1, False, mvp)
+        GL.glUniformMatrix3fv(at["u_normal"], 1, False, normal)
+        GL.glUniform1f(at["u_period"], HATCH_PERIOD_PX * self.view().devicePixelRatioF())
+        GL.glUniform1f(at["u_lit"], 1.0 if self._lit else 0.0)
+        GL.glUniform1f(at["u_depth"], _NEAREST if self._through else 1.0)
 
     def _enable_attributes(self) -> None:
         kinds = ((3, GL.GL_FLOAT, False), (3, GL.GL_FLOAT, False), (4, GL.GL_UNSIGNED_BYTE, True),

@@ -212,7 +212,11 @@ class SceneView(GLViewWidget):
         segments, strong = stage.floor_lines()
         self._add_lines(segments[~strong], self._scheme.grid)
         self._add_lines(np.concatenate([segments[strong], stage.height_lines()]), self._scheme.grid_strong)
-        axes, colours = stage.axis_lines(on_table=self._up == "z")
+        on_table = self._up == "z"
+        both = (stage.tick_labels(on_table=on_table), stage.axis_labels(on_table=on_table))
+        self._stage_labels = [(np.array([label.place for label in labels]), [label.text for label in labels])
+                              for labels in both]
+        axes, colours = stage.axis_lines(on_table=on_table)
         self._add_lines(axes, colours, width=2.0, depth=-5)
 
     def _add_cameras(self, rig: Rig) -> None:
@@ -224,11 +228,8 @@ class SceneView(GLViewWidget):
         matrix = self._projection()
         size = (self.width(), self.height())
         muted, plain = TextStyle(self._scheme.muted), TextStyle(self._scheme.text)
-        on_table = self._up == "z"
-        for labels, style in ((stage.tick_labels(on_table=on_table), muted),
-                              (stage.axis_labels(on_table=on_table), plain)):
-            self._labels.paint(painter, matrix, size, np.array([label.place for label in labels]),
-                               [label.text for label in labels], style)
+        for (places, texts), style in zip(self._stage_labels, (muted, plain), strict=True):
+            self._labels.paint(painter, matrix, size, places, texts, style)
         self._labels.paint(painter, matrix, size, np.array([place for _, place in self._cameras]),
                            [name for name, _ in self._cameras], muted, lift=10.0)
         if self._state is not None and self._show_labels:
