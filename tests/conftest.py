@@ -12,10 +12,11 @@ for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
 import pytest  # noqa: E402
-from hypothesis import settings  # noqa: E402
+from hypothesis import HealthCheck, settings  # noqa: E402
 
-# An example takes what it takes: compiling, or a machine that does other things, is no fault of what is tested.
-settings.register_profile("patient", deadline=None)
+# An example takes what it takes: compiling, or a machine that does other things, is no fault of what is tested. And the
+# examples are the same in every run; benchmarks/fuzz.py looks for others.
+settings.register_profile("patient", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("patient")
 
 _folder = pytest.StashKey[str]()

@@ -8,13 +8,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import zmq
+from patience import PATIENCE_MS, PATIENCE_S, eventually
 
 from rhot_app.keys import load_master_keys
 from rhot_app.project import load_rig
@@ -49,7 +49,7 @@ def ask_node(rig_path: Path, request: dict[str, Any]) -> dict[str, Any]:
         connect_with(requests, load_master_keys().own, node.public_key)
         requests.connect(f"tcp://127.0.0.1:{node.control_port}")
         requests.send_json(request)
-        assert requests.poll(10_000), "the node gives no answer"
+        assert requests.poll(PATIENCE_MS), "the node gives no answer"
         answer: dict[str, Any] = json.loads(requests.recv_multipart()[0])
         return answer
     finally:
@@ -68,7 +68,7 @@ def twin(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
     finally:
         process.terminate()
         try:
-            process.wait(10.0)
+            process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
@@ -87,18 +87,14 @@ def test_live_twin_obeys_heals_a_killed_node_and_ends_with_its_nodes(
     assert changed["ok"]
     with TwinRemote(rig_path.parent) as remote:
         remote.show(BoardShow(on_table=True))
-        deadline = time.monotonic() + 10.0
-        while remote.state().cameras["left"].exposure_us != 6000.0 and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert remote.state().cameras["left"].exposure_us == 6000.0, "what the node is told, the twin's sensor does"
+        eventually(lambda: remote.state().cameras["left"].exposure_us == 6000.0,
+                   told=lambda: "what the node is told, the twin's sensor does")
     nodes = children(process.pid)
     assert len(nodes) == 2 and len(set(ports)) == 2 and udp_ports_open(ports)
 
     os.kill(nodes[0], signal.SIGKILL)
-    deadline = time.monotonic() + 30.0
-    while time.monotonic() < deadline and not (len(children(process.pid)) == 2 and nodes[0] not in children(process.pid)
-                                               and udp_ports_open(ports)):
-        time.sleep(0.05)
+    eventually(lambda: len(children(process.pid)) == 2 and nodes[0] not in children(process.pid)
+               and udp_ports_open(ports), READY_S, told=lambda: f"not healed: {children(process.pid)}")
     healed = children(process.pid)
     assert len(healed) == 2 and nodes[0] not in healed and nodes[1] in healed
     assert udp_ports_open(ports), "the new node listens where the old one did"
@@ -106,7 +102,7 @@ def test_live_twin_obeys_heals_a_killed_node_and_ends_with_its_nodes(
     assert kept["camera"]["exposure_us"] == 6000.0, "a node that comes back keeps its settings"
 
     process.send_signal(signal.SIGTERM)
-    assert process.wait(10.0) == 0
+    assert process.wait(PATIENCE_S) == 0
     assert not any(Path(f"/proc/{pid}").exists() for pid in healed)
     assert not [*rig_path.parent.glob("*.frames"), *rig_path.parent.glob("*.ipc")], "no socket is left behind"
 

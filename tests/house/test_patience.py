@@ -1,0 +1,53 @@
+"""No test waits for a fixed time, or demands a time of a machine that may have other things to do."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+from hypothesis import settings
+
+TESTS = Path(__file__).parents[1]
+CLOCKS = {"time.monotonic", "time.perf_counter", "time.time", "time.monotonic_ns", "time.perf_counter_ns"}
+MAY_SLEEP = {
+    "patience.py": "between two looks",
+    "capture/test_open_camera.py": "a reader that is late", "capture/test_yuv.py": "a reader that is late",
+    "capture/test_webcam.py": "a camera's own pace, and a reader that is late",
+    "node/test_link.py": "a program that is late", "sources/test_receiver.py": "a program that is late",
+    "node/node_fakes.py": "a camera's own pace", "node/node_process.py": "a camera's own pace",
+    "simulator/test_proxy.py": "a node's own pace",
+    "e2e/test_demo_window.py": "between two looks at a hand that moves",
+    "e2e/test_virtual_screen.py": "between two presses of Ctrl-C",
+    "ui/wizards/slow_work.py": "work that takes long", "ui/wizards/wizard_rig.py": "a node that takes long",
+    "ui/wizards/test_wizard_feed.py": "a look that takes long, and work in full swing",
+}
+
+
+def calls(tree: ast.AST, names: set[str]) -> list[ast.Call]:
+    """All calls in `tree` of functions of these names."""
+    return [node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) in names]
+
+
+def files() -> list[tuple[str, ast.Module]]:
+    """Every file of the tests, by its place in them."""
+    return [(path.relative_to(TESTS).as_posix(), ast.parse(path.read_text())) for path in sorted(TESTS.rglob("*.py"))]
+
+
+def test_nobody_sleeps_where_something_can_be_waited_for() -> None:
+    sleepers = {name for name, tree in files() if calls(tree, {"time.sleep"})}
+    assert sleepers - set(MAY_SLEEP) == set(), "wait with eventually or settled of tests/patience.py"
+    assert set(MAY_SLEEP) - sleepers == set(), "these sleep no more; take them off the list"
+
+
+def test_no_time_is_demanded_of_a_single_attempt() -> None:
+    """A time of the clock that is asserted to be short; patience.py has `quickest` for it."""
+    hasty = [f"{name}:{node.lineno}" for name, tree in files() if name != "patience.py"
+             for node in ast.walk(tree) if isinstance(node, ast.Assert) and calls(node.test, CLOCKS)
+             and any(isinstance(op, ast.Lt | ast.LtE) for one in ast.walk(node.test) if isinstance(one, ast.Compare)
+                     for op in one.ops)]
+    assert not hasty, f"demanded of one attempt: {', '.join(hasty)}"
+
+
+def test_examples_are_the_same_in_every_run() -> None:
+    assert settings.default is not None
+    assert settings.default.deadline is None and settings.default.derandomize
