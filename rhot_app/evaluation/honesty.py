@@ -56,11 +56,13 @@ class Consistency:
 def squares(track: Track, off: Deviations, worn: Worn) -> Squares:
     """The normalised squares of one run."""
     tips = track.fingertip_covariances[:, worn.tip_fingers]
+    estimates = np.isfinite(track.joint_covariances).any()  # else its markers' covariances are those of raw positions
+    markers = off.markers if estimates else off.raw_markers
     values = {
         "tips": normalised(off.tips, tips),
         "joints": normalised(off.joints, track.joint_covariances),
         "palm": normalised(off.palm, track.palm_covariance)[:, None],
-        "markers": normalised(off.raw_markers, track.marker_covariances),
+        "markers": normalised(markers, track.marker_covariances),
         "angles": np.square(off.angles / np.where(track.angle_sd > 0.0, track.angle_sd, np.nan)),
     }
     everywhere = np.ones((len(track.times_s), 1), dtype=bool)
@@ -68,7 +70,7 @@ def squares(track: Track, off: Deviations, worn: Worn) -> Squares:
         "tips": axes_within(off.tips, tips, off.measured[:, worn.tips]),
         "joints": axes_within(off.joints, track.joint_covariances, track.joint_knowledge == Knowledge.MEASURED),
         "palm": axes_within(off.palm[:, None], track.palm_covariance[:, None], everywhere),
-        "markers": axes_within(off.raw_markers, track.marker_covariances, off.measured),
+        "markers": axes_within(markers, track.marker_covariances, off.measured),
         "angles": axes_within(off.angles[..., None], np.square(track.angle_sd)[..., None, None],
                               track.angle_knowledge == Knowledge.MEASURED),
     }

@@ -60,7 +60,7 @@ class HandState:
     marker_ids: tuple[str, ...]
     marker_positions: Array  # (M, 3) m, filtered
     marker_raw_positions: Array  # (M, 3) m, triangulated, unfiltered
-    marker_covariances: Array  # (M, 3, 3) m^2, of the unfiltered position
+    marker_covariances: Array  # (M, 3, 3) m^2, of the position (classic tracker: of the unfiltered one)
     marker_knowledge: Codes  # (M,) Knowledge
     camera_names: tuple[str, ...]
     camera_pixels: Array  # (C, M, 2) px, last observation; NaN when lost

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import BIAS, POSE, Estimate
 from rhot_app.tracking.kalman.markers import Frame, Worn, place_markers, project_marker
-from rhot_app.tracking.kalman.motion import Cameras
+from rhot_app.tracking.kalman.one_eye import Cameras
 
 Array = NDArray[np.float64]
 

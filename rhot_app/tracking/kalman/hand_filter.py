@@ -16,7 +16,6 @@ from rhot_app.tracking.kalman.estimate import (
     POSE,
     ROTATION,
     Estimate,
-    copy_mean,
     displace,
     empty_estimate,
 )
@@ -24,7 +23,8 @@ from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import contract, solve
 from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Worn, place_markers
-from rhot_app.tracking.kalman.motion import MOST, Cameras, Habits, predict
+from rhot_app.tracking.kalman.motion import MOST, Habits, predict
+from rhot_app.tracking.kalman.one_eye import Cameras, hold_back, single_eye
 from rhot_app.tracking.kalman.rows import ResidualBlock, Rows, clear, empty_rows
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
 
@@ -126,8 +126,8 @@ class HandFilter:
             clear(rows)
             for block in blocks:
                 block.linearise(trial, rows)
-        _conclude(estimate, trial, rows, self._believed, self._gains, count, dt, self._worn, self._habits,
-                  self._bias_variance, self._limits, step)
+        _conclude(estimate, rows, self._believed, self._gains, count, dt, self._worn, self._cameras,
+                  self._habits, self._bias_variance, self._limits, step)
         observations = int(rows.used[1])
         return Outcome(self._believed[:observations], rows.source[:observations])
 
@@ -147,15 +147,18 @@ def _improve(estimate: Estimate, rows: Rows, believed: Mask, widening: Array, st
 
 
 @njit(cache=True)
-def _conclude(estimate: Estimate, trial: Estimate, rows: Rows, believed: Mask, gains: Array, count: int, dt: float,
-              worn: Worn, habits: Habits, bias_variance: Array, limits: Array, step: Array) -> None:
+def _conclude(estimate: Estimate, rows: Rows, believed: Mask, gains: Array, count: int, dt: float,
+              worn: Worn, cameras: Cameras, habits: Habits, bias_variance: Array, limits: Array, step: Array) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
     for observation in range(rows.used[1]):
         if believed[observation] and rows.source[observation, 0] >= 0:
             estimate.unseeing[rows.source[observation, 0]] = 0.0
     note_trend(estimate, step, gains, count)
     contract(estimate.covariance, gains, count)
-    copy_mean(trial, estimate)
+    eye = single_eye(estimate)
+    if eye >= 0:
+        hold_back(estimate.covariance, gains, count, cameras.pose[eye], step)
+    displace(estimate, step, estimate)
     points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
     place_markers(worn, estimate, points, jacobian)
     forget(estimate, dt, habits, bias_variance, jacobian, step)

@@ -27,7 +27,8 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.motion import ACCELERATION_S, Cameras, liveliness
+from rhot_app.tracking.kalman.motion import ACCELERATION_S, liveliness
+from rhot_app.tracking.kalman.one_eye import Cameras
 from rhot_app.tracking.kalman.rows import Rows
 
 Array = NDArray[np.float64]

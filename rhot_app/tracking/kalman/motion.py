@@ -27,6 +27,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
+from rhot_app.tracking.kalman.one_eye import Cameras, single_eye, squint
 
 Array = NDArray[np.float64]
 
@@ -54,22 +55,8 @@ CALM_S = 0.15
 VELOCITY_S = np.array([0.4] * 6 + [0.2] * 21)
 """(27,) Velocities decay with these time constants: nobody goes on as he does for longer."""
 
-FRESH_S = 0.07
-"""A camera that saw a marker this recently still sees the hand: it may take turns with another."""
-
-SQUINT_REST_S, SQUINT_SHARE = 0.1, 0.02
-"""How soon the palm comes to rest along the line of sight of a single camera, and how much of its acceleration stays.
-"""
-
 BIAS_S = 3.0
 """Markers' biases change with this time constant: they turn with the hand and its light."""
-
-class Cameras(NamedTuple):
-    """C cameras: `pose` (C, 3, 4) camera_from_world m and `intrinsics` (C, 9) as in `CameraModel`."""
-
-    pose: Array
-    intrinsics: Array
-
 
 class Habits(NamedTuple):
     """What is known of a hand that is not seen.
@@ -99,42 +86,9 @@ def predict(estimate: Estimate, dt: float, cameras: Cameras, habits: Habits, bia
     eye = single_eye(estimate)
     if eye >= 0:
         together = together.copy()
-        _squint(estimate, cameras.pose[eye], dt, together)
+        squint(estimate, cameras.pose[eye], dt, together)
     shake(estimate.covariance, liveliness(estimate), together, dt)
     _fade_biases(estimate, dt, bias_variance)
-
-
-@njit(cache=True)
-def single_eye(estimate: Estimate) -> int:
-    """The only camera that sees the hand just now; -1 when several do, or none."""
-    eye = -1
-    for camera in range(estimate.unseeing.shape[0]):
-        if estimate.unseeing[camera] < FRESH_S:
-            if eye >= 0:
-                return -1
-            eye = camera
-    return eye
-
-
-@njit(cache=True)
-def _squint(estimate: Estimate, pose: Array, dt: float, together: Array) -> None:
-    """With one eye, believe that the palm keeps its distance and its bearing while the fingers move.
-
-    Along the line of sight, and about all axes, the palm comes to rest soon and is hardly accelerated (`together`,
-    (27, 27), is changed): a finger that bends and a palm that turns or withdraws look alike to one camera, and the
-    first is far more usual. `pose` (3, 4) camera_from_world.
-    """
-    rest = 1.0 - math.exp(-dt / SQUINT_REST_S)
-    for base in (VELOCITY, ACCELERATION):
-        motion = estimate.velocity if base == VELOCITY else estimate.acceleration
-        along = pose[2, 0] * motion[0] + pose[2, 1] * motion[1] + pose[2, 2] * motion[2]
-        for i in range(3):
-            motion[i] -= rest * along * pose[2, i]
-            motion[3 + i] *= 1.0 - rest
-    for i in range(3):
-        for j in range(3):
-            together[i, j] -= (1.0 - SQUINT_SHARE) * pose[2, i] * pose[2, j]
-        together[3 + i, 3 + i] = SQUINT_SHARE
 
 
 @njit(cache=True)

@@ -17,7 +17,8 @@ from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
 from rhot_app.tracking.kalman.forgetting import WIDEST
 from rhot_app.tracking.kalman.markers import Worn
-from rhot_app.tracking.kalman.motion import Cameras, Habits
+from rhot_app.tracking.kalman.motion import Habits
+from rhot_app.tracking.kalman.one_eye import Cameras
 from rhot_app.tracking.rig_arrays import band_axes
 from rhot_node.markers import Marker, MarkerSet
 
