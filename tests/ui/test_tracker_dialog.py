@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from fake_engine import FakeClient, FakeEngine, synthetic_rig
+from patience import PATIENCE_MS
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
@@ -37,7 +38,7 @@ class Desk:
 
     def until(self, condition):
         """Let time pass until it holds."""
-        self.qtbot.waitUntil(condition, timeout=8000)
+        self.qtbot.waitUntil(condition, timeout=PATIENCE_MS)
 
     def settled(self, sentence):
         """Wait until a change is through, and see what is said of it."""
@@ -55,7 +56,7 @@ def opened(qtbot, themed, tmp_path):
         qtbot.addWidget(dialog)
         dialog.show()
         dialog.activateWindow()
-        assert QTest.qWaitForWindowActive(dialog)
+        assert QTest.qWaitForWindowActive(dialog, PATIENCE_MS)
         return Desk(dialog, engine, path, qtbot)
     return open_on
 
