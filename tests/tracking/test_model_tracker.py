@@ -1,0 +1,221 @@
+"""The model tracker on sights without images: where it puts the hand, and how well it knows what it knows."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+from modelled_hand import after_s, deviations, model_rig, moving, seconds, sights, states_of
+from synthetic_rig import EPOCH_NS, LOST, Sight, altered, make_rig
+
+from rhot_app.errors import RigError
+from rhot_app.hand.anthropometry import scaled_hand
+from rhot_app.hand.skeleton import ANGLES
+from rhot_app.project import DepthSettings
+from rhot_app.tracking.classic import ClassicTracker
+from rhot_app.tracking.kalman.wearing import compile_wearing
+from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.model_tracker import FARTHEST_AHEAD_S, ModelTracker
+from rhot_app.tracking.state import Condition, Knowledge
+from rhot_app.tracking.tracker import Tracker
+
+RIG = model_rig()
+SECONDS = 3.0
+SLACK_RAD = np.radians(0.1)
+HERE = (Condition.TRACKING, Condition.PARTIAL)
+
+
+def in_limits(states, rig=RIG):
+    limits = compile_wearing(rig).limits
+    angles = np.array([state.angles for state in states if state.condition in HERE])
+    return (angles >= limits[:, 0] - SLACK_RAD).all() and (angles <= limits[:, 1] + SLACK_RAD).all()
+
+
+@pytest.mark.parametrize("motion", ["rest", "grasp", "fast"])
+def test_hand_is_where_it_is_and_the_covariances_say_how_well(motion):
+    states = states_of(RIG, sights(RIG, moving(motion), SECONDS))
+    found = deviations(after_s(states, 1.0), moving(motion))
+    assert found.rms_mm < 1.5
+    assert 0.01 < found.normalised.mean() < 2.0
+    assert found.within >= 0.97
+    assert np.mean([state.marker_knowledge == Knowledge.MEASURED for state in after_s(states, 1.0)]) > 0.9
+    assert in_limits(states)
+
+
+@pytest.mark.parametrize(("rig", "truth"), [
+    (model_rig(side="left"), moving(side="left")), (model_rig("rhot8"), moving(markers="rhot8")),
+    (model_rig(cameras=3), moving()), (model_rig(limits="thesis"), moving())], ids=["left", "rhot8", "three", "thesis"])
+def test_other_hands_markers_cameras_and_limits(rig, truth):
+    states = states_of(rig, sights(rig, truth, 2.0))
+    assert deviations(after_s(states, 1.0), truth).rms_mm < 1.5
+    assert in_limits(states, rig)
+
+
+def test_two_knuckles_show_how_the_palm_is_turned_and_a_wrist_alone_does_not():
+    def palm(markers):
+        rig = model_rig(markers)
+        last = states_of(rig, sights(rig, moving(markers=markers), 1.0))[-1]
+        return last, np.sqrt(np.trace(last.palm_covariance[3:, 3:]))
+
+    (bare, unsure), (full, sure) = palm("rhot6"), palm("rhot8")
+    assert full.palm_knowledge is Knowledge.MEASURED and bare.palm_knowledge is not Knowledge.MEASURED
+    assert unsure > 2.0 * sure
+
+
+def test_coupled_hands_keep_their_couplings():
+    rig = model_rig(variant="coupled")
+    states = after_s(states_of(rig, sights(rig, moving(), 2.0)), 0.5)
+    angles = np.array([state.angles for state in states])
+    for finger in ("index", "middle", "ring", "little"):
+        pip, dip = (angles[:, ANGLES.index(f"{finger}_{joint}_flexion")] for joint in ("pip", "dip"))
+        assert np.abs(dip - pip * 2.0 / 3.0).max() < np.radians(0.3)
+    assert in_limits(states, rig)
+
+
+def test_a_hand_is_found_within_a_fifth_of_a_second():
+    states = states_of(RIG, sights(RIG, moving(), 0.5))
+    assert states[0].condition is Condition.SEARCHING and states[0].palm_knowledge is Knowledge.UNKNOWN
+    first = next(state for state in states if state.condition in HERE)
+    assert seconds(first) < 0.2
+    assert deviations(after_s(states, 0.3), moving()).rms_mm < 5.0
+
+
+def test_one_blind_camera_does_not_end_the_tracking():
+    def blind(t, camera, _pixels, flags):
+        if camera == 0 and 1.0 < t < 2.0:
+            flags[:] = LOST
+
+    states = states_of(RIG, altered(sights(RIG, moving("rest"), SECONDS), blind))
+    assert all(state.condition in HERE for state in after_s(states, 0.5))
+    dark = after_s(states, 1.1, 2.0)
+    found = deviations(dark, moving("rest"))
+    assert found.rms_mm < 25.0
+    assert not any((state.marker_knowledge == Knowledge.MEASURED).all() for state in dark)
+    sighted = deviations(after_s(states, 0.6, 1.0), moving("rest"))
+    assert found.mm.mean() > sighted.mm.mean()
+    assert deviations(after_s(states, 2.3), moving("rest")).rms_mm < 3.0
+
+
+def test_markers_hidden_in_turns():
+    def hide(t, _camera, _pixels, flags):
+        for marker in range(len(flags)):
+            if (t + 0.31 * marker) % 1.0 < 0.3:
+                flags[marker] = LOST
+
+    states = after_s(states_of(RIG, altered(sights(RIG, moving("rest"), SECONDS), hide)), 1.0)
+    found = deviations(states, moving("rest"))
+    assert found.rms_mm < 6.0 and found.within >= 0.97
+    hidden = np.array([state.camera_flags[:, :5] & LOST for state in states]).all(axis=1)
+    measured = np.array([state.marker_knowledge[:5] for state in states]) == Knowledge.MEASURED
+    assert hidden.mean() > 0.2 and (hidden & measured).mean() < 0.5 * hidden.mean()
+
+
+def test_names_that_are_exchanged_are_put_right_by_the_hand():
+    def swap(t, _camera, pixels, _flags):
+        if t > 1.0:
+            pixels[[1, 2]] = pixels[[2, 1]]
+
+    states = states_of(RIG, altered(sights(RIG, moving(), SECONDS), swap))
+    late = after_s(states, 1.0)
+    assert deviations(late, moving()).rms_mm < 1.5
+    assert np.mean([state.marker_knowledge[1:3] == Knowledge.MEASURED for state in late]) > 0.9
+
+
+def test_a_lossy_network_and_doubled_and_late_frames():
+    frames = sights(RIG, moving(), SECONDS, Sight(frame_loss=0.1, marker_loss=0.02, delay_s=(0.001, 0.04), seed=3))
+    twice = [frame for k, frame in enumerate(frames) for frame in ([frame] * (2 if k % 7 == 0 else 1))]
+    arrivals = np.array([frame.t_row0_master_ns for frame in frames])
+    assert (np.diff(arrivals) < 0).sum() > 10
+    states = states_of(RIG, twice)
+    assert len(states) == len(frames)
+    assert deviations(after_s(states, 1.0), moving()).rms_mm < 2.0
+
+
+def test_a_frame_that_is_far_too_late_changes_nothing():
+    frames = sights(RIG, moving(), 0.9)
+    tracker = make_tracker(RIG)
+    for frame in frames[1:]:
+        tracker.ingest(frame)
+        before = tracker.solve()
+    shifted = replace(frames[0], pixels=frames[0].pixels + 5.0)
+    tracker.ingest(replace(shifted, t_receive_ns=frames[-1].t_receive_ns + 1))
+    after = tracker.solve()
+    assert after is None or np.array_equal(after.angles, before.angles)
+
+
+def test_a_hand_that_leaves_is_lost_and_found_again():
+    def leave(t, _camera, _pixels, flags):
+        if 1.0 < t < 2.0:
+            flags[:] = LOST
+
+    states = states_of(RIG, altered(sights(RIG, moving(), SECONDS), leave))
+    assert all(state.condition in HERE for state in after_s(states, 0.2, 1.0))
+    assert all(state.condition is Condition.PARTIAL for state in after_s(states, 1.1, 1.4))
+    gone = after_s(states, 1.6, 2.0)
+    assert all(state.condition is Condition.LOST for state in gone)
+    assert np.isnan(gone[-1].joint_positions).all() and (gone[-1].joint_knowledge == Knowledge.UNKNOWN).all()
+    assert all(state.condition in HERE for state in after_s(states, 2.25))
+    assert deviations(after_s(states, 2.5), moving()).rms_mm < 3.0
+
+
+def test_the_hands_size_is_found_while_it_moves():
+    """The hand's file has all lengths 5 % too large."""
+    right = model_rig("rhot8")
+    wrong = msgspec.structs.replace(model_rig("rhot8", float_scale=True), hand=scaled_hand(right.hand, 1.05))
+    truth = moving("grasp", 6.0, "rhot8")
+    last = states_of(wrong, sights(right, truth, 5.0))[-1]
+    assert last.hand_scale == pytest.approx(1.0 / 1.05, abs=0.02)
+    assert 0.0 < last.hand_scale_sd < 0.05
+    assert states_of(right, sights(right, truth, 0.5))[-1].hand_scale == 1.0
+
+
+def test_prediction_is_nearer_to_what_comes_than_the_newest_state():
+    truth, ahead_s = moving("fast"), 0.02
+    tracker = make_tracker(RIG)
+    assert isinstance(tracker, ModelTracker) and tracker.state_at(EPOCH_NS) is None
+    here, there = [], []
+    for frame in sights(RIG, truth, 2.0):
+        tracker.ingest(frame)
+        state = tracker.solve()
+        if state is not None and seconds(state) > 1.0:
+            later = tracker.state_at(state.t_master_ns + round(1e9 * ahead_s))
+            assert seconds(later) == pytest.approx(seconds(state) + ahead_s)
+            tips = truth(np.array([seconds(later)]))[0, :5]
+            here.append(np.linalg.norm(state.fingertip_positions - tips, axis=1))
+            there.append(np.linalg.norm(later.fingertip_positions - tips, axis=1))
+            assert np.trace(later.fingertip_covariances[1]) > np.trace(state.fingertip_covariances[1])
+    assert np.mean(there) < 0.3 * np.mean(here)
+    far = tracker.state_at(state.t_master_ns + 10**10)
+    assert seconds(far) == pytest.approx(seconds(state) + FARTHEST_AHEAD_S)
+
+
+def test_classic_and_model_tracker_are_exchangeable():
+    kinds, found = (ClassicTracker, ModelTracker), []
+    for rig, kind in zip((make_rig(), RIG), kinds, strict=True):
+        tracker: Tracker = make_tracker(rig)
+        assert type(tracker) is kind
+        assert tracker.solve() is None and tracker.newest_frames() == (None, None)
+        state = None
+        for frame in sights(rig, moving(), 0.6):
+            tracker.ingest(frame)
+            state = tracker.solve() or state
+        found.append(state)
+        assert {frame.camera for frame in tracker.newest_frames()} == {0, 1}
+        tracker.reset()
+        assert tracker.solve() is None
+    for name in type(found[0]).__dataclass_fields__:
+        a, b = (getattr(state, name) for state in found)
+        assert np.shape(a) == np.shape(b) if isinstance(a, np.ndarray) else type(a) is type(b), name
+
+
+def test_a_marker_without_a_place_on_the_hand_is_refused_with_a_sentence():
+    markers = (*RIG.markers.markers[:5], msgspec.structs.replace(RIG.markers.markers[5], role="elbow"))
+    rig = msgspec.structs.replace(RIG, markers=msgspec.structs.replace(RIG.markers, markers=markers))
+    with pytest.raises(RigError, match=r"marker '.*' has the role 'elbow'; a hand wears markers at thumb_tip"):
+        make_tracker(rig)
+
+
+def test_a_rig_without_calibration_is_refused_with_a_sentence():
+    rig = msgspec.structs.replace(RIG, depth=DepthSettings(mode="disparity"))
+    with pytest.raises(RigError, match=r"the model tracker needs calibrated cameras.*tracker\.kind"):
+        make_tracker(rig)
