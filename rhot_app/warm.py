@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+import msgspec
 import numpy as np
 
 from rhot_app.calibration.board import Chessboard
@@ -24,7 +25,7 @@ from rhot_app.engine.warm_up import warm_up as rehearse_tracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.project import Rig, load_rig
+from rhot_app.project import Rig, TrackerSettings, load_rig
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.simulator.shot import make_renderer, make_shot
 from rhot_app.simulator.shows import BoardShow, HandShow
@@ -32,6 +33,7 @@ from rhot_app.tracking.make import make_tracker
 from rhot_node.compiled import mark_complete
 from rhot_node.detect.fast import FastDetector
 from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
 from rhot_node.warm_up import warm_up as rehearse_detector
 
 
@@ -44,6 +46,14 @@ def warm_detector(rig: Rig) -> None:
 def warm_tracker(rig: Rig) -> None:
     """Compile what the engine does with observations."""
     rehearse_tracker(make_tracker(rig), rig)
+
+
+def warm_model_tracker(rig: Rig) -> None:
+    """The same with the model tracker, which begins in another way when markers on the palm show how it is turned."""
+    for markers in ("rhot6", "rhot8"):
+        chosen = msgspec.structs.replace(rig, markers=load_markers(resource_path("markers", f"{markers}.json")),
+                                         tracker=TrackerSettings(kind="model"))
+        rehearse_tracker(make_tracker(chosen), chosen)
 
 
 def warm_twin(_rig: Rig) -> None:
@@ -75,7 +85,8 @@ def warm_calibrations(rig: Rig) -> None:
     simulate(footage, np.array([OFF]), np.array([OFF]))
 
 
-STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker, "twin": warm_twin,
+STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker,
+                                           "model tracker": warm_model_tracker, "twin": warm_twin,
                                            "boards": warm_boards, "calibrations": warm_calibrations}
 
 

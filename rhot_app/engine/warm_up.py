@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 
 from rhot_app.engine.codec import encode
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.project import Rig, RigNode
+from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.model import build_model, neutral_pose
+from rhot_app.hand.places import ROLES, place_of
+from rhot_app.project import OTHER_HAND, Rig, RigNode
+from rhot_app.tracking.kalman.wearing import points_on
 from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_node.wire.codec import decode as decode_datagram
 from rhot_node.wire.codec import encode as encode_datagram
@@ -15,17 +20,17 @@ from rhot_node.wire.messages import MarkerObservation, Observations
 
 FRAMES = 24
 _PERIOD_NS = 8_333_333
-_DISTANCE_M = 0.6
+_CAMERA_FROM_PALM = np.array([[0.0, 1.0, 0.0, 0.04], [-1.0, 0.0, 0.0, 0.07], [0.0, 0.0, 1.0, 0.6],
+                              [0.0, 0.0, 0.0, 1.0]])
+"""Fingers up, 0.6 m away."""
 
 
 def warm_up(tracker: Tracker, rig: Rig) -> None:
-    """Let `tracker` solve a few frames of points 0.6 m along z of the rig frame, then forget them.
+    """Let `tracker` solve a few frames of the rig's own hand, 0.6 m before the first camera, then forget them.
 
     Compiled code is read from numba's cache where it can be written, else it is compiled here: seconds, once.
     """
-    count = len(rig.markers.markers)
-    spread = np.linspace(-0.06, 0.06, count)
-    points_m = np.column_stack([spread, 0.05 - np.abs(spread), np.full(count, _DISTANCE_M)])
+    points_m = _worn_points(rig)
     for frame in range(FRAMES):
         moved_m = points_m + np.array([0.002 * frame, 0.0, 0.0])
         for camera, node in enumerate(rig.nodes):
@@ -35,6 +40,27 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
                 encode(state)
     tracker.reset()
     _read_one(rig)
+
+
+def _worn_points(rig: Rig) -> np.ndarray:
+    """(M, 3) m, world: the markers on relaxed hands before the first camera; side by side those that no hand wears."""
+    markers, first = rig.markers.markers, rig.nodes[0]
+    points = np.tile(_CAMERA_FROM_PALM[:3, 3], (len(markers), 1))
+    points[:, 0] = np.linspace(-0.06, 0.06, len(markers))
+    for hand, prefix, aside_m in ((rig.hand, "", 0.0), (rig.other_hand, OTHER_HAND, -0.15)):
+        worn = [k for k, marker in enumerate(markers)
+                if (marker.role or "").startswith(prefix) and (marker.role or "").removeprefix(prefix) in ROLES]
+        if hand is None or not worn:
+            continue
+        model, pose = build_model(hand), neutral_pose(_CAMERA_FROM_PALM)
+        dh = points_on(model.dh, tuple(place_of(msgspec.structs.replace(
+            markers[k], role=(markers[k].role or "").removeprefix(prefix)), model) for k in worn))
+        found = np.empty((len(worn), 3))
+        forward_arrays(dh, pose.world_from_palm, pose.angles, empty_frames(dh), found)
+        found[:, 0] += aside_m
+        points[worn] = found
+    world_from_camera = np.linalg.inv(CameraModel.from_rig(first.intrinsics, first.pose).camera_from_world)
+    return np.asarray(points @ world_from_camera[:3, :3].T + world_from_camera[:3, 3])
 
 
 def _read_one(rig: Rig) -> None:
