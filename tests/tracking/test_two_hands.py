@@ -75,7 +75,7 @@ def test_both_are_of_one_instant_and_the_markers_in_the_rigs_order(states):
 
 def test_a_hand_is_tracked_as_if_it_were_alone(states):
     """States of the instant of its own rows are, number by number, those of a rig that has no other hand."""
-    own = [replace(frame, **{name: getattr(frame, name)[::2] for name in
+    own = [replace(frame, **{name: getattr(frame, name)[::2].copy() for name in
                              ("pixels", "covariances", "diameters", "qualities", "flags")}) for frame in FRAMES]
     alone = {state.t_master_ns: state for state in states_of(RIGHT, own)}
     same = [(state, alone[state.t_master_ns]) for state in states if state.t_master_ns in alone]
