@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from fake_backend import FakeBackend
+from patience import PATIENCE_S
 
 from rhot_app.ui.environment import cap_software_gl, choose_gl_platform
 
@@ -57,7 +58,7 @@ class Bench:
         """Press a key in the window."""
         QTest.keyClick(widget or self.window, key, modifier)
 
-    def until(self, condition: Callable[[], Any], timeout_s: float = 8.0) -> None:
+    def until(self, condition: Callable[[], Any], timeout_s: float = PATIENCE_S) -> None:
         """Let the window run until `condition` holds; the last look happens after the time is up."""
         end = time.monotonic() + timeout_s
         while time.monotonic() < end and not condition():

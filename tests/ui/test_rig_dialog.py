@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 from fake_engine import synthetic_rig
+from patience import PATIENCE_MS
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QTableWidget
 
@@ -26,5 +27,5 @@ def test_no_head_and_no_value_is_cut_off(qtbot, themed, page):
         texts.append(table.horizontalHeaderItem(column).text())
         assert table.columnWidth(column) >= max(metrics.horizontalAdvance(text) for text in texts) + 8
     bars = (table.horizontalScrollBar(), table.verticalScrollBar())
-    qtbot.waitUntil(lambda: not any(bar.isVisible() for bar in bars), timeout=2000)
+    qtbot.waitUntil(lambda: not any(bar.isVisible() for bar in bars), timeout=PATIENCE_MS)
     assert dialog.width() <= 1280

@@ -6,11 +6,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from fake_engine import synthetic_rig
+from patience import eventually
 
 from rhot_app.engine.process import running_engine, start_ticks, started_processes
 from rhot_app.errors import EngineError, RigError, SimulatorError
@@ -21,14 +21,6 @@ from rhot_app.ui.backend.session import Session, TwinChoice, TwinPace
 
 def quiet(text: str, fraction: float) -> None:
     """Nobody looks."""
-
-
-def wait_until(condition, timeout_s: float = 5.0) -> None:
-    """Wait for something that the system does in its own time."""
-    deadline = time.monotonic() + timeout_s
-    while time.monotonic() < deadline and not condition():
-        time.sleep(0.02)
-    assert condition()
 
 
 @pytest.fixture
@@ -52,7 +44,7 @@ def test_an_engine_is_started_found_restarted_and_ended(session, rig_path):
     later = Session(session.directory)
     assert later.found() and later.attach(quiet).ours
     os.kill(first, signal.SIGKILL)
-    wait_until(lambda: not later.found())
+    eventually(lambda: not later.found())
     assert later.restart_engine(str(rig_path), True, quiet).running
     second = running_engine(session.directory)
     assert second not in (None, first)
@@ -105,11 +97,11 @@ def stand_in(tmp_path, rig_path, monkeypatch):
 def test_simulated_nodes_are_started_watched_and_ended(session, stand_in):
     opened = session.open_twin(TwinChoice(motion="rest"), quiet)
     assert opened.simulated and opened.ours and session.twin_alive()
-    wait_until(lambda: session.twin_pace() == TwinPace(11.25, 40.0))
+    eventually(lambda: session.twin_pace() == TwinPace(11.25, 40.0))
     assert {process.role for process in started_processes(session._place)} == {"engine", session_module.TWIN_ROLE}
     twin = next(process for process in started_processes(session._place) if process.role == session_module.TWIN_ROLE)
     os.kill(twin.pid, signal.SIGKILL)
-    wait_until(lambda: not session.twin_alive())
+    eventually(lambda: not session.twin_alive())
 
 
 def test_the_twin_may_catch_up(tmp_path):

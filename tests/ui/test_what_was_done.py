@@ -41,7 +41,7 @@ def test_a_recording_that_vanished_is_said(tracking):
     Path(tracking.backend.engine.log_path).unlink()
     tracking.press(Qt.Key.Key_R)
     tracking.until(lambda: "cannot be found" in tracking.window.advice.texts[0])
-    assert not tracking.controller.recording
+    tracking.until(lambda: not tracking.controller.recording)
 
 
 def test_a_rig_that_differs_from_its_file_is_marked_and_saved(make_bench, tmp_path):
@@ -51,15 +51,14 @@ def test_a_rig_that_differs_from_its_file_is_marked_and_saved(make_bench, tmp_pa
     bench.window.open_rig(path)
     bench.until(lambda: bench.controller.rig is not None)
     label, action = bench.window.toolbar.rig_label, bench.window.actions_.save_rig
-    bench.run(0.3)
-    assert label.text().strip() == "rig: test bench" and not action.isEnabled()
+    bench.until(lambda: label.text().strip() == "rig: test bench" and not action.isEnabled())
     bench.backend.engine.rig = synthetic_rig("moved cameras")
     bench.until(lambda: label.text().strip() == "rig: moved cameras (edited)" and action.isEnabled())
     assert bench.controller.rig.name == "moved cameras" and load_rig(path).name == "test bench"
     bench.press(Qt.Key.Key_S, modifier=Qt.KeyboardModifier.ControlModifier)
     bench.until(lambda: label.text().strip() == "rig: moved cameras" and not action.isEnabled())
     assert load_rig(path).name == "moved cameras"
-    assert any(f"saved to {path}" in text for text in bench.window.advice.texts)
+    bench.until(lambda: any(f"saved to {path}" in text for text in bench.window.advice.texts))
 
 
 def test_slow_simulated_cameras_are_told_calmly(tracking):

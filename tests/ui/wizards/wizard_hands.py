@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from patience import PATIENCE_S
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from screen_pictures import SIZE, check
@@ -20,13 +21,13 @@ class Hands:
         assert QTest.qWaitForWindowActive(window)
 
     @staticmethod
-    def wait(condition, timeout_s=20.0):
+    def wait(condition, timeout_s=PATIENCE_S):
         end = time.monotonic() + timeout_s
         while time.monotonic() < end and not condition():
             QTest.qWait(10)
         assert condition()
 
-    def until(self, condition, timeout_s=20.0):
+    def until(self, condition, timeout_s=PATIENCE_S):
         try:
             self.wait(condition, timeout_s)
         except AssertionError:
