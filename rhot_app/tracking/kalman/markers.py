@@ -34,7 +34,7 @@ from rhot_app.tracking.kalman.rows import Rows
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-FLOOR_PX = 0.04
+FLOOR_PX = 0.02
 """No centroid is better than this, whatever a node says."""
 
 NEAREST_M = 0.02

@@ -24,7 +24,7 @@ from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]
 
-PLACE_SD_M = {"capsule": 0.15e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3}
+PLACE_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3}
 """How far a marker's seen middle lies from where the hand file has it, by its shape: paint, its shading, and the skin
 under it. A blob is paint on a knuckle that nobody measured."""
 
