@@ -40,7 +40,9 @@ FARTHEST_AHEAD_S = 0.1
 
 _PENDING = 16
 _JUMP_NS = 1_000_000_000
-"""A frame this far from the last ones is of another timeline."""
+"""A frame this far ahead of the last ones is of another timeline, and so are several this far behind."""
+
+_BEHIND = 5
 
 
 class ModelTracker:
@@ -64,7 +66,7 @@ class ModelTracker:
         self._starter.reset()
         self._sights.reset()
         self._tracking = self._ever = False
-        self._believed_ns = self._plausible_ns = 0
+        self._believed_ns = self._plausible_ns = self._behind = 0
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
@@ -114,8 +116,9 @@ class ModelTracker:
     def _take(self, observations: CameraObservations) -> bool:
         """Weigh one frame; False when it is a double or too late."""
         block = MarkerBlock(self._wearing, observations)
-        if self._tracking and abs(block.t_ns - self._timeline.t_ns) > _JUMP_NS:
+        if self._tracking and self._other_time(block.t_ns):
             self._give_up()
+            self._sights.reset()
         if not self._sights.enter(block):
             return False
         if not self._tracking:
@@ -125,6 +128,15 @@ class ModelTracker:
                 self._timeline.t_ns - self._plausible_ns > WRONG_AFTER_NS) or self._hand.astray:
             self._give_up()
         return True
+
+    def _other_time(self, t_ns: int) -> bool:
+        """Whether frames are of another timeline now: one far ahead, or several far behind; a single one is only late.
+        """
+        if t_ns >= self._timeline.t_ns - _JUMP_NS:
+            self._behind = 0
+            return t_ns > self._timeline.t_ns + _JUMP_NS
+        self._behind += 1
+        return self._behind >= _BEHIND
 
     def _look_for_hand(self, observations: CameraObservations) -> bool:
         self._starter.ingest(observations)

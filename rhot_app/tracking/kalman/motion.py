@@ -87,21 +87,36 @@ def predict(estimate: Estimate, dt: float, cameras: Cameras, habits: Habits, bia
     if eye >= 0:
         together = together.copy()
         squint(estimate, cameras.pose[eye], dt, together)
+    _keep_awake(estimate)
     shake(estimate.covariance, liveliness(estimate), together, dt)
     _fade_biases(estimate, dt, bias_variance)
 
 
 @njit(cache=True)
-def liveliness(estimate: Estimate) -> Array:
-    """(7,) variance of each group's acceleration: of one that is awake, and by its speed as far as that is no noise."""
-    speed, out = np.zeros(GROUPS), np.empty(GROUPS)
+def speeds(estimate: Estimate) -> Array:
+    """(7,) speed of each group, m/s and rad/s, as far as it is no noise."""
+    out = np.zeros(GROUPS)
     for i in range(POSE):
-        speed[GROUP_OF[i]] += estimate.velocity[i] ** 2 - 4.0 * estimate.covariance[VELOCITY + i, VELOCITY + i]
+        out[GROUP_OF[i]] += estimate.velocity[i] ** 2 - 4.0 * estimate.covariance[VELOCITY + i, VELOCITY + i]
+    return np.sqrt(np.maximum(out, 0.0))
+
+
+@njit(cache=True)
+def _keep_awake(estimate: Estimate) -> None:
+    """What moves is awake."""
+    moving = speeds(estimate)
     for group in range(GROUPS):
-        moving = math.sqrt(max(speed[group], 0.0))
-        awake = (moving / (moving + SLOW[group]) * AWAKE[group]) ** 2
+        awake = (moving[group] / (moving[group] + SLOW[group]) * AWAKE[group]) ** 2
         estimate.agitation[group] = max(estimate.agitation[group], awake)
-        out[group] = min(STILL[group] ** 2 + estimate.agitation[group] + (PER_SPEED[group] * moving) ** 2, MOST[group])
+
+
+@njit(cache=True)
+def liveliness(estimate: Estimate) -> Array:
+    """(7,) variance of each group's acceleration: of one at rest, of one that is awake, and by its speed."""
+    moving, out = speeds(estimate), np.empty(GROUPS)
+    for group in range(GROUPS):
+        out[group] = min(STILL[group] ** 2 + estimate.agitation[group] + (PER_SPEED[group] * moving[group]) ** 2,
+                         MOST[group])
     return out
 
 

@@ -1,8 +1,8 @@
 """A hand that one camera alone sees: what it cannot show is held, lest it be made up.
 
 One camera does not see distance. A finger that bends, a palm that turns and one that withdraws look alike to it, and a
-filter that linearises anew with every frame soon believes to tell them apart. So the palm is believed to keep its
-distance and its bearing, and the fingers to do what is seen.
+filter that linearises anew with every frame soon believes to tell them apart. So a palm that stands nearly still is
+believed to keep its distance and its bearing, and the fingers to do what is seen.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 FRESH_S = 0.07
 """A camera that saw a marker this recently still sees the hand: it may take turns with another."""
 
+MOVES_M_S, TURNS_RAD_S = 0.15, 1.5
+"""A palm that moves or turns faster goes on as it did."""
+
 REST_S, SHARE = 0.1, 0.02
 """How soon the palm comes to rest along the line of sight of a single camera, and how much of its acceleration stays.
 """
@@ -35,7 +38,13 @@ class Cameras(NamedTuple):
 
 @njit(cache=True)
 def single_eye(estimate: Estimate) -> int:
-    """The only camera that sees the hand just now; -1 when several do, or none."""
+    """The only camera that sees the hand just now, if the palm stands nearly still; -1 otherwise."""
+    speed, turning = 0.0, 0.0
+    for i in range(3):
+        speed += estimate.velocity[i] ** 2
+        turning += estimate.velocity[3 + i] ** 2
+    if speed > MOVES_M_S * MOVES_M_S or turning > TURNS_RAD_S * TURNS_RAD_S:
+        return -1
     eye = -1
     for camera in range(estimate.unseeing.shape[0]):
         if estimate.unseeing[camera] < FRESH_S:

@@ -28,7 +28,7 @@ class Rows(NamedTuple):
     change of what is expected per error state; `noise` (K, 2): of each row, its variance and its covariance with the
     row before or after it in the same observation of two. `first` (L + 1,): the rows of observation l are
     first[l] .. first[l + 1] - 1, one or two of them; `part` (L,): PALM_PART or the finger; `source` (L, 2): camera and
-    marker, or -1.
+    which of its sights, or -1.
     """
 
     used: Indices

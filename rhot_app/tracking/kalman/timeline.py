@@ -53,7 +53,7 @@ class Timeline:
     def add(self, block: TimedBlock) -> list[tuple[TimedBlock, Outcome]]:
         """Weigh a block, and once more all that are later than it. Returns what became of each; empty: too late."""
         place = bisect_right([moment.t_ns for moment in self._moments], block.t_ns)
-        if block.t_ns < self.t_ns and place == 0:
+        if block.t_ns < (self._moments[0].before_ns if self._moments else self.t_ns):
             self.dropped += 1
             return []
         again: Sequence[_Moment] = self._moments[place:]
