@@ -81,19 +81,27 @@ def describe(estimate: Estimate, dh: DhArrays, worn: Worn, seen: NDArray[np.bool
 
 @njit(cache=True)
 def _conclude(estimate: Estimate, worn: Worn, knowledge: Codes, report: Report) -> None:
-    """A joint is measured when the images determine it and a marker of its finger (the palm: of the palm) shows."""
-    shown = np.zeros(6, np.bool_)  # palm, then fingers
+    """What is measured, the images alone determine; what they determine through habit is inferred, however well.
+
+    A fingertip needs its marker, an inner joint two markers on its finger, a palm's rotation three on the palm, an
+    angle two on its finger beside those.
+    """
+    shown = np.zeros(6, np.int64)  # markers measured on the palm, then on each finger
     for m in range(worn.part.shape[0]):
-        shown[worn.part[m] + 1] |= knowledge[m] == _MEASURED
+        shown[worn.part[m] + 1] += knowledge[m] == _MEASURED
+    turn = shown[0] >= 3
     for joint in range(21):
+        finger = _FINGER_OF_JOINT[joint]
+        needed = 2 if finger >= 0 and (joint - 1) % 4 < 3 else 1
         sd = _worst(report.covariances[joint])
-        report.joint_knowledge[joint] = _know(sd, shown[_FINGER_OF_JOINT[joint] + 1], MEASURED_M, INFERRED_M)
+        report.joint_knowledge[joint] = _know(sd, shown[finger + 1] >= needed, MEASURED_M, INFERRED_M)
     for angle in range(21):
         sd = math.sqrt(max(estimate.covariance[ANGLES + angle, ANGLES + angle], 0.0))
         report.angle_sd[angle] = sd
-        report.angle_knowledge[angle] = _know(sd, shown[_FINGER_OF_ANGLE[angle] + 1], MEASURED_RAD, INFERRED_RAD)
+        report.angle_knowledge[angle] = _know(sd, turn and shown[_FINGER_OF_ANGLE[angle] + 1] >= 2, MEASURED_RAD,
+                                              INFERRED_RAD)
     sd = _worst(estimate.covariance[ROTATION:ANGLES, ROTATION:ANGLES])
-    report.palm[0] = _know(sd, shown[0], MEASURED_RAD, INFERRED_RAD)
+    report.palm[0] = _know(sd, turn, MEASURED_RAD, INFERRED_RAD)
 
 
 @njit(cache=True)

@@ -58,7 +58,9 @@ def test_each_hand_is_where_it_is(states):
     assert len(late) > 100
     assert deviations(late, RIGHT_TRUTH).rms_mm < 2.0
     assert deviations([state.other for state in late], left_truth).rms_mm < 2.0
-    assert all(state.condition is Condition.TRACKING and state.other.condition is Condition.TRACKING for state in late)
+    assert all(state.condition is Condition.TRACKING for state in late)
+    # A finger that has just surprised is known to some millimetres for a state or two, and said to be.
+    assert np.mean([state.other.condition is Condition.TRACKING for state in late]) > 0.9
 
 
 def test_both_are_of_one_instant_and_the_markers_in_the_rigs_order(states):

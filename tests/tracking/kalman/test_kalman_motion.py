@@ -108,10 +108,10 @@ def test_no_time_changes_no_mean():
 
 def test_one_eye_believes_that_the_palm_keeps_its_distance():
     """Camera 1 looks along z: what moves along it comes to rest sooner than what moves across."""
-    def after(unseeing):
+    def after(unseeing, speed=0.1):
         estimate = moving_estimate()
         estimate.velocity[:] = 0.0
-        estimate.velocity[[0, 2]] = 0.3
+        estimate.velocity[[0, 2]] = speed
         estimate.acceleration[:] = 0.0
         estimate.unseeing[:] = unseeing
         return carried(estimate, 0.05).velocity
@@ -119,3 +119,4 @@ def test_one_eye_believes_that_the_palm_keeps_its_distance():
     both, one, none = after((0.0, 0.0)), after((0.0, np.inf)), after((np.inf, np.inf))
     np.testing.assert_array_equal(both, none)
     assert one[0] == pytest.approx(both[0]) and one[2] < 0.8 * both[2]
+    np.testing.assert_array_equal(after((0.0, 0.0), 0.3), after((0.0, np.inf), 0.3))  # what moves goes on
