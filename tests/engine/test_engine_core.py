@@ -102,7 +102,9 @@ def test_silent_node_is_named_and_forgotten_when_it_answers(rig: Rig, bench: Ben
     node = SyntheticNode(rig, 0)
     node.start()
     bench.run_until(lambda: not any("Node left does not" in a.text for a in bench.engine.status().advice))
+    said = [advice.text for advice in bench.engine.status().advice]
     node.close()
+    assert not any("Node left does not" in text for text in said)
 
 
 def test_broken_tracker_is_reported_and_begins_anew(bench: Bench, nodes: list[SyntheticNode]) -> None:

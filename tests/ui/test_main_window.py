@@ -44,6 +44,7 @@ def test_space_stops_and_starts(tracking):
     tracking.click(tracking.window.screen_parts.scene.start_button)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
     tracking.until(lambda: "Stop" in tracking.window.actions_.start.text())
+    assert tracking.backend.engine.running
 
 
 def test_a_focused_button_keeps_its_space_bar(tracking):
@@ -118,6 +119,7 @@ def test_advice_comes_and_goes(tracking):
     tracking.backend.engine.hidden = {}
     tracking.backend.engine.advice = ()
     tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
+    assert sentence not in tracking.window.advice.texts
 
 
 def test_a_vanished_engine_is_said_and_started_again(tracking):
@@ -147,6 +149,7 @@ def test_an_engine_that_cannot_be_started_again_waits_for_a_click(tracking):
     button = next(button for *_, button in tracking.window.advice._lines if button.isVisible())
     tracking.click(button)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
+    assert backend.calls.count("restart start=True") == 4
 
 
 def test_simulated_cameras_that_stopped_can_be_started_again(tracking):
@@ -157,6 +160,7 @@ def test_simulated_cameras_that_stopped_can_be_started_again(tracking):
     tracking.until(lambda: tracking.backend.calls.count("twin grasp") == 1)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
     tracking.until(lambda: "The simulated cameras have stopped." not in tracking.window.advice.texts)
+    assert tracking.backend.calls.count("twin grasp") == 1
 
 
 def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
@@ -194,6 +198,7 @@ def test_a_hand_that_stands_still_for_a_second_is_taken_away(tracking):
     tracking.until(lambda: not scene._actors.items[0].visible())
     tracking.until(lambda: tracking.window.toolbar.badge.word == "LOST")
     tracking.until(lambda: tracking.window.screen_parts.markers.words == ["not seen"] * 6)
+    assert not scene._actors.items[0].visible()
 
 
 def test_the_window_stays_quick(tracking):

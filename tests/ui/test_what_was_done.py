@@ -42,6 +42,7 @@ def test_a_recording_that_vanished_is_said(tracking):
     tracking.press(Qt.Key.Key_R)
     tracking.until(lambda: "cannot be found" in tracking.window.advice.texts[0])
     tracking.until(lambda: not tracking.controller.recording)
+    assert not Path(tracking.backend.engine.log_path or "none").exists()
 
 
 def test_a_rig_that_differs_from_its_file_is_marked_and_saved(make_bench, tmp_path):
@@ -68,6 +69,7 @@ def test_slow_simulated_cameras_are_told_calmly(tracking):
     tracking.backend.pace = None
     tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
+    assert sentence not in tracking.window.advice.texts
 
 
 def test_the_bar_is_as_tall_as_its_sentences(bench):
