@@ -13,8 +13,7 @@ from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, SCALE, Estimate
-from rhot_app.tracking.kalman.markers import Worn, place_markers, project_marker
-from rhot_app.tracking.kalman.one_eye import Cameras
+from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers, project_marker
 from rhot_app.tracking.state import Knowledge
 
 Array = NDArray[np.float64]

@@ -46,12 +46,16 @@ class Starter:
 
     def find(self) -> tuple[int, HandPose] | None:
         """The hand and its instant, master ns, as soon as the frames so far show it."""
-        paired = self._pairing.due()
-        if paired is None:
+        located = self.locate()
+        if located is None:
             return None
-        markers = self._locate(paired)
-        pose = self._pose(markers)
-        return None if pose is None else (paired.t_ns, pose)
+        pose = self.pose_of(located[1])
+        return None if pose is None else (located[0], pose)
+
+    def locate(self) -> tuple[int, Array] | None:
+        """An instant, master ns, and where the markers were then, (M, 3) m, NaN where not located; None: not due."""
+        paired = self._pairing.due()
+        return None if paired is None else (paired.t_ns, self._locate(paired))
 
     def _locate(self, paired: Paired) -> Array:
         """(M, 3) m, NaN where not located."""
@@ -63,7 +67,8 @@ class Starter:
                    positions, covariances, np.empty(count))
         return positions
 
-    def _pose(self, markers: Array) -> HandPose | None:
+    def pose_of(self, markers: Array) -> HandPose | None:
+        """The hand whose `markers` (M, 3) m, NaN where not located, are enough to find it."""
         located = np.isfinite(markers[:, 0])
         if np.count_nonzero(located) < min(LEAST_MARKERS, len(markers)):
             return None

@@ -12,7 +12,9 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
+from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
 from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
@@ -43,6 +45,12 @@ _JUMP_NS = 1_000_000_000
 """A frame this far ahead of the last ones is of another timeline, and so are several this far behind."""
 
 _BEHIND = 5
+_APART_M, _APART_MARKERS, _APART_STATES = 0.012, 3, 3
+"""So many markers so far from where all cameras see them, so often in a row, are those of a hand that is elsewhere: two
+may have changed names."""
+
+_THUMB_NS = 200_000_000
+"""How often a thumb that bends backwards is looked at."""
 
 
 class ModelTracker:
@@ -66,7 +74,7 @@ class ModelTracker:
         self._starter.reset()
         self._sights.reset()
         self._tracking = self._ever = False
-        self._believed_ns = self._plausible_ns = self._behind = 0
+        self._believed_ns = self._plausible_ns = self._thumb_ns = self._behind = self._apart = 0
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
@@ -99,7 +107,7 @@ class ModelTracker:
             return None
         copy_estimate(self._hand.estimate, self._ahead)
         ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
-        predict(self._ahead, ahead, self._wearing.cameras, self._wearing.habits, self._wearing.bias_variance)
+        predict(self._ahead, ahead, self._wearing.worn.part, self._wearing.habits, self._wearing.bias_variance)
         return self._describe(self._ahead, self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
 
     def observe(self, block: TimedBlock) -> None:
@@ -121,13 +129,37 @@ class ModelTracker:
             self._sights.reset()
         if not self._sights.enter(block):
             return False
+        self._starter.ingest(observations)
         if not self._tracking:
-            return self._look_for_hand(observations)
+            return self._look_for_hand()
         self.observe(block)
+        self._look_at_thumb()
         if self._timeline.t_ns - self._believed_ns > LOST_AFTER_NS or (
                 self._timeline.t_ns - self._plausible_ns > WRONG_AFTER_NS) or self._hand.astray:
             self._give_up()
         return True
+
+    def _compare(self, estimated: Array) -> None:
+        """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them."""
+        found = self._starter.locate()
+        if found is None:
+            return
+        t_ns, located = found
+        speed = float(np.linalg.norm(self._hand.estimate.velocity[:3]))
+        allowed = _APART_M + speed * 1e-9 * abs(self._timeline.t_ns - t_ns)
+        off = np.linalg.norm(located - estimated, axis=1)
+        self._apart = self._apart + 1 if np.count_nonzero(off > allowed) >= _APART_MARKERS else 0
+        if self._apart >= _APART_STATES:
+            self._apart = 0
+            pose = self._starter.pose_of(located)
+            if pose is not None:
+                self._begin(t_ns, pose)
+
+    def _look_at_thumb(self) -> None:
+        """A thumb that bends backwards may be one that bends forwards."""
+        if self._timeline.t_ns - self._thumb_ns > _THUMB_NS and bent_backwards(self._hand.estimate):
+            self._thumb_ns = self._timeline.t_ns
+            unbend(self._hand.estimate, self._wearing.model, self._wearing.habits.usual)
 
     def _other_time(self, t_ns: int) -> bool:
         """Whether frames are of another timeline now: one far ahead, or several far behind; a single one is only late.
@@ -138,19 +170,20 @@ class ModelTracker:
         self._behind += 1
         return self._behind >= _BEHIND
 
-    def _look_for_hand(self, observations: CameraObservations) -> bool:
-        self._starter.ingest(observations)
+    def _look_for_hand(self) -> bool:
         found = self._starter.find()
-        if found is None:
-            return True
-        t_ns, pose = found
+        if found is not None:
+            self._begin(*found)
+        return True
+
+    def _begin(self, t_ns: int, pose: HandPose) -> None:
+        """Start the filter from a pose, and weigh again what was seen since."""
         self._hand.start(pose.world_from_palm, pose.angles)
         self._timeline.begin(t_ns)
         self._tracking = self._ever = True
         self._believed_ns = self._plausible_ns = t_ns
         for block in self._sights.recent(t_ns):
             self.observe(block)
-        return True
 
     def _give_up(self) -> None:
         self._tracking = False
@@ -183,6 +216,8 @@ class ModelTracker:
         located = time.perf_counter()
         knowledge, report = np.empty(markers, np.uint8), empty_report(markers)
         describe(estimate, wearing.model.dh, wearing.worn, self._sights.clear(t_ns), knowledge, report)
+        if estimate is self._hand.estimate:
+            self._compare(report.markers)
         seen_pixels, seen_flags = self._sights.last_seen()
         self._sequence += 1
         return HandState(

@@ -96,6 +96,50 @@ def test_one_blind_camera_does_not_end_the_tracking():
     assert deviations(after_s(states, 2.3), moving("rest")).rms_mm < 3.0
 
 
+def hidden(markers, begin, end, camera=None):
+    """Edits frames so that `markers` are out of sight of one camera, or of all, from `begin` to `end`, s."""
+    def hide(t, eye, _pixels, flags):
+        if begin < t < end and camera in (None, eye):
+            flags[markers] = LOST
+
+    return hide
+
+
+@pytest.mark.parametrize("camera", [0, 1])
+@pytest.mark.parametrize("motion", ["rest", "grasp"])
+def test_half_a_second_before_one_camera_is_bridged_and_not_called_measured(motion, camera):
+    states = states_of(RIG, altered(sights(RIG, moving(motion), 2.0), hidden(slice(None), 1.0, 1.5, camera)))
+    dark = after_s(states, 1.0, 1.5)
+    found = deviations(dark, moving(motion))
+    assert found.rms_mm < 25.0
+    assert all(state.condition in HERE for state in after_s(states, 0.5))
+    late = after_s(dark, 1.15)
+    assert len(late) > 10
+    assert not any((state.marker_knowledge == Knowledge.MEASURED).any() for state in late)
+    assert not any(state.palm_knowledge == Knowledge.MEASURED for state in late)
+    assert deviations(after_s(states, 1.7), moving(motion)).rms_mm < 3.0
+
+
+@pytest.mark.parametrize("motion", ["rest", "grasp"])
+def test_a_wrist_out_of_sight_stays_near_is_not_called_measured_and_comes_back_at_once(motion):
+    wrist = RIG.markers.ids.index(next(marker.id for marker in RIG.markers.markers if marker.role == "wrist"))
+    states = states_of(RIG, altered(sights(RIG, moving(motion), 2.0), hidden(wrist, 1.0, 1.5)))
+
+    def off_mm(some):
+        truth = moving(motion)(np.array([seconds(state) for state in some]))[:, wrist]
+        return 1e3 * np.linalg.norm(np.array([state.marker_positions[wrist] for state in some]) - truth, axis=1)
+
+    late = after_s(states, 1.15, 1.5)
+    assert all(state.condition in HERE for state in after_s(states, 0.5)) and len(late) > 20
+    assert np.sqrt(np.mean(off_mm(after_s(states, 1.0, 1.5)) ** 2)) < 25.0
+    assert not any(state.marker_knowledge[wrist] == Knowledge.MEASURED for state in late)
+    assert not any(state.palm_knowledge == Knowledge.MEASURED for state in late)
+    assert deviations(late, moving(motion)).rms_mm < 3.0  # the fingertips are seen
+    again = after_s(states, 1.6)
+    assert off_mm(again).max() < 3.0
+    assert all(state.marker_knowledge[wrist] == Knowledge.MEASURED for state in again)
+
+
 def test_markers_hidden_in_turns():
     def hide(t, _camera, _pixels, flags):
         for marker in range(len(flags)):

@@ -11,8 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import BIAS, POSE, Estimate
-from rhot_app.tracking.kalman.markers import Frame, Worn, place_markers, project_marker
-from rhot_app.tracking.kalman.one_eye import Cameras
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, place_markers, project_marker
+from rhot_app.tracking.kalman.reappearing import AWAY_S
 
 Array = NDArray[np.float64]
 
@@ -82,10 +82,10 @@ def _rename(frame: Frame, estimate: Estimate, expected: Array, slopes: Array, ja
                 if value >= 0.0:
                     distance[k, m] = value
     for k in range(count):
-        if not frame.seen[k] or frame.label[k] != k or distance[k, k] < FAR:
+        if not frame.seen[k] or frame.label[k] != k or distance[k, k] < FAR or not _placed(estimate, k):
             continue
         for m in range(count):
-            if m == k or frame.label[m] != m or not distance[k, m] < NEAR:
+            if m == k or frame.label[m] != m or not distance[k, m] < NEAR or not _placed(estimate, m):
                 continue
             if not frame.seen[m]:
                 frame.label[k] = m
@@ -96,6 +96,13 @@ def _rename(frame: Frame, estimate: Estimate, expected: Array, slopes: Array, ja
                 renamed += 2
                 break
     return renamed
+
+
+@njit(cache=True)
+def _placed(estimate: Estimate, m: int) -> bool:
+    """Whether the hand knows where marker `m` should be: what was out of sight for long is believed to be what it says.
+    """
+    return bool(estimate.unseen[:, m].min() < AWAY_S)
 
 
 @njit(cache=True)

@@ -31,9 +31,17 @@ GROUPS = 7
 """What accelerates on its own: the palm's translation, its rotation, and each finger's angles."""
 
 LINEAR, TURN, FIRST_FINGER = 0, 1, 2
+FINGERS = GROUPS - FIRST_FINGER
 
 GROUP_OF = np.array([LINEAR] * 3 + [TURN] * 3 + [FIRST_FINGER] * 5 + [FIRST_FINGER + 1 + k // 4 for k in range(16)])
 """(27,) the group of each pose number."""
+
+
+FREE, TURN_HELD, PALM_HELD, FINGERS_HELD = 0, 1, 2, 3
+"""How much of the hand an update holds to its course (`holding.py`)."""
+
+UNSEEN_S = 3600.0
+"""What was never seen counts as unseen for this long."""
 
 
 class Estimate(NamedTuple):
@@ -42,8 +50,9 @@ class Estimate(NamedTuple):
     `world` (4, 4) world_from_palm m; `angles` (21,) rad; `velocity` (27,) m/s and rad/s; `acceleration` (27,) m/s^2
     and rad/s^2; `log_scale` (1,); `bias` (M, 3) m. `covariance` (N, N). `agitation` (7,): variance of the acceleration,
     (m/s^2)^2 or (rad/s^2)^2, that surprised in each group of late. `trend` (27,): leaky mean of the normalised
-    corrections of each velocity. `unfaded` (1,): s since knowledge last faded. `unseeing` (C,): s since each camera was
-    last believed to see any marker.
+    corrections of each velocity. `unfaded` (1,): s since knowledge last faded. `unseen` (C, M): s since each camera was
+    last believed to see each marker. `held` (1,): how the last update held the hand
+    (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s.
     """
 
     world: Array
@@ -56,7 +65,9 @@ class Estimate(NamedTuple):
     agitation: Array
     trend: Array
     unfaded: Array
-    unseeing: Array
+    unseen: Array
+    held: NDArray[np.int64]
+    turning: Array
 
 
 def empty_estimate(cameras: int, markers: int) -> Estimate:
@@ -64,7 +75,7 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     size = BIAS + 3 * markers
     return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
                     np.zeros((size, size)), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1),
-                    np.full(cameras, np.inf))
+                    np.full((cameras, markers), UNSEEN_S), np.zeros(1, np.int64), np.zeros(1))
 
 
 @njit(cache=True)
@@ -75,7 +86,9 @@ def copy_estimate(source: Estimate, target: Estimate) -> None:
     target.agitation[:] = source.agitation
     target.trend[:] = source.trend
     target.unfaded[:] = source.unfaded
-    target.unseeing[:] = source.unseeing
+    target.unseen[:] = source.unseen
+    target.held[:] = source.held
+    target.turning[:] = source.turning
 
 
 @njit(cache=True)

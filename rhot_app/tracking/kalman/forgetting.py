@@ -21,7 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
-from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, POSE, Estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, FINGERS_HELD, PALM_HELD, POSE, ROTATION, TURN_HELD, Estimate
 from rhot_app.tracking.kalman.motion import Habits
 
 Array = NDArray[np.float64]
@@ -31,6 +31,18 @@ FADE_S = 2.0
 
 OPEN_S = 0.05
 """Time constant of what seems to be known of directions that no marker shows."""
+
+SHAPE_S = 2.0
+"""The same while the palm is not placed by its own markers: its course tells more for a while."""
+
+SETTLED_RAD = 0.25
+"""Standard deviation of the palm's turn below which it has been found, and only then can be seen to turn."""
+
+LEAST_SHOWN = 3
+"""With fewer markers in sight the hand's course tells more of it than habit does."""
+
+STRIDE_RAD = 0.1
+"""It goes back to habit in steps of no more than this: the open directions turn on the way."""
 
 SHARPNESS_M = 3e-5
 """What moves no marker by more than this counts as open."""
@@ -71,15 +83,32 @@ def open_directions(jacobian: Array, usual: Array, bias_variance: Array) -> Arra
 
 
 @njit(cache=True)
-def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, jacobian: Array, step: Array) -> None:
-    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. Others as in `open_directions`."""
+def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, jacobian: Array,
+           step: Array) -> None:
+    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. Others as in `open_directions`.
+
+    It depends on how the hand is held (`holding.py`).
+    """
     step[:] = 0.0
     estimate.unfaded[0] += dt
+    how = estimate.held[0]
     if estimate.unfaded[0] >= FADING_S:
-        _open_up(estimate, -math.expm1(-estimate.unfaded[0] / OPEN_S), habits, bias_variance, jacobian, step)
+        if how != FINGERS_HELD and _shown(jacobian) >= LEAST_SHOWN:
+            constant = OPEN_S if how < PALM_HELD else SHAPE_S
+            _open_up(estimate, -math.expm1(-estimate.unfaded[0] / constant), habits, bias_variance, jacobian, step)
         _fade(estimate.covariance, estimate.unfaded[0])
-        _return_to_habits(estimate, -math.expm1(-estimate.unfaded[0] / FADE_S), habits, step)
+        if how < PALM_HELD:
+            _return_to_habits(estimate, -math.expm1(-estimate.unfaded[0] / FADE_S), habits, step)
         estimate.unfaded[0] = 0.0
+
+
+@njit(cache=True)
+def _shown(jacobian: Array) -> int:
+    """How many markers are seen: their places go with the palm's."""
+    count = 0
+    for m in range(jacobian.shape[0]):
+        count += np.any(jacobian[m, :, :ROTATION] != 0.0)
+    return count
 
 
 @njit(cache=True)
@@ -97,7 +126,19 @@ def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Ar
         back[:, POSE + k] = share / bias_variance[k // 3] * left_open[:, POSE + k]
         away[POSE + k] = estimate.bias[k // 3, k % 3]
     moved = back @ away
+    farthest = 0.0
+    for i in range(ROTATION, POSE):
+        farthest = max(farthest, abs(moved[i]))
+    if farthest > STRIDE_RAD:
+        shorter = STRIDE_RAD / farthest
+        share *= shorter
+        back *= shorter
+        moved *= shorter
     step[:POSE] = -moved[:POSE]
+    turned = covariance[3, 3] + covariance[4, 4] + covariance[5, 5]
+    if estimate.held[0] == TURN_HELD and turned < SETTLED_RAD * SETTLED_RAD:
+        turned = math.sqrt(moved[3] ** 2 + moved[4] ** 2 + moved[5] ** 2) / estimate.unfaded[0]
+        estimate.turning[0] = max(estimate.turning[0], turned)
     step[BIAS:] = -moved[POSE:]
     part = np.empty((size, covariance.shape[0]))
     part[:POSE], part[POSE:] = covariance[:POSE], covariance[BIAS:]

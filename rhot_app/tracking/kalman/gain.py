@@ -6,6 +6,8 @@ H (K, N) rows' Jacobians, P (N, N) covariance, R the rows' noise, block-diagonal
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from rhot_app.hand.linear import factorise
 from rhot_app.tracking.kalman.rows import Rows
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
@@ -53,67 +56,94 @@ def _dot(a: Array, b: Array) -> float:
     return total
 
 
+class Gain(NamedTuple):
+    """How an update weighed its rows. `used` (1,): believed rows, the first ones of the others. `rows` (K, N): the
+    factor G of the posterior covariance P - G^T G, which is L^-1 H P; `jacobian` (K, N): H; `factor` (K, K): L, the
+    Cholesky factor of the innovations' covariance."""
+
+    used: Indices
+    rows: Array
+    jacobian: Array
+    factor: Array
+
+
+def empty_gain(rows: int, size: int) -> Gain:
+    """Room for `rows` rows of a state with `size` numbers."""
+    return Gain(np.zeros(1, np.int64), np.zeros((rows, size)), np.zeros((rows, size)), np.zeros((rows, rows)))
+
+
 @njit(cache=True)
-def solve(rows: Rows, covariance: Array, believed: Mask, widening: Array, step: Array, gains: Array) -> int:
-    """One Gauss-Newton step of the believed observations.
+def solve(rows: Rows, covariance: Array, believed: Mask, widening: Array, step: Array, gain: Gain) -> None:
+    """One Gauss-Newton step of the believed observations; fills `gain`.
 
     `step` (N,): where the rows were linearised, as a displacement of the prior mean; becomes where the mean should
-    be. `widening` (L,): factor on each observation's noise. Fills the first rows of `gains` (K, N) with the factor G
-    of the posterior covariance P - G^T G, and returns how many.
+    be. `widening` (L,): factor on each observation's noise.
     """
-    size, capacity = covariance.shape[0], rows.used[0]
-    chosen = np.empty(capacity, np.int64)
-    owner = np.empty(capacity, np.int64)
-    count = 0
-    for observation in range(rows.used[1]):
-        if believed[observation]:
-            for row in range(rows.first[observation], rows.first[observation + 1]):
-                chosen[count], owner[count] = row, observation
-                count += 1
-    if count == 0:
-        return 0
-    total, right = np.empty((count, count)), np.empty(count)
+    size = covariance.shape[0]
+    noise, right = np.empty((rows.used[0], 2)), np.empty(rows.used[0])
+    count = _gather(rows, believed, widening, step, noise, right, gain)
     for k in range(count):
-        jacobian, target = rows.jacobian[chosen[k]], gains[k]
-        target[:] = 0.0
-        right[k] = rows.residual[chosen[k]]
+        gain.rows[k] = 0.0
         for j in range(size):
-            factor = jacobian[j]
-            if factor != 0.0:
-                right[k] += factor * step[j]
-                source = covariance[j]
+            slope = gain.jacobian[k, j]
+            if slope != 0.0:
                 for i in range(size):
-                    target[i] += factor * source[i]
-    for k in range(count):
+                    gain.rows[k, i] += slope * covariance[j, i]
         for other in range(k + 1):
-            value = _dot(gains[k], rows.jacobian[chosen[other]])
-            if owner[k] == owner[other]:
-                value += widening[owner[k]] * rows.noise[chosen[k], 0 if k == other else 1]
-            total[k, other] = value
-    factorise(total)
-    for k in range(count):  # gains becomes L^-1 H P, right L^-1 times the innovation
+            gain.factor[k, other] = _dot(gain.rows[k], gain.jacobian[other])
+        gain.factor[k, k] += noise[k, 0]
+        if k > 0:
+            gain.factor[k, k - 1] += noise[k, 1]
+    factorise(gain.factor[:count, :count])
+    for k in range(count):  # H P becomes L^-1 H P, the innovation L^-1 times itself
         for other in range(k):
-            factor = total[k, other]
-            right[k] -= factor * right[other]
+            right[k] -= gain.factor[k, other] * right[other]
             for i in range(size):
-                gains[k, i] -= factor * gains[other, i]
-        inverse = 1.0 / total[k, k]
-        right[k] *= inverse
+                gain.rows[k, i] -= gain.factor[k, other] * gain.rows[other, i]
+        right[k] /= gain.factor[k, k]
         for i in range(size):
-            gains[k, i] *= inverse
+            gain.rows[k, i] /= gain.factor[k, k]
     step[:] = 0.0
     for k in range(count):
         for i in range(size):
-            step[i] += right[k] * gains[k, i]
+            step[i] += right[k] * gain.rows[k, i]
+
+
+@njit(cache=True)
+def _gather(rows: Rows, believed: Mask, widening: Array, step: Array, noise: Array, right: Array, gain: Gain) -> int:
+    """Fill the believed rows' Jacobians, `noise` (K, 2) of each and with the row before, and innovations from the prior
+    mean, `right` (K,); returns how many."""
+    count = 0
+    for observation in range(rows.used[1]):
+        if believed[observation]:
+            first = rows.first[observation]
+            for row in range(first, rows.first[observation + 1]):
+                gain.jacobian[count] = rows.jacobian[row]
+                noise[count, 0] = widening[observation] * rows.noise[row, 0]
+                noise[count, 1] = widening[observation] * rows.noise[row, 1] if row > first else 0.0
+                right[count] = rows.residual[row] + _dot(step, rows.jacobian[row])
+                count += 1
+    gain.used[0] = count
     return count
 
 
 @njit(cache=True)
-def contract(covariance: Array, gains: Array, count: int) -> None:
-    """The posterior covariance P - G^T G in place of P; `gains` and `count` as `solve` leaves them."""
+def misfit(rows: Rows, believed: Mask, widening: Array) -> float:
+    """The largest squared residual of a believed row, in units of its variance."""
+    worst = 0.0
+    for observation in range(rows.used[1]):
+        if believed[observation]:
+            for row in range(rows.first[observation], rows.first[observation + 1]):
+                worst = max(worst, rows.residual[row] ** 2 / (widening[observation] * rows.noise[row, 0]))
+    return worst
+
+
+@njit(cache=True)
+def contract(covariance: Array, gain: Gain) -> None:
+    """The posterior covariance P - G^T G in place of P."""
     size = covariance.shape[0]
-    for k in range(count):
-        row = gains[k]
+    for k in range(gain.used[0]):
+        row = gain.rows[k]
         for i in range(size):
             factor, target = row[i], covariance[i]
             for j in range(size):

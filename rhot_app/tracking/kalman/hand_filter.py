@@ -13,6 +13,7 @@ from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
     GROUP_OF,
+    PALM_HELD,
     POSE,
     ROTATION,
     Estimate,
@@ -20,18 +21,25 @@ from rhot_app.tracking.kalman.estimate import (
     empty_estimate,
 )
 from rhot_app.tracking.kalman.forgetting import forget
-from rhot_app.tracking.kalman.gain import contract, solve
+from rhot_app.tracking.kalman.gain import Gain, contract, empty_gain, misfit, solve
+from rhot_app.tracking.kalman.holding import hold, hold_turn, rest
 from rhot_app.tracking.kalman.limits import project
-from rhot_app.tracking.kalman.markers import Worn, place_markers
+from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
-from rhot_app.tracking.kalman.one_eye import Cameras, hold_back, single_eye
+from rhot_app.tracking.kalman.reappearing import loosen
 from rhot_app.tracking.kalman.rows import ResidualBlock, Rows, clear, empty_rows
+from rhot_app.tracking.kalman.sighted import keep_shown, note_sights
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
+from rhot_app.tracking.kalman.withholding import Held, empty_held, release, restore, withhold
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 ITERATIONS = 6
+
+MISFIT = 1000.0
+"""Squared normalised residual of one row beyond which what held the hand is let go."""
+
 NEAR_RAD = 0.02
 """Steps whose turns are smaller are taken without linearising again: what is left is 0.1 px or less."""
 
@@ -55,7 +63,7 @@ SCALE_SD = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of an update's L observations, in the order of the blocks: `believed` (L,), and `source` (L, 2) as in
+    """What became of an update's L observations, in the order of the blocks: `believed` (L,), and `source` (L, 3) as in
     `Rows`. Views that the next update overwrites."""
 
     believed: Mask
@@ -79,7 +87,7 @@ class HandFilter:
         self._float_scale = float_scale
         self._trial = empty_estimate(len(cameras.pose), markers)
         self._rows = empty_rows(ROWS_MAX, size)
-        self._gains = np.empty((ROWS_MAX, size))
+        self._gain, self._held = empty_gain(ROWS_MAX, size), empty_held(size)
         self._step = np.empty(size)
         self._believed = np.empty(ROWS_MAX, np.bool_)
         self._widening = np.empty(ROWS_MAX)
@@ -92,7 +100,7 @@ class HandFilter:
                       covariance):
             array[:] = 0.0
         estimate.agitation[:] = START_AGITATION
-        estimate.unseeing[:] = np.inf
+        estimate.unseen[:] = 0.0
         place, turn, speed, spin, bend = START_SD
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),
@@ -110,57 +118,92 @@ class HandFilter:
 
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""
-        estimate, trial, rows, step = self.estimate, self._trial, self._rows, self._step
-        predict(estimate, dt, self._cameras, self._habits, self._bias_variance)
-        clear(rows)
+        estimate, rows = self.estimate, self._rows
+        predict(estimate, dt, self._worn.part, self._habits, self._bias_variance)
         for block in blocks:
             block.associate(estimate)
-            block.linearise(estimate, rows)
-        appraise(rows, estimate, self._habits.together, self._believed, self._widening)
-        step[:] = 0.0
-        for _ in range(ITERATIONS):
-            count, near = _improve(estimate, rows, self._believed, self._widening, step, self._gains, self._limits,
-                                   trial)
-            if near:
-                break
-            clear(rows)
-            for block in blocks:
-                block.linearise(trial, rows)
-        _conclude(estimate, rows, self._believed, self._gains, count, dt, self._worn, self._cameras,
-                  self._habits, self._bias_variance, self._limits, step)
+        self._linearise(blocks, estimate)
+        _prepare(estimate, rows, dt, self._worn, self._cameras, self._habits, self._held, self._believed,
+                 self._widening)
+        self._settle(blocks)
+        if estimate.held[0] == PALM_HELD and self._misfits(blocks):
+            release(estimate.covariance, self._held)
+            hold_turn(self._held)
+            withhold(estimate.covariance, self._held)
+            self._linearise(blocks, estimate)
+            self._settle(blocks)
+        _conclude(estimate, rows, self._believed, self._gain, self._held, dt, self._worn, self._cameras, self._habits,
+                  self._bias_variance, self._limits, self._step)
         observations = int(rows.used[1])
         return Outcome(self._believed[:observations], rows.source[:observations])
 
+    def _linearise(self, blocks: Sequence[ResidualBlock], estimate: Estimate) -> None:
+        clear(self._rows)
+        for block in blocks:
+            block.linearise(estimate, self._rows)
+
+    def _settle(self, blocks: Sequence[ResidualBlock]) -> None:
+        """Iterate to the new mean, a `_step` from the old one."""
+        self._step[:] = 0.0
+        for _ in range(ITERATIONS):
+            if _improve(self.estimate, self._rows, self._believed, self._widening, self._step, self._gain,
+                        self._limits, self._trial):
+                return
+            self._linearise(blocks, self._trial)
+
+    def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
+        """Whether the hand as it is held cannot be where it is seen."""
+        self._linearise(blocks, self._trial)
+        return bool(misfit(self._rows, self._believed, self._widening) > MISFIT)
+
 
 @njit(cache=True)
-def _improve(estimate: Estimate, rows: Rows, believed: Mask, widening: Array, step: Array, gains: Array,
-             limits: Array, trial: Estimate) -> tuple[int, bool]:
-    """One iteration; `trial` becomes the new mean. Returns the rows used and whether it moved only little."""
+def _prepare(estimate: Estimate, rows: Rows, dt: float, worn: Worn, cameras: Cameras, habits: Habits, held: Held,
+             believed: Mask, widening: Array) -> None:
+    """Decide what is held of the hand and which observations are believed."""
+    hold(estimate, rows, worn.part, cameras.pose, habits.stiff, held)
+    rest(estimate, dt)
+    loosen(estimate, worn.part, rows, habits.usual)
+    appraise(rows, estimate, habits.together, believed, widening)
+    withhold(estimate.covariance, held)
+
+
+@njit(cache=True)
+def _improve(estimate: Estimate, rows: Rows, believed: Mask, widening: Array, step: Array, gain: Gain, limits: Array,
+             trial: Estimate) -> bool:
+    """One iteration; `trial` becomes the new mean. Returns whether it moved only little."""
     before = step.copy()
-    count = solve(rows, estimate.covariance, believed, widening, step, gains)
-    project(estimate.angles, estimate.velocity, estimate.covariance, gains, count, limits, step)
+    solve(rows, estimate.covariance, believed, widening, step, gain)
+    project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[0]], limits, step)
     displace(estimate, step, trial)
     turn = 0.0
     for i in range(ROTATION, POSE):
         turn = max(turn, abs(step[i] - before[i]))
-    return count, turn < NEAR_RAD
+    return turn < NEAR_RAD
 
 
 @njit(cache=True)
-def _conclude(estimate: Estimate, rows: Rows, believed: Mask, gains: Array, count: int, dt: float,
-              worn: Worn, cameras: Cameras, habits: Habits, bias_variance: Array, limits: Array, step: Array) -> None:
+def _conclude(estimate: Estimate, rows: Rows, believed: Mask, gain: Gain, held: Held, dt: float, worn: Worn,
+              cameras: Cameras, habits: Habits, bias_variance: Array, limits: Array, step: Array) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
-    for observation in range(rows.used[1]):
-        if believed[observation] and rows.source[observation, 0] >= 0:
-            estimate.unseeing[rows.source[observation, 0]] = 0.0
-    note_trend(estimate, step, gains, count)
-    contract(estimate.covariance, gains, count)
-    eye = single_eye(estimate)
-    if eye >= 0:
-        hold_back(estimate.covariance, gains, count, cameras.pose[eye], step)
+    note_sights(estimate, worn.part, rows, believed)
+    note_trend(estimate, step, gain)
+    contract(estimate.covariance, gain)
     displace(estimate, step, estimate)
+    restore(estimate.covariance, held, gain, bias_variance)
     points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
     place_markers(worn, estimate, points, jacobian)
+    keep_shown(estimate, worn.part, cameras.pose, points, jacobian)
     forget(estimate, dt, habits, bias_variance, jacobian, step)
-    project(estimate.angles, estimate.velocity, estimate.covariance, gains, 0, limits, step)
+    project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], limits, step)
     displace(estimate, step, estimate)
+    _even_out(estimate.covariance)
+
+
+@njit(cache=True)
+def _even_out(covariance: Array) -> None:
+    """Keep rounding from making the covariance unsymmetric: what fades would let it grow."""
+    for i in range(covariance.shape[0]):
+        for j in range(i):
+            mean = 0.5 * (covariance[i, j] + covariance[j, i])
+            covariance[i, j], covariance[j, i] = mean, mean

@@ -14,12 +14,11 @@ _ROUNDS = 4
 
 
 @njit(cache=True)
-def project(angles: Array, velocity: Array, covariance: Array, gains: Array, count: int, limits: Array,
-            step: Array) -> None:
+def project(angles: Array, velocity: Array, covariance: Array, gains: Array, limits: Array, step: Array) -> None:
     """Change `step` (N,) so that `angles` (21,) + step keep their `limits` (21, 2).
 
     The most plausible state with the offending angle on its limit (Simon and Chia 2002), one angle after the other,
-    the farthest first; plausible by `covariance` less what `count` rows of `gains` will take from it. The covariance
+    the farthest first; plausible by `covariance` less what `gains` (K, N) will take from it, P - G^T G. The covariance
     stays: to know that a joint is within its limits would make it smaller, so it is on the safe side. A joint at its
     limit does not move on beyond it: `velocity` (27,) + step is stopped likewise.
     """
@@ -34,17 +33,17 @@ def project(angles: Array, velocity: Array, covariance: Array, gains: Array, cou
             return
         speed = velocity[ANGLES + which] + step[VELOCITY + ANGLES + which]
         if speed * (target - 0.5 * (limits[which, 0] + limits[which, 1])) > 0.0:
-            _pull(covariance, gains, count, VELOCITY + ANGLES + which, -velocity[ANGLES + which], step)
-        _pull(covariance, gains, count, ANGLES + which, target - angles[which], step)
+            _pull(covariance, gains, VELOCITY + ANGLES + which, -velocity[ANGLES + which], step)
+        _pull(covariance, gains, ANGLES + which, target - angles[which], step)
     for i in range(angles.shape[0]):
         step[ANGLES + i] = min(max(angles[i] + step[ANGLES + i], limits[i, 0]), limits[i, 1]) - angles[i]
 
 
 @njit(cache=True)
-def _pull(covariance: Array, gains: Array, count: int, row: int, target: float, step: Array) -> None:
+def _pull(covariance: Array, gains: Array, row: int, target: float, step: Array) -> None:
     """Make one number of the step `target`, and the others what is then most plausible."""
     column = covariance[row].copy()
-    for k in range(count):
+    for k in range(gains.shape[0]):
         factor = gains[k, row]
         for i in range(column.shape[0]):
             column[i] -= factor * gains[k, i]

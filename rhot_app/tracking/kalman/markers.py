@@ -28,7 +28,6 @@ from rhot_app.tracking.kalman.estimate import (
     Estimate,
 )
 from rhot_app.tracking.kalman.motion import ACCELERATION_S, liveliness
-from rhot_app.tracking.kalman.one_eye import Cameras
 from rhot_app.tracking.kalman.rows import Rows
 
 Array = NDArray[np.float64]
@@ -41,6 +40,13 @@ NEAREST_M = 0.02
 """A marker this near to a camera's plane, or behind it, is not expected to be seen."""
 
 _REACH_M, _FINGER_M = 0.12, 0.05  # mean levers of palm rotation and of a finger's angles
+
+
+class Cameras(NamedTuple):
+    """C cameras: `pose` (C, 3, 4) camera_from_world m and `intrinsics` (C, 9) as in `CameraModel`."""
+
+    pose: Array
+    intrinsics: Array
 
 
 class Worn(NamedTuple):
@@ -155,7 +161,7 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
                                       + spread * strayed * abs(late) ** 5 / (10.0 * ACCELERATION_S))
             rows.noise[row + r, 1] = frame.covariances[sight, 0, 1]
         rows.part[observation] = worn.part[m]
-        rows.source[observation, 0], rows.source[observation, 1] = camera, sight
+        rows.source[observation, 0], rows.source[observation, 1], rows.source[observation, 2] = camera, sight, m
         rows.first[observation + 1] = row + 2
         rows.used[0], rows.used[1] = row + 2, observation + 1
 

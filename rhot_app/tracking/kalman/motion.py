@@ -20,16 +20,21 @@ from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     ANGLES,
     BIAS,
+    FINGERS,
+    FIRST_FINGER,
     GROUP_OF,
     GROUPS,
+    PALM_HELD,
     POSE,
     ROTATION,
+    TURN,
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.one_eye import Cameras, single_eye, squint
+from rhot_app.tracking.kalman.sighted import FRESH_S, fingers_away
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 STILL = np.array([3e-4, 3e-3, 1e-2, 1e-2, 1e-2, 1e-2, 1e-2])
 """Standard deviation of the acceleration of a hand at rest, by group, m/s^2 and rad/s^2."""
@@ -55,6 +60,9 @@ CALM_S = 0.15
 VELOCITY_S = np.array([0.4] * 6 + [0.2] * 21)
 """(27,) Velocities decay with these time constants: nobody goes on as he does for longer."""
 
+TURNING_S = 1.0
+"""A palm that turned is taken to turn for this long."""
+
 BIAS_S = 3.0
 """Markers' biases change with this time constant: they turn with the hand and its light."""
 
@@ -64,7 +72,8 @@ class Habits(NamedTuple):
     `rows` (K, 21) of factors and `values` (K,): beliefs about the angles, in standard deviations; `mean` (21,) and
     `information` (21, 21): the same as one Gaussian; `usual` (27, 27): the covariance of a pose that follows from it,
     with a palm that may be anywhere. `together` (27, 27): how the pose's numbers accelerate together, 1 for the
-    liveliest of a group: fingers bend all their joints at once.
+    liveliest of a group: fingers bend all their joints at once. `stiff` (R, 27): rows of what a finger does least, all
+    but its abduction and its bending at all joints at once.
     """
 
     rows: Array
@@ -73,22 +82,21 @@ class Habits(NamedTuple):
     information: Array
     usual: Array
     together: Array
+    stiff: Array
 
 
 @njit(cache=True)
-def predict(estimate: Estimate, dt: float, cameras: Cameras, habits: Habits, bias_variance: Array) -> None:
-    """Carry the estimate on by `dt` >= 0 s. `bias_variance` (M,) m^2 is what each marker's bias tends to."""
+def predict(estimate: Estimate, dt: float, part: Indices, habits: Habits, bias_variance: Array) -> None:
+    """Carry the estimate on by `dt` >= 0 s. `part` (M,) as in `Worn`; `bias_variance` (M,) m^2 is what
+    each marker's bias tends to."""
     _move_mean(estimate, dt)
     _move_covariance(estimate, dt)
     estimate.agitation[:] *= math.exp(-dt / CALM_S)
-    estimate.unseeing[:] += dt
-    together = habits.together
-    eye = single_eye(estimate)
-    if eye >= 0:
-        together = together.copy()
-        squint(estimate, cameras.pose[eye], dt, together)
+    estimate.unseen[:] += dt
+    estimate.turning[0] = max(estimate.turning[0] * math.exp(-dt / TURNING_S), speeds(estimate)[TURN])
     _keep_awake(estimate)
-    shake(estimate.covariance, liveliness(estimate), together, dt)
+    _go_along(estimate, part)
+    shake(estimate.covariance, liveliness(estimate), habits.together, dt)
     _fade_biases(estimate, dt, bias_variance)
 
 
@@ -105,9 +113,25 @@ def speeds(estimate: Estimate) -> Array:
 def _keep_awake(estimate: Estimate) -> None:
     """What moves is awake."""
     moving = speeds(estimate)
-    for group in range(GROUPS):
+    for group in range(FIRST_FINGER if estimate.held[0] == PALM_HELD else 0, GROUPS):
         awake = (moving[group] / (moving[group] + SLOW[group]) * AWAKE[group]) ** 2
         estimate.agitation[group] = max(estimate.agitation[group], awake)
+
+
+@njit(cache=True)
+def _go_along(estimate: Estimate, part: Indices) -> None:
+    """A finger out of sight is taken to be as lively as those that are seen."""
+    total, seen = 0.0, 0
+    away = fingers_away(estimate, part)
+    for finger in range(FINGERS):
+        if away[finger] < FRESH_S:
+            total += math.sqrt(estimate.agitation[FIRST_FINGER + finger])
+            seen += 1
+    if seen > 0:
+        for finger in range(FINGERS):
+            if away[finger] >= FRESH_S:
+                group = FIRST_FINGER + finger
+                estimate.agitation[group] = max(estimate.agitation[group], (total / seen) ** 2)
 
 
 @njit(cache=True)
@@ -189,11 +213,11 @@ def shake(covariance: Array, agitation: Array, together: Array, dt: float) -> No
 
     `together` as in `Habits`.
     """
-    gains = jerk_gains(dt)
+    gains, strength = jerk_gains(dt), np.sqrt(agitation)
     for i in range(POSE):
         for j in range(POSE):
-            if GROUP_OF[i] == GROUP_OF[j] and together[i, j] != 0.0:
-                q = agitation[GROUP_OF[i]] * together[i, j]
+            q = strength[GROUP_OF[i]] * strength[GROUP_OF[j]] * together[i, j]
+            if q != 0.0:
                 for a in range(3):
                     for b in range(3):
                         covariance[VELOCITY * a + i, VELOCITY * b + j] += q * gains[a, b]

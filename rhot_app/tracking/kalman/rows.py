@@ -27,8 +27,8 @@ class Rows(NamedTuple):
     `used` (2,): rows and observations in use. `residual` (K,): seen minus expected, in any unit; `jacobian` (K, N):
     change of what is expected per error state; `noise` (K, 2): of each row, its variance and its covariance with the
     row before or after it in the same observation of two. `first` (L + 1,): the rows of observation l are
-    first[l] .. first[l + 1] - 1, one or two of them; `part` (L,): PALM_PART or the finger; `source` (L, 2): camera and
-    which of its sights, or -1.
+    first[l] .. first[l + 1] - 1, one or two of them; `part` (L,): PALM_PART or the finger; `source` (L, 3): camera,
+    which of its sights, and of which marker it is taken to be, or -1.
     """
 
     used: Indices
@@ -58,7 +58,7 @@ class ResidualBlock(Protocol):
 def empty_rows(rows: int, size: int) -> Rows:
     """Room for `rows` rows of a state with `size` numbers."""
     return Rows(np.zeros(2, np.int64), np.zeros(rows), np.zeros((rows, size)), np.zeros((rows, 2)),
-                np.zeros(rows + 1, np.int64), np.zeros(rows, np.int64), np.zeros((rows, 2), np.int64))
+                np.zeros(rows + 1, np.int64), np.zeros(rows, np.int64), np.zeros((rows, 3), np.int64))
 
 
 @njit(cache=True)

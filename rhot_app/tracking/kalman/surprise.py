@@ -16,8 +16,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.estimate import FIRST_FINGER, GROUP_OF, GROUPS, LINEAR, POSE, TURN, VELOCITY, Estimate
-from rhot_app.tracking.kalman.gain import expected_noise, spread
+from rhot_app.tracking.kalman.estimate import (
+    FIRST_FINGER,
+    GROUP_OF,
+    GROUPS,
+    LINEAR,
+    PALM_HELD,
+    POSE,
+    TURN,
+    TURN_HELD,
+    VELOCITY,
+    Estimate,
+)
+from rhot_app.tracking.kalman.gain import Gain, expected_noise, spread
 from rhot_app.tracking.kalman.motion import AWAKE, MOST, STILL, jerk_gains, shake
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
 
@@ -54,7 +65,7 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
 
     `together` as in `Habits`.
     """
-    count, size = rows.used[1], estimate.covariance.shape[0]
+    count, size, how = rows.used[1], estimate.covariance.shape[0], estimate.held[0]
     if count == 0:
         return
     gains, grown = np.empty((rows.used[0], size)), jerk_gains(ONSET_S)
@@ -66,11 +77,17 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
             group = kind if kind < FIRST_FINGER else FIRST_FINGER + rows.part[observation]
             _effect(rows, observation, group, grown, together, per_unit[observation, kind])
     added = np.zeros(GROUPS)
-    _raise_palm(rows, estimate, noise, per_unit, LINEAR, added, surprise)
-    _raise_palm(rows, estimate, noise, per_unit, TURN, added, surprise)
+    if how != PALM_HELD:
+        _raise_palm(rows, estimate, noise, per_unit, LINEAR, added, surprise)
+        if how != TURN_HELD:
+            _raise_palm(rows, estimate, noise, per_unit, TURN, added, surprise)
     for finger in range(GROUPS - FIRST_FINGER):
         _raise_finger(rows, estimate, noise, per_unit, finger, added, surprise)
     _follow_trends(estimate, added)
+    if how == PALM_HELD:
+        added[LINEAR] = 0.0
+    if how in (PALM_HELD, TURN_HELD):
+        added[TURN] = 0.0
     _wake(estimate, added)
     shake(estimate.covariance, added, together, ONSET_S)
     for observation in range(count):
@@ -201,13 +218,14 @@ def _raise(added: Array, group: int) -> bool:
 
 
 @njit(cache=True)
-def note_trend(estimate: Estimate, step: Array, gains: Array, count: int) -> None:
-    """Remember how an update corrects the velocities: `step` (N,), and the `count` rows of `gains` by which."""
+def note_trend(estimate: Estimate, step: Array, gain: Gain) -> None:
+    """Remember how an update corrects the velocities: `step` (N,), and the `gain` by which."""
+    count = gain.used[0]
     if count == 0:
         return
     for i in range(POSE):
         variance = 0.0
         for k in range(count):
-            variance += gains[k, VELOCITY + i] ** 2
+            variance += gain.rows[k, VELOCITY + i] ** 2
         if variance > 0.0:
             estimate.trend[i] += LEAK * (step[VELOCITY + i] / math.sqrt(variance) - estimate.trend[i])

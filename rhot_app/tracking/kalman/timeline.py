@@ -69,7 +69,7 @@ class Timeline:
 
     def _weigh(self, block: TimedBlock) -> Outcome:
         estimate = self._hand.estimate
-        before = self._spare.pop() if self._spare else empty_estimate(len(estimate.unseeing), len(estimate.bias))
+        before = self._spare.pop() if self._spare else empty_estimate(*estimate.unseen.shape)
         copy_estimate(estimate, before)
         self._moments.append(_Moment(block.t_ns, self.t_ns, before, block))
         if len(self._moments) > LENGTH:

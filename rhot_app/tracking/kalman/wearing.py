@@ -11,14 +11,13 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import Place, place_of
-from rhot_app.hand.skeleton import ANGLE_SLICES
+from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS
 from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
 from rhot_app.tracking.kalman.forgetting import WIDEST
-from rhot_app.tracking.kalman.markers import Worn
+from rhot_app.tracking.kalman.markers import Cameras, Worn
 from rhot_app.tracking.kalman.motion import Habits
-from rhot_app.tracking.kalman.one_eye import Cameras
 from rhot_app.tracking.rig_arrays import band_axes
 from rhot_node.markers import Marker, MarkerSet
 
@@ -27,6 +26,10 @@ Array = NDArray[np.float64]
 PLACE_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3}
 """How far a marker's seen middle lies from where the hand file has it, by its shape: paint, its shading, and the skin
 under it. A blob is paint on a knuckle that nobody measured."""
+
+FINGERS_TOGETHER, THUMB_WITH_FINGERS = 0.8, 0.5
+"""Correlation of how fingers begin to bend: most of what hands do in daily life is one movement of all of them
+(Santello et al. 1998, Todorov and Ghahramani 2004)."""
 
 _COUPLED_SD_RAD = np.radians(0.02)
 
@@ -92,15 +95,42 @@ def habits_of(model: HandModel, variant: VariantName) -> Habits:
     information = rows.T @ rows
     usual[ANGLES:, ANGLES:] = np.linalg.inv(information)
     mean = np.asarray(np.linalg.solve(information, rows.T @ values), dtype=np.float64)
-    return Habits(rows, values, mean, information, usual, _together(model))
+    return Habits(rows, values, mean, information, usual, _together(model), _stiff(model))
 
 
 def _together(model: HandModel) -> Array:
-    """(27, 27) as in `Habits`: within a finger as the natural pose says, the palm's axes each on its own."""
+    """(27, 27) as in `Habits`: within a finger as the natural pose says, fingers by what they bend most in common, the
+    palm's axes each on its own."""
     natural = np.linalg.inv(model.natural.information)
     together = np.eye(POSE)
-    for columns in ANGLE_SLICES:
+    bends = np.zeros((len(ANGLE_SLICES), POSE))
+    for finger, columns in enumerate(ANGLE_SLICES):
         block = natural[columns, columns]
+        block = block / block.diagonal().max()
         rows = slice(ANGLES + columns.start, ANGLES + columns.stop)
-        together[rows, rows] = block / block.diagonal().max()
+        together[rows, rows] = block
+        values, vectors = np.linalg.eigh(block)
+        bends[finger, rows] = vectors[:, -1] * np.sqrt(values[-1]) * np.sign(vectors[:, -1].sum())
+    for one in range(len(bends)):
+        for other in range(len(bends)):
+            if one != other:
+                share = THUMB_WITH_FINGERS if 0 in (one, other) else FINGERS_TOGETHER
+                together += share * np.outer(bends[one], bends[other])
     return together
+
+
+def _stiff(model: HandModel) -> Array:
+    """(R, 27) as in `Habits`."""
+    natural = np.sqrt(np.linalg.inv(model.natural.information).diagonal())
+    rows = []
+    for columns, flexions in zip(ANGLE_SLICES, FLEXIONS, strict=True):
+        free = np.zeros((2, POSE))
+        free[0, ANGLES + columns.start] = 1.0
+        for angle in flexions:
+            free[1, ANGLES + angle] = natural[angle]
+        part = slice(ANGLES + columns.start, ANGLES + columns.stop)
+        held = np.linalg.svd(free[:, part])[2][2:]
+        for row in held:
+            rows.append(np.zeros(POSE))
+            rows[-1][part] = row
+    return np.array(rows)

@@ -27,6 +27,7 @@ from rhot_app.tracking.kalman.estimate import (
 from rhot_app.tracking.kalman.hand_filter import HandFilter
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
+from rhot_app.tracking.kalman.rows import Rows, clear, empty_rows
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -84,6 +85,18 @@ def difference(a: Estimate, b: Estimate) -> np.ndarray:
     return step
 
 
+def sighting(*seen: tuple[int, int], part: np.ndarray = WEARING.worn.part) -> Rows:
+    """Rows of an update in which each `seen` (camera, marker) was observed; they say nothing but that."""
+    rows = empty_rows(2 * len(seen) + 2, SIZE)
+    clear(rows)
+    for k, (camera, marker) in enumerate(seen):
+        rows.source[k] = camera, 0, marker
+        rows.part[k] = -1 if marker < 0 else part[marker]
+        rows.first[k + 1] = 2 * k + 2
+    rows.used[:] = 2 * len(seen), len(seen)
+    return rows
+
+
 @cache
 def _frames() -> list[CameraObservations]:
     return sights(RIG, moving(), 1.3)
@@ -112,6 +125,5 @@ def next_frame() -> tuple[Estimate, MarkerBlock]:
     """The settled hand, carried to the instant of the frame that comes next, and that frame."""
     (estimate, last), frame = settled(), blocks()[SETTLED]
     estimate = twin(estimate)
-    predict(estimate, 1e-9 * (frame.t_ns - last.t_ns), WEARING.cameras, WEARING.habits,
-            WEARING.bias_variance)
+    predict(estimate, 1e-9 * (frame.t_ns - last.t_ns), WEARING.worn.part, WEARING.habits, WEARING.bias_variance)
     return estimate, frame

@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 from known_hand import MARKERS, SIZE, WEARING, moved, moving_estimate
 
-from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, POSE
-from rhot_app.tracking.kalman.forgetting import SHARPNESS_M, WIDEST, forget, open_directions
+from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, FINGERS_HELD, FREE, PALM_HELD, POSE, ROTATION, TURN_HELD
+from rhot_app.tracking.kalman.forgetting import (
+    FADING_S,
+    SETTLED_RAD,
+    SHARPNESS_M,
+    STRIDE_RAD,
+    WIDEST,
+    forget,
+    open_directions,
+)
 from rhot_app.tracking.kalman.markers import place_markers
 
 HABITS, BIAS_VARIANCE = WEARING.habits, WEARING.bias_variance
@@ -70,7 +78,7 @@ def test_what_nothing_shows_returns_to_the_natural_pose_and_its_spread():
     estimate = confident()
     estimate.covariance[BIAS:, BIAS:] = prior()[POSE:, POSE:]
     estimate.angles[:] += 0.2
-    end = faded(estimate, 20.0)
+    end = faded(estimate, 40.0)
     np.testing.assert_allclose(np.sqrt(np.diag(end.covariance)[ANGLES:POSE]), NATURAL, rtol=0.1)
     np.testing.assert_allclose(end.angles, HABITS.mean, atol=0.05 * NATURAL.max())
     assert np.sqrt(np.diag(end.covariance)[:ANGLES]).max() <= 1.001 * WIDEST
@@ -100,3 +108,73 @@ def test_forgetting_adds_up_over_short_frames(dt):
     together, apart = faded(confident(), 0.4, 0.04), faded(confident(), 0.4, dt)
     a, b = (np.sqrt(np.diag(end.covariance)[ANGLES:POSE]) for end in (together, apart))
     np.testing.assert_allclose(a, b, rtol=0.05)
+
+
+def opened(estimate, how=FREE):
+    """The step that forgetting takes at once, of a hand that is held so and whose markers show nothing but the palm's
+    place."""
+    estimate.held[0], step, jacobian = how, np.zeros(SIZE), np.zeros((MARKERS, 3, POSE))
+    jacobian[:, :, :ROTATION] = np.eye(3)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, step)
+    return step
+
+
+def bent(rad):
+    estimate = confident()
+    estimate.angles[:] = HABITS.mean + rad
+    return estimate
+
+
+def test_the_way_back_to_habit_is_gone_in_small_strides():
+    small, large = opened(bent(0.02)), opened(bent(1.0))
+    assert np.abs(small[ROTATION:POSE]).max() == pytest.approx(0.02 * (1.0 - np.exp(-0.8)), rel=0.05)
+    assert np.abs(large[ROTATION:POSE]).max() == pytest.approx(STRIDE_RAD, rel=0.05)
+
+
+def test_a_short_stride_gives_up_as_much_less_of_what_is_known():
+    """The covariance goes with the mean: a part of the way is a part of the knowledge."""
+    estimate = bent(1.0)
+    share = STRIDE_RAD  # of the way of 1 rad
+    opened(estimate)
+    gained = np.diag(estimate.covariance)[ANGLES:POSE] / NATURAL**2
+    np.testing.assert_allclose(gained, share * (2.0 - share), rtol=0.05)
+
+
+def test_a_short_stride_keeps_the_spread_of_habit():
+    estimate = bent(1.0)
+    estimate.covariance[np.ix_(KEPT, KEPT)] = prior()
+    opened(estimate)
+    np.testing.assert_allclose(np.diag(estimate.covariance)[ANGLES:POSE], NATURAL**2, rtol=0.05)
+
+
+def test_the_rest_of_a_hand_that_is_held_is_forgotten_more_slowly_or_not_at_all():
+    steps, doubts = [], []
+    for how in (FREE, TURN_HELD, PALM_HELD, FINGERS_HELD):
+        estimate = bent(0.05)
+        steps.append(np.abs(opened(estimate, how)[ANGLES:POSE]).max())
+        doubts.append(np.sqrt(np.diag(estimate.covariance)[ANGLES:POSE].max()))
+    assert steps[0] == pytest.approx(steps[1]) and doubts[0] == pytest.approx(doubts[1])
+    assert 0.0 < steps[2] < 0.2 * steps[0] and 1e-3 < doubts[2] < 0.5 * doubts[0]
+    assert steps[3] == 0.0 and doubts[3] == pytest.approx(1e-4, rel=0.05)
+
+
+@pytest.mark.parametrize(("how", "doubt_rad", "turns"), [(TURN_HELD, 0.5 * SETTLED_RAD, True),
+                                                         (FREE, 0.5 * SETTLED_RAD, False),
+                                                         (TURN_HELD, 1.1 * SETTLED_RAD, False)])
+def test_a_palm_that_habit_turns_is_taken_to_turn_once_it_has_been_found(how, doubt_rad, turns):
+    estimate, step = moving_estimate(), np.zeros(SIZE)
+    estimate.held[0], estimate.turning[0] = how, 0.0
+    estimate.covariance[:] = 1e-8 * np.eye(SIZE)
+    estimate.covariance[3, 3] = doubt_rad**2
+    jacobian = marker_jacobian(estimate)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, step)
+    assert (estimate.turning[0] > 0.01) == turns
+
+
+def test_a_hand_of_which_hardly_anything_is_seen_is_not_opened():
+    estimate, step = bent(0.5), np.zeros(SIZE)
+    jacobian = np.zeros((MARKERS, 3, POSE))
+    jacobian[:2, :, :ROTATION] = np.eye(3)
+    before = estimate.covariance[:ROTATION, :ROTATION].copy()
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, step)
+    np.testing.assert_allclose(estimate.covariance[:ROTATION, :ROTATION], before, rtol=0.1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhot_app.tracking.kalman.gain import contract, expected_noise, solve, spread
+from rhot_app.tracking.kalman.gain import contract, empty_gain, expected_noise, misfit, solve, spread
 from rhot_app.tracking.kalman.rows import empty_rows
 
 SIZE = 40
@@ -48,21 +48,30 @@ def test_update_is_the_textbooks(believed):
     rng = np.random.default_rng(5)
     widening, step = 1.0 + rng.random(len(SIZES)), 0.1 * rng.normal(size=SIZE)
     mean, posterior = textbook(rows, covariance, noise, believed, widening, step)
-    gains = np.empty((32, SIZE))
-    count = solve(rows, covariance, believed, widening, step, gains)
-    contract(covariance, gains, count)
-    assert count == sum(np.array(SIZES)[believed])
+    gain = empty_gain(32, SIZE)
+    solve(rows, covariance, believed, widening, step, gain)
+    contract(covariance, gain)
+    assert gain.used[0] == sum(np.array(SIZES)[believed])
     np.testing.assert_allclose(step, mean, atol=1e-10)
     np.testing.assert_allclose(covariance, posterior, atol=1e-10)
 
 
 def test_nothing_believed_changes_nothing():
     rows, covariance, _ = case()
-    before, step, gains = covariance.copy(), np.zeros(SIZE), np.empty((32, SIZE))
-    count = solve(rows, covariance, np.zeros(len(SIZES), bool), np.ones(len(SIZES)), step, gains)
-    contract(covariance, gains, count)
-    assert count == 0 and not step.any()
+    before, step, gain = covariance.copy(), np.zeros(SIZE), empty_gain(32, SIZE)
+    solve(rows, covariance, np.zeros(len(SIZES), bool), np.ones(len(SIZES)), step, gain)
+    contract(covariance, gain)
+    assert gain.used[0] == 0 and not step.any()
     np.testing.assert_array_equal(covariance, before)
+
+
+@pytest.mark.parametrize("believed", [(1, 1, 1, 1, 1, 1), (0, 1, 0, 0, 1, 0), (0, 0, 0, 0, 0, 0)])
+def test_misfit_is_the_worst_believed_row_in_units_of_its_noise(believed):
+    rows, _, _ = case()
+    believed, widening = np.array(believed, dtype=bool), 1.0 + np.arange(len(SIZES))
+    owner = np.repeat(np.arange(len(SIZES)), SIZES)
+    squares = rows.residual[:len(owner)]**2 / (widening[owner] * rows.noise[:len(owner), 0])
+    assert misfit(rows, believed, widening) == pytest.approx(squares[believed[owner]].max(initial=0.0))
 
 
 def test_expected_noise_is_the_innovations_covariance():

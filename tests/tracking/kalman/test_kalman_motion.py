@@ -4,15 +4,30 @@ import numpy as np
 import pytest
 from known_hand import SIZE, WEARING, difference, moved, moving_estimate, twin
 
-from rhot_app.tracking.kalman.estimate import ACCELERATION, BIAS, GROUP_OF, LINEAR, POSE, SCALE, VELOCITY
-from rhot_app.tracking.kalman.motion import MOST, liveliness, predict
+from rhot_app.hand.skeleton import FLEXIONS
+from rhot_app.tracking.kalman.estimate import (
+    ACCELERATION,
+    ANGLES,
+    BIAS,
+    FIRST_FINGER,
+    GROUP_OF,
+    LINEAR,
+    PALM_HELD,
+    POSE,
+    SCALE,
+    TURN,
+    VELOCITY,
+)
+from rhot_app.tracking.kalman.motion import MOST, TURNING_S, liveliness, predict, speeds
+from rhot_app.tracking.kalman.sighted import FRESH_S
 
 DT = 0.0125
+TOGETHER = WEARING.habits.together
 
 
 def carried(estimate, dt=DT):
     other = twin(estimate)
-    predict(other, dt, WEARING.cameras, WEARING.habits, WEARING.bias_variance)
+    predict(other, dt, WEARING.worn.part, WEARING.habits, WEARING.bias_variance)
     return other
 
 
@@ -47,7 +62,7 @@ def test_covariance_is_carried_as_the_mean_is():
     for i in range(POSE):
         for j in range(POSE):
             block = added[np.ix_(places[i], places[j])]
-            if GROUP_OF[i] != GROUP_OF[j] or WEARING.habits.together[i, j] == 0.0:
+            if TOGETHER[i, j] == 0.0:
                 assert np.abs(block).max() < 1e-7
             else:
                 unit = block[2, 2] / shape[2, 2]
@@ -64,7 +79,7 @@ def test_what_is_added_is_what_the_group_is_capable_of():
     estimate.acceleration[:] = 0.0
     estimate.agitation[:] = np.arange(1.0, 8.0)
     after = carried(estimate)
-    expected = liveliness(after)[GROUP_OF] * np.diag(WEARING.habits.together)
+    expected = liveliness(after)[GROUP_OF] * np.diag(TOGETHER)
     got = np.diag(after.covariance)[ACCELERATION:SCALE]
     assert got.min() > 0.0
     np.testing.assert_allclose(got / expected, (got / expected)[0], rtol=1e-9)
@@ -96,7 +111,7 @@ def test_biases_tend_to_what_their_markers_have():
     estimate.covariance[BIAS:, BIAS:] = 0.0
     before = np.abs(estimate.bias).sum()
     for _ in range(300):
-        predict(estimate, 0.1, WEARING.cameras, WEARING.habits, WEARING.bias_variance)
+        predict(estimate, 0.1, WEARING.worn.part, WEARING.habits, WEARING.bias_variance)
     np.testing.assert_allclose(np.diag(estimate.covariance)[BIAS:], np.repeat(WEARING.bias_variance, 3), rtol=1e-3)
     assert np.abs(estimate.bias).sum() < 1e-3 * before
 
@@ -106,17 +121,71 @@ def test_no_time_changes_no_mean():
     assert np.abs(difference(carried(estimate, 0.0), estimate)).max() < 1e-12
 
 
-def test_one_eye_believes_that_the_palm_keeps_its_distance():
-    """Camera 1 looks along z: what moves along it comes to rest sooner than what moves across."""
-    def after(unseeing, speed=0.1):
-        estimate = moving_estimate()
-        estimate.velocity[:] = 0.0
-        estimate.velocity[[0, 2]] = speed
-        estimate.acceleration[:] = 0.0
-        estimate.unseeing[:] = unseeing
-        return carried(estimate, 0.05).velocity
+def still():
+    """A hand at rest that both cameras see and of which all is known."""
+    estimate = moving_estimate()
+    for array in (estimate.covariance, estimate.velocity, estimate.acceleration, estimate.agitation, estimate.unseen):
+        array[:] = 0.0
+    return estimate
 
-    both, one, none = after((0.0, 0.0)), after((0.0, np.inf)), after((np.inf, np.inf))
-    np.testing.assert_array_equal(both, none)
-    assert one[0] == pytest.approx(both[0]) and one[2] < 0.8 * both[2]
-    np.testing.assert_array_equal(after((0.0, 0.0), 0.3), after((0.0, np.inf), 0.3))  # what moves goes on
+
+def test_fingers_bend_together():
+    """What predicting adds is correlated between fingers as habit has it, however lively each of them is."""
+    assert np.linalg.eigvalsh(TOGETHER).min() > -1e-9
+    np.testing.assert_allclose(TOGETHER, TOGETHER.T, atol=1e-12)
+    estimate = still()
+    estimate.agitation[:] = (1.0, 1.0, 5.0, 20.0, 300.0, 40.0, 7.0)
+    added = carried(estimate).covariance[ACCELERATION:SCALE, ACCELERATION:SCALE]
+    sd, habit = np.sqrt(np.diag(added)), np.sqrt(np.diag(TOGETHER))
+    np.testing.assert_allclose(added / np.outer(sd, sd), TOGETHER / np.outer(habit, habit), atol=1e-9)
+    assert not added[:ANGLES, ANGLES:].any()
+    pips = [ANGLES + flexions[1] for flexions in FLEXIONS]
+    correlations = (added / np.outer(sd, sd))[np.ix_(pips, pips)]
+    fingers = correlations[1:, 1:][np.triu_indices(4, 1)]
+    assert fingers.min() > 0.5 and correlations[0, 1:].min() > 0.2 and correlations[0, 1:].max() < fingers.min()
+
+
+def test_a_finger_out_of_sight_is_as_lively_as_its_neighbours():
+    estimate = still()
+    lively = np.array([40.0, 90.0, 160.0])
+    estimate.agitation[FIRST_FINGER + np.array([1, 3, 4])] = lively
+    estimate.unseen[:, [0, 2]] = 2.0 * FRESH_S
+    estimate.unseen[0, 1] = 2.0 * FRESH_S  # one camera is enough
+    faded, neighbours = carried(twin(estimate)).agitation[FIRST_FINGER + 1] / 40.0, np.mean(np.sqrt(lively)) ** 2
+    after = carried(estimate).agitation[FIRST_FINGER:]
+    np.testing.assert_allclose(after, faded * np.array([neighbours, 40.0, neighbours, 90.0, 160.0]), rtol=1e-9)
+    estimate.agitation[FIRST_FINGER + 2] = 1000.0
+    assert carried(estimate).agitation[FIRST_FINGER + 2] == pytest.approx(1000.0 * faded)
+
+
+def test_fingers_that_none_sees_fall_asleep():
+    estimate = still()
+    estimate.agitation[FIRST_FINGER + 1] = 100.0
+    estimate.unseen[:, :5] = 2.0 * FRESH_S
+    after = carried(estimate).agitation
+    assert 0.0 < after[FIRST_FINGER + 1] < 100.0
+    assert not np.delete(after, FIRST_FINGER + 1).any()
+
+
+def test_time_passes_for_what_was_seen():
+    estimate = still()
+    estimate.unseen[1, 2] = 0.3
+    np.testing.assert_allclose(carried(estimate).unseen, estimate.unseen + DT)
+
+
+def test_a_palm_that_turned_is_taken_to_turn_for_a_while():
+    estimate = still()
+    estimate.velocity[4] = 2.0
+    turns = carried(estimate)
+    assert 1.5 < speeds(turns)[TURN] <= turns.turning[0] <= 2.0
+    turns.velocity[:], turns.acceleration[:] = 0.0, 0.0
+    assert carried(turns, 0.2).turning[0] == pytest.approx(turns.turning[0] * np.exp(-0.2 / TURNING_S))
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_palm_that_is_held_does_not_wake_by_moving(held):
+    estimate = still()
+    estimate.velocity[[0, 4, ANGLES + 6]] = 0.1, 1.0, 2.0
+    estimate.held[0] = PALM_HELD if held else 0
+    awake = carried(estimate).agitation > 0.0
+    assert awake[FIRST_FINGER + 1] and awake[LINEAR] == awake[TURN] == (not held)

@@ -5,7 +5,7 @@ import pytest
 from known_hand import SIZE, WEARING, moving_estimate
 
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE, VELOCITY
-from rhot_app.tracking.kalman.gain import contract
+from rhot_app.tracking.kalman.gain import contract, empty_gain
 from rhot_app.tracking.kalman.limits import project
 
 LIMITS, NO_GAINS = WEARING.limits, np.empty((0, SIZE))
@@ -17,9 +17,9 @@ def within(angles, step):
     return (values >= LIMITS[:, 0] - SMALL).all() and (values <= LIMITS[:, 1] + SMALL).all()
 
 
-def projected(estimate, step, gains=NO_GAINS, count=0):
+def projected(estimate, step, gains=NO_GAINS):
     out = step.copy()
-    project(estimate.angles, estimate.velocity, estimate.covariance, gains, count, LIMITS, out)
+    project(estimate.angles, estimate.velocity, estimate.covariance, gains, LIMITS, out)
     return out
 
 
@@ -61,10 +61,11 @@ def test_the_correction_goes_where_least_is_known():
 def test_gains_count_as_if_the_covariance_were_contracted_already():
     estimate = moving_estimate()
     rng = np.random.default_rng(1)
-    gains = 2e-3 * rng.normal(size=(3, SIZE))
+    gain = empty_gain(3, SIZE)
+    gain.used[0], gain.rows[:] = 3, 2e-3 * rng.normal(size=(3, SIZE))
     step = 0.3 * rng.normal(size=SIZE)
-    ahead = projected(estimate, step, gains, 3)
-    contract(estimate.covariance, gains, 3)
+    ahead = projected(estimate, step, gain.rows)
+    contract(estimate.covariance, gain)
     np.testing.assert_allclose(ahead, projected(estimate, step), atol=1e-9)
 
 

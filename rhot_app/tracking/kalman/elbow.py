@@ -1,0 +1,56 @@
+"""A thumb that bends backwards, looked at again: the same tip, the same palm, and the bones between them mirrored.
+
+A nearly straight thumb has its tip in the same place whether its joints bend a little forwards or a little backwards.
+The way from one to the other leads through the straight thumb, whose tip is elsewhere, so a filter that has once taken
+the wrong one stays there. Thumbs seldom bend backwards.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.hand.finger_ik import solve_finger
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.model import HandModel
+from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
+from rhot_app.tracking.kalman.estimate import Estimate
+from rhot_app.tracking.kalman.reappearing import forget_finger
+
+Array = NDArray[np.float64]
+
+BACKWARDS_RAD = np.radians(5.0)
+"""Sum of the outer two joints' angles beyond which a thumb counts as bent backwards."""
+
+_THUMB = ANGLE_SLICES[0]
+_ROOT, _OUTER = 1, slice(3, 5)
+_LEVERS = np.array([1.2, 0.6])  # what the root turns for a tip that stays, per angle of the outer joints mirrored
+
+
+def bent_backwards(estimate: Estimate) -> bool:
+    """Whether the thumb's outer joints bend the unusual way."""
+    return bool(estimate.angles[_OUTER].sum() < -BACKWARDS_RAD)
+
+
+def unbend(estimate: Estimate, model: HandModel, usual: Array) -> bool:
+    """Bend the thumb forwards if that is more natural and leaves its tip in place; returns whether it was.
+
+    `usual` (27, 27) as in `Habits`: what is known of the thumb's angles afterwards.
+    """
+    world, angles = estimate.world, estimate.angles[_THUMB].copy()
+    target = forward(model, HandPose(world, estimate.angles)).marker_centres[0]
+    mirrored = angles.copy()
+    mirrored[_OUTER] *= -1.0
+    mirrored[_ROOT] += _LEVERS @ angles[_OUTER]
+    found = solve_finger(model, 0, world, mirrored, target)
+    if not found.reached or found.angles[_OUTER].sum() < 0.0 or _strain(model, found.angles) >= _strain(model, angles):
+        return False
+    estimate.angles[_THUMB] = found.angles
+    forget_finger(estimate, 0, usual)
+    return True
+
+
+def _strain(model: HandModel, angles: Array) -> float:
+    """How unnatural the thumb's `angles` (5,) are, in squared standard deviations."""
+    away = angles - model.natural.mean[_THUMB]
+    return float(away @ model.natural.information[_THUMB, _THUMB] @ away)

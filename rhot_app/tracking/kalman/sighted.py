@@ -1,0 +1,99 @@
+"""What the markers show of the hand just now: who was seen by whom, and what that leaves open."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.tracking.kalman.estimate import ANGLES, FINGERS, UNSEEN_S, Estimate
+from rhot_app.tracking.kalman.rows import PALM_PART, Rows
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+FRESH_S = 0.07
+"""A camera that saw a marker this recently still sees it: it may take turns with another."""
+
+
+@njit(cache=True)
+def note_sights(estimate: Estimate, part: Indices, rows: Rows, believed: Mask) -> None:
+    """Remember which markers were seen; `part` (M,) as in `Worn`. What no camera saw shows all markers of its part."""
+    for observation in range(rows.used[1]):
+        if not believed[observation]:
+            continue
+        camera, marker = rows.source[observation, 0], rows.source[observation, 2]
+        if camera >= 0:
+            estimate.unseen[camera, marker] = 0.0
+        else:
+            for m in range(part.shape[0]):
+                if part[m] == rows.part[observation]:
+                    estimate.unseen[:, m] = 0.0
+
+
+@njit(cache=True)
+def unseen_now(estimate: Estimate, rows: Rows) -> Array:
+    """(C, M) as `Estimate.unseen`, with what is seen just now, whether it will be believed or not."""
+    unseen = estimate.unseen.copy()
+    for observation in range(rows.used[1]):
+        if rows.source[observation, 0] >= 0:
+            unseen[rows.source[observation, 0], rows.source[observation, 2]] = 0.0
+    return unseen
+
+
+@njit(cache=True)
+def eyes_on(unseen: Array, marker: int) -> tuple[int, int]:
+    """How many cameras see a marker, and the last of them, -1 if none; `unseen` (C, M) as in `Estimate`."""
+    eyes, eye = 0, -1
+    for camera in range(unseen.shape[0]):
+        if unseen[camera, marker] < FRESH_S:
+            eyes, eye = eyes + 1, camera
+    return eyes, eye
+
+
+@njit(cache=True)
+def fingers_away(estimate: Estimate, part: Indices) -> Array:
+    """(5,) s since any camera saw any marker of each finger."""
+    away = np.full(FINGERS, UNSEEN_S)
+    for m in range(part.shape[0]):
+        if part[m] != PALM_PART:
+            for camera in range(estimate.unseen.shape[0]):
+                away[part[m]] = min(away[part[m]], estimate.unseen[camera, m])
+    return away
+
+
+@njit(cache=True)
+def keep_shown(estimate: Estimate, part: Indices, cameras: Array, points: Array, jacobian: Array) -> None:
+    """Leave in `jacobian` (M, 3, 27) of markers at `points` (M, 3) what is seen of them; `cameras` (C, 3, 4).
+
+    Of a marker that one camera sees, its way across the line of sight; of one that none sees, on a finger, its way
+    relative to the palm - a finger out of sight keeps its bend - and on the palm nothing.
+    """
+    sight = np.empty(3)
+    for m in range(points.shape[0]):
+        eyes, eye = eyes_on(estimate.unseen, m)
+        if eyes == 0:
+            jacobian[m, :, :ANGLES] = 0.0
+            if part[m] == PALM_PART:
+                jacobian[m] = 0.0
+        elif eyes == 1:
+            line_of_sight(cameras[eye], points[m], sight)
+            for j in range(jacobian.shape[2]):
+                along = sight[0] * jacobian[m, 0, j] + sight[1] * jacobian[m, 1, j] + sight[2] * jacobian[m, 2, j]
+                for i in range(3):
+                    jacobian[m, i, j] -= along * sight[i]
+
+
+@njit(cache=True)
+def line_of_sight(camera: Array, point: Array, out: Array) -> None:
+    """Fill `out` (3,) with the unit vector from a camera, (3, 4) camera_from_world, to a point (3,), world."""
+    length = 0.0
+    for i in range(3):
+        out[i] = point[i]
+        for k in range(3):
+            out[i] += camera[k, i] * camera[k, 3]
+        length += out[i] ** 2
+    out /= math.sqrt(length)

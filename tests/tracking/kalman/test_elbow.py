@@ -1,0 +1,60 @@
+"""A thumb that is taken to bend backwards."""
+
+import numpy as np
+import pytest
+from known_hand import WEARING, moving_estimate
+
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
+from rhot_app.tracking.kalman.elbow import BACKWARDS_RAD, bent_backwards, unbend
+from rhot_app.tracking.kalman.estimate import ANGLES, POSE
+
+MODEL, USUAL, LIMITS = WEARING.model, WEARING.habits.usual, WEARING.limits
+THUMB = ANGLE_SLICES[0]
+MCP, IP = 3, 4
+
+
+def with_thumb(flexion, mcp, ip):
+    estimate = moving_estimate()
+    estimate.angles[[1, MCP, IP]] = flexion, mcp, ip
+    return estimate
+
+
+def joints(estimate):
+    """(5, 3) m thumb tip's marker, and the others'."""
+    return forward(MODEL, HandPose(estimate.world, estimate.angles)).marker_centres
+
+
+@pytest.mark.parametrize(("flexion", "mcp", "ip"), [(0.09, -0.1, -0.1), (0.3, -0.15, -0.15), (0.3, -0.02, -0.2),
+                                                    (0.5, -0.15, -0.05)])
+def test_a_thumb_that_bends_backwards_is_bent_forwards_with_its_tip_in_place(flexion, mcp, ip):
+    estimate = with_thumb(flexion, mcp, ip)
+    before, others, world = joints(estimate), estimate.angles[THUMB.stop:].copy(), estimate.world.copy()
+    assert bent_backwards(estimate)
+    assert unbend(estimate, MODEL, USUAL)
+    assert estimate.angles[[MCP, IP]].sum() > BACKWARDS_RAD and not bent_backwards(estimate)
+    np.testing.assert_allclose(joints(estimate), before, atol=1e-4)
+    np.testing.assert_array_equal(estimate.angles[THUMB.stop:], others)
+    np.testing.assert_array_equal(estimate.world, world)
+    assert (estimate.angles >= LIMITS[:, 0]).all() and (estimate.angles <= LIMITS[:, 1]).all()
+    thumb = slice(ANGLES + THUMB.start, ANGLES + THUMB.stop)
+    np.testing.assert_array_equal(estimate.covariance[thumb, thumb], USUAL[thumb, thumb])
+    assert not estimate.covariance[thumb, ANGLES + THUMB.stop:POSE].any()
+
+
+@pytest.mark.parametrize(("mcp", "ip"), [(0.26, 0.26), (0.5, -0.1), (0.0, 0.0), (-0.4 * BACKWARDS_RAD,) * 2])
+def test_a_thumb_that_hardly_bends_backwards_is_not_looked_at(mcp, ip):
+    assert not bent_backwards(with_thumb(0.09, mcp, ip))
+
+
+@pytest.mark.parametrize("thumb", [None, (-0.43, -0.17, -0.2)], ids=["natural", "at the end of its range"])
+def test_a_thumb_that_has_no_better_way_to_bend_is_left_alone(thumb):
+    """Bent forwards, the second one's root would have to go back beyond its limit."""
+    estimate = moving_estimate() if thumb is None else with_thumb(*thumb)
+    if thumb is None:
+        estimate.angles[:] = WEARING.habits.mean
+    assert bent_backwards(estimate) == (thumb is not None)
+    angles, covariance = estimate.angles.copy(), estimate.covariance.copy()
+    assert not unbend(estimate, MODEL, USUAL)
+    np.testing.assert_array_equal(estimate.angles, angles)
+    np.testing.assert_array_equal(estimate.covariance, covariance)

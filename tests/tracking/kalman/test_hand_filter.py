@@ -1,0 +1,105 @@
+"""Whole updates of the filter: what moves when the hand is held, and what the covariance is afterwards."""
+
+from itertools import pairwise
+
+import numpy as np
+from known_hand import SETTLED, SIZE, WEARING, blocks, empty, filter_of_hand, settled
+
+from rhot_app.tracking.kalman.estimate import ANGLES, FIRST_FINGER, LINEAR, PALM_HELD, TURN, copy_estimate
+from rhot_app.tracking.kalman.motion import predict
+from rhot_app.tracking.kalman.sighted import line_of_sight
+
+POSES, WRIST = WEARING.cameras.pose, 5
+HIDDEN = 1.0  # s
+
+
+def weighed(change):
+    """The hand that two cameras saw for a second, after one more frame that `change(estimate, block)` has edited, and
+    as it was expected at that instant."""
+    hand, expected, (known, last), block = filter_of_hand(), empty(), settled(), blocks()[SETTLED]
+    for estimate in (hand.estimate, expected):
+        copy_estimate(known, estimate)
+        estimate.unfaded[0] = 0.0
+        estimate.velocity[:ANGLES], estimate.acceleration[:ANGLES], estimate.turning[0] = 0.0, 0.0, 0.0
+        change(estimate, block)
+    dt = 1e-9 * (block.t_ns - last.t_ns)
+    outcome = hand.update(dt, [block])
+    predict(expected, dt, WEARING.worn.part, WEARING.habits, WEARING.bias_variance)
+    return hand.estimate, expected, outcome
+
+
+def test_one_camera_moves_a_palm_across_its_line_of_sight_only():
+    def hide(estimate, block):
+        estimate.unseen[1 - block.observations.camera] = HIDDEN
+        block.frame.pixels[WRIST, 0] += 0.3
+
+    after, expected, outcome = weighed(hide)
+    assert after.held[0] == PALM_HELD and outcome.believed.all()
+    sight, moved = np.empty(3), after.world[:3, 3] - expected.world[:3, 3]
+    line_of_sight(POSES[blocks()[SETTLED].observations.camera], expected.world[:3, 3], sight)
+    assert np.linalg.norm(moved) > 3e-5
+    assert abs(moved @ sight) < 1e-8
+    np.testing.assert_allclose(after.world[:3, :3], expected.world[:3, :3], atol=1e-8)
+
+
+def test_a_palm_out_of_sight_stays_while_its_fingers_go_where_they_are_seen():
+    def hide(estimate, block):
+        estimate.unseen[:, WRIST] = HIDDEN
+        block.frame.seen[WRIST] = False
+        block.frame.pixels[:, 0] += 0.1
+
+    after, expected, outcome = weighed(hide)
+    assert after.held[0] == PALM_HELD and outcome.believed.all()
+    np.testing.assert_allclose(after.world, expected.world, atol=1e-8)
+    assert np.abs(after.angles - expected.angles).max() > 1e-3
+
+
+def test_a_jump_of_a_palm_that_is_held_is_taken_for_one_of_its_fingers():
+    def jump(hide):
+        def change(estimate, block):
+            estimate.agitation[:] = 0.0
+            estimate.unseen[:, WRIST] = HIDDEN if hide else 0.0
+            block.frame.seen[WRIST] = not hide
+            block.frame.pixels[:, 1] -= 3.0
+        return change
+
+    held, free = weighed(jump(hide=True))[0], weighed(jump(hide=False))[0]
+    assert held.held[0] == PALM_HELD and not held.agitation[[LINEAR, TURN]].any()
+    assert (held.agitation[FIRST_FINGER:] > free.agitation[FIRST_FINGER:]).all()
+    assert free.agitation[LINEAR] > 0.1
+
+
+def test_a_distance_that_does_not_fit_what_is_seen_is_let_go():
+    """The hand is taken to be 8 cm too far away, and not known to be there."""
+    sight, where = np.empty(3), {}
+
+    def push(estimate, block):
+        eye = block.observations.camera
+        estimate.unseen[1 - eye] = HIDDEN
+        line_of_sight(POSES[eye], estimate.world[:3, 3], sight)
+        where["true"] = estimate.world[:3, 3].copy()
+        estimate.world[:3, 3] += 0.08 * sight
+        estimate.covariance[:3, :3] += 0.08**2 * np.outer(sight, sight)
+
+    after, expected, outcome = weighed(push)
+    assert after.held[0] == PALM_HELD and outcome.believed.sum() > 3
+    assert abs((after.world[:3, 3] - where["true"]) @ sight) < 0.02
+    np.testing.assert_allclose(after.world[:3, :3], expected.world[:3, :3], atol=1e-8)
+
+
+def test_rounding_does_not_add_up():
+    """What makes the covariance unsymmetric is not kept: as knowledge fades it would grow without end."""
+    hand, (known, last) = filter_of_hand(), settled()
+    copy_estimate(known, hand.estimate)
+    covariance, sd = hand.estimate.covariance, np.sqrt(np.diag(known.covariance))
+    crooked = 1e-9 * np.random.default_rng(3).normal(size=(SIZE, SIZE)) * np.outer(sd, sd)
+    covariance += crooked - crooked.T
+
+    def skew():
+        away = (covariance - covariance.T)[:ANGLES, :ANGLES]
+        return np.abs(away / np.outer(sd, sd)[:ANGLES, :ANGLES]).max()
+
+    before = skew()
+    for earlier, block in pairwise([last, *blocks()[SETTLED:]]):
+        hand.update(1e-9 * (block.t_ns - earlier.t_ns), [block])
+    assert before > 1e-10 and skew() < 1e-3 * before

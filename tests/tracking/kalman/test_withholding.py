@@ -1,0 +1,148 @@
+"""Updates that leave directions of the state alone, against plain numpy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rhot_app.tracking.kalman.estimate import BIAS
+from rhot_app.tracking.kalman.gain import contract, empty_gain, solve
+from rhot_app.tracking.kalman.rows import empty_rows
+from rhot_app.tracking.kalman.withholding import empty_held, release, restore, withhold
+
+MARKERS = 2
+SIZE = BIAS + 3 * MARKERS
+ANY_BIAS = np.full(MARKERS, 1e9)
+SEEDS, COUNTS = st.integers(0, 10_000), st.integers(0, 12)
+
+
+def covariance_of(rng):
+    root = rng.normal(size=(SIZE, SIZE))
+    return root @ root.T / SIZE
+
+
+def held_of(rng, count):
+    """`count` directions that are neither orthogonal nor of unit length, each of a few numbers of the state."""
+    held = empty_held(SIZE)
+    held.used[0], held.loads[:] = count, 7.0  # of an earlier update
+    for row in held.directions[:count]:
+        row[rng.choice(SIZE, 5, replace=False)] = rng.normal(size=5)
+    return held
+
+
+def known(covariance, directions):
+    """The covariance of the rest, given that the state along `directions` (K, N) is known."""
+    cross = directions @ covariance
+    return covariance - cross.T @ np.linalg.solve(cross @ directions.T, cross) if len(directions) else covariance
+
+
+def update_of(rng, count=7):
+    """Rows of one number each, and their noise."""
+    rows = empty_rows(count, SIZE)
+    rows.used[:] = count, count
+    rows.first[:] = np.arange(count + 1)
+    rows.residual[:] = rng.normal(size=count)
+    rows.jacobian[:] = rng.normal(size=(count, SIZE)) * (rng.random((count, SIZE)) < 0.4)
+    rows.noise[:, 0] = 0.1 + rng.random(count)
+    return rows
+
+
+def updated(covariance, held, rows, bias_variance=ANY_BIAS):
+    """The step, and the covariance after withholding, weighing and restoring."""
+    after, gain, step = covariance.copy(), empty_gain(len(rows.residual), SIZE), np.zeros(SIZE)
+    withhold(after, held)
+    solve(rows, after, np.ones(rows.used[1], bool), np.ones(rows.used[1]), step, gain)
+    contract(after, gain)
+    restore(after, held, gain, bias_variance)
+    return step, after
+
+
+@given(SEEDS, COUNTS)
+def test_what_is_withheld_comes_back_whole(seed, count):
+    rng = np.random.default_rng(seed)
+    covariance, held = covariance_of(rng), held_of(rng, count)
+    after = covariance.copy()
+    withhold(after, held)
+    assert count == 0 or np.abs(after - covariance).max() > 0.01
+    release(after, held)
+    np.testing.assert_allclose(after, covariance, atol=1e-10)
+    assert held.used[0] == 0 and not held.directions.any()
+
+
+@given(SEEDS, COUNTS)
+def test_held_directions_count_as_known(seed, count):
+    rng = np.random.default_rng(seed)
+    covariance, held = covariance_of(rng), held_of(rng, count)
+    after, directions = covariance.copy(), held.directions[:count]
+    withhold(after, held)
+    np.testing.assert_allclose(directions @ after, 0.0, atol=1e-9)
+    np.testing.assert_allclose(after, known(covariance, directions), atol=1e-9)
+    assert np.linalg.eigvalsh(after).min() > -1e-9
+
+
+def test_what_is_known_already_is_held_at_no_cost():
+    """Twice the same direction, and one whose covariance is zero."""
+    rng = np.random.default_rng(3)
+    covariance, held = covariance_of(rng), held_of(rng, 2)
+    covariance[7], covariance[:, 7] = 0.0, 0.0
+    held.used[0], held.directions[2] = 4, held.directions[0]
+    held.directions[3, 7] = 1.0
+    after = covariance.copy()
+    withhold(after, held)
+    np.testing.assert_allclose(after, known(covariance, held.directions[:2]), atol=1e-9)
+    release(after, held)
+    np.testing.assert_allclose(after, covariance, atol=1e-9)
+
+
+@given(SEEDS, COUNTS)
+def test_the_update_is_josephs_with_the_gain_of_the_rest(seed, count):
+    rng = np.random.default_rng(seed)
+    covariance, held, rows = covariance_of(rng), held_of(rng, count), update_of(rng)
+    rest, noise, jacobian = known(covariance, held.directions[:count]), np.diag(rows.noise[:, 0]), rows.jacobian
+    gain = rest @ jacobian.T @ np.linalg.inv(jacobian @ rest @ jacobian.T + noise)
+    left = np.eye(SIZE) - gain @ jacobian
+    step, after = updated(covariance, held, rows)
+    np.testing.assert_allclose(step, gain @ rows.residual, atol=1e-9)
+    np.testing.assert_allclose(after, left @ covariance @ left.T + gain @ noise @ gain.T, atol=1e-9)
+
+
+@given(SEEDS, COUNTS)
+def test_the_step_leaves_held_directions_alone_and_nothing_is_learnt_of_them(seed, count):
+    rng = np.random.default_rng(seed)
+    covariance, held, rows = covariance_of(rng), held_of(rng, count), update_of(rng)
+    directions = held.directions[:count].copy()
+    step, after = updated(covariance, held, rows)
+    assert np.abs(step).max() > 1e-3
+    np.testing.assert_allclose(directions @ step, 0.0, atol=1e-9)
+    np.testing.assert_allclose(directions @ after @ directions.T, directions @ covariance @ directions.T, atol=1e-9)
+
+
+def test_a_markers_place_is_known_no_less_than_by_its_making():
+    """However uncertain what is held is, the biases do not pay for it; correlations stay what they are."""
+    rng = np.random.default_rng(4)
+    covariance, rows = covariance_of(rng), update_of(rng)
+    covariance[0, 0] += 1e3
+    most = np.array([0.2, 1e9])
+
+    def held():
+        out = empty_held(SIZE)
+        out.used[0], out.directions[0, 0] = 1, 1.0
+        return out
+
+    _, free = updated(covariance, held(), rows)
+    _, capped = updated(covariance, held(), rows, most)
+    own, others = slice(BIAS, BIAS + 3), np.r_[0:BIAS, BIAS + 3:SIZE]
+    assert np.diag(free)[own].min() > most[0]
+    np.testing.assert_allclose(np.diag(capped)[own], most[0])
+    np.testing.assert_array_equal(capped[np.ix_(others, others)], free[np.ix_(others, others)])
+    sd = [np.sqrt(np.diag(one)) for one in (free, capped)]
+    np.testing.assert_allclose(capped / np.outer(sd[1], sd[1]), free / np.outer(sd[0], sd[0]), atol=1e-9)
+
+
+@pytest.mark.parametrize("most", [1e-6, 1.0])
+def test_biases_are_as_they_were_when_nothing_is_held(most):
+    rng = np.random.default_rng(5)
+    covariance, rows = covariance_of(rng), update_of(rng)
+    _, free = updated(covariance, empty_held(SIZE), rows)
+    _, after = updated(covariance, empty_held(SIZE), rows, np.full(MARKERS, most))
+    np.testing.assert_array_equal(after, free)
