@@ -107,7 +107,8 @@ def _shown(jacobian: Array) -> int:
     """How many markers are seen: their places go with the palm's."""
     count = 0
     for m in range(jacobian.shape[0]):
-        count += np.any(jacobian[m, :, :ROTATION] != 0.0)
+        if np.any(jacobian[m, :, :ROTATION] != 0.0):
+            count += 1
     return count
 
 
