@@ -1,11 +1,12 @@
 """What a filter must forget to stay honest.
 
-What no worn marker can show fades fast. Six markers leave nine of a hand's 27 freedoms open: directions in which it can
-move with every marker in its place. They turn with the pose. A filter that linearises anew with every frame, each time
-about a slightly other pose, sees each time a slightly other subspace left open, and takes the sum of what it saw for
-knowledge of everything, which it is not (Huang et al. 2010 call it inconsistency). So within these directions, and only
-there, the pose returns to habit: an Ornstein-Uhlenbeck process whose mean is the natural pose and whose covariance is
-what habit leaves to a hand with its markers in their places.
+What no marker in sight can show fades fast. Six markers leave nine of a hand's 27 freedoms open: directions in which it
+can move with every marker in its place; hidden ones leave more. They turn with the pose. A filter that linearises anew
+with every frame, each time about a slightly other pose, sees each time a slightly other subspace left open, and takes
+the sum of what it saw for knowledge of everything, which it is not (Huang et al. 2010 call it inconsistency). So within
+these directions, and only there, the pose returns to habit: an Ornstein-Uhlenbeck process whose mean is the natural
+pose and whose covariance is what habit leaves to a hand with its markers where they are seen. What the palm's own
+markers do not place goes on as it went (`holding.py`) and returns more slowly.
 
 Everything about the pose fades slowly, in the manner of stabilised forgetting (Kulhavy and Zarrop 1993): information is
 given up and that of the natural pose comes in for it. What markers show is there again with the next frame; a joint
@@ -56,10 +57,11 @@ WIDEST = 0.7
 
 @njit(cache=True)
 def open_directions(jacobian: Array, usual: Array, bias_variance: Array) -> Array:
-    """(27 + 3 M, 27 + 3 M): the covariance that habit leaves to the pose and the biases of markers that are all seen
-    to stay in their places.
+    """(27 + 3 M, 27 + 3 M): the covariance that habit leaves to the pose and the biases of markers that are seen to
+    stay in their places.
 
-    `jacobian` (M, 3, 27) of the markers' places per pose number; `usual` (27, 27) as in `Habits`; `bias_variance` (M,).
+    `jacobian` (M, 3, 27) of what is seen of the markers' places per pose number (`sighted.keep_shown`); `usual`
+    (27, 27) as in `Habits`; `bias_variance` (M,).
     """
     rows = 3 * jacobian.shape[0]
     size = POSE + rows
@@ -113,6 +115,17 @@ def _shown(jacobian: Array) -> int:
 
 
 @njit(cache=True)
+def _note_turning(estimate: Estimate, turned: Array) -> None:
+    """A palm whose held turn habit has to bring on, by `turned` (3,) rad since knowledge last faded, does turn."""
+    doubt = 0.0
+    for i in range(ROTATION, ANGLES):
+        doubt += estimate.covariance[i, i]
+    if estimate.held[0] == TURN_HELD and doubt < SETTLED_RAD * SETTLED_RAD:
+        rate = math.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2) / estimate.unfaded[0]
+        estimate.turning[0] = max(estimate.turning[0], rate)
+
+
+@njit(cache=True)
 def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Array, jacobian: Array,
              step: Array) -> None:
     """A `share` of the way back to habit, within the open directions."""
@@ -135,12 +148,8 @@ def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Ar
         share *= shorter
         back *= shorter
         moved *= shorter
-    step[:POSE] = -moved[:POSE]
-    turned = covariance[3, 3] + covariance[4, 4] + covariance[5, 5]
-    if estimate.held[0] == TURN_HELD and turned < SETTLED_RAD * SETTLED_RAD:
-        turned = math.sqrt(moved[3] ** 2 + moved[4] ** 2 + moved[5] ** 2) / estimate.unfaded[0]
-        estimate.turning[0] = max(estimate.turning[0], turned)
-    step[BIAS:] = -moved[POSE:]
+    step[:POSE], step[BIAS:] = -moved[:POSE], -moved[POSE:]
+    _note_turning(estimate, moved[ROTATION:ANGLES])
     part = np.empty((size, covariance.shape[0]))
     part[:POSE], part[POSE:] = covariance[:POSE], covariance[BIAS:]
     part -= back @ part
