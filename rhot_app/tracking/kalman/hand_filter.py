@@ -35,7 +35,8 @@ from rhot_app.tracking.kalman.withholding import Held, empty_held, release, rest
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-ITERATIONS = 6
+ITERATIONS = 2
+"""More of them go to and fro where an angle is open: what is left is there again with the next frame."""
 
 MISFIT = 1000.0
 """Squared normalised residual of one row beyond which what held the hand is let go."""
