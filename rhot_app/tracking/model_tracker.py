@@ -131,7 +131,8 @@ class ModelTracker:
             return False
         self._starter.ingest(observations)
         if not self._tracking:
-            return self._look_for_hand()
+            self._look_for_hand()
+            return True
         self.observe(block)
         self._look_at_thumb()
         if self._timeline.t_ns - self._believed_ns > LOST_AFTER_NS or (
@@ -150,7 +151,6 @@ class ModelTracker:
         off = np.linalg.norm(located - estimated, axis=1)
         self._apart = self._apart + 1 if np.count_nonzero(off > allowed) >= _APART_MARKERS else 0
         if self._apart >= _APART_STATES:
-            self._apart = 0
             pose = self._starter.pose_of(located)
             if pose is not None:
                 self._begin(t_ns, pose)
@@ -170,11 +170,10 @@ class ModelTracker:
         self._behind += 1
         return self._behind >= _BEHIND
 
-    def _look_for_hand(self) -> bool:
+    def _look_for_hand(self) -> None:
         found = self._starter.find()
         if found is not None:
             self._begin(*found)
-        return True
 
     def _begin(self, t_ns: int, pose: HandPose) -> None:
         """Start the filter from a pose, and weigh again what was seen since."""
@@ -182,6 +181,7 @@ class ModelTracker:
         self._timeline.begin(t_ns)
         self._tracking = self._ever = True
         self._believed_ns = self._plausible_ns = t_ns
+        self._apart = 0
         for block in self._sights.recent(t_ns):
             self.observe(block)
 

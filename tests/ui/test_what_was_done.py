@@ -80,6 +80,7 @@ def test_the_bar_is_as_tall_as_its_sentences(bench):
     bench.until(lambda: len(advice.texts) == 2 and advice.parentWidget().height() > 45)
     bench.window.passing.clear()
     bench.until(lambda: advice.parentWidget().height() < 40)
+    assert "Something is wrong." not in advice.texts
 
 
 def test_a_sentence_passes_by():

@@ -146,11 +146,12 @@ class HandFilter:
     def _settle(self, blocks: Sequence[ResidualBlock]) -> None:
         """Iterate to the new mean, a `_step` from the old one."""
         self._step[:] = 0.0
-        for _ in range(ITERATIONS):
+        for iteration in range(ITERATIONS):
+            if iteration > 0:
+                self._linearise(blocks, self._trial)
             if _improve(self.estimate, self._rows, self._believed, self._widening, self._step, self._gain,
                         self._limits, self._trial):
                 return
-            self._linearise(blocks, self._trial)
 
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
         """Whether the hand as it is held cannot be where it is seen."""

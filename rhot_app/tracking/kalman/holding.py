@@ -33,6 +33,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
+from rhot_app.tracking.kalman.motion import speeds
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
 from rhot_app.tracking.kalman.sighted import eyes_on, line_of_sight, unseen_now
 from rhot_app.tracking.kalman.withholding import Held
@@ -61,12 +62,11 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, cameras: Array, stiff: A
     `Habits`.
     """
     unseen = unseen_now(estimate, rows)
-    on_palm, placed, most, eye, all_once, all_twice = 0, 0, 0, -1, True, True
+    on_palm, placed, most, eye, all_seen = 0, 0, 0, -1, True
     eyes_of = np.zeros(FINGERS, np.int64)
     for m in range(part.shape[0]):
         eyes, last = eyes_on(unseen, m)
-        all_once &= eyes > 0
-        all_twice &= eyes > 1
+        all_seen &= eyes > 0
         if part[m] != PALM_PART:
             eyes_of[part[m]] = max(eyes_of[part[m]], eyes)
         else:
@@ -74,14 +74,15 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, cameras: Array, stiff: A
             placed += eyes > 1
             if eyes > most:
                 most, eye = eyes, last
-    hurries = _hurries(estimate)
+    moving = speeds(estimate)
+    hurries = moving[LINEAR] > HURRIES_M_S or moving[TURN] > HURRIES_RAD_S
     held.used[0] = 0
     held.directions[:] = 0.0
     estimate.held[0] = FREE
-    if on_palm == 0 or (placed >= ENOUGH and all_twice):
+    if on_palm == 0:
         return
     if most > 1:
-        if all_once and (hurries or estimate.turning[0] > TURNS_RAD_S):
+        if all_seen and (hurries or estimate.turning[0] > TURNS_RAD_S):
             return
         _hold_stiff(stiff, eyes_of, held)
         if placed < ENOUGH:
@@ -99,17 +100,6 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, cameras: Array, stiff: A
             for i in range(ROTATION):
                 _hold_number(i, held)
         hold_turn(held)
-
-
-@njit(cache=True)
-def _hurries(estimate: Estimate) -> bool:
-    """Whether the palm moves or turns fast, as far as it is no noise."""
-    speed, turning = 0.0, 0.0
-    for i in range(ROTATION):
-        k = ROTATION + i
-        speed += estimate.velocity[i] ** 2 - 4.0 * estimate.covariance[VELOCITY + i, VELOCITY + i]
-        turning += estimate.velocity[k] ** 2 - 4.0 * estimate.covariance[VELOCITY + k, VELOCITY + k]
-    return speed > HURRIES_M_S**2 or turning > HURRIES_RAD_S**2
 
 
 @njit(cache=True)

@@ -82,6 +82,7 @@ def test_a_paused_feed_asks_for_nothing(feed, asker):
     asked = len(asker.commands)
     feed.pause(False)
     eventually(lambda: len(asker.commands) > asked)
+    assert feed.problem("left") == ""
 
 
 def test_a_picture_that_was_overtaken_is_left_out(asker):
