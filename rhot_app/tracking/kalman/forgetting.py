@@ -22,7 +22,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
+from rhot_app.tracking.kalman.combine import add_rows, add_squares, mirror
 from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, FINGERS_HELD, PALM_HELD, POSE, ROTATION, TURN_HELD, Estimate
+from rhot_app.tracking.kalman.gain import Gain, project_rows, whiten
 from rhot_app.tracking.kalman.motion import Habits
 
 Array = NDArray[np.float64]
@@ -85,9 +87,10 @@ def open_directions(jacobian: Array, usual: Array, bias_variance: Array) -> Arra
 
 
 @njit(cache=True)
-def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, jacobian: Array,
+def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, jacobian: Array, gain: Gain,
            step: Array) -> None:
-    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. Others as in `open_directions`.
+    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. `gain` is room to work in, others as in
+    `open_directions`.
 
     It depends on how the hand is held (`holding.py`).
     """
@@ -100,7 +103,8 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
             _open_up(estimate, -math.expm1(-estimate.unfaded[0] / constant), habits, bias_variance, jacobian, step)
         _fade(estimate.covariance, estimate.unfaded[0])
         if how < PALM_HELD:
-            _return_to_habits(estimate, -math.expm1(-estimate.unfaded[0] / FADE_S), habits, step)
+            _return_to_habits(estimate, -math.expm1(-estimate.unfaded[0] / FADE_S), habits, gain, step)
+        mirror(estimate.covariance)  # rounding must not make it unsymmetric: what fades would let it grow
         estimate.unfaded[0] = 0.0
 
 
@@ -182,27 +186,17 @@ def _fade(covariance: Array, dt: float) -> None:
 
 
 @njit(cache=True)
-def _return_to_habits(estimate: Estimate, share: float, habits: Habits, step: Array) -> None:
-    """Weigh a `share` of what habits say: every row is one scalar observation, exact because it is linear."""
-    covariance = estimate.covariance
-    size = covariance.shape[0]
-    gain = np.empty(size)
-    for k in range(habits.rows.shape[0]):
-        row = habits.rows[k]
-        gain[:] = 0.0
-        expected = 0.0
-        for a in range(21):
-            if row[a] != 0.0:
-                expected += row[a] * (estimate.angles[a] + step[ANGLES + a])
-                for j in range(size):
-                    gain[j] += row[a] * covariance[ANGLES + a, j]
-        variance = 1.0 / share
-        for a in range(21):
-            if row[a] != 0.0:
-                variance += row[a] * gain[ANGLES + a]
-        pull = (habits.values[k] - expected) / variance
-        for i in range(size):
-            step[i] += gain[i] * pull
-            factor = gain[i] / variance
-            for j in range(size):
-                covariance[i, j] -= factor * gain[j]
+def _return_to_habits(estimate: Estimate, share: float, habits: Habits, gain: Gain, step: Array) -> None:
+    """Weigh a `share` of what habits say, in one linear update; `gain` is room for it."""
+    count = habits.rows.shape[0]
+    noise, right = np.zeros((count, 2)), habits.values.copy()
+    noise[:, 0] = 1.0 / share
+    for k in range(count):
+        gain.jacobian[k] = 0.0
+        gain.jacobian[k, ANGLES:POSE] = habits.rows[k]
+        for a in range(ANGLES, POSE):
+            right[k] -= gain.jacobian[k, a] * (estimate.angles[a - ANGLES] + step[a])
+    project_rows(gain, count, estimate.covariance, noise)
+    whiten(gain, count, right)
+    add_rows(step, right, gain.rows, np.arange(count), 0)
+    add_squares(estimate.covariance, gain.rows, count, -1.0)

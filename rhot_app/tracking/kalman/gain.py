@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
+from rhot_app.tracking.kalman.combine import add_rows, add_squares, dot
 from rhot_app.tracking.kalman.rows import Rows
 
 Array = NDArray[np.float64]
@@ -21,38 +22,42 @@ Mask = NDArray[np.bool_]
 
 
 @njit(cache=True)
-def spread(rows: Rows, covariance: Array, out: Array) -> None:
-    """Fill `out` (K, N) with H P. Zeros of the Jacobian cost nothing."""
+def expected_noise(rows: Rows, covariance: Array, out: Array) -> None:
+    """Fill `out` (L, 3): innovation covariance of each observation, (uu, uv, vv); for a single row vv = 1, uv = 0."""
     size = covariance.shape[0]
-    for k in range(rows.used[0]):
-        target = out[k]
-        target[:] = 0.0
-        for j in range(size):
-            factor = rows.jacobian[k, j]
-            if factor != 0.0:
-                source = covariance[j]
-                for i in range(size):
-                    target[i] += factor * source[i]
+    chosen, weights, product = np.empty(size, np.int64), np.empty(size), np.empty(size)
+    for observation in range(rows.used[1]):
+        row, last = rows.first[observation], rows.first[observation + 1] - 1
+        count = _pick(rows.jacobian[row], chosen, weights)
+        product[:] = 0.0
+        add_rows(product, weights[:count], covariance, chosen[:count], 0)
+        out[observation, 0] = rows.noise[row, 0] + _at(product, chosen, weights, count)
+        out[observation, 1], out[observation, 2] = 0.0, 1.0
+        if last > row:
+            count = _pick(rows.jacobian[last], chosen, weights)
+            out[observation, 1] = rows.noise[last, 1] + _at(product, chosen, weights, count)
+            product[:] = 0.0
+            add_rows(product, weights[:count], covariance, chosen[:count], 0)
+            out[observation, 2] = rows.noise[last, 0] + _at(product, chosen, weights, count)
 
 
 @njit(cache=True)
-def expected_noise(rows: Rows, spread_rows: Array, observation: int) -> tuple[float, float, float]:
-    """Innovation covariance of one observation: (uu, uv, vv); for a single row vv = 1 and uv = 0."""
-    row = rows.first[observation]
-    uu = rows.noise[row, 0] + _dot(spread_rows[row], rows.jacobian[row])
-    if rows.first[observation + 1] - row < 2:
-        return uu, 0.0, 1.0
-    vv = rows.noise[row + 1, 0] + _dot(spread_rows[row + 1], rows.jacobian[row + 1])
-    uv = rows.noise[row, 1] + _dot(spread_rows[row], rows.jacobian[row + 1])
-    return uu, uv, vv
+def _pick(row: Array, chosen: Indices, weights: Array) -> int:
+    """Note which numbers of `row` (N,) are not zero, and them; returns how many. A marker's row has some 40 of 100."""
+    count = 0
+    for j in range(row.shape[0]):
+        if row[j] != 0.0:
+            chosen[count], weights[count] = j, row[j]
+            count += 1
+    return count
 
 
 @njit(cache=True)
-def _dot(a: Array, b: Array) -> float:
+def _at(vector: Array, chosen: Indices, weights: Array, count: int) -> float:
+    """The product of `vector` (N,) with a row that was picked."""
     total = 0.0
-    for i in range(a.shape[0]):
-        if b[i] != 0.0:
-            total += a[i] * b[i]
+    for k in range(count):
+        total += weights[k] * vector[chosen[k]]
     return total
 
 
@@ -79,34 +84,41 @@ def solve(rows: Rows, covariance: Array, believed: Mask, widening: Array, step: 
     `step` (N,): where the rows were linearised, as a displacement of the prior mean; becomes where the mean should
     be. `widening` (L,): factor on each observation's noise.
     """
-    size = covariance.shape[0]
     noise, right = np.empty((rows.used[0], 2)), np.empty(rows.used[0])
     count = _gather(rows, believed, widening, step, noise, right, gain)
+    project_rows(gain, count, covariance, noise)
+    whiten(gain, count, right)
+    step[:] = 0.0
+    add_rows(step, right[:count], gain.rows, np.arange(count), 0)
+
+
+@njit(cache=True)
+def project_rows(gain: Gain, count: int, covariance: Array, noise: Array) -> None:
+    """Fill the first `count` of `gain.rows` with H P and of `gain.factor` with the Cholesky factor of H P H^T + R."""
+    size = covariance.shape[0]
+    chosen, weights = np.empty(size, np.int64), np.empty(size)
     for k in range(count):
+        picked = _pick(gain.jacobian[k], chosen, weights)
         gain.rows[k] = 0.0
-        for j in range(size):
-            slope = gain.jacobian[k, j]
-            if slope != 0.0:
-                for i in range(size):
-                    gain.rows[k, i] += slope * covariance[j, i]
+        add_rows(gain.rows[k], weights[:picked], covariance, chosen[:picked], 0)
         for other in range(k + 1):
-            gain.factor[k, other] = _dot(gain.rows[k], gain.jacobian[other])
+            gain.factor[k, other] = _at(gain.rows[other], chosen, weights, picked)
         gain.factor[k, k] += noise[k, 0]
         if k > 0:
             gain.factor[k, k - 1] += noise[k, 1]
     factorise(gain.factor[:count, :count])
-    for k in range(count):  # H P becomes L^-1 H P, the innovation L^-1 times itself
+
+
+@njit(cache=True)
+def whiten(gain: Gain, count: int, right: Array) -> None:
+    """H P becomes L^-1 H P, the innovation `right` (K,) L^-1 times itself."""
+    order = np.arange(count)
+    for k in range(count):
         for other in range(k):
             right[k] -= gain.factor[k, other] * right[other]
-            for i in range(size):
-                gain.rows[k, i] -= gain.factor[k, other] * gain.rows[other, i]
+        add_rows(gain.rows[k], -gain.factor[k, :k], gain.rows, order[:k], 0)
         right[k] /= gain.factor[k, k]
-        for i in range(size):
-            gain.rows[k, i] /= gain.factor[k, k]
-    step[:] = 0.0
-    for k in range(count):
-        for i in range(size):
-            step[i] += right[k] * gain.rows[k, i]
+        gain.rows[k] /= gain.factor[k, k]
 
 
 @njit(cache=True)
@@ -121,7 +133,7 @@ def _gather(rows: Rows, believed: Mask, widening: Array, step: Array, noise: Arr
                 gain.jacobian[count] = rows.jacobian[row]
                 noise[count, 0] = widening[observation] * rows.noise[row, 0]
                 noise[count, 1] = widening[observation] * rows.noise[row, 1] if row > first else 0.0
-                right[count] = rows.residual[row] + _dot(step, rows.jacobian[row])
+                right[count] = rows.residual[row] + dot(step, rows.jacobian[row])
                 count += 1
     gain.used[0] = count
     return count
@@ -141,10 +153,4 @@ def misfit(rows: Rows, believed: Mask, widening: Array) -> float:
 @njit(cache=True)
 def contract(covariance: Array, gain: Gain) -> None:
     """The posterior covariance P - G^T G in place of P."""
-    size = covariance.shape[0]
-    for k in range(gain.used[0]):
-        row = gain.rows[k]
-        for i in range(size):
-            factor, target = row[i], covariance[i]
-            for j in range(size):
-                target[j] -= factor * row[j]
+    add_squares(covariance, gain.rows, gain.used[0], -1.0)

@@ -196,16 +196,6 @@ def _conclude(estimate: Estimate, rows: Rows, believed: Mask, gain: Gain, held: 
     points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
     place_markers(worn, estimate, points, jacobian)
     keep_shown(estimate, worn.part, cameras.pose, points, jacobian)
-    forget(estimate, dt, habits, bias_variance, jacobian, step)
+    forget(estimate, dt, habits, bias_variance, jacobian, gain, step)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], limits, step)
     displace(estimate, step, estimate)
-    _even_out(estimate.covariance)
-
-
-@njit(cache=True)
-def _even_out(covariance: Array) -> None:
-    """Keep rounding from making the covariance unsymmetric: what fades would let it grow."""
-    for i in range(covariance.shape[0]):
-        for j in range(i):
-            mean = 0.5 * (covariance[i, j] + covariance[j, i])
-            covariance[i, j], covariance[j, i] = mean, mean

@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.tracking.kalman.combine import add_rows
 from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     ANGLES,
@@ -169,9 +170,20 @@ def _move_mean(estimate: Estimate, dt: float) -> None:
         world[i, 3] += moved[i]
     for i in range(21):
         estimate.angles[i] += moved[ANGLES + i]
-    covariance = estimate.covariance
-    covariance[ROTATION:ANGLES] = rotation @ np.ascontiguousarray(covariance[ROTATION:ANGLES])
-    covariance[:, ROTATION:ANGLES] = covariance[:, ROTATION:ANGLES].copy() @ rotation.T
+    _turn(estimate.covariance, rotation)
+
+
+@njit(cache=True)
+def _turn(covariance: Array, rotation: Array) -> None:
+    """Turn what is known of the palm's rotation with the palm."""
+    block = covariance[ROTATION:ANGLES].copy()
+    covariance[ROTATION:ANGLES] = 0.0
+    for i in range(3):
+        add_rows(covariance[ROTATION + i], rotation[i], block, np.arange(3), 0)
+    for row in covariance:
+        x, y, z = row[ROTATION], row[ROTATION + 1], row[ROTATION + 2]
+        for i in range(3):
+            row[ROTATION + i] = rotation[i, 0] * x + rotation[i, 1] * y + rotation[i, 2] * z
 
 
 @njit(cache=True)
@@ -213,14 +225,17 @@ def shake(covariance: Array, agitation: Array, together: Array, dt: float) -> No
 
     `together` as in `Habits`.
     """
-    gains, strength = jerk_gains(dt), np.sqrt(agitation)
+    gains, strength, shaken = jerk_gains(dt), np.sqrt(agitation), np.empty(POSE)
     for i in range(POSE):
+        if strength[GROUP_OF[i]] == 0.0:
+            continue
         for j in range(POSE):
-            q = strength[GROUP_OF[i]] * strength[GROUP_OF[j]] * together[i, j]
-            if q != 0.0:
-                for a in range(3):
-                    for b in range(3):
-                        covariance[VELOCITY * a + i, VELOCITY * b + j] += q * gains[a, b]
+            shaken[j] = strength[GROUP_OF[i]] * strength[GROUP_OF[j]] * together[i, j]
+        for a in range(3):
+            for b in range(3):
+                target, gain = covariance[VELOCITY * a + i, VELOCITY * b:VELOCITY * b + POSE], gains[a, b]
+                for j in range(POSE):
+                    target[j] += gain * shaken[j]
 
 
 @njit(cache=True)
@@ -239,10 +254,10 @@ def jerk_gains(dt: float) -> Array:
 def _fade_biases(estimate: Estimate, dt: float, variance: Array) -> None:
     covariance, fade = estimate.covariance, math.exp(-dt / BIAS_S)
     size = covariance.shape[0]
+    covariance[BIAS:] *= fade
+    for i in range(size):
+        covariance[i, BIAS:] *= fade
     for i in range(BIAS, size):
         marker = (i - BIAS) // 3
         estimate.bias[marker, (i - BIAS) % 3] *= fade
-        for j in range(size):
-            covariance[i, j] *= fade
-            covariance[j, i] *= fade
         covariance[i, i] += (1.0 - fade * fade) * variance[marker]

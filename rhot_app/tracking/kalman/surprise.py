@@ -28,7 +28,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.gain import Gain, expected_noise, spread
+from rhot_app.tracking.kalman.gain import Gain, expected_noise
 from rhot_app.tracking.kalman.motion import AWAKE, MOST, STILL, jerk_gains, shake
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
 
@@ -65,14 +65,12 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
 
     `together` as in `Habits`.
     """
-    count, size, how = rows.used[1], estimate.covariance.shape[0], estimate.held[0]
+    count, how, grown = rows.used[1], estimate.held[0], jerk_gains(ONSET_S)
     if count == 0:
         return
-    gains, grown = np.empty((rows.used[0], size)), jerk_gains(ONSET_S)
-    spread(rows, estimate.covariance, gains)
     noise, per_unit, surprise = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count)
+    expected_noise(rows, estimate.covariance, noise)
     for observation in range(count):
-        noise[observation] = expected_noise(rows, gains, observation)
         for kind in range(3):
             group = kind if kind < FIRST_FINGER else FIRST_FINGER + rows.part[observation]
             _effect(rows, observation, group, grown, together, per_unit[observation, kind])
@@ -130,25 +128,24 @@ def _effect(rows: Rows, observation: int, group: int, gains: Array, together: Ar
     """Fill `out` (3,): innovation variance uu, uv, vv per unit of a group's agitation."""
     out[:] = 0.0
     row, last = rows.first[observation], rows.first[observation + 1] - 1
-    for i in range(POSE):
-        if GROUP_OF[i] != group:
+    u, v = rows.jacobian[row], rows.jacobian[last]
+    grown_u, grown_v = np.empty(3), np.empty(3)
+    for j in range(POSE):
+        if GROUP_OF[j] != group:
             continue
-        for j in range(POSE):
-            if GROUP_OF[j] == group and together[i, j] != 0.0:
-                out[0] += together[i, j] * _grown(rows.jacobian[row], rows.jacobian[row], i, j, gains)
-                if last > row:
-                    out[1] += together[i, j] * _grown(rows.jacobian[row], rows.jacobian[last], i, j, gains)
-                    out[2] += together[i, j] * _grown(rows.jacobian[last], rows.jacobian[last], i, j, gains)
-
-
-@njit(cache=True)
-def _grown(a: Array, b: Array, i: int, j: int, gains: Array) -> float:
-    """What acceleration of unit variance does, by `gains`, to the product of two rows, by their numbers i and j."""
-    total = 0.0
-    for m in range(3):
-        for n in range(3):
-            total += a[VELOCITY * m + i] * b[VELOCITY * n + j] * gains[m, n]
-    return total
+        for m in range(3):  # what acceleration of unit variance does to the row's j-th number and its derivatives
+            grown_u[m], grown_v[m] = 0.0, 0.0
+            for n in range(3):
+                grown_u[m] += gains[m, n] * u[VELOCITY * n + j]
+                grown_v[m] += gains[m, n] * v[VELOCITY * n + j]
+        for i in range(POSE):
+            if GROUP_OF[i] == group and together[i, j] != 0.0:
+                for m in range(3):
+                    out[0] += together[i, j] * u[VELOCITY * m + i] * grown_u[m]
+                    out[1] += together[i, j] * u[VELOCITY * m + i] * grown_v[m]
+                    out[2] += together[i, j] * v[VELOCITY * m + i] * grown_v[m]
+    if last == row:
+        out[1], out[2] = 0.0, 0.0
 
 
 @njit(cache=True)

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.tracking.kalman.combine import add_rows, add_squares, dot
 from rhot_app.tracking.kalman.estimate import BIAS
 from rhot_app.tracking.kalman.gain import Gain
 
@@ -40,28 +41,25 @@ def empty_held(size: int) -> Held:
 @njit(cache=True)
 def withhold(covariance: Array, held: Held) -> None:
     """Make `covariance` (N, N) that of a hand of which the held directions are known; fills `held.loads`."""
-    size = covariance.shape[0]
+    order = np.arange(held.used[0])
+    shares = np.empty(held.used[0])
     for k in range(held.used[0]):
-        direction, load, variance = held.directions[k], held.loads[k], 0.0
+        direction, load = held.directions[k], held.loads[k]
         load[:] = 0.0
-        for i in range(size):
-            if direction[i] != 0.0:
-                for j in range(size):
-                    load[j] += direction[i] * covariance[i, j]
-        for i in range(size):
-            variance += direction[i] * load[i]
+        picked = np.flatnonzero(direction)
+        add_rows(load, direction[picked], covariance, picked, 0)
+        for other in range(k):  # what goes with those before is theirs
+            shares[other] = -dot(direction, held.loads[other])
+        add_rows(load, shares[:k], held.loads, order[:k], 0)
+        variance = dot(direction, load)
         load *= 1.0 / math.sqrt(variance) if variance > 1e-14 else 0.0
-        for i in range(size):
-            if load[i] != 0.0:
-                for j in range(size):
-                    covariance[i, j] -= load[i] * load[j]
+    add_squares(covariance, held.loads, held.used[0], -1.0)
 
 
 @njit(cache=True)
 def release(covariance: Array, held: Held) -> None:
     """Undo `withhold`; nothing is held any more."""
-    for k in range(held.used[0]):
-        _add_square(covariance, held.loads[k])
+    add_squares(covariance, held.loads, held.used[0], 1.0)
     held.used[0] = 0
     held.directions[:] = 0.0
 
@@ -73,33 +71,22 @@ def restore(covariance: Array, held: Held, gain: Gain, bias_variance: Array) -> 
     A marker's place on the hand is never known less than by its making, `bias_variance` (M,) m^2: it does not pay for
     what is not known of the palm.
     """
-    size, count = covariance.shape[0], gain.used[0]
+    if held.used[0] == 0:
+        return
+    count, order = gain.used[0], np.arange(gain.used[0])
     shown = np.empty(count)
     for h in range(held.used[0]):
         load = held.loads[h]
-        for k in range(count):  # L^-1 H load
-            shown[k] = 0.0
-            for i in range(size):
-                shown[k] += gain.jacobian[k, i] * load[i]
+        for k in range(count):  # - L^-1 H load
+            shown[k] = -dot(gain.jacobian[k], load)
             for other in range(k):
                 shown[k] -= gain.factor[k, other] * shown[other]
             shown[k] /= gain.factor[k, k]
-        for k in range(count):
-            for i in range(size):
-                load[i] -= gain.rows[k, i] * shown[k]
-        _add_square(covariance, load)
-    if held.used[0] > 0:
-        for i in range(BIAS, size):
-            most = bias_variance[(i - BIAS) // 3]
-            if covariance[i, i] > most:
-                scale = math.sqrt(most / covariance[i, i])
-                covariance[i] *= scale
-                covariance[:, i] *= scale
-
-
-@njit(cache=True)
-def _add_square(covariance: Array, load: Array) -> None:
-    for i in range(load.shape[0]):
-        if load[i] != 0.0:
-            for j in range(load.shape[0]):
-                covariance[i, j] += load[i] * load[j]
+        add_rows(load, shown, gain.rows, order, 0)
+    add_squares(covariance, held.loads, held.used[0], 1.0)
+    for i in range(BIAS, covariance.shape[0]):
+        most = bias_variance[(i - BIAS) // 3]
+        if covariance[i, i] > most:
+            scale = math.sqrt(most / covariance[i, i])
+            covariance[i] *= scale
+            covariance[:, i] *= scale

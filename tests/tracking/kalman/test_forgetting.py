@@ -14,10 +14,12 @@ from rhot_app.tracking.kalman.forgetting import (
     forget,
     open_directions,
 )
+from rhot_app.tracking.kalman.gain import empty_gain
 from rhot_app.tracking.kalman.markers import place_markers
 
 HABITS, BIAS_VARIANCE = WEARING.habits, WEARING.bias_variance
 KEPT = np.r_[0:POSE, BIAS:SIZE]  # pose and biases among the estimate's numbers
+GAIN = empty_gain(64, SIZE)
 NATURAL = np.sqrt(np.diag(HABITS.usual)[ANGLES:])
 
 
@@ -43,7 +45,7 @@ def faded(estimate, seconds, dt=0.05):
     """The estimate after `seconds` of forgetting alone."""
     for _ in range(round(seconds / dt)):
         step = np.zeros(SIZE)
-        forget(estimate, dt, HABITS, BIAS_VARIANCE, marker_jacobian(estimate), step)
+        forget(estimate, dt, HABITS, BIAS_VARIANCE, marker_jacobian(estimate), GAIN, step)
         estimate = moved(estimate, step)
     return estimate
 
@@ -115,7 +117,7 @@ def opened(estimate, how=FREE):
     place."""
     estimate.held[0], step, jacobian = how, np.zeros(SIZE), np.zeros((MARKERS, 3, POSE))
     jacobian[:, :, :ROTATION] = np.eye(3)
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, step)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step)
     return step
 
 
@@ -167,7 +169,7 @@ def test_a_palm_that_habit_turns_is_taken_to_turn_once_it_has_been_found(how, do
     estimate.covariance[:] = 1e-8 * np.eye(SIZE)
     estimate.covariance[3, 3] = doubt_rad**2
     jacobian = marker_jacobian(estimate)
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, step)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step)
     assert (estimate.turning[0] > 0.01) == turns
 
 
@@ -176,5 +178,5 @@ def test_a_hand_of_which_hardly_anything_is_seen_is_not_opened():
     jacobian = np.zeros((MARKERS, 3, POSE))
     jacobian[:2, :, :ROTATION] = np.eye(3)
     before = estimate.covariance[:ROTATION, :ROTATION].copy()
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, step)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step)
     np.testing.assert_allclose(estimate.covariance[:ROTATION, :ROTATION], before, rtol=0.1)

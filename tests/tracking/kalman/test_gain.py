@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhot_app.tracking.kalman.gain import contract, empty_gain, expected_noise, misfit, solve, spread
+from rhot_app.tracking.kalman.gain import contract, empty_gain, expected_noise, misfit, solve
 from rhot_app.tracking.kalman.rows import empty_rows
 
 SIZE = 40
@@ -76,13 +76,13 @@ def test_misfit_is_the_worst_believed_row_in_units_of_its_noise(believed):
 
 def test_expected_noise_is_the_innovations_covariance():
     rows, covariance, noise = case()
-    gains = np.empty((32, SIZE))
-    spread(rows, covariance, gains)
+    out = np.empty((len(SIZES), 3))
+    expected_noise(rows, covariance, out)
     jacobian = rows.jacobian[:sum(SIZES)]
     total = jacobian @ covariance @ jacobian.T + noise
     for observation, size in enumerate(SIZES):
         row = rows.first[observation]
         expected = total[row:row + size, row:row + size]
-        uu, uv, vv = expected_noise(rows, gains, observation)
+        uu, uv, vv = out[observation]
         assert uu == pytest.approx(expected[0, 0])
         assert (uv, vv) == (pytest.approx((expected[0, 1], expected[1, 1])) if size == 2 else (0.0, 1.0))

@@ -1,0 +1,62 @@
+"""Sums of weighted rows: what the covariance's algebra consists of, done so that the processor's vector units can."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@njit(cache=True, fastmath={"contract"})
+def add_rows(target: Array, weights: Array, rows: Array, chosen: Indices, first: int) -> None:
+    """Add to `target` (N - first,) the rows chosen (K,) of `rows` (R, N), from column `first` on, times their `weights`
+    (K,).
+
+    Four rows at once: the target is read and written once for them, and slices begin at zero, because a loop from
+    `first` on would be compiled with a test for negative indices, and so number by number.
+    """
+    size, count, k = target.shape[0], chosen.shape[0], 0
+    while k + 4 <= count:
+        a, b, c, d = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
+        row_a, row_b = rows[chosen[k], first:], rows[chosen[k + 1], first:]
+        row_c, row_d = rows[chosen[k + 2], first:], rows[chosen[k + 3], first:]
+        for j in range(size):
+            target[j] += a * row_a[j] + b * row_b[j] + c * row_c[j] + d * row_d[j]
+        k += 4
+    while k < count:
+        a, row_a = weights[k], rows[chosen[k], first:]
+        for j in range(size):
+            target[j] += a * row_a[j]
+        k += 1
+
+
+@njit(cache=True, fastmath={"contract", "reassoc"})
+def dot(a: Array, b: Array) -> float:
+    """The product of two vectors, summed up in any order."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True)
+def add_squares(matrix: Array, rows: Array, count: int, sign: float) -> None:
+    """Add to a symmetric `matrix` (N, N) sign G^T G, G being the first `count` of `rows` (R, N); leaves it symmetric to
+    the last bit."""
+    size, chosen, weights = matrix.shape[0], np.arange(count), np.empty(count)
+    for i in range(size):
+        for k in range(count):
+            weights[k] = sign * rows[k, i]
+        add_rows(matrix[i, i:], weights, rows, chosen, i)
+    mirror(matrix)
+
+
+@njit(cache=True)
+def mirror(matrix: Array) -> None:
+    """Copy what is above the diagonal of a square matrix below it."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            matrix[i, j] = matrix[j, i]
