@@ -13,12 +13,14 @@ from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, SCALE, Estimate
-from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers, project_marker
+from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
+from rhot_app.tracking.locate import locate_all
+from rhot_app.tracking.sights import Seen, bring_together, seen_clearly
 from rhot_app.tracking.state import Knowledge
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
-Times = NDArray[np.int64]
+Indices = NDArray[np.int64]
 
 _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED), int(Knowledge.GUESSED)
 
@@ -34,12 +36,15 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 
 
 class Report(NamedTuple):
-    """Arrays of one state, filled by `describe`; fields as in `HandState`. `points` (26, 3): joints, then tips."""
+    """Arrays of one state, filled by `describe`; M markers, fields as in `HandState`."""
 
-    points: Array
+    points: Array  # (26, 3) m: joints, then tips
     covariances: Array  # (26, 3, 3)
     markers: Array
     marker_covariances: Array
+    marker_knowledge: Codes
+    raw: Array
+    errors: Array
     angle_sd: Array
     joint_knowledge: Codes
     angle_knowledge: Codes
@@ -49,37 +54,63 @@ class Report(NamedTuple):
 def empty_report(markers: int) -> Report:
     """Room for one state."""
     return Report(np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((markers, 3)), np.empty((markers, 3, 3)),
-                  np.empty(21), np.empty(21, np.uint8), np.empty(21, np.uint8), np.empty(1, np.uint8))
+                  np.empty(markers, np.uint8), np.empty((markers, 3)), np.empty(markers), np.empty(21),
+                  np.empty(21, np.uint8), np.empty(21, np.uint8), np.empty(1, np.uint8))
 
 
 @njit(cache=True)
-def describe(estimate: Estimate, dh: DhArrays, worn: Worn, seen: NDArray[np.bool_], knowledge: Codes,
-             report: Report) -> None:
-    """Fill `report` and `knowledge` (M,). `seen` (M,): seen beyond doubt by two cameras or more, just now."""
+def describe(estimate: Estimate, dh: DhArrays, worn: Worn, cameras: Cameras, focal: Array, shapes: Array, seen: Seen,
+             fresh_ns: int, t_ns: int, report: Report) -> bool:
+    """Fill `report` of the hand at `t_ns`; returns whether all markers are measured.
+
+    `dh` has the hand's 26 points; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in `RigArrays`; sights that are older
+    than `fresh_ns` are not of now. One call for all that is told of a state: each costs some microseconds.
+    """
     count = worn.part.shape[0]
-    jacobian = np.empty((26, 3, POSE))
+    jacobian = np.empty((count, 3, POSE))
+    place_markers(worn, estimate, report.markers, jacobian)
+    _locate(estimate, worn, cameras, focal, shapes, jacobian, seen, fresh_ns, t_ns, report)
+    _cover_all(estimate, jacobian, report.markers, report.marker_covariances)
+    _place_points(estimate, dh, report)
+    all_measured = True
+    for m in range(count):
+        report.marker_knowledge[m] = _know(_worst(report.marker_covariances[m]),
+                                           seen_clearly(seen, t_ns, fresh_ns, m), MEASURED_M, INFERRED_M)
+        all_measured &= report.marker_knowledge[m] == _MEASURED
+    _conclude(estimate, worn, report)
+    return all_measured
+
+
+@njit(cache=True)
+def _locate(estimate: Estimate, worn: Worn, cameras: Cameras, focal: Array, shapes: Array, jacobian: Array, seen: Seen,
+            fresh_ns: int, t_ns: int, report: Report) -> None:
+    """Where the sights alone have the markers: they are of several instants, and the hand says how it moved since."""
+    shape = seen.times.shape
+    pixels, used = np.empty((shape[0], shape[1], 2)), np.empty(shape, np.bool_)
+    bring_together(worn, cameras, estimate, report.markers, jacobian, t_ns, seen, fresh_ns, pixels, used)
+    locate_all(pixels, seen.covariances, used, cameras.intrinsics, cameras.pose, focal, shapes, report.raw,
+               np.empty((shape[1], 3, 3)), report.errors)
+
+
+@njit(cache=True)
+def _place_points(estimate: Estimate, dh: DhArrays, report: Report) -> None:
+    """The joints and fingertips, with covariances."""
+    points, world = report.points, estimate.world
+    jacobian, frames = np.empty((points.shape[0], 3, POSE)), np.empty((dh.parent.shape[0], 3, 4))
     scale = math.exp(estimate.log_scale[0])
-    frames = np.empty((dh.parent.shape[0], 3, 4))
-    forward_arrays(dh, estimate.world, estimate.angles, frames, report.points)
-    jacobian_arrays(dh, estimate.world, frames, report.points, jacobian)
+    forward_arrays(dh, world, estimate.angles, frames, points)
+    jacobian_arrays(dh, world, frames, points, jacobian)
     if scale != 1.0:
-        for p in range(26):
+        for p in range(points.shape[0]):
             for i in range(3):
-                report.points[p, i] = estimate.world[i, 3] + scale * (report.points[p, i] - estimate.world[i, 3])
+                points[p, i] = world[i, 3] + scale * (points[p, i] - world[i, 3])
                 for j in range(ROTATION, POSE):
                     jacobian[p, i, j] *= scale
-    for p in range(26):
-        _cover(estimate, jacobian[p], report.points[p], report.covariances[p])
-    marker_jacobian = np.empty((count, 3, POSE))
-    place_markers(worn, estimate, report.markers, marker_jacobian)
-    for m in range(count):
-        _cover(estimate, marker_jacobian[m], report.markers[m], report.marker_covariances[m])
-        knowledge[m] = _know(_worst(report.marker_covariances[m]), seen[m], MEASURED_M, INFERRED_M)
-    _conclude(estimate, worn, knowledge, report)
+    _cover_all(estimate, jacobian, points, report.covariances)
 
 
 @njit(cache=True)
-def _conclude(estimate: Estimate, worn: Worn, knowledge: Codes, report: Report) -> None:
+def _conclude(estimate: Estimate, worn: Worn, report: Report) -> None:
     """What is measured, the images alone determine; what they determine through habit is inferred, however well.
 
     A fingertip needs its marker, an inner joint two markers on its finger, a palm's rotation three on the palm, an
@@ -87,7 +118,7 @@ def _conclude(estimate: Estimate, worn: Worn, knowledge: Codes, report: Report) 
     """
     shown = np.zeros(6, np.int64)  # markers measured on the palm, then on each finger
     for m in range(worn.part.shape[0]):
-        shown[worn.part[m] + 1] += knowledge[m] == _MEASURED
+        shown[worn.part[m] + 1] += report.marker_knowledge[m] == _MEASURED
     turn = shown[0] >= 3
     for joint in range(21):
         finger = _FINGER_OF_JOINT[joint]
@@ -117,57 +148,44 @@ def _worst(covariance: Array) -> float:
 
 
 @njit(cache=True)
-def _cover(estimate: Estimate, jacobian: Array, point: Array, out: Array) -> None:
-    """Fill `out` (3, 3) m^2 with the covariance of a point with `jacobian` (3, 27); zeros cost nothing."""
-    chosen, count = np.empty(POSE + 1, np.int64), 0
-    slopes = np.empty((POSE + 1, 3))
-    for j in range(POSE):
-        if jacobian[0, j] != 0.0 or jacobian[1, j] != 0.0 or jacobian[2, j] != 0.0:
-            chosen[count] = j
-            slopes[count] = jacobian[:, j]
+def _cover_all(estimate: Estimate, jacobian: Array, points: Array, out: Array) -> None:
+    """Fill `out` (P, 3, 3) m^2 with the covariances of `points` (P, 3) m with `jacobian` (P, 3, 27)."""
+    columns, slopes = np.empty(POSE + 1, np.int64), np.empty((POSE + 1, 3))
+    scaled = estimate.covariance[SCALE, SCALE] > 0.0
+    for p in range(points.shape[0]):
+        count = 0
+        for j in range(POSE):  # zeros cost nothing
+            x, y, z = jacobian[p, 0, j], jacobian[p, 1, j], jacobian[p, 2, j]
+            if x != 0.0 or y != 0.0 or z != 0.0:
+                columns[count] = j
+                slopes[count, 0], slopes[count, 1], slopes[count, 2] = x, y, z
+                count += 1
+        if scaled:
+            columns[count] = SCALE
+            for i in range(3):
+                slopes[count, i] = points[p, i] - estimate.world[i, 3]
             count += 1
-    if estimate.covariance[SCALE, SCALE] > 0.0:
-        chosen[count] = SCALE
-        for i in range(3):
-            slopes[count, i] = point[i] - estimate.world[i, 3]
-        count += 1
-    out[:] = 0.0
-    for a in range(count):
-        x, y, z = 0.0, 0.0, 0.0
-        row = estimate.covariance[chosen[a]]
-        for b in range(count):
-            p = row[chosen[b]]
-            x += p * slopes[b, 0]
-            y += p * slopes[b, 1]
-            z += p * slopes[b, 2]
-        for i in range(3):
-            out[i, 0] += slopes[a, i] * x
-            out[i, 1] += slopes[a, i] * y
-            out[i, 2] += slopes[a, i] * z
+        _cover(estimate.covariance, columns[:count], slopes, out[p])
 
 
 @njit(cache=True)
-def bring_together(worn: Worn, cameras: Cameras, estimate: Estimate, t_ns: int, times: Times, fresh_ns: int,
-                   pixels: Array, out: Array, used: NDArray[np.bool_]) -> None:
-    """Fill `out` (C, M, 2) px: each camera's last sight of each marker, carried to `t_ns` as the hand moved since.
-
-    `times` (C, M) ns of the sights `pixels` (C, M, 2); those older than `fresh_ns` are NaN and not `used` (C, M).
-    """
-    count = worn.part.shape[0]
-    points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
-    place_markers(worn, estimate, points, jacobian)
-    pixel, slope = np.empty(2), np.empty((2, 3))
-    for c in range(times.shape[0]):
-        for m in range(count):
-            used[c, m] = times[c, m] >= 0 and abs(t_ns - times[c, m]) <= fresh_ns and project_marker(
-                points[m], estimate.world, worn.half_axes[m], cameras.pose[c], cameras.intrinsics[c], pixel, slope)
-            out[c, m] = np.nan
-            if not used[c, m]:
-                continue
-            out[c, m] = pixels[c, m]
-            for i in range(3):
-                speed = 0.0
-                for j in range(POSE):
-                    speed += jacobian[m, i, j] * estimate.velocity[j]
-                for k in range(2):
-                    out[c, m, k] += slope[k, i] * speed * 1e-9 * (t_ns - times[c, m])
+def _cover(covariance: Array, columns: Indices, slopes: Array, out: Array) -> None:
+    """Fill `out` (3, 3) with the covariance of what changes by `slopes` (K, 3) per number of the state in `columns`."""
+    xx = xy = xz = yy = yz = zz = 0.0
+    for a in range(columns.shape[0]):
+        x = y = z = 0.0
+        for b in range(columns.shape[0]):
+            p = covariance[columns[a], columns[b]]
+            x += p * slopes[b, 0]
+            y += p * slopes[b, 1]
+            z += p * slopes[b, 2]
+        xx += slopes[a, 0] * x
+        xy += slopes[a, 0] * y
+        xz += slopes[a, 0] * z
+        yy += slopes[a, 1] * y
+        yz += slopes[a, 1] * z
+        zz += slopes[a, 2] * z
+    out[0, 0], out[1, 1], out[2, 2] = xx, yy, zz
+    out[0, 1] = out[1, 0] = xy
+    out[0, 2] = out[2, 0] = xz
+    out[1, 2] = out[2, 1] = yz

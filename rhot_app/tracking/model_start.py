@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.geometry.transforms import fit_rigid
@@ -59,12 +62,10 @@ class Starter:
 
     def _locate(self, paired: Paired) -> Array:
         """(M, 3) m, NaN where not located."""
-        rig, count = self._rig, len(self._rig.marker_ids)
-        used = np.empty((len(rig.cameras), count), np.bool_)
-        positions, covariances = np.empty((count, 3)), np.empty((count, 3, 3))
-        choose_views(paired.flags, paired.live, used, np.empty(count, np.bool_))
-        locate_all(paired.pixels, paired.covariances, used, rig.intrinsics, rig.cameras, rig.focal, rig.shapes,
-                   positions, covariances, np.empty(count))
+        rig = self._rig
+        positions = np.empty((len(rig.marker_ids), 3))
+        _locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
+                      rig.focal, rig.shapes, positions)
         return positions
 
     def pose_of(self, markers: Array) -> HandPose | None:
@@ -85,3 +86,23 @@ class Starter:
             return None
         fit = fit_palm(self._wearing.model, wrist, tips, None, 0.0)
         return None if fit is None else fit.pose
+
+
+@njit(cache=True)
+def _locate_clear(flags: NDArray[np.int64], live: NDArray[np.bool_], pixels: Array, covariances: Array,
+                  intrinsics: Array, cameras: Array, focal: Array, shapes: Array, positions: Array) -> None:
+    """Fill `positions` (M, 3) m of one instant; arrays as in `Paired` and `RigArrays`."""
+    used, count = np.empty(flags.shape, np.bool_), positions.shape[0]
+    choose_views(flags, live, used, np.empty(count, np.bool_))
+    locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, positions, np.empty((count, 3, 3)),
+               np.empty(count))
+
+
+@njit(cache=True)
+def count_apart(one: Array, other: Array, allowed_m: float) -> int:
+    """How many points of `one` (M, 3) m are farther from those of `other` than allowed; NaN is not."""
+    count = 0
+    for m in range(one.shape[0]):
+        x, y, z = one[m, 0] - other[m, 0], one[m, 1] - other[m, 1], one[m, 2] - other[m, 2]
+        count += math.sqrt(x * x + y * y + z * z) > allowed_m
+    return count

@@ -7,6 +7,7 @@ shape and habits tell, with the covariance that says how well that is.
 
 from __future__ import annotations
 
+import math
 import time
 
 import numpy as np
@@ -15,15 +16,14 @@ from numpy.typing import NDArray
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
-from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, copy_estimate, empty_estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
-from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline
+from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline, copy_whole
 from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.locate import locate_all
-from rhot_app.tracking.model_output import bring_together, describe, empty_report
-from rhot_app.tracking.model_start import Starter
+from rhot_app.tracking.model_output import describe, empty_report
+from rhot_app.tracking.model_start import Starter, count_apart
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.sights import Sights
 from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
@@ -105,7 +105,7 @@ class ModelTracker:
                      key=lambda frame: frame.t_receive_ns, default=None)
         if not self._tracking or newest is None:
             return None
-        copy_estimate(self._hand.estimate, self._ahead)
+        copy_whole(self._hand.estimate, self._ahead)
         ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
         predict(self._ahead, ahead, self._wearing.worn.part, self._wearing.habits, self._wearing.bias_variance)
         return self._describe(self._ahead, self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
@@ -146,10 +146,9 @@ class ModelTracker:
         if found is None:
             return
         t_ns, located = found
-        speed = float(np.linalg.norm(self._hand.estimate.velocity[:3]))
+        speed = math.hypot(*self._hand.estimate.velocity[:3].tolist())
         allowed = _APART_M + speed * 1e-9 * abs(self._timeline.t_ns - t_ns)
-        off = np.linalg.norm(located - estimated, axis=1)
-        self._apart = self._apart + 1 if np.count_nonzero(off > allowed) >= _APART_MARKERS else 0
+        self._apart = self._apart + 1 if count_apart(located, estimated, allowed) >= _APART_MARKERS else 0
         if self._apart >= _APART_STATES:
             pose = self._starter.pose_of(located)
             if pose is not None:
@@ -191,8 +190,7 @@ class ModelTracker:
 
     def _learn(self, block: MarkerBlock, outcome: Outcome) -> None:
         """Note what was believed of a frame."""
-        believed = int(np.count_nonzero(outcome.believed))
-        self._sights.believe(block, outcome)
+        believed = self._sights.believe(block, outcome)
         if believed:
             self._believed_ns = max(self._believed_ns, block.t_ns)
         if 2 * believed >= block.sights:
@@ -204,39 +202,30 @@ class ModelTracker:
         return self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
 
     def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
-        wearing, rig = self._wearing, self._rig
-        cameras, markers = len(rig.camera_names), len(rig.marker_ids)
-        pixels, used = np.empty((cameras, markers, 2)), np.empty((cameras, markers), np.bool_)
-        raw, raw_covariances, errors = np.empty((markers, 3)), np.empty((markers, 3, 3)), np.empty(markers)
-        solved = time.perf_counter()
-        bring_together(wearing.worn, wearing.cameras, estimate, t_ns, self._sights.times, self._sights.fresh_ns,
-                       self._sights.pixels, pixels, used)
-        locate_all(pixels, self._sights.covariances, used, rig.intrinsics, rig.cameras, rig.focal, rig.shapes, raw,
-                   raw_covariances, errors)
-        located = time.perf_counter()
-        knowledge, report = np.empty(markers, np.uint8), empty_report(markers)
-        describe(estimate, wearing.model.dh, wearing.worn, self._sights.clear(t_ns), knowledge, report)
+        wearing, rig, sights = self._wearing, self._rig, self._sights
+        solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
+        complete = describe(estimate, wearing.model.dh, wearing.worn, wearing.cameras, rig.focal, rig.shapes,
+                            sights.seen, sights.fresh_ns, t_ns, report)
         if estimate is self._hand.estimate:
             self._compare(report.markers)
-        seen_pixels, seen_flags = self._sights.last_seen()
+        seen_pixels, seen_flags = sights.last_seen()
         self._sequence += 1
         return HandState(
             sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
-            condition=Condition.TRACKING if (knowledge == Knowledge.MEASURED).all() else Condition.PARTIAL,
-            marker_ids=rig.marker_ids, marker_positions=report.markers, marker_raw_positions=raw,
-            marker_covariances=report.marker_covariances, marker_knowledge=knowledge, camera_names=rig.camera_names,
-            camera_pixels=seen_pixels, camera_flags=seen_flags, joint_positions=report.points[:21],
-            joint_knowledge=report.joint_knowledge, fingertip_positions=report.points[21:],
-            angles=estimate.angles.copy(), angle_knowledge=report.angle_knowledge,
-            world_from_palm=estimate.world.copy(), palm_knowledge=Knowledge(int(report.palm[0])),
-            epipolar_error_px=errors, joint_covariances=report.covariances[:21],
-            fingertip_covariances=report.covariances[21:], angle_sd=report.angle_sd,
-            palm_covariance=estimate.covariance[:ANGLES, :ANGLES].copy(),
-            hand_scale=float(np.exp(estimate.log_scale[0])),
-            hand_scale_sd=float(np.sqrt(max(estimate.covariance[SCALE, SCALE], 0.0))),
-            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0,
-                       "triangulate": located - solved, "filter": solved - begun,
-                       "solve": time.perf_counter() - located})
+            condition=Condition.TRACKING if complete else Condition.PARTIAL, marker_ids=rig.marker_ids,
+            marker_positions=report.markers, marker_raw_positions=report.raw,
+            marker_covariances=report.marker_covariances, marker_knowledge=report.marker_knowledge,
+            camera_names=rig.camera_names, camera_pixels=seen_pixels, camera_flags=seen_flags,
+            joint_positions=report.points[:21], joint_knowledge=report.joint_knowledge,
+            fingertip_positions=report.points[21:], angles=estimate.angles.copy(),
+            angle_knowledge=report.angle_knowledge, world_from_palm=estimate.world.copy(),
+            palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors,
+            joint_covariances=report.covariances[:21], fingertip_covariances=report.covariances[21:],
+            angle_sd=report.angle_sd, palm_covariance=estimate.covariance[:ANGLES, :ANGLES].copy(),
+            hand_scale=math.exp(estimate.log_scale[0]),
+            hand_scale_sd=math.sqrt(max(estimate.covariance[SCALE, SCALE], 0.0)),
+            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
+                       "filter": solved - begun, "solve": time.perf_counter() - solved})
 
     def _nothing(self, newest: CameraObservations, begun: float) -> HandState:
         """No hand: what the cameras see is all there is to tell."""

@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.tracking.kalman.estimate import POSE, Estimate
 from rhot_app.tracking.kalman.hand_filter import Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint16]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 _SAME_FRAME_NS = 1_000_000
 _RECENT = 12
 _PERIODS = 1.5
 _SLOWEST_NS = 400_000_000
+_LOST = int(MarkerFlag.LOST)
+
+
+class Seen(NamedTuple):
+    """The last believed sight of each of M markers by each of C cameras: `times` (C, M) ns, -1 for never; `pixels`
+    (C, M, 2) raw px with `covariances` (C, M, 2, 2); `doubtful` (C, M), for what its flags say."""
+
+    times: Indices
+    pixels: Array
+    covariances: Array
+    doubtful: Mask
 
 
 class Sights:
-    """C cameras, M markers. `times` (C, M) ns, -1 for never, `pixels` (C, M, 2) and `covariances` (C, M, 2, 2) of the
-    last believed sight of each marker; `fresh_ns`: how old one may be that counts as of now."""
+    """C cameras, M markers. `seen`: what was believed; `fresh_ns`: how old a sight may be that counts as of now;
+    `newest`: each camera's newest frame."""
 
     def __init__(self, cameras: int, markers: int) -> None:
         self._shape = (cameras, markers)
@@ -30,17 +48,18 @@ class Sights:
 
     def reset(self) -> None:
         """Forget all."""
-        self.times = np.full(self._shape, -1, np.int64)
-        self.pixels = np.full((*self._shape, 2), np.nan)
-        self.covariances = np.ones((*self._shape, 2, 2)) * np.eye(2)
+        self.seen = Seen(np.full(self._shape, -1, np.int64), np.full((*self._shape, 2), np.nan),
+                         np.ones((*self._shape, 2, 2)) * np.eye(2), np.zeros(self._shape, np.bool_))
         self.fresh_ns = 60_000_000
         self.newest: list[CameraObservations | None] = [None] * self._shape[0]
-        self._doubtful = np.zeros(self._shape, np.bool_)
+        self._newest_pixels = np.full((*self._shape, 2), np.nan)
+        self._newest_flags = np.full(self._shape, _LOST, np.uint16)
         self._blocks: list[MarkerBlock] = []
 
     def enter(self, block: MarkerBlock) -> bool:
         """Take a frame in; False when it is there already."""
-        camera, begin = block.observations.camera, block.observations.t_row0_master_ns
+        observations = block.observations
+        camera, begin = observations.camera, observations.t_row0_master_ns
         for other in self._blocks:
             if (other.observations.camera == camera
                     and abs(other.observations.t_row0_master_ns - begin) < _SAME_FRAME_NS):
@@ -51,36 +70,80 @@ class Sights:
             if last is not None and 0 < begin - last.t_row0_master_ns < _SLOWEST_NS:
                 period = _PERIODS * (begin - last.t_row0_master_ns)
                 self.fresh_ns += round(0.1 * (period - self.fresh_ns))
-            self.newest[camera] = block.observations
+            self.newest[camera] = observations
+            self._newest_pixels[camera], self._newest_flags[camera] = observations.pixels, observations.flags
         return True
 
     def recent(self, since_ns: int) -> list[MarkerBlock]:
         """The frames of the last moments that are not earlier than `since_ns`, in the order of time."""
         return sorted((block for block in self._blocks if block.t_ns >= since_ns), key=lambda block: block.t_ns)
 
-    def believe(self, block: MarkerBlock, outcome: Outcome) -> None:
-        """Note which sights of a frame were believed, under the names that the hand gave them."""
-        frame, camera = block.frame, block.observations.camera
-        sights = outcome.source[outcome.believed, 1]
-        markers = frame.label[sights]
-        times = block.t_ns + (1e9 * frame.late_s[sights]).astype(np.int64)
-        newer = times >= self.times[camera, markers]
-        sights, markers = sights[newer], markers[newer]
-        self.times[camera, markers] = times[newer]
-        self.pixels[camera, markers] = frame.pixels[sights]
-        self.covariances[camera, markers] = frame.covariances[sights]
-        self._doubtful[camera, markers] = (block.observations.flags[sights] & DOUBTFUL) != 0
-
-    def clear(self, t_ns: int) -> NDArray[np.bool_]:
-        """(M,) markers that two cameras or more see beyond doubt, just now."""
-        fresh = (self.times >= 0) & (np.abs(t_ns - self.times) <= self.fresh_ns) & ~self._doubtful
-        return np.asarray(fresh.sum(axis=0) >= 2)
+    def believe(self, block: MarkerBlock, outcome: Outcome) -> int:
+        """Note which sights of a frame were believed, under the names that the hand gave them; returns how many."""
+        return int(_believe(self.seen, block.frame, block.observations.flags, block.t_ns, outcome.believed,
+                            outcome.source))
 
     def last_seen(self) -> tuple[Array, Flags]:
         """(C, M, 2) px of each camera's newest frame, NaN where lost, and (C, M) its flags."""
-        pixels = np.full((*self._shape, 2), np.nan)
-        flags = np.full(self._shape, int(MarkerFlag.LOST), np.uint16)
-        for camera, frame in enumerate(self.newest):
-            if frame is not None:
-                pixels[camera], flags[camera] = frame.pixels, frame.flags
-        return pixels, flags
+        return self._newest_pixels.copy(), self._newest_flags.copy()
+
+
+@njit(cache=True)
+def _believe(seen: Seen, frame: Frame, flags: Flags, t_ns: int, believed: Mask, source: Indices) -> int:
+    """Enter a frame of `t_ns` into `seen`; `flags` (M,) of its sights, `believed` and `source` as in `Outcome`."""
+    camera, count = frame.camera[0], 0
+    for observation in range(believed.shape[0]):
+        if not believed[observation]:
+            continue
+        count += 1
+        sight = source[observation, 1]
+        marker = frame.label[sight]
+        time_ns = t_ns + int(1e9 * frame.late_s[sight])
+        if time_ns >= seen.times[camera, marker]:
+            seen.times[camera, marker] = time_ns
+            for i in range(2):
+                seen.pixels[camera, marker, i] = frame.pixels[sight, i]
+                for j in range(2):
+                    seen.covariances[camera, marker, i, j] = frame.covariances[sight, i, j]
+            seen.doubtful[camera, marker] = (flags[sight] & DOUBTFUL) != 0
+    return count
+
+
+@njit(cache=True)
+def seen_clearly(seen: Seen, t_ns: int, fresh_ns: int, marker: int) -> bool:
+    """Whether two cameras or more see a marker beyond doubt at `t_ns`, by sights no older than `fresh_ns`."""
+    count = 0
+    for c in range(seen.times.shape[0]):
+        count += is_fresh(seen, t_ns, fresh_ns, c, marker) and not seen.doubtful[c, marker]
+    return count >= 2
+
+
+@njit(cache=True)
+def is_fresh(seen: Seen, t_ns: int, fresh_ns: int, camera: int, marker: int) -> bool:
+    """Whether a sight counts as of `t_ns`."""
+    return bool(seen.times[camera, marker] >= 0 and abs(t_ns - seen.times[camera, marker]) <= fresh_ns)
+
+
+@njit(cache=True)
+def bring_together(worn: Worn, cameras: Cameras, estimate: Estimate, points: Array, jacobian: Array, t_ns: int,
+                   seen: Seen, fresh_ns: int, out: Array, used: Mask) -> None:
+    """Fill `out` (C, M, 2) px: each camera's last sight of each marker, carried to `t_ns` as the hand moved since.
+
+    `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them. Sights older than `fresh_ns` are NaN and
+    not `used` (C, M).
+    """
+    pixel, slope, speed = np.empty(2), np.empty((2, 3)), np.empty(3)
+    for m in range(points.shape[0]):
+        for i in range(3):
+            speed[i] = 0.0
+            for j in range(POSE):
+                speed[i] += jacobian[m, i, j] * estimate.velocity[j]
+        for c in range(out.shape[0]):
+            used[c, m] = is_fresh(seen, t_ns, fresh_ns, c, m) and project_marker(
+                points[m], estimate.world, worn.half_axes[m], cameras.pose[c], cameras.intrinsics[c], pixel, slope)
+            elapsed_s = 1e-9 * (t_ns - seen.times[c, m])
+            for k in range(2):
+                out[c, m, k] = np.nan
+                if used[c, m]:
+                    shift = slope[k, 0] * speed[0] + slope[k, 1] * speed[1] + slope[k, 2] * speed[2]
+                    out[c, m, k] = seen.pixels[c, m, k] + shift * elapsed_s

@@ -5,9 +5,10 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Protocol
 
-from rhot_app.tracking.kalman.estimate import Estimate, copy_estimate, empty_estimate
+from rhot_app.tracking.kalman.estimate import Estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.rows import ResidualBlock
 
@@ -34,6 +35,15 @@ class _Moment:
     block: TimedBlock
 
 
+_INSTANT = attrgetter("t_ns")
+
+
+def copy_whole(source: Estimate, target: Estimate) -> None:
+    """Copy every array of `source` into `target`: the covariance, 80 KB, goes as one block of memory."""
+    for one, other in zip(source, target, strict=True):
+        other[...] = one
+
+
 class Timeline:
     """Feeds a filter in the order of time, whatever the order of arrival."""
 
@@ -52,13 +62,13 @@ class Timeline:
 
     def add(self, block: TimedBlock) -> list[tuple[TimedBlock, Outcome]]:
         """Weigh a block, and once more all that are later than it. Returns what became of each; empty: too late."""
-        place = bisect_right([moment.t_ns for moment in self._moments], block.t_ns)
+        place = bisect_right(self._moments, block.t_ns, key=_INSTANT)
         if block.t_ns < (self._moments[0].before_ns if self._moments else self.t_ns):
             self.dropped += 1
             return []
         again: Sequence[_Moment] = self._moments[place:]
         if again:
-            copy_estimate(again[0].before, self._hand.estimate)
+            copy_whole(again[0].before, self._hand.estimate)
             self.t_ns = again[0].before_ns
             del self._moments[place:]
         outcomes = [(block, self._weigh(block))]
@@ -70,7 +80,7 @@ class Timeline:
     def _weigh(self, block: TimedBlock) -> Outcome:
         estimate = self._hand.estimate
         before = self._spare.pop() if self._spare else empty_estimate(*estimate.unseen.shape)
-        copy_estimate(estimate, before)
+        copy_whole(estimate, before)
         self._moments.append(_Moment(block.t_ns, self.t_ns, before, block))
         if len(self._moments) > LENGTH:
             self._spare.append(self._moments.pop(0).before)

@@ -1,10 +1,10 @@
 """Frames that arrive in another order than they were taken."""
 
 import numpy as np
-from known_hand import blocks, difference, filter_of_hand, moving_estimate, settled, twin
+from known_hand import blocks, difference, empty, filter_of_hand, moving_estimate, settled, twin
 
 from rhot_app.tracking.kalman.estimate import copy_estimate
-from rhot_app.tracking.kalman.timeline import LENGTH, Timeline
+from rhot_app.tracking.kalman.timeline import LENGTH, Timeline, copy_whole
 
 
 def follow(frames):
@@ -57,3 +57,13 @@ def test_a_new_beginning_forgets_the_past():
     timeline.begin(frames[12].t_ns)
     assert timeline.add(frames[5]) == [] and timeline.dropped == 1
     assert len(timeline.add(frames[13])) == 1
+
+
+def test_what_is_remembered_is_whole_and_its_own():
+    estimate, other = moving_estimate(), empty()
+    for array in estimate:
+        array += 1 if array.dtype == np.int64 else 0.01
+    copy_whole(estimate, other)
+    for field, source, target in zip(estimate._fields, estimate, other, strict=True):
+        np.testing.assert_array_equal(source, target, err_msg=field)
+        assert not np.shares_memory(source, target)
