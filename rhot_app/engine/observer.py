@@ -16,7 +16,7 @@ from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
 from rhot_app.sources.receiver import RECEIVE_BUFFER
 from rhot_app.sources.source import ObservationSource
-from rhot_app.tracking.state import Condition
+from rhot_app.tracking.state import Condition, HandState
 
 _SUMMARY_NS = 500_000_000  # sorting the latencies is the dearest part of a status
 
@@ -68,8 +68,9 @@ class Observer:
         state, rate_hz = self._pipeline.last_state, self._pipeline.states.rate_hz(now_ns)
         if state is None or rate_hz == 0.0:
             return Condition.LOST if self._ever_tracked else Condition.SEARCHING
-        self._ever_tracked |= state.condition is Condition.TRACKING
-        return state.condition
+        condition = condition_of(state)
+        self._ever_tracked |= condition is Condition.TRACKING
+        return condition
 
     def _advice(self, nodes: tuple[NodeStatus, ...], running: bool, now_ns: int) -> list[Advice]:
         facts = [self._facts(camera, status, now_ns) for camera, status in enumerate(nodes)]
@@ -93,3 +94,11 @@ class Observer:
             buffer_bytes=None if receiver is None else receiver.buffer_bytes, wanted_buffer_bytes=RECEIVE_BUFFER,
             unseen_s=unseen_s.tolist(), streams_elsewhere=link.streams_elsewhere,
             not_started_s=link.not_started_s(now_ns))
+
+
+def condition_of(state: HandState) -> Condition:
+    """One word for a state of one hand or two: partial when only one of two hands is there."""
+    if state.other is None or state.other.condition is state.condition:
+        return state.condition
+    both = {state.condition, state.other.condition}
+    return Condition.PARTIAL if both & {Condition.TRACKING, Condition.PARTIAL} else Condition.LOST
