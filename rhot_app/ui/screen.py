@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QSplitter
 from rhot_app.project import Rig
 from rhot_app.tracking.state import Condition
 from rhot_app.ui.backend.live import SILENCE_S, Live
+from rhot_app.ui.models.hands import each_hand
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.camera_panel import CameraPanel
@@ -73,7 +74,7 @@ class Screen:
         for plot in self.all_plots:
             plot.begin_anew()
         self.nodes.show_status(None)
-        self.hand.show_state(None)
+        self.hand.show_rig(rig)
         self._drawn_state = self._drawn_preview = self._framed_session = -1
         self._state_seen_at = 0.0
 
@@ -110,9 +111,10 @@ class Screen:
             self._state_seen_at = 0.0
 
     def _frame_once(self, live: Live) -> None:
-        """Go near the hand the first time that all of it is tracked after a start."""
+        """Go near the hands the first time that all of them are tracked after a start."""
         session = live.status.session if live.status is not None else 0
-        if session != self._framed_session and live.state is not None and live.state.condition is Condition.TRACKING:
+        hands = each_hand(live.state)
+        if session != self._framed_session and hands and all(hand.condition is Condition.TRACKING for hand in hands):
             self._framed_session = session
             self.scene.frame_first()
 

@@ -1,4 +1,4 @@
-"""The hand's joint angles as a table, each with how and how well it is known, and the palm."""
+"""A hand's joint angles as a table, each with how and how well it is known, and the palm."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from PySide6.QtGui import QBrush, QColor, QPainter
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
+from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.ui.models.glossary import tip
+from rhot_app.ui.models.hands import hand_names
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, angle_text, palm_text
 from rhot_app.ui.models.tracker_words import scale_text, size_known
 from rhot_app.ui.models.words import KNOWLEDGE
+from rhot_app.ui.panels.hand_choice import HandChoice
 from rhot_app.ui.shapes import ShapeMark
 
 FINGER_HEADS = (("spread", "abduction"), ("MCP", "MCP"), ("PIP", "PIP"), ("DIP", "DIP"))
@@ -56,7 +59,7 @@ class AngleCell(QLabel):
 
 
 class HandPanel(QWidget):
-    """Four fingers in one table, the thumb in another, and the key to how values are known."""
+    """Four fingers in one table, the thumb in another, and the key to how values are known; of two hands the chosen."""
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -64,6 +67,7 @@ class HandPanel(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("guide", "hand")
         self._scheme = scheme
+        self.choice = HandChoice(scheme)
         self.cells: list[AngleCell] = []
         self._grid = QGridLayout()
         self._grid.setHorizontalSpacing(2)
@@ -73,6 +77,7 @@ class HandPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 4, 8, 8)
         layout.setSpacing(6)
+        layout.addWidget(self.choice)
         layout.addLayout(self._grid)
         layout.addLayout(self._whole)
         layout.addLayout(self._key)
@@ -82,6 +87,7 @@ class HandPanel(QWidget):
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
         self._scheme = scheme
+        self.choice.set_scheme(scheme)
         for box in (self._grid, self._whole, self._key):
             while (item := box.takeAt(0)) is not None:
                 if (widget := item.widget()) is not None:
@@ -136,8 +142,15 @@ class HandPanel(QWidget):
             self._grid.addWidget(cell, row, column)
             self._grid.setColumnStretch(column, 1)
 
+    def show_rig(self, rig: Rig | None) -> None:
+        """Hands of another rig, of which nothing is known yet."""
+        self.choice.show_hands(hand_names(rig))
+        self.show_state(None)
+
     def show_state(self, state: HandState | None) -> None:
-        """The angles of `state`; None shows dashes."""
+        """The angles of `state`, of its other hand when that is chosen; None shows dashes."""
+        self.choice.show_state(state)
+        state = self.choice.chosen(state)
         for k, cell in enumerate(self.cells):
             if state is None:
                 cell.show_angle(math.nan, math.nan, Knowledge.UNKNOWN)

@@ -32,7 +32,7 @@ def camera_like(points: Array, up: Up) -> Array:
 
 
 def camera_like_state(state: HandState, up: Up) -> HandState:
-    """What the scene draws of `state`, in axes like the left camera's."""
+    """What the scene draws of `state` and of its other hand, in axes like the left camera's."""
     if up == "-y":
         return state
     turn = DISPLAY_FROM_RIG.T
@@ -44,7 +44,8 @@ def camera_like_state(state: HandState, up: Up) -> HandState:
                    fingertip_positions=camera_like(state.fingertip_positions, up),
                    marker_covariances=turn @ state.marker_covariances @ turn.T,
                    joint_covariances=turn @ state.joint_covariances @ turn.T,
-                   fingertip_covariances=turn @ state.fingertip_covariances @ turn.T)
+                   fingertip_covariances=turn @ state.fingertip_covariances @ turn.T,
+                   other=None if state.other is None else camera_like_state(state.other, up))
 
 
 def to_display(points: Array) -> Array:

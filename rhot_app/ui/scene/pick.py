@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.ui.models.hands import each_hand
 from rhot_app.ui.models.rows import position_text, short_name
 from rhot_app.ui.models.spread import sd_text, worst_sd
 from rhot_app.ui.models.words import KNOWLEDGE
@@ -38,12 +40,14 @@ class Spot:
         return "\n".join(lines)
 
 
-def spots(state: HandState) -> list[Spot]:
-    """Markers first, then the joints that no marker's middle stands for."""
+def spots(state: HandState, hands: Sequence[str] = ("",)) -> list[Spot]:
+    """Markers first, then the joints that no marker's middle stands for; `hands` are their names, "" for none."""
     found = [Spot(f"marker {short_name(name)}", Knowledge(int(state.marker_knowledge[k])), state.marker_positions[k],
                   state.marker_covariances[k]) for k, name in enumerate(state.marker_ids)]
-    found += [Spot(joint_name(JOINTS[k]), Knowledge(int(state.joint_knowledge[k])), state.joint_positions[k],
-                   state.joint_covariances[k]) for k in range(len(JOINTS)) if k not in TIPS]
+    for name, hand in zip(hands, each_hand(state), strict=False):  # the other hand is not there with every tracker
+        found += [Spot(f"{name} {joint_name(JOINTS[k])}".lstrip(), Knowledge(int(hand.joint_knowledge[k])),
+                       hand.joint_positions[k], hand.joint_covariances[k])
+                  for k in range(len(JOINTS)) if k not in TIPS]
     return [spot for spot in found if np.isfinite(spot.place).all()]
 
 

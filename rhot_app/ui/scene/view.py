@@ -1,4 +1,4 @@
-"""The scene's widget: hand, markers, cameras and floor; orbit, pan, zoom; F frames the hand, Home resets the view."""
+"""The scene's widget: hands, markers, cameras and floor; orbit, pan, zoom; F frames the hands, Home resets the view."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
+from rhot_app.ui.models.hands import each_hand, hand_names
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.scene import stage
@@ -32,6 +33,8 @@ _HOME_AZIMUTH_DEG = -62.0
 _HOME_ELEVATION_DEG = 20.0
 _FRAMED_DISTANCE_M = 0.42
 _FIRST_DISTANCE_M = 0.56  # with room around the hand for what it will do next
+_HAND_RADIUS_M = 0.12
+"""About the middle of a hand's joints; what reaches farther is looked at from so much farther away."""
 
 
 class SceneView(GLViewWidget):
@@ -70,13 +73,15 @@ class SceneView(GLViewWidget):
         self._rebuild()
 
     def show_rig(self, rig: Rig | None) -> None:
-        """Another rig: other cameras, markers and hand. None shows the empty floor."""
+        """Another rig: other cameras, markers and hands. None shows the empty floor."""
         self._rig = rig
         self._state = self._in_rig = None
         self._rebuild()
 
     def show_state(self, state: HandState | None) -> None:
-        """Pose hand and markers; None hides them."""
+        """Pose hands and markers; None hides them, and so does a state that came before its rig or after it."""
+        if state is not None and self._rig is not None and state.marker_ids != self._rig.markers.ids:
+            state = None
         self._in_rig = state
         self._state = None if state is None else camera_like_state(state, self._up)
         self._pose()
@@ -118,23 +123,25 @@ class SceneView(GLViewWidget):
         self.update()
 
     def frame_first(self) -> None:
-        """Go near the hand, unless somebody has moved the view since it was reset."""
-        if self.cameraParams() == self._untouched_view and self._show_hand_from(_FIRST_DISTANCE_M):
+        """Go near the hands, unless somebody has moved the view since it was reset."""
+        if self.cameraParams() == self._untouched_view and self._show_hands_from(_FIRST_DISTANCE_M):
             self._untouched_view = self.cameraParams()
 
     def frame_hand(self) -> None:
-        """Bring the hand into the middle, near enough to see every finger; without a hand, reset the view."""
-        if not self._show_hand_from(_FRAMED_DISTANCE_M):
+        """Bring the hands into the middle, near enough to see every finger; without a hand, reset the view."""
+        if not self._show_hands_from(_FRAMED_DISTANCE_M):
             self.reset_view()
 
-    def _show_hand_from(self, distance_m: float) -> bool:
-        """Bring the hand into the middle; False when there is none."""
-        joints = self._state.joint_positions if self._state is not None else np.full((1, 3), np.nan)
+    def _show_hands_from(self, distance_m: float) -> bool:
+        """Bring the hands that are there into the middle, one hand from so far away; False when there is none."""
+        joints = np.concatenate([hand.joint_positions for hand in each_hand(self._state)] or [np.empty((0, 3))])
         joints = joints[np.isfinite(joints).all(axis=1)]
         if not len(joints):
             return False
-        middle = to_display(0.5 * (joints.min(axis=0) + joints.max(axis=0)))
-        self.setCameraParams(center=QVector3D(*(float(v) for v in middle)), distance=distance_m)
+        middle = 0.5 * (joints.min(axis=0) + joints.max(axis=0))
+        reach_m = float(np.linalg.norm(joints - middle, axis=1).max())
+        self.setCameraParams(center=QVector3D(*(float(v) for v in to_display(middle))),
+                             distance=distance_m * max(reach_m / _HAND_RADIUS_M, 1.0))
         self.update()
         return True
 
@@ -154,7 +161,7 @@ class SceneView(GLViewWidget):
 
     def told_at(self, at: QPoint) -> str:
         """What is known of the marker or joint nearest to a place in the widget, "" when none is near."""
-        found = spots(self._in_rig) if self._in_rig is not None else []
+        found = spots(self._in_rig, hand_names(self._rig)) if self._in_rig is not None else []
         if not found:
             return ""
         places = to_display(camera_like(np.array([spot.place for spot in found]), self._up))
@@ -174,7 +181,7 @@ class SceneView(GLViewWidget):
         painter.end()
 
     def _rebuild(self) -> None:
-        """New items for another rig or scheme; never while the hand moves."""
+        """New items for another rig or scheme; never while a hand moves."""
         self.clear()
         self._labels.clear()
         self.setBackgroundColor(pg.mkColor(self._scheme.scene))
