@@ -8,6 +8,7 @@ import pytest
 from fake_backend import FakeBackend
 from fake_engine import FakeEngine, synthetic_rig
 from screen_pictures import SIZE, UPDATE, check, colours_in, picture_of
+from two_hands_engine import TwoHandsEngine
 
 from rhot_app.engine.status import Advice
 from rhot_app.project import TrackerSettings
@@ -107,6 +108,16 @@ def test_what_is_real(make_bench):
     dialog = bench.window.dialogs.tracker
     bench.until(dialog.size_button.isEnabled)
     check("tracker", dialog.grab().toImage(), 12)
+
+
+def test_two_hands(make_bench):
+    bench = make_bench(FakeBackend(TwoHandsEngine(running=False)))
+    bench.window.resize(SIZE)
+    bench.track()
+    bench.run(8.0 if UPDATE else 0.5)
+    bench.window.screen_parts.scene.frame_hand()
+    bench.run(0.7)
+    check("two-hands", picture_of(bench.window), 80)
 
 
 def connecting() -> NodesDialog:
