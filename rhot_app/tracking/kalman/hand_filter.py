@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -28,6 +29,7 @@ from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
 from rhot_app.tracking.kalman.reappearing import loosen
 from rhot_app.tracking.kalman.rows import ResidualBlock, Rows, clear, empty_rows
+from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import keep_shown, note_sights
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
 from rhot_app.tracking.kalman.withholding import Held, empty_held, release, restore, withhold
@@ -62,6 +64,24 @@ SCALE_SD = 0.1
 """Of the hand's size at the start, when it may float."""
 
 
+class Desk(NamedTuple):
+    """All that an update works with: the `estimate`, a `trial` of it, and room for what comes between."""
+
+    estimate: Estimate
+    trial: Estimate
+    rows: Rows
+    gain: Gain
+    held: Held
+    step: Array  # (N,)
+    believed: Mask
+    widening: Array
+    worn: Worn
+    cameras: Cameras
+    habits: Habits
+    limits: Array
+    bias_variance: Array
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What became of an update's L observations, in the order of the blocks: `believed` (L,), and `source` (L, 3) as in
@@ -80,23 +100,19 @@ class HandFilter:
 
     def __init__(self, worn: Worn, cameras: Cameras, habits: Habits, limits: Array, bias_variance: Array, *,
                  float_scale: bool = False) -> None:
-        markers = len(worn.part)
-        size = BIAS + 3 * markers
-        self.estimate = empty_estimate(len(cameras.pose), markers)
-        self._worn, self._cameras, self._habits = worn, cameras, habits
-        self._limits, self._bias_variance = limits, bias_variance
+        cameras_markers = len(cameras.pose), len(worn.part)
+        size = BIAS + 3 * len(worn.part)
+        self.estimate = empty_estimate(*cameras_markers)
+        self._desk = Desk(self.estimate, empty_estimate(*cameras_markers), empty_rows(ROWS_MAX, size),
+                          empty_gain(ROWS_MAX, size), empty_held(size), np.empty(size), np.empty(ROWS_MAX, np.bool_),
+                          np.empty(ROWS_MAX), worn, cameras, habits, limits, bias_variance)
+        self._shared = Share(self._desk)
         self._float_scale = float_scale
-        self._trial = empty_estimate(len(cameras.pose), markers)
-        self._rows = empty_rows(ROWS_MAX, size)
-        self._gain, self._held = empty_gain(ROWS_MAX, size), empty_held(size)
-        self._step = np.empty(size)
-        self._believed = np.empty(ROWS_MAX, np.bool_)
-        self._widening = np.empty(ROWS_MAX)
 
     def start(self, world_from_palm: Array, angles: Array) -> None:
         """Begin at a pose (4, 4) m and (21,) rad that something rougher has found, knowing little else."""
         estimate, covariance = self.estimate, self.estimate.covariance
-        estimate.world[:], estimate.angles[:] = world_from_palm, np.clip(angles, *self._limits.T)
+        estimate.world[:], estimate.angles[:] = world_from_palm, np.clip(angles, *self._desk.limits.T)
         for array in (estimate.velocity, estimate.acceleration, estimate.log_scale, estimate.bias, estimate.trend,
                       covariance):
             array[:] = 0.0
@@ -106,9 +122,9 @@ class HandFilter:
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),
             np.sqrt(START_AGITATION)[GROUP_OF], [SCALE_SD if self._float_scale else 0.0],
-            np.repeat(np.sqrt(self._bias_variance), 3)])
+            np.repeat(np.sqrt(self._desk.bias_variance), 3)])
         np.fill_diagonal(covariance, diagonal**2)
-        covariance[ANGLES:POSE, ANGLES:POSE] = self._habits.usual[ANGLES:, ANGLES:]
+        covariance[ANGLES:POSE, ANGLES:POSE] = self._desk.habits.usual[ANGLES:, ANGLES:]
 
     @property
     def astray(self) -> bool:
@@ -119,65 +135,77 @@ class HandFilter:
 
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""
-        estimate, rows = self.estimate, self._rows
-        predict(estimate, dt, self._worn.part, self._habits, self._bias_variance)
+        estimate, rows = self.estimate, self._desk.rows
+        _carry_on(self._shared, dt)
         for block in blocks:
             block.associate(estimate)
         self._linearise(blocks, estimate)
-        _prepare(estimate, rows, dt, self._worn, self._cameras, self._habits, self._held, self._believed,
-                 self._widening)
+        _prepare(self._shared, dt)
         self._settle(blocks)
         if estimate.held[0] == PALM_HELD and self._misfits(blocks):
-            release(estimate.covariance, self._held)
-            hold_turn(self._held)
-            withhold(estimate.covariance, self._held)
+            _let_place_go(self._shared)
             self._linearise(blocks, estimate)
             self._settle(blocks)
-        _conclude(estimate, rows, self._believed, self._gain, self._held, dt, self._worn, self._cameras, self._habits,
-                  self._bias_variance, self._limits, self._step)
+        _conclude(self._shared, dt)
         observations = int(rows.used[1])
-        return Outcome(self._believed[:observations], rows.source[:observations])
+        return Outcome(self._desk.believed[:observations], rows.source[:observations])
 
     def _linearise(self, blocks: Sequence[ResidualBlock], estimate: Estimate) -> None:
-        clear(self._rows)
+        clear(self._desk.rows)
         for block in blocks:
-            block.linearise(estimate, self._rows)
+            block.linearise(estimate, self._desk.rows)
 
     def _settle(self, blocks: Sequence[ResidualBlock]) -> None:
-        """Iterate to the new mean, a `_step` from the old one."""
-        self._step[:] = 0.0
+        """Iterate to the new mean, a step from the old one."""
+        self._desk.step[:] = 0.0
         for iteration in range(ITERATIONS):
             if iteration > 0:
-                self._linearise(blocks, self._trial)
-            if _improve(self.estimate, self._rows, self._believed, self._widening, self._step, self._gain,
-                        self._limits, self._trial):
+                self._linearise(blocks, self._desk.trial)
+            if _improve(self._shared):
                 return
 
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
         """Whether the hand as it is held cannot be where it is seen."""
-        self._linearise(blocks, self._trial)
-        return bool(misfit(self._rows, self._believed, self._widening) > MISFIT)
+        self._linearise(blocks, self._desk.trial)
+        return bool(misfit(self._desk.rows, self._desk.believed, self._desk.widening) > MISFIT)
 
 
 @njit(cache=True)
-def _prepare(estimate: Estimate, rows: Rows, dt: float, worn: Worn, cameras: Cameras, habits: Habits, held: Held,
-             believed: Mask, widening: Array) -> None:
+def _carry_on(shared: Share, dt: float) -> None:
+    desk: Desk = shared.of
+    predict(desk.estimate, dt, desk.worn.part, desk.habits, desk.bias_variance)
+
+
+@njit(cache=True)
+def _prepare(shared: Share, dt: float) -> None:
     """Decide what is held of the hand and which observations are believed."""
-    hold(estimate, rows, worn.part, cameras.pose, habits.stiff, held)
+    desk: Desk = shared.of
+    estimate, rows, part = desk.estimate, desk.rows, desk.worn.part
+    hold(estimate, rows, part, desk.cameras.pose, desk.habits.stiff, desk.held)
     rest(estimate, dt)
-    loosen(estimate, worn.part, rows, habits.usual)
-    appraise(rows, estimate, habits.together, believed, widening)
-    withhold(estimate.covariance, held)
+    loosen(estimate, part, rows, desk.habits.usual)
+    appraise(rows, estimate, desk.habits.together, desk.believed, desk.widening)
+    withhold(estimate.covariance, desk.held)
 
 
 @njit(cache=True)
-def _improve(estimate: Estimate, rows: Rows, believed: Mask, widening: Array, step: Array, gain: Gain, limits: Array,
-             trial: Estimate) -> bool:
-    """One iteration; `trial` becomes the new mean. Returns whether it moved only little."""
+def _let_place_go(shared: Share) -> None:
+    """Hold no more of the palm than its turn."""
+    desk: Desk = shared.of
+    release(desk.estimate.covariance, desk.held)
+    hold_turn(desk.held)
+    withhold(desk.estimate.covariance, desk.held)
+
+
+@njit(cache=True)
+def _improve(shared: Share) -> bool:
+    """One iteration; the trial becomes the new mean. Returns whether it moved only little."""
+    desk: Desk = shared.of
+    estimate, gain, step = desk.estimate, desk.gain, desk.step
     before = step.copy()
-    solve(rows, estimate.covariance, believed, widening, step, gain)
-    project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[0]], limits, step)
-    displace(estimate, step, trial)
+    solve(desk.rows, estimate.covariance, desk.believed, desk.widening, step, gain)
+    project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[0]], desk.limits, step)
+    displace(estimate, step, desk.trial)
     turn = 0.0
     for i in range(ROTATION, POSE):
         turn = max(turn, abs(step[i] - before[i]))
@@ -185,17 +213,18 @@ def _improve(estimate: Estimate, rows: Rows, believed: Mask, widening: Array, st
 
 
 @njit(cache=True)
-def _conclude(estimate: Estimate, rows: Rows, believed: Mask, gain: Gain, held: Held, dt: float, worn: Worn,
-              cameras: Cameras, habits: Habits, bias_variance: Array, limits: Array, step: Array) -> None:
+def _conclude(shared: Share, dt: float) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
-    note_sights(estimate, worn.part, rows, believed)
+    desk: Desk = shared.of
+    estimate, worn, gain, step = desk.estimate, desk.worn, desk.gain, desk.step
+    note_sights(estimate, worn.part, desk.rows, desk.believed)
     note_trend(estimate, step, gain)
     contract(estimate.covariance, gain)
     displace(estimate, step, estimate)
-    restore(estimate.covariance, held, gain, bias_variance)
+    restore(estimate.covariance, desk.held, gain, desk.bias_variance)
     points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
     place_markers(worn, estimate, points, jacobian)
-    keep_shown(estimate, worn.part, cameras.pose, points, jacobian)
-    forget(estimate, dt, habits, bias_variance, jacobian, gain, step)
-    project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], limits, step)
+    keep_shown(estimate, worn.part, desk.cameras.pose, points, jacobian)
+    forget(estimate, dt, desk.habits, desk.bias_variance, jacobian, gain, step)
+    project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], desk.limits, step)
     displace(estimate, step, estimate)
