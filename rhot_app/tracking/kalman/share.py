@@ -15,14 +15,14 @@ class _ShareType(types.StructRef):
     """numba's type of a `Share`."""
 
 
-class Share(structref.StructRefProxy):  # type: ignore[misc]
+class Share(structref.StructRefProxy):
     """Carries a tuple of arrays, `of`, into compiled functions, where they unpack it; arrays are changed in place."""
 
     of: Any
 
     def __new__(cls, of: tuple[Any, ...]) -> Share:
         """Share the arrays of a (named) tuple, which may hold further ones."""
-        return _share(of)  # type: ignore[no-any-return]
+        return _share(of)
 
 
 structref.define_proxy(Share, _ShareType, ["of"])
