@@ -1,40 +1,35 @@
-"""Arrays that go into compiled functions as one."""
+"""Arrays that go into compiled functions as one.
 
-from typing import NamedTuple
+Plain tuples only: the cache of compiled functions, which other programs read, would else name classes of this file.
+"""
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.share import Share
 
 
-class Pair(NamedTuple):
-    one: NDArray[np.float64]
-    other: tuple[NDArray[np.int64], NDArray[np.float64]]
-
-
 @njit
 def _add(shared, amount):
-    pair = shared.of
-    pair.one[:] += amount
-    pair.other[1][0] = pair.one.sum() + pair.other[0][1]
-    return pair.other[0][0]
+    one, (numbers, total) = shared.of
+    one[:] += amount
+    total[0] = one.sum() + numbers[1]
+    return numbers[0]
 
 
 def test_compiled_functions_change_the_very_arrays():
-    pair = Pair(np.zeros(3), (np.array([7, 8]), np.zeros(1)))
-    shared = Share(pair)
+    one, total = np.zeros(3), np.zeros(1)
+    shared = Share((one, (np.array([7, 8]), total)))
     assert _add(shared, 1.0) == 7 and _add(shared, 1.0) == 7
-    np.testing.assert_array_equal(pair.one, [2.0, 2.0, 2.0])
-    assert pair.other[1][0] == 14.0
+    np.testing.assert_array_equal(one, [2.0, 2.0, 2.0])
+    assert total[0] == 14.0
+
+
+@njit
+def _sum_of_first(shared):
+    return shared.of[0].sum()
 
 
 def test_what_is_shared_lives_as_long_as_its_share():
     shared = Share((np.arange(5.0), (np.array([3]), np.zeros(1))))
-    assert _first(shared) == 10.0
-
-
-@njit
-def _first(shared):
-    return shared.of[0].sum()
+    assert _sum_of_first(shared) == 10.0
