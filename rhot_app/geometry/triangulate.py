@@ -49,19 +49,26 @@ def solve_symmetric3(a: Array, b: Array, x: Array, inverse: Array) -> bool:
 
 
 @njit(cache=True)
+def _direction(rays: Array, cameras: Array, c: int) -> tuple[float, float, float]:
+    """Unit vector, world axes, along one camera's ray. No array: this is asked of every marker of every state."""
+    x, y = rays[c, 0], rays[c, 1]
+    norm = math.sqrt(x ** 2 + y ** 2 + 1.0)
+    return ((x * cameras[c, 0, 0] + y * cameras[c, 1, 0] + cameras[c, 2, 0]) / norm,
+            (x * cameras[c, 0, 1] + y * cameras[c, 1, 1] + cameras[c, 2, 1]) / norm,
+            (x * cameras[c, 0, 2] + y * cameras[c, 1, 2] + cameras[c, 2, 2]) / norm)
+
+
+@njit(cache=True)
 def _parallax_sine(rays: Array, cameras: Array, used: NDArray[np.bool_]) -> float:
     """Largest sine of the angle between any two used rays, whose normalised coordinates are (C, 2)."""
-    count = rays.shape[0]
-    directions = np.empty((count, 3))
-    for c in range(count):
-        norm = math.sqrt(rays[c, 0] ** 2 + rays[c, 1] ** 2 + 1.0)
-        for k in range(3):
-            directions[c, k] = (rays[c, 0] * cameras[c, 0, k] + rays[c, 1] * cameras[c, 1, k] + cameras[c, 2, k]) / norm
     largest = 0.0
-    for i in range(count):
+    for i in range(rays.shape[0]):
+        if not used[i]:
+            continue
+        a = _direction(rays, cameras, i)
         for j in range(i):
-            if used[i] and used[j]:
-                a, b = directions[i], directions[j]
+            if used[j]:
+                b = _direction(rays, cameras, j)
                 sine = math.sqrt((a[1] * b[2] - a[2] * b[1]) ** 2 + (a[2] * b[0] - a[0] * b[2]) ** 2
                                  + (a[0] * b[1] - a[1] * b[0]) ** 2)
                 largest = max(largest, sine)
@@ -69,17 +76,23 @@ def _parallax_sine(rays: Array, cameras: Array, used: NDArray[np.bool_]) -> floa
 
 
 @njit(cache=True)
+def _slope(camera: Array, axis: int, at: float, depth: float) -> tuple[float, float, float]:
+    """Change per m of a point of its normalised coordinate `axis`, which is `at`. For a depth of -1 it is the normal of
+    the plane that all points with that coordinate lie in."""
+    return ((camera[axis, 0] - at * camera[2, 0]) / depth, (camera[axis, 1] - at * camera[2, 1]) / depth,
+            (camera[axis, 2] - at * camera[2, 2]) / depth)
+
+
+@njit(cache=True)
 def _linear_start(rays: Array, cameras: Array, used: NDArray[np.bool_], normal: Array, side: Array) -> None:
     """Normal equations of the rays' planes: (x p3 - p1) X = 0 and (y p3 - p2) X = 0 for every used camera."""
     normal[:] = 0.0
     side[:] = 0.0
-    row = np.empty(3)
     for c in range(rays.shape[0]):
         if not used[c]:
             continue
         for axis in range(2):
-            for k in range(3):
-                row[k] = rays[c, axis] * cameras[c, 2, k] - cameras[c, axis, k]
+            row = _slope(cameras[c], axis, rays[c, axis], -1.0)
             value = cameras[c, axis, 3] - rays[c, axis] * cameras[c, 2, 3]
             for i in range(3):
                 side[i] += row[i] * value
@@ -93,30 +106,34 @@ def _weighted_step(rays: Array, weights: Array, cameras: Array, used: NDArray[np
     """Gauss-Newton normal equations of the weighted reprojection error at `position`; False when it is behind one."""
     normal[:] = 0.0
     side[:] = 0.0
-    jacobian = np.empty((2, 3))
-    local = np.empty(3)
     for c in range(rays.shape[0]):
         if not used[c]:
             continue
-        for i in range(3):
-            local[i] = cameras[c, i, 3]
-            for k in range(3):
-                local[i] += cameras[c, i, k] * position[k]
-        if not local[2] > 0.0:
+        x, y, z = _local(cameras[c], position)
+        if not z > 0.0:
             return False
-        x, y = local[0] / local[2], local[1] / local[2]
-        for k in range(3):
-            jacobian[0, k] = (cameras[c, 0, k] - x * cameras[c, 2, k]) / local[2]
-            jacobian[1, k] = (cameras[c, 1, k] - y * cameras[c, 2, k]) / local[2]
+        x, y = x / z, y / z
+        u, v = _slope(cameras[c], 0, x, z), _slope(cameras[c], 1, y, z)
         ex, ey = rays[c, 0] - x, rays[c, 1] - y
         wx = weights[c, 0] * ex + weights[c, 1] * ey
         wy = weights[c, 1] * ex + weights[c, 2] * ey
         for i in range(3):
-            side[i] += jacobian[0, i] * wx + jacobian[1, i] * wy
+            side[i] += u[i] * wx + v[i] * wy
             for j in range(3):
-                normal[i, j] += (jacobian[0, i] * (weights[c, 0] * jacobian[0, j] + weights[c, 1] * jacobian[1, j])
-                                 + jacobian[1, i] * (weights[c, 1] * jacobian[0, j] + weights[c, 2] * jacobian[1, j]))
+                normal[i, j] += (u[i] * (weights[c, 0] * u[j] + weights[c, 1] * v[j])
+                                 + v[i] * (weights[c, 1] * u[j] + weights[c, 2] * v[j]))
     return True
+
+
+@njit(cache=True)
+def _local(camera: Array, position: Array) -> tuple[float, float, float]:
+    """A point (3,) m, world, in the frame of a camera, (3, 4) camera_from_world."""
+    x, y, z = camera[0, 3], camera[1, 3], camera[2, 3]
+    for k in range(3):  # not @: three products do not pay for a call of BLAS
+        x += camera[0, k] * position[k]
+        y += camera[1, k] * position[k]
+        z += camera[2, k] * position[k]
+    return x, y, z
 
 
 @njit(cache=True)
@@ -146,11 +163,7 @@ def reprojection_rms(position: Array, rays: Array, cameras: Array, focal: Array,
     for c in range(rays.shape[0]):
         if not used[c]:
             continue
-        x, y, z = cameras[c, 0, 3], cameras[c, 1, 3], cameras[c, 2, 3]
-        for k in range(3):  # not @: three products do not pay for a call of BLAS
-            x += cameras[c, 0, k] * position[k]
-            y += cameras[c, 1, k] * position[k]
-            z += cameras[c, 2, k] * position[k]
+        x, y, z = _local(cameras[c], position)
         total += (focal[c, 0] * (x / z - rays[c, 0])) ** 2 + (focal[c, 1] * (y / z - rays[c, 1])) ** 2
         count += 1
     return math.sqrt(total / count) if count > 0 else math.nan
@@ -177,8 +190,8 @@ def triangulate(rays: Array, covariances: Array, cameras: Array, focal: Array, u
         return math.nan, 1
     if not _parallax_sine(rays, cameras, good) > _MIN_PARALLAX_RAD:
         return math.nan, 2
-    normal, side, point, step = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
-    inverse = np.empty((3, 3))
+    normal, inverse, vectors = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    side, point, step = vectors[0], vectors[1], vectors[2]
     _linear_start(rays, cameras, good, normal, side)
     if not solve_symmetric3(normal, side, point, inverse):
         return math.nan, 2
@@ -187,7 +200,8 @@ def triangulate(rays: Array, covariances: Array, cameras: Array, focal: Array, u
             return math.nan, 3
         if not solve_symmetric3(normal, side, step, inverse):
             return math.nan, 2
-        point += step
+        for k in range(3):
+            point[k] += step[k]
     if not _weighted_step(rays, weights, cameras, good, point, normal, side):
         return math.nan, 3
     position[:] = point

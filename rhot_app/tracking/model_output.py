@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES
-from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, SCALE, Estimate
-from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
+from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, SCALE
+from rhot_app.tracking.kalman.markers import Cameras
+from rhot_app.tracking.kalman.wearing import Wearing
 from rhot_app.tracking.locate import locate_all
+from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.sights import Seen, bring_together, seen_clearly
 from rhot_app.tracking.state import Knowledge
 
@@ -29,76 +31,86 @@ MEASURED_M, INFERRED_M = 3e-3, 12e-3
 
 MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
 
+FIRST_TIP, FIRST_MARKER = 21, 26
+"""Of the points that a state tells of: joints, fingertips, markers."""
+
 _FINGER_OF_JOINT = np.array([-1] + [finger for finger, rows in enumerate(JOINT_SLICES)
                                     for _ in range(rows.stop - rows.start)])
 _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICES)
                              for _ in range(columns.stop - columns.start)])
 
 
-class Report(NamedTuple):
-    """Arrays of one state, filled by `describe`; M markers, fields as in `HandState`."""
+class Subject(NamedTuple):
+    """What states tell of, unchanging: `dh`, the hand's table with P = 26 + M points: joints, fingertips, M markers;
+    `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in
+    `RigArrays`."""
 
-    points: Array  # (26, 3) m: joints, then tips
-    covariances: Array  # (26, 3, 3)
-    markers: Array
-    marker_covariances: Array
-    marker_knowledge: Codes
+    dh: DhArrays
+    part: Indices
+    half_axes: Array
+    cameras: Cameras
+    focal: Array
+    shapes: Array
+
+
+class Report(NamedTuple):
+    """Arrays of one state, filled by `describe`; fields as in `HandState`, P points as in `Subject`."""
+
+    points: Array  # (P, 3) m
+    covariances: Array  # (P, 3, 3) m^2
     raw: Array
     errors: Array
     angle_sd: Array
+    marker_knowledge: Codes
     joint_knowledge: Codes
     angle_knowledge: Codes
     palm: Codes  # (1,)
 
 
+def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
+    """The hand with its markers before its cameras."""
+    one, other = wearing.model.dh, wearing.worn.dh
+    dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
+                      point_offset=np.concatenate([one.point_offset, other.point_offset]))
+    return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes)
+
+
 def empty_report(markers: int) -> Report:
     """Room for one state."""
-    return Report(np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((markers, 3)), np.empty((markers, 3, 3)),
-                  np.empty(markers, np.uint8), np.empty((markers, 3)), np.empty(markers), np.empty(21),
-                  np.empty(21, np.uint8), np.empty(21, np.uint8), np.empty(1, np.uint8))
+    points = FIRST_MARKER + markers
+    return Report(np.empty((points, 3)), np.empty((points, 3, 3)), np.empty((markers, 3)), np.empty(markers),
+                  np.empty(21), np.empty(markers, np.uint8), np.empty(21, np.uint8), np.empty(21, np.uint8),
+                  np.empty(1, np.uint8))
 
 
 @njit(cache=True)
-def describe(estimate: Estimate, dh: DhArrays, worn: Worn, cameras: Cameras, focal: Array, shapes: Array, seen: Seen,
-             fresh_ns: int, t_ns: int, report: Report) -> bool:
+def describe(world: Array, angles: Array, velocity: Array, covariance: Array, scale: float, subject: Subject,
+             seen: Seen, fresh_ns: int, t_ns: int, report: Report) -> bool:
     """Fill `report` of the hand at `t_ns`; returns whether all markers are measured.
 
-    `dh` has the hand's 26 points; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in `RigArrays`; sights that are older
-    than `fresh_ns` are not of now. One call for all that is told of a state: each costs some microseconds.
+    The first four as in `Estimate`, `scale` its factor on lengths; sights older than `fresh_ns` are not of now. One
+    call for all that is told of a state, with no array that it does not need: each array costs a call 0.2 us.
     """
-    count = worn.part.shape[0]
+    count = report.points.shape[0]
     jacobian = np.empty((count, 3, POSE))
-    place_markers(worn, estimate, report.markers, jacobian)
-    _locate(estimate, worn, cameras, focal, shapes, jacobian, seen, fresh_ns, t_ns, report)
-    _cover_all(estimate, jacobian, report.markers, report.marker_covariances)
-    _place_points(estimate, dh, report)
+    _place(world, angles, scale, subject.dh, report.points, jacobian)
+    _cover_all(world, covariance, jacobian, report.points, report.covariances)
+    _locate(world, velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, fresh_ns, t_ns,
+            report)
     all_measured = True
-    for m in range(count):
-        report.marker_knowledge[m] = _know(_worst(report.marker_covariances[m]),
+    for m in range(count - FIRST_MARKER):
+        report.marker_knowledge[m] = _know(_worst(report.covariances[FIRST_MARKER + m]),
                                            seen_clearly(seen, t_ns, fresh_ns, m), MEASURED_M, INFERRED_M)
         all_measured &= report.marker_knowledge[m] == _MEASURED
-    _conclude(estimate, worn, report)
+    _conclude(covariance, subject.part, report)
     return all_measured
 
 
 @njit(cache=True)
-def _locate(estimate: Estimate, worn: Worn, cameras: Cameras, focal: Array, shapes: Array, jacobian: Array, seen: Seen,
-            fresh_ns: int, t_ns: int, report: Report) -> None:
-    """Where the sights alone have the markers: they are of several instants, and the hand says how it moved since."""
-    shape = seen.times.shape
-    pixels, used = np.empty((shape[0], shape[1], 2)), np.empty(shape, np.bool_)
-    bring_together(worn, cameras, estimate, report.markers, jacobian, t_ns, seen, fresh_ns, pixels, used)
-    locate_all(pixels, seen.covariances, used, cameras.intrinsics, cameras.pose, focal, shapes, report.raw,
-               np.empty((shape[1], 3, 3)), report.errors)
-
-
-@njit(cache=True)
-def _place_points(estimate: Estimate, dh: DhArrays, report: Report) -> None:
-    """The joints and fingertips, with covariances."""
-    points, world = report.points, estimate.world
-    jacobian, frames = np.empty((points.shape[0], 3, POSE)), np.empty((dh.parent.shape[0], 3, 4))
-    scale = math.exp(estimate.log_scale[0])
-    forward_arrays(dh, world, estimate.angles, frames, points)
+def _place(world: Array, angles: Array, scale: float, dh: DhArrays, points: Array, jacobian: Array) -> None:
+    """Fill `points` (P, 3) m and `jacobian` (P, 3, 27) of a hand of any size."""
+    frames = np.empty((dh.parent.shape[0], 3, 4))
+    forward_arrays(dh, world, angles, frames, points)
     jacobian_arrays(dh, world, frames, points, jacobian)
     if scale != 1.0:
         for p in range(points.shape[0]):
@@ -106,19 +118,29 @@ def _place_points(estimate: Estimate, dh: DhArrays, report: Report) -> None:
                 points[p, i] = world[i, 3] + scale * (points[p, i] - world[i, 3])
                 for j in range(ROTATION, POSE):
                     jacobian[p, i, j] *= scale
-    _cover_all(estimate, jacobian, points, report.covariances)
 
 
 @njit(cache=True)
-def _conclude(estimate: Estimate, worn: Worn, report: Report) -> None:
+def _locate(world: Array, velocity: Array, subject: Subject, markers: Array, jacobian: Array, seen: Seen, fresh_ns: int,
+            t_ns: int, report: Report) -> None:
+    """Where the sights alone have the markers: they are of several instants, and the hand says how it moved since."""
+    shape, cameras = seen.times.shape, subject.cameras
+    pixels, used = np.empty((shape[0], shape[1], 2)), np.empty(shape, np.bool_)
+    bring_together(subject.half_axes, cameras, world, velocity, markers, jacobian, t_ns, seen, fresh_ns, pixels, used)
+    locate_all(pixels, seen.covariances, used, cameras.intrinsics, cameras.pose, subject.focal, subject.shapes,
+               report.raw, np.empty((shape[1], 3, 3)), report.errors)
+
+
+@njit(cache=True)
+def _conclude(covariance: Array, part: Indices, report: Report) -> None:
     """What is measured, the images alone determine; what they determine through habit is inferred, however well.
 
     A fingertip needs its marker, an inner joint two markers on its finger, a palm's rotation three on the palm, an
     angle two on its finger beside those.
     """
     shown = np.zeros(6, np.int64)  # markers measured on the palm, then on each finger
-    for m in range(worn.part.shape[0]):
-        shown[worn.part[m] + 1] += report.marker_knowledge[m] == _MEASURED
+    for m in range(part.shape[0]):
+        shown[part[m] + 1] += report.marker_knowledge[m] == _MEASURED
     turn = shown[0] >= 3
     for joint in range(21):
         finger = _FINGER_OF_JOINT[joint]
@@ -126,11 +148,11 @@ def _conclude(estimate: Estimate, worn: Worn, report: Report) -> None:
         sd = _worst(report.covariances[joint])
         report.joint_knowledge[joint] = _know(sd, shown[finger + 1] >= needed, MEASURED_M, INFERRED_M)
     for angle in range(21):
-        sd = math.sqrt(max(estimate.covariance[ANGLES + angle, ANGLES + angle], 0.0))
+        sd = math.sqrt(max(covariance[ANGLES + angle, ANGLES + angle], 0.0))
         report.angle_sd[angle] = sd
         report.angle_knowledge[angle] = _know(sd, turn and shown[_FINGER_OF_ANGLE[angle] + 1] >= 2, MEASURED_RAD,
                                               INFERRED_RAD)
-    sd = _worst(estimate.covariance[ROTATION:ANGLES, ROTATION:ANGLES])
+    sd = _worst(covariance[ROTATION:ANGLES, ROTATION:ANGLES])
     report.palm[0] = _know(sd, turn, MEASURED_RAD, INFERRED_RAD)
 
 
@@ -148,10 +170,10 @@ def _worst(covariance: Array) -> float:
 
 
 @njit(cache=True)
-def _cover_all(estimate: Estimate, jacobian: Array, points: Array, out: Array) -> None:
+def _cover_all(world: Array, covariance: Array, jacobian: Array, points: Array, out: Array) -> None:
     """Fill `out` (P, 3, 3) m^2 with the covariances of `points` (P, 3) m with `jacobian` (P, 3, 27)."""
     columns, slopes = np.empty(POSE + 1, np.int64), np.empty((POSE + 1, 3))
-    scaled = estimate.covariance[SCALE, SCALE] > 0.0
+    scaled = covariance[SCALE, SCALE] > 0.0
     for p in range(points.shape[0]):
         count = 0
         for j in range(POSE):  # zeros cost nothing
@@ -163,9 +185,9 @@ def _cover_all(estimate: Estimate, jacobian: Array, points: Array, out: Array) -
         if scaled:
             columns[count] = SCALE
             for i in range(3):
-                slopes[count, i] = points[p, i] - estimate.world[i, 3]
+                slopes[count, i] = points[p, i] - world[i, 3]
             count += 1
-        _cover(estimate.covariance, columns[:count], slopes, out[p])
+        _cover(covariance, columns[:count], slopes, out[p])
 
 
 @njit(cache=True)

@@ -22,7 +22,7 @@ from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline, copy_whole
 from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.model_output import describe, empty_report
+from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, describe, empty_report, subject_of
 from rhot_app.tracking.model_start import Starter, count_apart
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.sights import Sights
@@ -63,6 +63,7 @@ class ModelTracker:
                                 self._wearing.bias_variance, float_scale=rig.tracker.float_scale)
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)
+        self._subject = subject_of(self._wearing, self._rig)
         self._sights = Sights(cameras, markers)
         self._ahead = empty_estimate(cameras, markers)
         self._sequence = 0
@@ -202,28 +203,28 @@ class ModelTracker:
         return self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
 
     def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
-        wearing, rig, sights = self._wearing, self._rig, self._sights
+        rig, sights, covariance, scale = self._rig, self._sights, estimate.covariance, math.exp(estimate.log_scale[0])
         solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
-        complete = describe(estimate, wearing.model.dh, wearing.worn, wearing.cameras, rig.focal, rig.shapes,
+        complete = describe(estimate.world, estimate.angles, estimate.velocity, covariance, scale, self._subject,
                             sights.seen, sights.fresh_ns, t_ns, report)
+        points, covariances = report.points, report.covariances
         if estimate is self._hand.estimate:
-            self._compare(report.markers)
+            self._compare(points[FIRST_MARKER:])
         seen_pixels, seen_flags = sights.last_seen()
         self._sequence += 1
         return HandState(
             sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
             condition=Condition.TRACKING if complete else Condition.PARTIAL, marker_ids=rig.marker_ids,
-            marker_positions=report.markers, marker_raw_positions=report.raw,
-            marker_covariances=report.marker_covariances, marker_knowledge=report.marker_knowledge,
+            marker_positions=points[FIRST_MARKER:], marker_raw_positions=report.raw,
+            marker_covariances=covariances[FIRST_MARKER:], marker_knowledge=report.marker_knowledge,
             camera_names=rig.camera_names, camera_pixels=seen_pixels, camera_flags=seen_flags,
-            joint_positions=report.points[:21], joint_knowledge=report.joint_knowledge,
-            fingertip_positions=report.points[21:], angles=estimate.angles.copy(),
+            joint_positions=points[:FIRST_TIP], joint_knowledge=report.joint_knowledge,
+            fingertip_positions=points[FIRST_TIP:FIRST_MARKER], angles=estimate.angles.copy(),
             angle_knowledge=report.angle_knowledge, world_from_palm=estimate.world.copy(),
             palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors,
-            joint_covariances=report.covariances[:21], fingertip_covariances=report.covariances[21:],
-            angle_sd=report.angle_sd, palm_covariance=estimate.covariance[:ANGLES, :ANGLES].copy(),
-            hand_scale=math.exp(estimate.log_scale[0]),
-            hand_scale_sd=math.sqrt(max(estimate.covariance[SCALE, SCALE], 0.0)),
+            joint_covariances=covariances[:FIRST_TIP], fingertip_covariances=covariances[FIRST_TIP:FIRST_MARKER],
+            angle_sd=report.angle_sd, palm_covariance=covariance[:ANGLES, :ANGLES].copy(),
+            hand_scale=scale, hand_scale_sd=math.sqrt(max(covariance[SCALE, SCALE], 0.0)),
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
 

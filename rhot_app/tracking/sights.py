@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.estimate import POSE, Estimate
+from rhot_app.tracking.kalman.estimate import POSE
 from rhot_app.tracking.kalman.hand_filter import Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, project_marker
+from rhot_app.tracking.kalman.markers import Cameras, Frame, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
@@ -125,22 +125,22 @@ def is_fresh(seen: Seen, t_ns: int, fresh_ns: int, camera: int, marker: int) -> 
 
 
 @njit(cache=True)
-def bring_together(worn: Worn, cameras: Cameras, estimate: Estimate, points: Array, jacobian: Array, t_ns: int,
-                   seen: Seen, fresh_ns: int, out: Array, used: Mask) -> None:
+def bring_together(half_axes: Array, cameras: Cameras, world: Array, velocity: Array, points: Array, jacobian: Array,
+                   t_ns: int, seen: Seen, fresh_ns: int, out: Array, used: Mask) -> None:
     """Fill `out` (C, M, 2) px: each camera's last sight of each marker, carried to `t_ns` as the hand moved since.
 
-    `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them. Sights older than `fresh_ns` are NaN and
-    not `used` (C, M).
+    `half_axes` (M, 3) as in `Worn`, `world` and `velocity` as in `Estimate`, `points` (M, 3) m and `jacobian`
+    (M, 3, 27) as `place_markers` has them. Sights older than `fresh_ns` are NaN and not `used` (C, M).
     """
     pixel, slope, speed = np.empty(2), np.empty((2, 3)), np.empty(3)
     for m in range(points.shape[0]):
         for i in range(3):
             speed[i] = 0.0
             for j in range(POSE):
-                speed[i] += jacobian[m, i, j] * estimate.velocity[j]
+                speed[i] += jacobian[m, i, j] * velocity[j]
         for c in range(out.shape[0]):
             used[c, m] = is_fresh(seen, t_ns, fresh_ns, c, m) and project_marker(
-                points[m], estimate.world, worn.half_axes[m], cameras.pose[c], cameras.intrinsics[c], pixel, slope)
+                points[m], world, half_axes[m], cameras.pose[c], cameras.intrinsics[c], pixel, slope)
             elapsed_s = 1e-9 * (t_ns - seen.times[c, m])
             for k in range(2):
                 out[c, m, k] = np.nan

@@ -85,7 +85,8 @@ def test_sights_are_carried_along_as_the_hand_moves():
     points, jacobian = np.empty((MARKERS, 3)), np.empty((MARKERS, 3, 27))
     place_markers(WEARING.worn, estimate, points, jacobian)
     pixels, used = np.empty((CAMERAS, MARKERS, 2)), np.empty((CAMERAS, MARKERS), np.bool_)
-    bring_together(WEARING.worn, WEARING.cameras, estimate, points, jacobian, t_ns, seen, FRESH_NS, pixels, used)
+    bring_together(WEARING.worn.half_axes, WEARING.cameras, estimate.world, estimate.velocity, points, jacobian, t_ns,
+                   seen, FRESH_NS, pixels, used)
     expected, pixel, slope = np.full_like(pixels, np.nan), np.empty(2), np.empty((2, 3))
     for c in range(CAMERAS):
         for m in range(MARKERS):
