@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES
-from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, SCALE
+from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, SCALE, Estimate, scale_of
 from rhot_app.tracking.kalman.markers import Cameras
+from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.wearing import Wearing
 from rhot_app.tracking.locate import locate_all
 from rhot_app.tracking.rig_arrays import RigArrays
@@ -83,20 +84,26 @@ def empty_report(markers: int) -> Report:
                   np.empty(1, np.uint8))
 
 
-@njit(cache=True)
-def describe(world: Array, angles: Array, velocity: Array, covariance: Array, scale: float, subject: Subject,
-             seen: Seen, fresh_ns: int, t_ns: int, report: Report) -> bool:
-    """Fill `report` of the hand at `t_ns`; returns whether all markers are measured.
+class Account(NamedTuple):
+    """What a state tells of: a hand as it is estimated, and what was seen of it."""
 
-    The first four as in `Estimate`, `scale` its factor on lengths; sights older than `fresh_ns` are not of now. One
-    call for all that is told of a state, with no array that it does not need: each array costs a call 0.2 us.
-    """
-    count = report.points.shape[0]
+    estimate: Estimate
+    subject: Subject
+    seen: Seen
+
+
+@njit(cache=True)
+def describe(account: Share, fresh_ns: int, t_ns: int, report: Report) -> bool:
+    """Fill `report` from a shared `Account` of `t_ns`; returns whether all markers are measured. Sights older than
+    `fresh_ns` are not of now. One call for all that is told of a state: each costs some microseconds."""
+    told: Account = account.of
+    estimate, subject, seen = told.estimate, told.subject, told.seen
+    world, covariance, count = estimate.world, estimate.covariance, report.points.shape[0]
     jacobian = np.empty((count, 3, POSE))
-    _place(world, angles, scale, subject.dh, report.points, jacobian)
+    _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
     _cover_all(world, covariance, jacobian, report.points, report.covariances)
-    _locate(world, velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, fresh_ns, t_ns,
-            report)
+    _locate(world, estimate.velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, fresh_ns,
+            t_ns, report)
     all_measured = True
     for m in range(count - FIRST_MARKER):
         report.marker_knowledge[m] = _know(_worst(report.covariances[FIRST_MARKER + m]),

@@ -20,9 +20,10 @@ from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, empty_est
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
+from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline, copy_whole
 from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, describe, empty_report, subject_of
+from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, Account, describe, empty_report, subject_of
 from rhot_app.tracking.model_start import Starter, count_apart
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.sights import Sights
@@ -63,9 +64,11 @@ class ModelTracker:
                                 self._wearing.bias_variance, float_scale=rig.tracker.float_scale)
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)
-        self._subject = subject_of(self._wearing, self._rig)
         self._sights = Sights(cameras, markers)
         self._ahead = empty_estimate(cameras, markers)
+        subject = subject_of(self._wearing, self._rig)
+        self._told = Share(Account(self._hand.estimate, subject, self._sights.seen))
+        self._told_ahead = Share(Account(self._ahead, subject, self._sights.seen))
         self._sequence = 0
         self.reset()
 
@@ -203,12 +206,11 @@ class ModelTracker:
         return self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
 
     def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
-        rig, sights, covariance, scale = self._rig, self._sights, estimate.covariance, math.exp(estimate.log_scale[0])
+        rig, sights, covariance, now = self._rig, self._sights, estimate.covariance, estimate is self._hand.estimate
         solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
-        complete = describe(estimate.world, estimate.angles, estimate.velocity, covariance, scale, self._subject,
-                            sights.seen, sights.fresh_ns, t_ns, report)
+        complete = describe(self._told if now else self._told_ahead, sights.fresh_ns, t_ns, report)
         points, covariances = report.points, report.covariances
-        if estimate is self._hand.estimate:
+        if now:
             self._compare(points[FIRST_MARKER:])
         seen_pixels, seen_flags = sights.last_seen()
         self._sequence += 1
@@ -224,7 +226,7 @@ class ModelTracker:
             palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors,
             joint_covariances=covariances[:FIRST_TIP], fingertip_covariances=covariances[FIRST_TIP:FIRST_MARKER],
             angle_sd=report.angle_sd, palm_covariance=covariance[:ANGLES, :ANGLES].copy(),
-            hand_scale=scale, hand_scale_sd=math.sqrt(max(covariance[SCALE, SCALE], 0.0)),
+            hand_scale=math.exp(estimate.log_scale[0]), hand_scale_sd=math.sqrt(max(covariance[SCALE, SCALE], 0.0)),
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
 

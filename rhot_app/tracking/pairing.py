@@ -8,12 +8,14 @@ paired by arrival.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking import schedule, tracks
+from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
@@ -43,33 +45,47 @@ class Paired:
     completed_by: CameraObservations
 
 
+class _Tracks(NamedTuple):
+    """C cameras, M markers: `frames` (C, 8) and `book` (C, 4) as in `schedule`; `marks` (3,) ns; `times` .. `counts` as
+    in `tracks`; `newest` (C, M) the markers' own times in the newest frame, `seen_pixels` (C, M, 2) and `seen_flags`
+    (C, M) what it shows."""
+
+    frames: Times
+    book: Times
+    marks: Times
+    times: Times
+    pixels: Array
+    covariances: Array
+    flags: Flags
+    counts: Times
+    newest: Times
+    seen_pixels: Array
+    seen_flags: Flags
+
+
 class Pairing:
     """Tracks of C cameras and M markers, and the clockwork that says when the next state is due."""
 
     def __init__(self, cameras: int, markers: int) -> None:
         self._shape = (cameras, markers)
         length = tracks.LENGTH
-        self._times = np.zeros((cameras, markers, length), np.int64)
-        self._pixels = np.zeros((cameras, markers, length, 2))
-        self._covariances = np.zeros((cameras, markers, length, 2, 2))
-        self._flags = np.zeros((cameras, markers, length), np.uint16)
-        self._counts = np.zeros((cameras, markers), np.int64)
-        self._newest = np.empty((cameras, markers), np.int64)
-        self._seen_pixels = np.empty((cameras, markers, 2))
-        self._seen_flags = np.empty((cameras, markers), np.uint16)
-        self._frames = np.zeros((cameras, schedule.FRAMES), np.int64)
-        self._book = np.zeros((cameras, 4), np.int64)
-        self._marks = np.empty(3, np.int64)
+        self._tracks = _Tracks(
+            np.zeros((cameras, schedule.FRAMES), np.int64), np.zeros((cameras, 4), np.int64), np.empty(3, np.int64),
+            np.zeros((cameras, markers, length), np.int64), np.zeros((cameras, markers, length, 2)),
+            np.zeros((cameras, markers, length, 2, 2)), np.zeros((cameras, markers, length), np.uint16),
+            np.zeros((cameras, markers), np.int64), np.empty((cameras, markers), np.int64),
+            np.empty((cameras, markers, 2)), np.empty((cameras, markers), np.uint16))
+        self._shared = Share(self._tracks)
         self.reset()
 
     def reset(self) -> None:
         """Forget all tracks and the last state."""
-        self._counts[:] = 0
-        self._newest[:] = -1
-        self._seen_pixels[:] = np.nan
-        self._seen_flags[:] = _LOST
-        self._book[:] = 0
-        self._marks[:] = -1
+        self._tracks.counts[:] = 0
+        self._tracks.newest[:] = -1
+        self._tracks.seen_pixels[:] = np.nan
+        self._tracks.seen_flags[:] = _LOST
+        self._tracks.book[:] = 0
+        self._tracks.marks[:] = -1
         self._latest: CameraObservations | None = None
         self.newest_frames: list[CameraObservations | None] = [None] * self._shape[0]
 
@@ -81,10 +97,8 @@ class Pairing:
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame into the tracks. Duplicates are ignored, late frames are put in their place."""
         camera = observations.camera
-        if _ingest(camera, observations.t_row0_master_ns, observations.t_receive_ns, observations.row_time_ns,
-                   observations.pixels, observations.covariances, observations.flags, self._frames,
-                   self._book, self._marks, self._times, self._pixels, self._covariances, self._flags, self._counts,
-                   self._newest, self._seen_pixels, self._seen_flags):
+        if _ingest(self._shared, camera, observations.t_row0_master_ns, observations.t_receive_ns,
+                   observations.row_time_ns, observations.pixels, observations.covariances, observations.flags):
             self._latest = self.newest_frames[camera] = observations
 
     def due(self) -> Paired | None:
@@ -99,52 +113,51 @@ class Pairing:
             return None
         live, pixels = np.empty(self._shape[0], np.bool_), np.empty((*self._shape, 2))
         covariances, flags = np.empty((*self._shape, 2, 2)), np.empty(self._shape, np.int64)
-        instant = _pair(self._frames, self._book, self._marks, self._times, self._pixels, self._covariances,
-                        self._flags, self._counts, self._newest, live, pixels, covariances, flags)
+        instant = _pair(self._shared, live, pixels, covariances, flags)
         return None if instant < 0 else Paired(instant, pixels, covariances, flags, live, self._latest)
 
     def last_seen(self) -> tuple[Array, Flags]:
         """(C, M, 2) px of each camera's newest frame, NaN where lost, and (C, M) its flags."""
-        return self._seen_pixels.copy(), self._seen_flags.copy()
+        return self._tracks.seen_pixels.copy(), self._tracks.seen_flags.copy()
 
 
 @njit(cache=True)
-def _ingest(camera: int, t_row0_ns: int, receive_ns: int, row_time_ns: int, new_pixels: Array, new_covariances: Array,
-            new_flags: Flags, frames: Times, book: Times, marks: Times, times: Times, pixels: Array,
-            covariances: Array, flags: Flags, counts: Times, newest: Times, seen_pixels: Array,
-            seen_flags: Flags) -> bool:
-    """Take one frame in; returns whether it is its camera's newest."""
+def _ingest(shared: Share, camera: int, t_row0_ns: int, receive_ns: int, row_time_ns: int, pixels: Array,
+            covariances: Array, flags: Flags) -> bool:
+    """Take one frame into shared `_Tracks`; returns whether it is its camera's newest."""
+    all_tracks: _Tracks = shared.of
+    frames, book, marks, newest = all_tracks.frames, all_tracks.book, all_tracks.marks, all_tracks.newest
     if marks[_FIRST_RECEIVE] < 0:
         marks[_FIRST_RECEIVE] = receive_ns
     outcome = schedule.place_frame(frames[camera], book[camera], t_row0_ns, receive_ns)
     if outcome == schedule.IGNORED:
         return False
     if outcome == schedule.ANEW:
-        counts[camera] = 0
+        all_tracks.counts[camera] = 0
         newest[camera] = -1
     book[camera, schedule.RECEIVED] = max(book[camera, schedule.RECEIVED], receive_ns)
     marks[_LAST_RECEIVE] = max(marks[_LAST_RECEIVE], receive_ns)
     is_newest = frames[camera, book[camera, schedule.COUNT] - 1] == t_row0_ns
-    tracks.ingest_frame(times[camera], pixels[camera], covariances[camera], flags[camera], counts[camera],
-                        newest[camera], t_row0_ns, row_time_ns, is_newest, _SIGMA_FLOOR_PX, new_pixels,
-                        new_covariances, new_flags)
+    tracks.ingest_frame(all_tracks.times[camera], all_tracks.pixels[camera], all_tracks.covariances[camera],
+                        all_tracks.flags[camera], all_tracks.counts[camera], newest[camera], t_row0_ns, row_time_ns,
+                        is_newest, _SIGMA_FLOOR_PX, pixels, covariances, flags)
     if is_newest:
         book[camera, schedule.NEW] = 1
         for m in range(newest.shape[1]):
             seen = newest[camera, m] >= 0
             for k in range(2):
-                seen_pixels[camera, m, k] = new_pixels[m, k] if seen else np.nan
-            seen_flags[camera, m] = new_flags[m] if seen else _LOST
+                all_tracks.seen_pixels[camera, m, k] = pixels[m, k] if seen else np.nan
+            all_tracks.seen_flags[camera, m] = flags[m] if seen else _LOST
     return bool(is_newest)
 
 
 @njit(cache=True)
-def _pair(frames: Times, book: Times, marks: Times, times: Times, pixels: Array, covariances: Array, flags: Flags,
-          counts: Times, newest: Times, live: Mask, out_pixels: Array, out_covariances: Array,
-          out_flags: Times) -> int:
+def _pair(shared: Share, live: Mask, pixels: Array, covariances: Array, flags: Times) -> int:
     """The instant at which a state is due, with the last four arrays filled as `Paired` says; -1 when none is."""
+    all_tracks: _Tracks = shared.of
+    frames, book, marks = all_tracks.frames, all_tracks.book, all_tracks.marks
     schedule.find_live(frames, book, marks[_FIRST_RECEIVE], marks[_LAST_RECEIVE], live)
-    instant, period, all_new = schedule.newest_instant(frames, book, newest, live)
+    instant, period, all_new = schedule.newest_instant(frames, book, all_tracks.newest, live)
     if instant < 0:
         return -1
     advance = instant - marks[_LAST_STATE]
@@ -155,8 +168,8 @@ def _pair(frames: Times, book: Times, marks: Times, times: Times, pixels: Array,
     gaps = np.empty(live.shape[0], np.int64)
     for c in range(live.shape[0]):
         gaps[c] = tracks.longest_gap_ns(schedule.period_ns(frames[c], book[c, schedule.COUNT]))
-    tracks.interpolate_all(times, pixels, covariances, flags, counts, gaps, instant, out_pixels, out_covariances,
-                           out_flags)
+    tracks.interpolate_all(all_tracks.times, all_tracks.pixels, all_tracks.covariances, all_tracks.flags,
+                           all_tracks.counts, gaps, instant, pixels, covariances, flags)
     marks[_LAST_STATE] = instant
     book[:, schedule.NEW] = 0
     return int(instant)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import POSE
 from rhot_app.tracking.kalman.hand_filter import Outcome
-from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.markers import Cameras, Frame, project_marker
+from rhot_app.tracking.kalman.marker_block import MarkerBlock, Sighting
+from rhot_app.tracking.kalman.markers import Cameras, project_marker
+from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
@@ -26,6 +27,7 @@ _RECENT = 12
 _PERIODS = 1.5
 _SLOWEST_NS = 400_000_000
 _LOST = int(MarkerFlag.LOST)
+_NEVER = -(1 << 62)  # ns
 
 
 class Seen(NamedTuple):
@@ -43,27 +45,33 @@ class Sights:
     `newest`: each camera's newest frame."""
 
     def __init__(self, cameras: int, markers: int) -> None:
-        self._shape = (cameras, markers)
+        shape = (cameras, markers)
+        self.seen = Seen(np.empty(shape, np.int64), np.empty((*shape, 2)), np.empty((*shape, 2, 2)),
+                         np.empty(shape, np.bool_))
+        self._shared = Share(self.seen)
+        self._newest_pixels, self._newest_flags = np.empty((*shape, 2)), np.empty(shape, np.uint16)
         self.reset()
 
     def reset(self) -> None:
-        """Forget all."""
-        self.seen = Seen(np.full(self._shape, -1, np.int64), np.full((*self._shape, 2), np.nan),
-                         np.ones((*self._shape, 2, 2)) * np.eye(2), np.zeros(self._shape, np.bool_))
+        """Forget all; `seen` stays the same arrays."""
+        self.seen.times[:], self.seen.pixels[:], self.seen.covariances[:], self.seen.doubtful[:] = (
+            -1, np.nan, np.eye(2), False)
         self.fresh_ns = 60_000_000
-        self.newest: list[CameraObservations | None] = [None] * self._shape[0]
-        self._newest_pixels = np.full((*self._shape, 2), np.nan)
-        self._newest_flags = np.full(self._shape, _LOST, np.uint16)
+        self.newest: list[CameraObservations | None] = [None] * len(self._newest_flags)
+        self._newest_pixels[:], self._newest_flags[:] = np.nan, _LOST
+        self._latest = [_NEVER] * len(self._newest_flags)
         self._blocks: list[MarkerBlock] = []
 
     def enter(self, block: MarkerBlock) -> bool:
         """Take a frame in; False when it is there already."""
         observations = block.observations
         camera, begin = observations.camera, observations.t_row0_master_ns
-        for other in self._blocks:
-            if (other.observations.camera == camera
-                    and abs(other.observations.t_row0_master_ns - begin) < _SAME_FRAME_NS):
-                return False
+        if begin < self._latest[camera] + _SAME_FRAME_NS:
+            for other in self._blocks:
+                if (other.observations.camera == camera
+                        and abs(other.observations.t_row0_master_ns - begin) < _SAME_FRAME_NS):
+                    return False
+        self._latest[camera] = max(self._latest[camera], begin)
         self._blocks = [*self._blocks[1 - _RECENT:], block]
         last = self.newest[camera]
         if last is None or begin > last.t_row0_master_ns or last.t_row0_master_ns - begin > _SLOWEST_NS:
@@ -80,8 +88,7 @@ class Sights:
 
     def believe(self, block: MarkerBlock, outcome: Outcome) -> int:
         """Note which sights of a frame were believed, under the names that the hand gave them; returns how many."""
-        return int(_believe(self.seen, block.frame, block.observations.flags, block.t_ns, outcome.believed,
-                            outcome.source))
+        return int(_believe(self._shared, block.shared, block.t_ns, outcome.believed, outcome.source))
 
     def last_seen(self) -> tuple[Array, Flags]:
         """(C, M, 2) px of each camera's newest frame, NaN where lost, and (C, M) its flags."""
@@ -89,8 +96,11 @@ class Sights:
 
 
 @njit(cache=True)
-def _believe(seen: Seen, frame: Frame, flags: Flags, t_ns: int, believed: Mask, source: Indices) -> int:
-    """Enter a frame of `t_ns` into `seen`; `flags` (M,) of its sights, `believed` and `source` as in `Outcome`."""
+def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, source: Indices) -> int:
+    """Enter a frame, a shared `Sighting` of `t_ns`, into a shared `Seen`; `believed` and `source` as in `Outcome`."""
+    seen: Seen = shared.of
+    sighting: Sighting = block.of
+    frame = sighting.frame
     camera, count = frame.camera[0], 0
     for observation in range(believed.shape[0]):
         if not believed[observation]:
@@ -105,7 +115,7 @@ def _believe(seen: Seen, frame: Frame, flags: Flags, t_ns: int, believed: Mask, 
                 seen.pixels[camera, marker, i] = frame.pixels[sight, i]
                 for j in range(2):
                     seen.covariances[camera, marker, i, j] = frame.covariances[sight, i, j]
-            seen.doubtful[camera, marker] = (flags[sight] & DOUBTFUL) != 0
+            seen.doubtful[camera, marker] = (sighting.flags[sight] & DOUBTFUL) != 0
     return count
 
 

@@ -75,7 +75,7 @@ def test_late_reordered_and_doubled_frames_never_turn_time_back(seed):
     times = [s.t_ns for s in states]
     assert (np.diff(times) > 0).all()
     assert len(states) > 50
-    held = pairing._times[0, 0, :pairing._counts[0, 0]]
+    held = pairing._tracks.times[0, 0, :pairing._tracks.counts[0, 0]]
     assert (np.diff(held) > 0).all()
 
 
