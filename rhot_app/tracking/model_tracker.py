@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
-from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, empty_estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.share import Share
-from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline, copy_whole
+from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, Account, describe, empty_report, subject_of
 from rhot_app.tracking.model_start import Starter, count_apart
@@ -109,7 +109,7 @@ class ModelTracker:
                      key=lambda frame: frame.t_receive_ns, default=None)
         if not self._tracking or newest is None:
             return None
-        copy_whole(self._hand.estimate, self._ahead)
+        copy_estimate(self._hand.estimate, self._ahead)
         ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
         predict(self._ahead, ahead, self._wearing.worn.part, self._wearing.habits, self._wearing.bias_variance)
         return self._describe(self._ahead, self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())

@@ -17,18 +17,19 @@ from rhot_app.tracking.kalman.estimate import (
     PALM_HELD,
     POSE,
     ROTATION,
+    TURN_HELD,
     Estimate,
     displace,
     empty_estimate,
 )
 from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import Gain, contract, empty_gain, misfit, solve
-from rhot_app.tracking.kalman.holding import hold, hold_turn, rest
+from rhot_app.tracking.kalman.holding import TURN_ALONE, hold, hold_turn, rest
 from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
 from rhot_app.tracking.kalman.reappearing import loosen
-from rhot_app.tracking.kalman.rows import ResidualBlock, Rows, clear, empty_rows
+from rhot_app.tracking.kalman.rows import Page, ResidualBlock, Rows, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import keep_shown, note_sights
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
@@ -40,8 +41,8 @@ Mask = NDArray[np.bool_]
 ITERATIONS = 2
 """More of them go to and fro where an angle is open: what is left is there again with the next frame."""
 
-MISFIT = 1000.0
-"""Squared normalised residual of one row beyond which what held the hand is let go."""
+MISFIT = {PALM_HELD: 1000.0, TURN_HELD: 200.0}
+"""Squared normalised residual of one row beyond which the palm's place, and how fingers bend, are held no more."""
 
 NEAR_RAD = 0.02
 """Steps whose turns are smaller are taken without linearising again: what is left is 0.1 px or less."""
@@ -107,6 +108,7 @@ class HandFilter:
                           empty_gain(ROWS_MAX, size), empty_held(size), np.empty(size), np.empty(ROWS_MAX, np.bool_),
                           np.empty(ROWS_MAX), worn, cameras, habits, limits, bias_variance)
         self._shared = Share(self._desk)
+        self._now, self._tried = (Share(Page(mean, self._desk.rows)) for mean in (self.estimate, self._desk.trial))
         self._float_scale = float_scale
 
     def start(self, world_from_palm: Array, angles: Array) -> None:
@@ -135,39 +137,42 @@ class HandFilter:
 
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""
-        estimate, rows = self.estimate, self._desk.rows
+        rows = self._desk.rows
         _carry_on(self._shared, dt)
         for block in blocks:
-            block.associate(estimate)
-        self._linearise(blocks, estimate)
+            block.associate(self._now)
+        self._linearise(blocks, self._now)
         _prepare(self._shared, dt)
         self._settle(blocks)
-        if estimate.held[0] == PALM_HELD and self._misfits(blocks):
-            _let_place_go(self._shared)
-            self._linearise(blocks, estimate)
+        if self._misfits(blocks):
+            _hold_turn_alone(self._shared)
+            self._linearise(blocks, self._now)
             self._settle(blocks)
         _conclude(self._shared, dt)
         observations = int(rows.used[1])
         return Outcome(self._desk.believed[:observations], rows.source[:observations])
 
-    def _linearise(self, blocks: Sequence[ResidualBlock], estimate: Estimate) -> None:
-        clear(self._desk.rows)
+    def _linearise(self, blocks: Sequence[ResidualBlock], page: Share) -> None:
+        self._desk.rows.used[:] = 0
         for block in blocks:
-            block.linearise(estimate, self._desk.rows)
+            block.linearise(page)
 
     def _settle(self, blocks: Sequence[ResidualBlock]) -> None:
         """Iterate to the new mean, a step from the old one."""
         self._desk.step[:] = 0.0
         for iteration in range(ITERATIONS):
             if iteration > 0:
-                self._linearise(blocks, self._desk.trial)
+                self._linearise(blocks, self._tried)
             if _improve(self._shared):
                 return
 
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
         """Whether the hand as it is held cannot be where it is seen."""
-        self._linearise(blocks, self._desk.trial)
-        return bool(misfit(self._desk.rows, self._desk.believed, self._desk.widening) > MISFIT)
+        worst = MISFIT.get(int(self.estimate.held[0]))
+        if worst is None or self._desk.held.used[0] <= TURN_ALONE:
+            return False
+        self._linearise(blocks, self._tried)
+        return bool(misfit(self._desk.rows, self._desk.believed, self._desk.widening) > worst)
 
 
 @njit(cache=True)
@@ -189,8 +194,8 @@ def _prepare(shared: Share, dt: float) -> None:
 
 
 @njit(cache=True)
-def _let_place_go(shared: Share) -> None:
-    """Hold no more of the palm than its turn."""
+def _hold_turn_alone(shared: Share) -> None:
+    """Let go of all that is held but the palm's turn."""
     desk: Desk = shared.of
     release(desk.estimate.covariance, desk.held)
     hold_turn(desk.held)

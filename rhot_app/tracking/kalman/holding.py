@@ -48,7 +48,10 @@ HURRIES_M_S, HURRIES_RAD_S = 0.15, 1.5
 """A palm that moves or turns faster carries its fingers along."""
 
 TURNS_RAD_S = 0.5
-"""A palm that turns faster, while all markers are in sight, is known by its fingertips to do so."""
+"""A palm that turns faster, while two cameras see all markers, is known by its fingertips to do so."""
+
+TURN_ALONE = 9
+"""Directions that are held when nothing but the palm's turn is: three angles, their velocities and accelerations."""
 
 REST_S = 0.1
 """A turn that is held comes to rest with this time constant."""
@@ -62,11 +65,11 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, cameras: Array, stiff: A
     `Habits`.
     """
     unseen = unseen_now(estimate, rows)
-    on_palm, placed, most, eye, all_seen = 0, 0, 0, -1, True
+    on_palm, placed, most, eye, all_placed = 0, 0, 0, -1, True
     eyes_of = np.zeros(FINGERS, np.int64)
     for m in range(part.shape[0]):
         eyes, last = eyes_on(unseen, m)
-        all_seen &= eyes > 0
+        all_placed &= eyes > 1
         if part[m] != PALM_PART:
             eyes_of[part[m]] = max(eyes_of[part[m]], eyes)
         else:
@@ -78,17 +81,17 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, cameras: Array, stiff: A
     hurries = moving[LINEAR] > HURRIES_M_S or moving[TURN] > HURRIES_RAD_S
     held.used[0] = 0
     held.directions[:] = 0.0
-    estimate.held[0] = FREE
+    before, estimate.held[0] = estimate.held[0], FREE
     if on_palm == 0:
         return
     if most > 1:
-        if all_seen and (hurries or estimate.turning[0] > TURNS_RAD_S):
+        if all_placed and (hurries or estimate.turning[0] > TURNS_RAD_S):
             return
         _hold_stiff(stiff, eyes_of, held)
         if placed < ENOUGH:
             estimate.held[0] = TURN_HELD
             hold_turn(held)
-    elif hurries:
+    elif hurries and before != PALM_HELD:
         estimate.held[0] = FINGERS_HELD
         for i in range(ANGLES, POSE):
             _hold_number(i, held)
@@ -147,7 +150,7 @@ def rest(estimate: Estimate, dt: float) -> None:
     if estimate.held[0] != TURN_HELD and estimate.held[0] != PALM_HELD:
         return
     share, covariance = math.exp(-dt / REST_S), estimate.covariance
-    for i in range(ROTATION, 2 * ROTATION):
+    for i in range(ROTATION, ANGLES):
         estimate.velocity[i] *= share
         estimate.acceleration[i] *= share
         for base in (VELOCITY, ACCELERATION):

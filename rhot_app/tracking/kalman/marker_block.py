@@ -9,9 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.association import relabel
-from rhot_app.tracking.kalman.estimate import Estimate
 from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, append_markers
-from rhot_app.tracking.kalman.rows import Rows
+from rhot_app.tracking.kalman.rows import Page
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.wearing import Wearing
 from rhot_app.tracking.tracker import CameraObservations
@@ -42,25 +41,27 @@ class MarkerBlock:
         after_ns, self.sights = _read(self.shared, 1e-9 * observations.row_time_ns)
         self.t_ns = observations.t_row0_master_ns + int(after_ns)
 
-    def associate(self, estimate: Estimate) -> int:
+    def associate(self, page: Share) -> int:
         """Ask the hand, carried to this frame's instant, which marker each sight is of; returns how many changed."""
-        return int(_associate(self.shared, estimate))
+        return int(_associate(self.shared, page))
 
-    def linearise(self, estimate: Estimate, rows: Rows) -> None:
+    def linearise(self, page: Share) -> None:
         """Append the frame's observations; see `ResidualBlock`."""
-        _linearise(self.shared, estimate, rows)
+        _linearise(self.shared, page)
 
 
 @njit(cache=True)
-def _associate(shared: Share, estimate: Estimate) -> int:
+def _associate(shared: Share, page: Share) -> int:
     sighting: Sighting = shared.of
-    return relabel(sighting.worn, sighting.cameras, sighting.frame, estimate)
+    there: Page = page.of
+    return relabel(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
 
 
 @njit(cache=True)
-def _linearise(shared: Share, estimate: Estimate, rows: Rows) -> None:
+def _linearise(shared: Share, page: Share) -> None:
     sighting: Sighting = shared.of
-    append_markers(sighting.worn, sighting.cameras, sighting.frame, estimate, rows)
+    there: Page = page.of
+    append_markers(sighting.worn, sighting.cameras, sighting.frame, there.estimate, there.rows)
 
 
 @njit(cache=True)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import Estimate
+from rhot_app.tracking.kalman.share import Share
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -40,15 +40,23 @@ class Rows(NamedTuple):
     source: Indices
 
 
-class ResidualBlock(Protocol):
-    """Something that was observed at an instant: a frame's markers, an edge, an object in the hand."""
+class Page(NamedTuple):
+    """The hand as it is believed to be, and the rows of what is observed of it."""
 
-    def associate(self, estimate: Estimate) -> int:
+    estimate: Estimate
+    rows: Rows
+
+
+class ResidualBlock(Protocol):
+    """Something that was observed at an instant: a frame's markers, an edge, an object in the hand. A `Share` carries a
+    `Page`."""
+
+    def associate(self, page: Share) -> int:
         """Decide what the observations are of, given the hand at that instant; returns how many changed."""
         ...
 
-    def linearise(self, estimate: Estimate, rows: Rows) -> None:
-        """Append this block's observations to `rows`, expected and linearised at the mean of `estimate`.
+    def linearise(self, page: Share) -> None:
+        """Append this block's observations to the page's rows, expected and linearised at the mean of its estimate.
 
         Called once or more per update; every time it must append the same observations in the same order.
         """
@@ -59,10 +67,3 @@ def empty_rows(rows: int, size: int) -> Rows:
     """Room for `rows` rows of a state with `size` numbers."""
     return Rows(np.zeros(2, np.int64), np.zeros(rows), np.zeros((rows, size)), np.zeros((rows, 2)),
                 np.zeros(rows + 1, np.int64), np.zeros(rows, np.int64), np.zeros((rows, 3), np.int64))
-
-
-@njit(cache=True)
-def clear(rows: Rows) -> None:
-    """Begin anew."""
-    rows.used[:] = 0
-    rows.first[0] = 0

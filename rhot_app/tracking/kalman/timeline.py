@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Protocol
 
-from rhot_app.tracking.kalman.estimate import Estimate, empty_estimate
+from rhot_app.tracking.kalman.estimate import Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.rows import ResidualBlock
 
@@ -38,12 +38,6 @@ class _Moment:
 _INSTANT = attrgetter("t_ns")
 
 
-def copy_whole(source: Estimate, target: Estimate) -> None:
-    """Copy every array of `source` into `target`: the covariance, 80 KB, goes as one block of memory."""
-    for one, other in zip(source, target, strict=True):
-        other[...] = one
-
-
 class Timeline:
     """Feeds a filter in the order of time, whatever the order of arrival."""
 
@@ -68,7 +62,7 @@ class Timeline:
             return []
         again: Sequence[_Moment] = self._moments[place:]
         if again:
-            copy_whole(again[0].before, self._hand.estimate)
+            copy_estimate(again[0].before, self._hand.estimate)
             self.t_ns = again[0].before_ns
             del self._moments[place:]
         outcomes = [(block, self._weigh(block))]
@@ -80,7 +74,7 @@ class Timeline:
     def _weigh(self, block: TimedBlock) -> Outcome:
         estimate = self._hand.estimate
         before = self._spare.pop() if self._spare else empty_estimate(*estimate.unseen.shape)
-        copy_whole(estimate, before)
+        copy_estimate(estimate, before)
         self._moments.append(_Moment(block.t_ns, self.t_ns, before, block))
         if len(self._moments) > LENGTH:
             self._spare.append(self._moments.pop(0).before)

@@ -27,7 +27,7 @@ from rhot_app.tracking.kalman.estimate import (
 from rhot_app.tracking.kalman.hand_filter import HandFilter
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
-from rhot_app.tracking.kalman.rows import Rows, clear, empty_rows
+from rhot_app.tracking.kalman.rows import Rows, empty_rows
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -88,7 +88,6 @@ def difference(a: Estimate, b: Estimate) -> np.ndarray:
 def sighting(*seen: tuple[int, int], part: np.ndarray = WEARING.worn.part) -> Rows:
     """Rows of an update in which each `seen` (camera, marker) was observed; they say nothing but that."""
     rows = empty_rows(2 * len(seen) + 2, SIZE)
-    clear(rows)
     for k, (camera, marker) in enumerate(seen):
         rows.source[k] = camera, 0, marker
         rows.part[k] = -1 if marker < 0 else part[marker]

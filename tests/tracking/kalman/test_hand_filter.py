@@ -5,11 +5,20 @@ from itertools import pairwise
 import numpy as np
 from known_hand import SETTLED, SIZE, WEARING, blocks, empty, filter_of_hand, settled
 
-from rhot_app.tracking.kalman.estimate import ANGLES, FIRST_FINGER, LINEAR, PALM_HELD, TURN, copy_estimate
+from rhot_app.hand.skeleton import ANGLE_SLICES
+from rhot_app.tracking.kalman.estimate import (
+    ANGLES,
+    FIRST_FINGER,
+    LINEAR,
+    PALM_HELD,
+    TURN,
+    TURN_HELD,
+    copy_estimate,
+)
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.sighted import line_of_sight
 
-POSES, WRIST = WEARING.cameras.pose, 5
+POSES, WRIST, MIDDLE = WEARING.cameras.pose, 5, 2
 HIDDEN = 1.0  # s
 
 
@@ -85,6 +94,22 @@ def test_a_distance_that_does_not_fit_what_is_seen_is_let_go():
     assert after.held[0] == PALM_HELD and outcome.believed.sum() > 3
     assert abs((after.world[:3, 3] - where["true"]) @ sight) < 0.02
     np.testing.assert_allclose(after.world[:3, :3], expected.world[:3, :3], atol=1e-8)
+
+
+def test_a_finger_that_cannot_bend_as_it_is_held_to_does_not_drag_the_palm_along():
+    """One camera sees the middle finger where it would not be with all its joints bent alike; both see the wrist."""
+    def stray(estimate, block):
+        estimate.unseen[1 - block.observations.camera, MIDDLE] = HIDDEN
+        rows = slice(ANGLES + ANGLE_SLICES[MIDDLE].start, ANGLES + ANGLE_SLICES[MIDDLE].stop)
+        estimate.covariance[rows] = estimate.covariance[:, rows] = 0.0
+        estimate.covariance[rows, rows] = 0.3**2 * np.eye(4)
+        block.frame.pixels[MIDDLE, 1] += 12.0
+
+    after, expected, outcome = weighed(stray)
+    assert after.held[0] == TURN_HELD and outcome.believed.all()
+    assert np.linalg.norm(after.world[:3, 3] - expected.world[:3, 3]) < 1.3e-3  # 1.9 mm if it were held
+    _, knuckle, joint, _ = (after.angles - expected.angles)[ANGLE_SLICES[MIDDLE]]
+    assert knuckle < -0.1 and joint > 0.5
 
 
 def test_rounding_does_not_add_up():

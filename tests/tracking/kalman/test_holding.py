@@ -147,12 +147,26 @@ def test_a_palm_out_of_sight_that_hurries_carries_its_fingers_along(hidden_from,
         assert_holds(directions, numbers(*range(ANGLES, POSE)))
 
 
+def test_a_palm_that_seems_to_hurry_only_since_it_was_held_does_not_carry_its_fingers_along():
+    """Its speed is what fingertips made of it."""
+    estimate, part = hand_with()
+    estimate.unseen[:, WRIST] = HIDDEN
+    estimate.held[0] = PALM_HELD
+    faster(estimate, part, 2.0 * HURRIES_M_S)
+    assert estimate.held[0] == PALM_HELD
+    estimate.held[0] = TURN_HELD
+    faster(estimate, part, 2.0 * HURRIES_M_S)
+    faster(estimate, part, 2.0 * HURRIES_M_S)
+    assert estimate.held[0] == FINGERS_HELD
+
+
 def test_a_speed_that_may_be_noise_is_none():
     estimate, part = hand_with()
     estimate.unseen[:, WRIST] = HIDDEN
     estimate.covariance[VELOCITY + 1, VELOCITY + 1] = HURRIES_M_S**2
     faster(estimate, part, 1.9 * HURRIES_M_S)
     assert estimate.held[0] == PALM_HELD
+    estimate.held[0] = TURN_HELD
     faster(estimate, part, 2.3 * HURRIES_M_S)
     assert estimate.held[0] == FINGERS_HELD
 
@@ -162,7 +176,7 @@ def test_the_turn_of_a_hand_that_moves_in_sight_is_not_held():
     assert len(faster(estimate, part, 1.2 * HURRIES_M_S)) == 0 and estimate.held[0] == FREE
     estimate.velocity[:], estimate.turning[0] = 0.0, 1.1 * TURNS_RAD_S
     assert len(held_of(estimate, part)) == 0 and estimate.held[0] == FREE
-    estimate.unseen[:, 2] = HIDDEN
+    estimate.unseen[0, 2] = HIDDEN  # the other camera still sees it, but not where it is along its line of sight
     held_of(estimate, part)
     assert estimate.held[0] == TURN_HELD
 

@@ -6,15 +6,15 @@ from known_hand import MARKERS, SIZE, WEARING, blocks, difference, empty, moved,
 
 from rhot_app.tracking.kalman.estimate import ACCELERATION, BIAS, POSE, SCALE, VELOCITY
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.rows import PALM_PART, clear, empty_rows
+from rhot_app.tracking.kalman.rows import PALM_PART, Page, empty_rows
+from rhot_app.tracking.kalman.share import Share
 
 STEP = 1e-6
 
 
 def residuals(block, estimate):
     rows = empty_rows(64, SIZE)
-    clear(rows)
-    block.linearise(estimate, rows)
+    block.linearise(Share(Page(estimate, rows)))
     return rows
 
 

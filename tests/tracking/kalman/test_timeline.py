@@ -4,7 +4,7 @@ import numpy as np
 from known_hand import blocks, difference, empty, filter_of_hand, moving_estimate, settled, twin
 
 from rhot_app.tracking.kalman.estimate import copy_estimate
-from rhot_app.tracking.kalman.timeline import LENGTH, Timeline, copy_whole
+from rhot_app.tracking.kalman.timeline import LENGTH, Timeline
 
 
 def follow(frames):
@@ -63,7 +63,7 @@ def test_what_is_remembered_is_whole_and_its_own():
     estimate, other = moving_estimate(), empty()
     for array in estimate:
         array += 1 if array.dtype == np.int64 else 0.01
-    copy_whole(estimate, other)
+    copy_estimate(estimate, other)
     for field, source, target in zip(estimate._fields, estimate, other, strict=True):
         np.testing.assert_array_equal(source, target, err_msg=field)
         assert not np.shares_memory(source, target)
