@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.geometry.transforms import fit_rigid
 from rhot_app.hand.finger_ik import solve_fingers
+from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
@@ -25,6 +26,9 @@ Array = NDArray[np.float64]
 LEAST_MARKERS = 4
 FLATTEST_M2 = 1e-5
 """Least area spanned by three palm markers that show how the palm is turned."""
+
+UNFIT_M = 0.06
+"""Markers so far from where the hand has them are something else. A first fit of a moving hand may be 3 cm off."""
 
 _TARGET_SD_M = 1e-3
 
@@ -69,7 +73,20 @@ class Starter:
         return positions
 
     def pose_of(self, markers: Array) -> HandPose | None:
-        """The hand whose `markers` (M, 3) m, NaN where not located, are enough to find it."""
+        """The hand whose `markers` (M, 3) m, NaN where not located, are enough to find it.
+
+        None when they are not, or are where no hand has them: two that change names in one camera seem far away.
+        """
+        pose = self._fitted(markers)
+        return pose if pose is not None and count_apart(markers, self._worn_at(pose), UNFIT_M) == 0 else None
+
+    def _worn_at(self, pose: HandPose) -> Array:
+        """(M, 3) m where a hand in `pose` has its markers."""
+        dh, out = self._wearing.worn.dh, np.empty((len(self._rig.marker_ids), 3))
+        forward_arrays(dh, pose.world_from_palm, pose.angles, empty_frames(dh), out)
+        return out
+
+    def _fitted(self, markers: Array) -> HandPose | None:
         located = np.isfinite(markers[:, 0])
         if np.count_nonzero(located) < min(LEAST_MARKERS, len(markers)):
             return None

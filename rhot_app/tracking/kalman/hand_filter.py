@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
+    FREE,
     GROUP_OF,
     PALM_HELD,
     POSE,
@@ -58,8 +59,8 @@ START_AGITATION = 0.01 * MOST
 ASTRAY_M = 0.3
 """Standard deviation of a palm's place beyond which it must be looked for."""
 
-FASTEST = 12.0
-"""No palm is faster, m/s: a boxer's fist peaks near 10."""
+FASTEST_M_S, FASTEST_RAD_S = 12.0, 40.0
+"""No palm is faster: a boxer's fist peaks near 10 m/s, a forearm turns at 25 rad/s."""
 
 SCALE_SD = 0.1
 """Of the hand's size at the start, when it may float."""
@@ -119,7 +120,7 @@ class HandFilter:
                       covariance):
             array[:] = 0.0
         estimate.agitation[:] = START_AGITATION
-        estimate.unseen[:] = 0.0
+        estimate.unseen[:], estimate.unfaded[:], estimate.turning[:], estimate.held[:] = 0.0, 0.0, 0.0, FREE
         place, turn, speed, spin, bend = START_SD
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),
@@ -133,7 +134,8 @@ class HandFilter:
         """Whether the estimate is worth nothing any more: nobody's hand is so fast or so lost."""
         covariance, velocity = self.estimate.covariance, self.estimate.velocity
         return not (float(covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) < ASTRAY_M**2
-                    and float(velocity[:3] @ velocity[:3]) < FASTEST**2)
+                    and float(velocity[:ROTATION] @ velocity[:ROTATION]) < FASTEST_M_S**2
+                    and float(velocity[ROTATION:ANGLES] @ velocity[ROTATION:ANGLES]) < FASTEST_RAD_S**2)
 
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""
