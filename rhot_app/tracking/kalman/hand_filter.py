@@ -53,6 +53,9 @@ ROWS_MAX = 128
 START_SD = (0.03, 0.4, 1.0, 3.0, 6.0)
 """Standard deviations at the start: palm's place m, its rotation rad, velocities m/s, palm rad/s, fingers rad/s."""
 
+START_TURNING = 3.0
+"""A palm just found is taken to turn so fast, rad/s: how it is turned, all markers show at first, not habit."""
+
 START_AGITATION = 0.01 * MOST
 """Where nobody knows yet how the hand moves."""
 
@@ -120,7 +123,7 @@ class HandFilter:
                       covariance):
             array[:] = 0.0
         estimate.agitation[:] = START_AGITATION
-        estimate.unseen[:], estimate.unfaded[:], estimate.turning[:], estimate.held[:] = 0.0, 0.0, 0.0, FREE
+        estimate.unseen[:], estimate.unfaded[:], estimate.turning[:], estimate.held[:] = 0.0, 0.0, START_TURNING, FREE
         place, turn, speed, spin, bend = START_SD
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),

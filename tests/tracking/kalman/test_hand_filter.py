@@ -6,6 +6,7 @@ import numpy as np
 from known_hand import SETTLED, SIZE, WEARING, blocks, empty, filter_of_hand, settled
 
 from rhot_app.hand.skeleton import ANGLE_SLICES
+from rhot_app.tracking.kalman import hand_filter
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     FIRST_FINGER,
@@ -13,8 +14,10 @@ from rhot_app.tracking.kalman.estimate import (
     PALM_HELD,
     TURN,
     TURN_HELD,
+    Estimate,
     copy_estimate,
 )
+from rhot_app.tracking.kalman.hand_filter import FASTEST_RAD_S
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.sighted import line_of_sight
 
@@ -96,20 +99,44 @@ def test_a_distance_that_does_not_fit_what_is_seen_is_let_go():
     np.testing.assert_allclose(after.world[:3, :3], expected.world[:3, :3], atol=1e-8)
 
 
-def test_a_finger_that_cannot_bend_as_it_is_held_to_does_not_drag_the_palm_along():
+def test_a_finger_that_cannot_bend_as_it_is_held_to_is_let_go(monkeypatch):
     """One camera sees the middle finger where it would not be with all its joints bent alike; both see the wrist."""
     def stray(estimate, block):
         estimate.unseen[1 - block.observations.camera, MIDDLE] = HIDDEN
         rows = slice(ANGLES + ANGLE_SLICES[MIDDLE].start, ANGLES + ANGLE_SLICES[MIDDLE].stop)
         estimate.covariance[rows] = estimate.covariance[:, rows] = 0.0
         estimate.covariance[rows, rows] = 0.3**2 * np.eye(4)
-        block.frame.pixels[MIDDLE, 1] += 12.0
+        block.frame.pixels[MIDDLE] += (-3.0, 25.0)
 
-    after, expected, outcome = weighed(stray)
-    assert after.held[0] == TURN_HELD and outcome.believed.all()
-    assert np.linalg.norm(after.world[:3, 3] - expected.world[:3, 3]) < 1.3e-3  # 1.9 mm if it were held
-    _, knuckle, joint, _ = (after.angles - expected.angles)[ANGLE_SLICES[MIDDLE]]
-    assert knuckle < -0.1 and joint > 0.5
+    def bend():
+        """How far the finger bends in each of its joints, rad."""
+        after, expected, outcome = weighed(stray)
+        assert after.held[0] == TURN_HELD and outcome.believed.all()
+        return (after.angles - expected.angles)[ANGLE_SLICES[MIDDLE]][1:]
+
+    knuckle, joint, last = bend()
+    assert knuckle > 2.0 * joint and last < 0.1
+    monkeypatch.setattr(hand_filter, "MISFIT", {})
+    knuckle, joint, last = bend()
+    assert joint > 1.2 * knuckle and last > 0.8 * knuckle
+
+
+def test_a_hand_begun_anew_remembers_nothing_of_the_lost_one():
+    fresh, used = filter_of_hand(), filter_of_hand()
+    copy_estimate(settled()[0], used.estimate)
+    used.estimate.turning[:], used.estimate.held[:], used.estimate.unfaded[:] = 300.0, PALM_HELD, 0.03
+    for hand in (fresh, used):
+        hand.start(settled()[0].world, settled()[0].angles)
+    for field, one, other in zip(Estimate._fields, fresh.estimate, used.estimate, strict=True):
+        np.testing.assert_array_equal(one, other, err_msg=field)
+
+
+def test_a_palm_that_spins_faster_than_a_forearm_can_is_lost():
+    hand = filter_of_hand()
+    hand.start(settled()[0].world, settled()[0].angles)
+    assert not hand.astray
+    hand.estimate.velocity[4] = -1.1 * FASTEST_RAD_S
+    assert hand.astray
 
 
 def test_rounding_does_not_add_up():
