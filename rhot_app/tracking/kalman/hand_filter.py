@@ -53,7 +53,7 @@ ROWS_MAX = 128
 START_SD = (0.03, 0.4, 1.0, 3.0, 6.0)
 """Standard deviations at the start: palm's place m, its rotation rad, velocities m/s, palm rad/s, fingers rad/s."""
 
-START_TURNING = 3.0
+START_TURNING = 1.0
 """A palm just found is taken to turn so fast, rad/s: how it is turned, all markers show at first, not habit."""
 
 START_AGITATION = 0.01 * MOST
