@@ -87,6 +87,7 @@ class Starter:
         return out
 
     def _fitted(self, markers: Array) -> HandPose | None:
+        """The hand that comes nearest to them; None when they are too few."""
         located = np.isfinite(markers[:, 0])
         if np.count_nonzero(located) < min(LEAST_MARKERS, len(markers)):
             return None

@@ -203,15 +203,16 @@ class ModelTracker:
     def _state(self, newest: CameraObservations, begun: float) -> HandState:
         if not self._tracking:
             return self._nothing(newest, begun)
-        return self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
+        state = self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
+        self._compare(state.marker_positions)
+        return state
 
     def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
-        rig, sights, covariance, now = self._rig, self._sights, estimate.covariance, estimate is self._hand.estimate
+        rig, sights, covariance = self._rig, self._sights, estimate.covariance
+        told = self._told if estimate is self._hand.estimate else self._told_ahead
         solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
-        complete = describe(self._told if now else self._told_ahead, sights.fresh_ns, t_ns, report)
+        complete = describe(told, sights.fresh_ns, t_ns, report)
         points, covariances = report.points, report.covariances
-        if now:
-            self._compare(points[FIRST_MARKER:])
         seen_pixels, seen_flags = sights.last_seen()
         self._sequence += 1
         return HandState(

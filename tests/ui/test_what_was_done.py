@@ -83,6 +83,15 @@ def test_the_bar_is_as_tall_as_its_sentences(bench):
     assert "Something is wrong." not in advice.texts
 
 
+def test_the_bar_grows_with_a_sentence_that_takes_two_lines(bench):
+    """As many sentences as before, one of them longer."""
+    advice = bench.window.advice
+    bench.until(lambda: len(advice.texts) == 1 and advice.height() < 40)
+    label = advice._lines[0][2]
+    bench.window.tell(Notice("error", "The simulated cameras did not start. " * 8))
+    bench.until(lambda: len(advice.texts) == 1 and label.height() >= label.heightForWidth(label.width()) > 30)
+
+
 def test_a_sentence_passes_by():
     passing, done, failed = PassingNotices(), Notice("info", "done"), Notice("error", "failed")
     passing.show(done, 100.0)

@@ -105,10 +105,10 @@ class HandFilter:
 
     def __init__(self, worn: Worn, cameras: Cameras, habits: Habits, limits: Array, bias_variance: Array, *,
                  float_scale: bool = False) -> None:
-        cameras_markers = len(cameras.pose), len(worn.part)
+        shape = len(cameras.pose), len(worn.part)
         size = BIAS + 3 * len(worn.part)
-        self.estimate = empty_estimate(*cameras_markers)
-        self._desk = Desk(self.estimate, empty_estimate(*cameras_markers), empty_rows(ROWS_MAX, size),
+        self.estimate = empty_estimate(*shape)
+        self._desk = Desk(self.estimate, empty_estimate(*shape), empty_rows(ROWS_MAX, size),
                           empty_gain(ROWS_MAX, size), empty_held(size), np.empty(size), np.empty(ROWS_MAX, np.bool_),
                           np.empty(ROWS_MAX), worn, cameras, habits, limits, bias_variance)
         self._shared = Share(self._desk)

@@ -80,6 +80,9 @@ class AdviceBar(QWidget):
         """Toolbars do not ask how tall wrapped text gets at their width, so the bar says it."""
         layout = self.layout()
         if layout is not None and self.width() > 100:
+            for line, _, label, _ in self._lines:  # each would tell the height of the sentence before
+                label.updateGeometry()
+                line.updateGeometry()
             layout.invalidate()  # it would count lines that have just been hidden
             self.setFixedHeight(max(layout.heightForWidth(self.width()), _LEAST_PX))
 
