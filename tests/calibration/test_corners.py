@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 from board_rendering import LENS, Photo, corners_px, pose, take
+from patience import quickest
 from stereo_pictures import NUMBERS, needs_pictures, picture
 
 from rhot_app.calibration.board import Board, CharucoBoard, Chessboard
@@ -134,24 +134,19 @@ def test_why_a_chessboard_was_not_found() -> None:
 
 
 @needs_pictures
-def test_live_pictures_take_less_than_two_frames() -> None:
-    """On one core; the best of three counts, because the machine has other things to do."""
+def test_a_live_picture_costs_little_of_a_thorough_search() -> None:
+    """Against what a thorough search costs in the same run: how fast the machine is must not matter."""
+    boards = [picture("left", number) for number in NUMBERS[:5]]
+    desks = [np.ascontiguousarray(np.vstack([gray[240:], gray[:240]])[:, ::-1]) for gray in boards]
+    assert all(detect(image, BOARD, thorough=False) is not None for image in boards)
+    assert all(detect(image, BOARD, thorough=False) is None for image in desks)
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        boards = [picture("left", number) for number in NUMBERS[:5]]
-        desks = [np.ascontiguousarray(np.vstack([gray[240:], gray[:240]])[:, ::-1]) for gray in boards]
-        detect(boards[0], BOARD, thorough=False)
-        seconds = {"board": [], "none": []}
-        for kind, images in (("board", boards), ("none", desks)):
-            for image in images:
-                times = []
-                for _ in range(3):
-                    begun = time.process_time()
-                    view = detect(image, BOARD, thorough=False)
-                    times.append(time.process_time() - begun)
-                assert (view is not None) == (kind == "board")
-                seconds[kind].append(min(times))
+        thorough = quickest(lambda: detect(desks[0], BOARD), times=2)
+        found, missed = (np.median([quickest(lambda image=image: detect(image, BOARD, thorough=False), times=5)
+                                    for image in images]) for images in (boards, desks))
     finally:
         cv2.setNumThreads(threads)
-    assert np.median(seconds["board"]) < 0.05 and np.median(seconds["none"]) < 0.05, seconds
+    assert missed < 0.12 * thorough  # 0.055 where it was measured
+    assert found < 0.12 * thorough

@@ -8,7 +8,8 @@ from pathlib import Path
 from hypothesis import settings
 
 TESTS = Path(__file__).parents[1]
-CLOCKS = {"time.monotonic", "time.perf_counter", "time.time", "time.monotonic_ns", "time.perf_counter_ns"}
+CLOCKS = {"time.monotonic", "time.perf_counter", "time.time", "time.monotonic_ns", "time.perf_counter_ns",
+          "time.process_time", "time.thread_time"}
 MAY_SLEEP = {
     "patience.py": "between two looks",
     "capture/test_open_camera.py": "a reader that is late", "capture/test_yuv.py": "a reader that is late",
