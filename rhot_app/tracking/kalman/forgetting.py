@@ -36,7 +36,10 @@ OPEN_S = 0.05
 """Time constant of what seems to be known of directions that no marker shows."""
 
 SHAPE_S = 2.0
-"""The same while the palm is not placed by its own markers: its course tells more for a while."""
+"""The same while a single camera sees the palm, and does not see its distance: its course tells more for a while."""
+
+HIDDEN_S = 0.5
+"""The same while none sees it: soon its fingertips tell more than its course."""
 
 SETTLED_RAD = 0.25
 """Standard deviation of the palm's turn below which it has been found, and only then can be seen to turn."""
@@ -99,7 +102,9 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
     how = estimate.held[0]
     if estimate.unfaded[0] >= FADING_S:
         if how != FINGERS_HELD and _shown(jacobian) >= LEAST_SHOWN:
-            constant = OPEN_S if how < PALM_HELD else SHAPE_S
+            constant = OPEN_S
+            if how == PALM_HELD:
+                constant = SHAPE_S if _palm_shown(jacobian) else HIDDEN_S
             _open_up(estimate, -math.expm1(-estimate.unfaded[0] / constant), habits, bias_variance, jacobian, step)
         _fade(estimate.covariance, estimate.unfaded[0])
         if how < PALM_HELD:
@@ -116,6 +121,15 @@ def _shown(jacobian: Array) -> int:
         if np.any(jacobian[m, :, :ROTATION] != 0.0):
             count += 1
     return count
+
+
+@njit(cache=True)
+def _palm_shown(jacobian: Array) -> bool:
+    """Whether a marker is seen that goes with the palm alone."""
+    for m in range(jacobian.shape[0]):
+        if np.any(jacobian[m, :, :ROTATION] != 0.0) and not np.any(jacobian[m, :, ANGLES:] != 0.0):
+            return True
+    return False
 
 
 @njit(cache=True)

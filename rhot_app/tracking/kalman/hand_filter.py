@@ -40,7 +40,14 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 ITERATIONS = 2
-"""More of them go to and fro where an angle is open: what is left is there again with the next frame."""
+"""Whole steps; more of them go to and fro where an angle is open: what is left is there again with the next frame."""
+
+LONGEST_RAD = 0.35
+"""A step that turns anything by more is shortened to this and the rows are linearised again: what moves along an arc
+would be led off it."""
+
+MOST_STEPS = 12
+"""Short ones and whole ones together."""
 
 MISFIT = {PALM_HELD: 1000.0, TURN_HELD: 200.0}
 """Squared normalised residual of one row beyond which the palm's place, and how fingers bend, are held no more."""
@@ -165,10 +172,13 @@ class HandFilter:
     def _settle(self, blocks: Sequence[ResidualBlock]) -> None:
         """Iterate to the new mean, a step from the old one."""
         self._desk.step[:] = 0.0
-        for iteration in range(ITERATIONS):
-            if iteration > 0:
+        whole = 0
+        for count in range(MOST_STEPS):
+            if count > 0:
                 self._linearise(blocks, self._tried)
-            if _improve(self._shared):
+            turn = _improve(self._shared)
+            whole += turn < 0.99 * LONGEST_RAD
+            if turn < NEAR_RAD or whole == ITERATIONS:
                 return
 
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
@@ -208,18 +218,27 @@ def _hold_turn_alone(shared: Share) -> None:
 
 
 @njit(cache=True)
-def _improve(shared: Share) -> bool:
-    """One iteration; the trial becomes the new mean. Returns whether it moved only little."""
+def _improve(shared: Share) -> float:
+    """One iteration, no longer than `LONGEST_RAD`; the trial becomes the new mean. Returns its largest turn, rad."""
     desk: Desk = shared.of
     estimate, gain, step = desk.estimate, desk.gain, desk.step
     before = step.copy()
     solve(desk.rows, estimate.covariance, desk.believed, desk.widening, step, gain)
+    turn = _turn(before, step)
+    if turn > LONGEST_RAD:
+        step[:] = before + LONGEST_RAD / turn * (step - before)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[0]], desk.limits, step)
     displace(estimate, step, desk.trial)
+    return _turn(before, step)
+
+
+@njit(cache=True)
+def _turn(one: Array, other: Array) -> float:
+    """The largest angle between two steps (N,), rad."""
     turn = 0.0
     for i in range(ROTATION, POSE):
-        turn = max(turn, abs(step[i] - before[i]))
-    return turn < NEAR_RAD
+        turn = max(turn, abs(other[i] - one[i]))
+    return turn
 
 
 @njit(cache=True)

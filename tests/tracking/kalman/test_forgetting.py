@@ -20,6 +20,7 @@ from rhot_app.tracking.kalman.markers import place_markers
 HABITS, BIAS_VARIANCE = WEARING.habits, WEARING.bias_variance
 KEPT = np.r_[0:POSE, BIAS:SIZE]  # pose and biases among the estimate's numbers
 GAIN = empty_gain(64, SIZE)
+WRIST = WEARING.roles.index("wrist")
 NATURAL = np.sqrt(np.diag(HABITS.usual)[ANGLES:])
 
 
@@ -158,6 +159,19 @@ def test_the_rest_of_a_hand_that_is_held_is_forgotten_more_slowly_or_not_at_all(
     assert steps[0] == pytest.approx(steps[1]) and doubts[0] == pytest.approx(doubts[1])
     assert 0.0 < steps[2] < 0.2 * steps[0] and 1e-3 < doubts[2] < 0.5 * doubts[0]
     assert steps[3] == 0.0 and doubts[3] == pytest.approx(1e-4, rel=0.05)
+
+
+def test_a_palm_that_no_camera_sees_returns_to_habit_sooner():
+    steps = []
+    for shown in (True, False):
+        estimate, step = bent(0.05), np.zeros(SIZE)
+        estimate.held[0] = PALM_HELD
+        jacobian = marker_jacobian(estimate)
+        if not shown:
+            jacobian[WRIST] = 0.0
+        forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step)
+        steps.append(np.abs(step[ANGLES:POSE]).max())
+    assert steps[1] > 1.5 * steps[0] > 0.0
 
 
 @pytest.mark.parametrize(("how", "doubt_rad", "turns"), [(TURN_HELD, 0.5 * SETTLED_RAD, True),
