@@ -51,7 +51,7 @@ class MarkerBlock:
 
     def associate(self, page: Share) -> int:
         """Ask the hand, carried to this frame's instant, which marker each sight is of, and whether it shows enough of
-        it; returns how many changed."""
+        it; returns how many changed. The hand learns how wide its paint is."""
         return int(_associate(self.shared, page))
 
     def linearise(self, page: Share) -> None:
