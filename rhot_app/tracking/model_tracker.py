@@ -111,7 +111,7 @@ class ModelTracker:
             return None
         copy_estimate(self._hand.estimate, self._ahead)
         ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
-        predict(self._ahead, ahead, self._wearing.worn.part, self._wearing.habits, self._wearing.bias_variance)
+        predict(self._ahead, ahead, self._wearing.worn.part, self._wearing.habits, self._ahead.bias_variance)
         return self._describe(self._ahead, self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
 
     def observe(self, block: TimedBlock) -> None:

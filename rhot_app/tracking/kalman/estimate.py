@@ -52,7 +52,9 @@ class Estimate(NamedTuple):
     (m/s^2)^2 or (rad/s^2)^2, that surprised in each group of late. `trend` (27,): leaky mean of the normalised
     corrections of each velocity. `unfaded` (1,): s since knowledge last faded. `unseen` (C, M): s since each camera was
     last believed to see each marker. `held` (1,): how the last update held the hand
-    (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s.
+    (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s. `width` (M,) m: how wide paint on the inner
+    side of the palm is known to be, 0 where nobody knows; `bias_variance` (M,) m^2: what the biases' variances tend to
+    now (both: `covering.py`).
     """
 
     world: Array
@@ -68,6 +70,8 @@ class Estimate(NamedTuple):
     unseen: Array
     held: NDArray[np.int64]
     turning: Array
+    width: Array
+    bias_variance: Array
 
 
 def empty_estimate(cameras: int, markers: int) -> Estimate:
@@ -75,7 +79,8 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     size = BIAS + 3 * markers
     return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
                     np.zeros((size, size)), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1),
-                    np.full((cameras, markers), UNSEEN_S), np.zeros(1, np.int64), np.zeros(1))
+                    np.full((cameras, markers), UNSEEN_S), np.zeros(1, np.int64), np.zeros(1), np.zeros(markers),
+                    np.zeros(markers))
 
 
 def copy_estimate(source: Estimate, target: Estimate) -> None:

@@ -131,6 +131,7 @@ class HandFilter:
             array[:] = 0.0
         estimate.agitation[:] = START_AGITATION
         estimate.unseen[:], estimate.unfaded[:], estimate.turning[:], estimate.held[:] = 0.0, 0.0, START_TURNING, FREE
+        estimate.bias_variance[:] = self._desk.bias_variance
         place, turn, speed, spin, bend = START_SD
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),
@@ -193,7 +194,7 @@ class HandFilter:
 @njit(cache=True)
 def _carry_on(shared: Share, dt: float) -> None:
     desk: Desk = shared.of
-    predict(desk.estimate, dt, desk.worn.part, desk.habits, desk.bias_variance)
+    predict(desk.estimate, dt, desk.worn.part, desk.habits, desk.estimate.bias_variance)
 
 
 @njit(cache=True)
@@ -201,7 +202,7 @@ def _prepare(shared: Share, dt: float) -> None:
     """Decide what is held of the hand and which observations are believed."""
     desk: Desk = shared.of
     estimate, rows, part = desk.estimate, desk.rows, desk.worn.part
-    hold(estimate, rows, part, desk.cameras.pose, desk.habits.stiff, desk.held)
+    hold(estimate, rows, part, desk.worn.palmar, desk.cameras.pose, desk.habits.stiff, desk.held)
     rest(estimate, dt)
     loosen(estimate, part, rows, desk.habits.usual)
     appraise(rows, estimate, desk.habits.together, desk.believed, desk.widening)
@@ -250,10 +251,10 @@ def _conclude(shared: Share, dt: float) -> None:
     note_trend(estimate, step, gain)
     contract(estimate.covariance, gain)
     displace(estimate, step, estimate)
-    restore(estimate.covariance, desk.held, gain, desk.bias_variance)
+    restore(estimate.covariance, desk.held, gain, estimate.bias_variance)
     points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
     place_markers(worn, estimate, points, jacobian)
-    keep_shown(estimate, worn.part, desk.cameras.pose, points, jacobian)
-    forget(estimate, dt, desk.habits, desk.bias_variance, jacobian, gain, step)
+    keep_shown(estimate, worn.part, worn.palmar, desk.cameras.pose, points, jacobian)
+    forget(estimate, dt, desk.habits, estimate.bias_variance, jacobian, gain, step)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], desk.limits, step)
     displace(estimate, step, estimate)

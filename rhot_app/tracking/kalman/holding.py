@@ -40,6 +40,7 @@ from rhot_app.tracking.kalman.withholding import Held
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 ENOUGH = 3
 """This many markers on a palm, seen by two cameras, show how it is turned."""
@@ -48,7 +49,8 @@ HURRIES_M_S, HURRIES_RAD_S = 0.15, 1.5
 """A palm that moves or turns faster carries its fingers along."""
 
 TURNS_RAD_S = 0.5
-"""A palm that turns faster, while two cameras see all markers, is known by its fingertips to do so."""
+"""A palm that turns faster, while two cameras see all markers, is known by its fingertips to do so. Paint on its inner
+side may be covered."""
 
 TURN_ALONE = 9
 """Directions that are held when nothing but the palm's turn is: three angles, their velocities and accelerations."""
@@ -58,18 +60,19 @@ REST_S = 0.1
 
 
 @njit(cache=True)
-def hold(estimate: Estimate, rows: Rows, part: Indices, cameras: Array, stiff: Array, held: Held) -> None:
+def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: Array, stiff: Array,
+         held: Held) -> None:
     """Decide how the hand is to be held, `estimate.held`, and fill `held.directions`.
 
-    `rows` of this update; `part` (M,) as in `Worn`; `cameras` (C, 3, 4) camera_from_world m; `stiff` (R, 27) as in
-    `Habits`.
+    `rows` of this update; `part` and `palmar` (M,) as in `Worn`; `cameras` (C, 3, 4) camera_from_world m; `stiff`
+    (R, 27) as in `Habits`.
     """
     unseen = unseen_now(estimate, rows)
     on_palm, placed, most, eye, all_placed = 0, 0, 0, -1, True
     eyes_of = np.zeros(FINGERS, np.int64)
     for m in range(part.shape[0]):
         eyes, last = eyes_on(unseen, m)
-        all_placed &= eyes > 1
+        all_placed &= eyes > 1 or palmar[m]
         if part[m] != PALM_PART:
             eyes_of[part[m]] = max(eyes_of[part[m]], eyes)
         else:

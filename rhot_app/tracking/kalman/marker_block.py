@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.association import relabel
+from rhot_app.tracking.kalman.covering import leave_out_covered
 from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, append_markers
 from rhot_app.tracking.kalman.rows import Page
 from rhot_app.tracking.kalman.share import Share
@@ -20,12 +22,14 @@ _LOST = int(MarkerFlag.LOST)
 
 
 class Sighting(NamedTuple):
-    """One frame with all that it takes to understand it; `flags` (M,) MarkerFlag of its sights."""
+    """One frame with all that it takes to understand it; `flags` (M,) MarkerFlag of its sights; `made` (M,) m^2: the
+    variance of the markers' places by their making."""
 
     worn: Worn
     cameras: Cameras
     frame: Frame
     flags: NDArray[np.uint16]
+    made: NDArray[np.float64]
 
 
 class MarkerBlock:
@@ -35,14 +39,19 @@ class MarkerBlock:
     def __init__(self, wearing: Wearing, observations: CameraObservations) -> None:
         count = len(observations.pixels)
         self.observations = observations
+        sized = not math.isnan(observations.detect_s)  # text datagrams tell no sizes
         self.frame = Frame(np.array([observations.camera]), np.empty(count, np.bool_), observations.pixels,
-                           observations.covariances, np.empty(count), np.empty(count, np.int64))
-        self.shared = Share(Sighting(wearing.worn, wearing.cameras, self.frame, observations.flags))
+                           observations.covariances, np.empty(count), np.empty(count, np.int64),
+                           observations.diameters if sized else np.zeros(count), observations.flags == 0,
+                           np.zeros(count, np.bool_))
+        self.shared = Share(Sighting(wearing.worn, wearing.cameras, self.frame, observations.flags,
+                                     wearing.bias_variance))
         after_ns, self.sights = _read(self.shared, 1e-9 * observations.row_time_ns)
         self.t_ns = observations.t_row0_master_ns + int(after_ns)
 
     def associate(self, page: Share) -> int:
-        """Ask the hand, carried to this frame's instant, which marker each sight is of; returns how many changed."""
+        """Ask the hand, carried to this frame's instant, which marker each sight is of, and whether it shows enough of
+        it; returns how many changed. The hand learns how wide its paint is."""
         return int(_associate(self.shared, page))
 
     def linearise(self, page: Share) -> None:
@@ -54,7 +63,9 @@ class MarkerBlock:
 def _associate(shared: Share, page: Share) -> int:
     sighting: Sighting = shared.of
     there: Page = page.of
-    return relabel(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
+    changed = relabel(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
+    leave_out_covered(sighting.worn, sighting.cameras, sighting.frame, there.estimate, sighting.made)
+    return changed
 
 
 @njit(cache=True)

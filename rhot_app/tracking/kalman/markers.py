@@ -53,18 +53,21 @@ class Worn(NamedTuple):
     """The markers on the hand, M of them, unchanging.
 
     `dh`: the hand's table with one point per marker. `part` (M,): the finger, PALM_PART on the palm. `half_axes`
-    (M, 3) m: their bodies' along the palm's axes (a ball has three equal ones), zero for flat ones.
+    (M, 3) m: their bodies' along the palm's axes (a ball has three equal ones), zero for flat ones. `palmar` (M,):
+    paint of no known shape on the inner side of the palm, which closing fingers cover (`covering.py`).
     """
 
     dh: DhArrays
     part: Indices
     half_axes: Array
+    palmar: NDArray[np.bool_]
 
 
 class Frame(NamedTuple):
     """What one camera saw: `camera` (1,) its index; `seen` (M,) which markers count; `pixels` (M, 2) raw px with
     `covariances` (M, 2, 2); `late_s` (M,): when each was seen, s after the estimate's instant (before: negative).
-    `label` (M,): which of the hand's markers the m-th sight is of."""
+    `label` (M,): which of the hand's markers the m-th sight is of. `widths` (M,) px: diameters of discs of their areas,
+    0 where unknown; `plain` (M,): without any flag; `covered` (M,): shows too little of its marker to be weighed."""
 
     camera: Indices
     seen: NDArray[np.bool_]
@@ -72,6 +75,9 @@ class Frame(NamedTuple):
     covariances: Array
     late_s: Array
     label: Indices
+    widths: Array
+    plain: NDArray[np.bool_]
+    covered: NDArray[np.bool_]
 
 
 @njit(cache=True)
@@ -131,14 +137,14 @@ def project_marker(point: Array, world: Array, half_axes: Array, camera: Array, 
 
 @njit(cache=True)
 def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, rows: Rows) -> None:
-    """Append one observation of two rows, px, for each marker of `frame` that was seen."""
+    """Append one observation of two rows, px, for each marker of `frame` that was seen and is not covered."""
     count = worn.part.shape[0]
     points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
     place_markers(worn, estimate, points, jacobian)
     camera, lively = frame.camera[0], liveliness(estimate)
     pixel, slope, place = np.empty(2), np.empty((2, 3)), np.empty(3)
     for sight in range(count):
-        if not frame.seen[sight]:
+        if not frame.seen[sight] or frame.covered[sight]:
             continue
         m, late = frame.label[sight], frame.late_s[sight]
         for i in range(3):

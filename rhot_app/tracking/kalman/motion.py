@@ -64,6 +64,9 @@ VELOCITY_S = np.array([0.4] * 6 + [0.2] * 21)
 TURNING_S = 1.0
 """A palm that turned is taken to turn for this long."""
 
+WIDTH_S = 300.0
+"""How wide paint is, is forgotten with this time constant, lest a wrong size stay."""
+
 BIAS_S = 3.0
 """Markers' biases change with this time constant: they turn with the hand and its light."""
 
@@ -95,6 +98,7 @@ def predict(estimate: Estimate, dt: float, part: Indices, habits: Habits, bias_v
     estimate.agitation[:] *= math.exp(-dt / CALM_S)
     estimate.unseen[:] += dt
     estimate.turning[0] = max(estimate.turning[0] * math.exp(-dt / TURNING_S), speeds(estimate)[TURN])
+    estimate.width[:] *= math.exp(-dt / WIDTH_S)
     _keep_awake(estimate)
     _go_along(estimate, part)
     shake(estimate.covariance, liveliness(estimate), habits.together, dt)

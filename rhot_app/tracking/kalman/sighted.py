@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.estimate import ANGLES, FINGERS, UNSEEN_S, Estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, FINGERS, TURN_HELD, UNSEEN_S, Estimate
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
 
 Array = NDArray[np.float64]
@@ -17,6 +17,9 @@ Mask = NDArray[np.bool_]
 
 FRESH_S = 0.07
 """A camera that saw a marker this recently still sees it: it may take turns with another."""
+
+KEPT_S = 3.0
+"""A palm whose turn is held is known for so long by paint that fingers have covered since."""
 
 
 @njit(cache=True)
@@ -66,15 +69,19 @@ def fingers_away(estimate: Estimate, part: Indices) -> Array:
 
 
 @njit(cache=True)
-def keep_shown(estimate: Estimate, part: Indices, cameras: Array, points: Array, jacobian: Array) -> None:
+def keep_shown(estimate: Estimate, part: Indices, palmar: Mask, cameras: Array, points: Array,
+               jacobian: Array) -> None:
     """Leave in `jacobian` (M, 3, 27) of markers at `points` (M, 3) what is seen of them; `cameras` (C, 3, 4).
 
     Of a marker that one camera sees, its way across the line of sight; of one that none sees, on a finger, its way
-    relative to the palm - a finger out of sight keeps its bend - and on the palm nothing.
+    relative to the palm - a finger out of sight keeps its bend - and on the palm nothing, unless it is paint (`palmar`
+    (M,) as in `Worn`) that was seen of late on a palm whose turn is held: that keeps its place.
     """
     sight = np.empty(3)
     for m in range(points.shape[0]):
         eyes, eye = eyes_on(estimate.unseen, m)
+        if eyes == 0 and palmar[m] and estimate.held[0] == TURN_HELD and estimate.unseen[:, m].min() < KEPT_S:
+            continue
         if eyes == 0:
             jacobian[m, :, :ANGLES] = 0.0
             if part[m] == PALM_PART:

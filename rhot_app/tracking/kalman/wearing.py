@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.model import HandModel, build_model
-from rhot_app.hand.places import Place, place_of
+from rhot_app.hand.places import KNUCKLE_ROLES, Place, place_of
 from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS
 from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
@@ -54,7 +54,8 @@ def compile_wearing(rig: Rig) -> Wearing:
     places = tuple(place_of(marker, model) for marker in rig.markers.markers)
     models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     worn = Worn(points_on(model.dh, places), np.array([place.finger for place in places], dtype=np.int64),
-                half_axes_of(rig.markers, model))
+                half_axes_of(rig.markers, model),
+                np.array([marker.role in KNUCKLE_ROLES and marker.shape == "blob" for marker in rig.markers.markers]))
     return Wearing(
         model, worn,
         Cameras(np.array([camera.camera_from_world[:3] for camera in models]),

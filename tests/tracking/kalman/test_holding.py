@@ -41,11 +41,12 @@ def hand_with(on_palm=1):
     return estimate, np.array([*TIPS, *[PALM_PART] * on_palm])
 
 
-def held_of(estimate, part, *seen):
-    """(K, N) the directions that are held, when `seen` (camera, marker) is what the update sees."""
+def held_of(estimate, part, *seen, palmar=()):
+    """(K, N) the directions that are held, when `seen` (camera, marker) is what the update sees; fingers may cover
+    the markers `palmar`."""
     held = empty_held(BIAS + 3 * len(part))
     held.used[0], held.directions[:] = 7, 3.0  # of an earlier update
-    hold(estimate, sighting(*seen, part=part), part, POSES, STIFF, held)
+    hold(estimate, sighting(*seen, part=part), part, np.isin(np.arange(len(part)), palmar), POSES, STIFF, held)
     count = held.used[0]
     assert count <= MOST and not held.directions[count:].any()
     return held.directions[:count]
@@ -178,6 +179,18 @@ def test_the_turn_of_a_hand_that_moves_in_sight_is_not_held():
     assert len(held_of(estimate, part)) == 0 and estimate.held[0] == FREE
     estimate.unseen[0, 2] = HIDDEN  # the other camera still sees it, but not where it is along its line of sight
     held_of(estimate, part)
+    assert estimate.held[0] == TURN_HELD
+
+
+def test_covered_paint_does_not_keep_a_turning_palm_from_being_known_by_its_fingertips():
+    estimate, part = hand_with(3)
+    estimate.turning[0], estimate.unseen[:, 6] = 1.1 * TURNS_RAD_S, HIDDEN
+    held_of(estimate, part, palmar=(6, 7))
+    assert estimate.held[0] == FREE
+    held_of(estimate, part)
+    assert estimate.held[0] == TURN_HELD
+    estimate.turning[0] = 0.0
+    held_of(estimate, part, palmar=(6, 7))
     assert estimate.held[0] == TURN_HELD
 
 

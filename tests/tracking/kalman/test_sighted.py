@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from known_hand import MARKERS, WEARING, moving_estimate, sighting
 
-from rhot_app.tracking.kalman.estimate import ANGLES, POSE, UNSEEN_S
+from rhot_app.tracking.kalman.estimate import ANGLES, FREE, PALM_HELD, POSE, TURN_HELD, UNSEEN_S
 from rhot_app.tracking.kalman.rows import PALM_PART
 from rhot_app.tracking.kalman.sighted import (
     FRESH_S,
+    KEPT_S,
     eyes_on,
     fingers_away,
     keep_shown,
@@ -83,10 +84,21 @@ def test_what_is_shown_of_a_marker_is_what_its_cameras_see_of_it():
     estimate.unseen[0, 1] = LONG
     points, before = np.array([0.0, 0.0, 3.0]) + rng.normal(size=(MARKERS, 3)), rng.normal(size=(MARKERS, 3, POSE))
     after, sight = before.copy(), np.empty(3)
-    keep_shown(estimate, PART, POSES, points, after)
+    keep_shown(estimate, PART, WEARING.worn.palmar, POSES, points, after)
     line_of_sight(POSES[1], points[1], sight)
     np.testing.assert_array_equal(after[2:5], before[2:5])
     np.testing.assert_allclose(sight @ after[1], 0.0, atol=1e-12)
     np.testing.assert_allclose(after[1], before[1] - np.outer(sight, sight @ before[1]), atol=1e-12)
     assert not after[5].any() and not after[0, :, :ANGLES].any()
     np.testing.assert_array_equal(after[0, :, ANGLES:], before[0, :, ANGLES:])
+
+
+@pytest.mark.parametrize(("how", "away", "kept"), [(TURN_HELD, LONG, True), (TURN_HELD, 0.99 * KEPT_S, True),
+                                                   (TURN_HELD, KEPT_S, False), (FREE, LONG, False),
+                                                   (PALM_HELD, LONG, False)])
+def test_paint_that_was_covered_shows_for_a_while_how_a_held_palm_is_turned(how, away, kept):
+    estimate, palmar = all_unseen(0.0), np.arange(MARKERS) == 5
+    estimate.unseen[:, 5], estimate.held[0] = away, how
+    after = np.ones((MARKERS, 3, POSE))
+    keep_shown(estimate, PART, palmar, POSES, np.ones((MARKERS, 3)), after)
+    assert after[5].all() == kept and after[5].any() == kept
