@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
+from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
 from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
@@ -61,7 +62,8 @@ class ModelTracker:
         self._rig, self._wearing = compile_rig(rig), compile_wearing(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
         self._hand = HandFilter(self._wearing.worn, self._wearing.cameras, self._wearing.habits, self._wearing.limits,
-                                self._wearing.bias_variance, float_scale=rig.tracker.float_scale)
+                                self._wearing.bias_variance)
+        self._size = HandSize(self._wearing) if rig.tracker.float_scale else None
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)
         self._sights = Sights(cameras, markers)
@@ -77,6 +79,9 @@ class ModelTracker:
         self._pending: list[CameraObservations] = []
         self._starter.reset()
         self._sights.reset()
+        if self._size is not None:
+            self._size.reset()
+            self._hand.resize(*self._size.known)
         self._tracking = self._ever = False
         self._believed_ns = self._plausible_ns = self._thumb_ns = self._behind = self._apart = 0
 
@@ -146,17 +151,19 @@ class ModelTracker:
 
     def _compare(self, estimated: Array) -> None:
         """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them."""
-        found = self._starter.locate()
-        if found is None:
+        located = self._starter.locate()
+        if located is None:
             return
-        t_ns, located = found
         speed = math.hypot(*self._hand.estimate.velocity[:3].tolist())
-        allowed = _APART_M + speed * 1e-9 * abs(self._timeline.t_ns - t_ns)
-        self._apart = self._apart + 1 if count_apart(located, estimated, allowed) >= _APART_MARKERS else 0
+        allowed = _APART_M + speed * 1e-9 * abs(self._timeline.t_ns - located.t_ns)
+        apart = count_apart(located.positions, estimated, allowed)
+        if self._size is not None and apart == 0:
+            self._size.look(located, self._hand.estimate.world, self._hand.estimate.angles)
+        self._apart = self._apart + 1 if apart >= _APART_MARKERS else 0
         if self._apart >= _APART_STATES:
-            pose = self._starter.pose_of(located)
+            pose = self._starter.pose_of(located.positions)
             if pose is not None:
-                self._begin(t_ns, pose)
+                self._begin(located.t_ns, pose)
 
     def _look_at_thumb(self) -> None:
         """A thumb that bends backwards may be one that bends forwards."""
@@ -205,6 +212,9 @@ class ModelTracker:
             return self._nothing(newest, begun)
         state = self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
         self._compare(state.marker_positions)
+        if self._size is not None:
+            self._size.work()
+            self._hand.resize(*self._size.follow(self._timeline.t_ns))
         return state
 
     def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
