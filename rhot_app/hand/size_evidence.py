@@ -36,8 +36,8 @@ _SIZE = TWIST + len(ANGLES)
 
 
 class Posture(NamedTuple):
-    """What holds of a hand in any pose. `dh`: its table with one point per marker; `limits` (21, 2) rad; `mean` (21,) rad
-    and `information` (21, 21) 1/rad^2 of its angles without evidence."""
+    """What holds of a hand in any pose. `dh`: its table with one point per marker; `limits` (21, 2) rad; `mean` (21,)
+    rad and `information` (21, 21) 1/rad^2 of its angles without evidence."""
 
     dh: DhArrays
     limits: Array
@@ -62,7 +62,8 @@ def implausibility(posture: Posture, places: Array, information: Array, log_scal
     covariances. The descent (Levenberg-Marquardt) starts from `world` (4, 4) and `angles` (21,) rad, which become the
     most plausible pose.
     """
-    now, next_one = Fitting(np.empty((_SIZE, _SIZE)), np.empty(_SIZE)), Fitting(np.empty((_SIZE, _SIZE)), np.empty(_SIZE))
+    now = Fitting(np.empty((_SIZE, _SIZE)), np.empty(_SIZE))
+    then = Fitting(np.empty((_SIZE, _SIZE)), np.empty(_SIZE))
     scale, factor, step = math.exp(log_scale), np.empty((_SIZE, _SIZE)), np.empty(_SIZE)
     trial_world, trial_angles = world.copy(), angles.copy()
     cost = linearise(posture, places, information, scale, world, angles, now)
@@ -74,11 +75,11 @@ def implausibility(posture: Posture, places: Array, information: Array, log_scal
             substitute(factor, now.right, step)
             step *= min(1.0, _STEP_RAD / max(np.abs(step[3:]).max(), 1e-9))
             move(world, angles, step, trial_world, trial_angles)
-            trial = linearise(posture, places, information, scale, trial_world, trial_angles, next_one)
+            trial = linearise(posture, places, information, scale, trial_world, trial_angles, then)
             if trial <= cost:
                 cost, damping = trial, max(0.1 * damping, 1e-9)
                 world[:], angles[:] = trial_world, trial_angles
-                now.matrix[:], now.right[:] = next_one.matrix, next_one.right
+                now.matrix[:], now.right[:] = then.matrix, then.right
                 break
             damping = max(10.0 * damping, 1e-3)
         if before - cost < _SMALL_GAIN:

@@ -28,18 +28,18 @@ USUAL_SD = 0.1
 """How far hands are from the size in their file, before anything is seen: standard deviation of the logarithm."""
 
 LEAST_SD = 0.015
-"""No size is known better: bones of hands of one length scatter by 3 to 8 %, so hands differ in proportion, and then the
-one size is a mean of fifteen bones."""
+"""No size is known better: bones of hands of one length scatter by 3 to 8 %, so hands differ in proportion, and the one
+size is a mean over fifteen bones."""
 
 DISTINCT_M = 0.01
 """A shape is another when the distance of two markers differs by as much from every shape that is kept."""
 
 SHARE, MOST = 0.25, 2.0
-"""How much each shape but the first counts, in independent ones, and all of them at most. Poses drawn from the natural
+"""How much each shape counts, in independent ones, and all of them at most. Poses drawn from the natural
 pose show the size to 1 or 2 % each, those of people with other habits and proportions to 2 or 3, however many."""
 
-UNFIT = 40.0
-"""Least misfit and strain beyond which a shape is none of a hand of any size. Natural ones have 6, seldom more than 16."""
+UNFIT = 20.0
+"""Least misfit and strain beyond which a shape is none of a hand of any size. Natural ones have 6, seldom 16."""
 
 KEPT = 48
 LEAST_MARKERS = 5
@@ -74,6 +74,15 @@ class HandSize:
         """The logarithm of the scale and its variance; until it has followed, what it lags behind is doubt as well."""
         return self._log_scale, self._aim_variance + (self._aim - self._log_scale) ** 2
 
+    @property
+    def scale(self) -> float:
+        """The factor on every length that is best known, followed or not."""
+        return math.exp(self._aim)
+
+    def settle(self) -> None:
+        """A hand that begins anew need not follow."""
+        self._log_scale = self._aim
+
     def follow(self, t_ns: int) -> tuple[float, float]:
         """`known` at `t_ns`, master ns, a while later."""
         dt = min(max(1e-9 * (t_ns - self._t_ns), 0.0), _LONGEST_S)
@@ -89,7 +98,7 @@ class HandSize:
         shape = np.linalg.norm(places[self._pairs[0]] - places[self._pairs[1]], axis=1)
         if all(np.nanmax(np.abs(shape - other), initial=0.0) > DISTINCT_M for other in self._shapes):
             self._shapes = [*self._shapes[1 - KEPT:], shape]
-            information = np.linalg.inv(located.covariances + self._doubt)
+            information = np.asarray(np.linalg.inv(located.covariances + self._doubt), dtype=np.float64)
             self._in_work = _Curve(self._posture, places, information, world, angles, self._log_scale)
 
     def work(self) -> None:
@@ -103,9 +112,9 @@ class HandSize:
     def _conclude(self) -> None:
         """Mean and standard deviation of the size by all shapes."""
         counted = [curve for curve in self._curves if curve.any()]
-        if len(counted) < 2:
+        if not counted:
             return
-        weight = min(SHARE * (len(counted) - 1), MOST)
+        weight = min(SHARE * len(counted), MOST)
         total = weight * np.mean(counted, axis=0) + 0.5 * np.square(GRID / USUAL_SD)
         likely = np.exp(total.min() - total)
         likely /= likely.sum()

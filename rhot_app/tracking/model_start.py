@@ -35,8 +35,8 @@ _TARGET_SD_M = 1e-3
 
 
 class Located(NamedTuple):
-    """Where M markers were at `t_ns`, master ns: `positions` (M, 3) m, world, with `covariances` (M, 3, 3) m^2, NaN where
-    not located; `clear` (M,) bool: by two cameras that saw it beyond doubt."""
+    """Where M markers were at `t_ns`, master ns: `positions` (M, 3) m, world, with `covariances` (M, 3, 3) m^2, NaN
+    where not located; `clear` (M,) bool: by two cameras that saw it beyond doubt."""
 
     t_ns: int
     positions: Array
@@ -62,14 +62,6 @@ class Starter:
         """Take one frame in."""
         self._pairing.ingest(observations)
 
-    def find(self) -> tuple[int, HandPose] | None:
-        """The hand and its instant, master ns, as soon as the frames so far show it."""
-        located = self.locate()
-        if located is None:
-            return None
-        pose = self.pose_of(located.positions)
-        return None if pose is None else (located.t_ns, pose)
-
     def locate(self) -> Located | None:
         """Where the markers were at the newest instant; None: none is due."""
         paired = self._pairing.due()
@@ -82,11 +74,18 @@ class Starter:
                       rig.focal, rig.shapes, positions, covariances, clear)
         return Located(paired.t_ns, positions, covariances, clear)
 
-    def pose_of(self, markers: Array) -> HandPose | None:
-        """The hand whose `markers` (M, 3) m, NaN where not located, are enough to find it.
+    def pose_of(self, markers: Array, scale: float = 1.0) -> HandPose | None:
+        """The hand, `scale` times as large as its file says, whose `markers` (M, 3) m, NaN where not located, are
+        enough to find it.
 
         None when they are not, or are where no hand has them: two that change names in one camera seem far away.
         """
+        if scale != 1.0 and np.isfinite(markers).any():
+            centre = np.nanmean(markers, axis=0)
+            pose = self.pose_of(centre + (markers - centre) / scale)
+            if pose is not None:
+                pose.world_from_palm[:3, 3] = centre + (pose.world_from_palm[:3, 3] - centre) * scale
+            return pose
         pose = self._fitted(markers)
         return pose if pose is not None and count_apart(markers, self._worn_at(pose), UNFIT_M) == 0 else None
 

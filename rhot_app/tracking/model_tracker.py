@@ -13,7 +13,6 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
@@ -25,7 +24,7 @@ from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, Account, describe, empty_report, subject_of
-from rhot_app.tracking.model_start import Starter, count_apart
+from rhot_app.tracking.model_start import Located, Starter, count_apart
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.sights import Sights
 from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
@@ -103,6 +102,9 @@ class ModelTracker:
         taken = [observations for observations in pending if self._take(observations)]
         if not taken:
             return None
+        if self._size is not None:
+            self._size.work()
+            self._hand.resize(*self._size.follow(taken[-1].t_row0_master_ns))
         return self._state(taken[-1], begun)
 
     def state_at(self, t_ns: int) -> HandState | None:
@@ -161,9 +163,7 @@ class ModelTracker:
             self._size.look(located, self._hand.estimate.world, self._hand.estimate.angles)
         self._apart = self._apart + 1 if apart >= _APART_MARKERS else 0
         if self._apart >= _APART_STATES:
-            pose = self._starter.pose_of(located.positions)
-            if pose is not None:
-                self._begin(located.t_ns, pose)
+            self._begin(located)
 
     def _look_at_thumb(self) -> None:
         """A thumb that bends backwards may be one that bends forwards."""
@@ -181,12 +181,20 @@ class ModelTracker:
         return self._behind >= _BEHIND
 
     def _look_for_hand(self) -> None:
-        found = self._starter.find()
-        if found is not None:
-            self._begin(*found)
+        located = self._starter.locate()
+        if located is not None:
+            self._begin(located)
 
-    def _begin(self, t_ns: int, pose: HandPose) -> None:
-        """Start the filter from a pose, and weigh again what was seen since."""
+    def _begin(self, located: Located) -> None:
+        """Start the filter from what one instant shows, if it is enough, and weigh again what was seen since."""
+        pose = self._starter.pose_of(located.positions, 1.0 if self._size is None else self._size.scale)
+        if pose is None:
+            return
+        t_ns = located.t_ns
+        if self._size is not None:
+            self._size.settle()
+            self._size.look(located, pose.world_from_palm, pose.angles)
+            self._hand.resize(*self._size.known)
         self._hand.start(pose.world_from_palm, pose.angles)
         self._timeline.begin(t_ns)
         self._tracking = self._ever = True
@@ -212,9 +220,6 @@ class ModelTracker:
             return self._nothing(newest, begun)
         state = self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
         self._compare(state.marker_positions)
-        if self._size is not None:
-            self._size.work()
-            self._hand.resize(*self._size.follow(self._timeline.t_ns))
         return state
 
     def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
@@ -242,8 +247,9 @@ class ModelTracker:
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
 
     def _nothing(self, newest: CameraObservations, begun: float) -> HandState:
-        """No hand: what the cameras see is all there is to tell."""
+        """No hand: what the cameras see is all there is to tell, and how large it was."""
         rig = self._rig
+        log_scale, variance = (0.0, math.nan) if self._size is None else self._size.known
         markers = len(rig.marker_ids)
         seen_pixels, seen_flags = self._sights.last_seen()
         unknown = int(Knowledge.UNKNOWN)
@@ -258,6 +264,7 @@ class ModelTracker:
             joint_knowledge=np.full(21, unknown, np.uint8), fingertip_positions=np.full((5, 3), np.nan),
             angles=np.full(21, np.nan), angle_knowledge=np.full(21, unknown, np.uint8),
             world_from_palm=np.full((4, 4), np.nan), palm_knowledge=Knowledge.UNKNOWN,
-            epipolar_error_px=np.full(markers, np.nan), **UNESTIMATED,
+            epipolar_error_px=np.full(markers, np.nan),
+            **UNESTIMATED | {"hand_scale": math.exp(log_scale), "hand_scale_sd": math.sqrt(variance)},
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": time.perf_counter() - begun, "solve": 0.0})
