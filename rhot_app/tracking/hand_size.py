@@ -2,7 +2,7 @@
 
 One frame hardly shows a hand's size, and a filter that takes every frame for new evidence soon believes to know it. So
 shapes of the hand are kept that differ from each other, each as all its markers were located at one instant; for each
-of them the evidence for a grid of sizes is worked out once, one size per state; and all shapes together are the
+of them the evidence for a grid of sizes is worked out once, one size per datagram; and all shapes together are the
 evidence for the one size that they share. They are of one person, whose habits are not the natural pose's and who often
 repeats a movement, so they count for less than as many independent ones.
 """
@@ -35,11 +35,11 @@ DISTINCT_M = 0.01
 """A shape is another when the distance of two markers differs by as much from every shape that is kept."""
 
 SHARE, MOST = 0.25, 2.0
-"""How much each shape counts, in independent ones, and all of them at most. Poses drawn from the natural
-pose show the size to 1 or 2 % each, those of people with other habits and proportions to 2 or 3, however many."""
+"""How much each shape counts, in independent ones, and all of them at most: habits are a person's own, and movements
+return (`benchmarks/hand_size.py`)."""
 
 UNFIT = 20.0
-"""Least misfit and strain beyond which a shape is none of a hand of any size. Natural ones have 6, seldom 16."""
+"""Least misfit and strain beyond which a shape is none of a hand of any size. Those of the twin have 0 to 10."""
 
 KEPT = 48
 LEAST_MARKERS = 5
