@@ -105,9 +105,11 @@ def test_the_size_is_followed_slowly_and_what_it_lags_is_doubt():
     size.follow(0)
     for angles in natural_poses(8, 6):
         show(size, located(angles, 1.1, rng), angles)
-    steps = np.array([size.follow(round(1e9 * t)) for t in np.arange(0.01, 5.0 * FOLLOW_S, 0.01)])
+    times = np.arange(0.01, 5.0 * FOLLOW_S, 0.01)
+    steps = np.array([(size.follow(round(1e9 * t)), size.follow(round(1e9 * (t - 0.006))))[1] for t in times])
     assert 0.0 < np.diff(steps[:, 0]).max() < 0.1 * 0.01 / FOLLOW_S
     assert steps[-1, 0] == pytest.approx(np.log(size.scale), abs=1e-3)
+    assert steps[99, 0] == pytest.approx(np.log(size.scale) * -np.expm1(-1.0 / FOLLOW_S))
     assert (np.abs(steps[:, 0] - np.log(1.1)) < 2.0 * np.sqrt(steps[:, 1])).all()
     size.reset()
     assert size.known == (0.0, USUAL_SD**2) and size.scale == 1.0
