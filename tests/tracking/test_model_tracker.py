@@ -234,8 +234,7 @@ def test_a_hand_found_again_has_the_size_that_it_had_and_a_reset_forgets_it():
         if 5.0 < t < 6.0:
             flags[:] = LOST
 
-    rig = of_wrong_size(1.1)
-    tracker = make_tracker(rig)
+    tracker = make_tracker(of_wrong_size(1.1))
     states = run(tracker, altered(sights(RIG, moving("grasp", 8.0), 7.0), leave))
     assert any(state.condition is Condition.LOST for state in states)
     before, after = (sizes_of(after_s(states, *span)) for span in ((4.0, 5.0), (6.2, 7.0)))
