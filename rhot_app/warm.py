@@ -49,10 +49,11 @@ def warm_tracker(rig: Rig) -> None:
 
 
 def warm_model_tracker(rig: Rig) -> None:
-    """The same with the model tracker, which begins in another way when markers on the palm show how it is turned."""
+    """The same with the model tracker, which begins in another way when markers on the palm show how it is turned, and
+    with the search for the hand's size."""
     for markers in ("rhot6", "rhot8"):
         chosen = msgspec.structs.replace(rig, markers=load_markers(resource_path("markers", f"{markers}.json")),
-                                         tracker=TrackerSettings(kind="model"))
+                                         tracker=TrackerSettings(kind="model", float_scale=True))
         rehearse_tracker(make_tracker(chosen), chosen)
 
 

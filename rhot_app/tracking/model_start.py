@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -33,6 +34,16 @@ UNFIT_M = 0.06
 _TARGET_SD_M = 1e-3
 
 
+class Located(NamedTuple):
+    """Where M markers were at `t_ns`, master ns: `positions` (M, 3) m, world, with `covariances` (M, 3, 3) m^2, NaN
+    where not located; `clear` (M,) bool: by two cameras that saw it beyond doubt."""
+
+    t_ns: int
+    positions: Array
+    covariances: Array
+    clear: NDArray[np.bool_]
+
+
 class Starter:
     """Collects frames until one instant shows enough of the hand."""
 
@@ -51,32 +62,30 @@ class Starter:
         """Take one frame in."""
         self._pairing.ingest(observations)
 
-    def find(self) -> tuple[int, HandPose] | None:
-        """The hand and its instant, master ns, as soon as the frames so far show it."""
-        located = self.locate()
-        if located is None:
-            return None
-        pose = self.pose_of(located[1])
-        return None if pose is None else (located[0], pose)
-
-    def locate(self) -> tuple[int, Array] | None:
-        """An instant, master ns, and where the markers were then, (M, 3) m, NaN where not located; None: not due."""
+    def locate(self) -> Located | None:
+        """Where the markers were at the newest instant; None: none is due."""
         paired = self._pairing.due()
-        return None if paired is None else (paired.t_ns, self._locate(paired))
+        return None if paired is None else self._locate(paired)
 
-    def _locate(self, paired: Paired) -> Array:
-        """(M, 3) m, NaN where not located."""
-        rig = self._rig
-        positions = np.empty((len(rig.marker_ids), 3))
+    def _locate(self, paired: Paired) -> Located:
+        rig, count = self._rig, len(self._rig.marker_ids)
+        positions, covariances, clear = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count, np.bool_)
         _locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
-                      rig.focal, rig.shapes, positions)
-        return positions
+                      rig.focal, rig.shapes, positions, covariances, clear)
+        return Located(paired.t_ns, positions, covariances, clear)
 
-    def pose_of(self, markers: Array) -> HandPose | None:
-        """The hand whose `markers` (M, 3) m, NaN where not located, are enough to find it.
+    def pose_of(self, markers: Array, scale: float = 1.0) -> HandPose | None:
+        """The hand, `scale` times as large as its file says, whose `markers` (M, 3) m, NaN where not located, are
+        enough to find it.
 
         None when they are not, or are where no hand has them: two that change names in one camera seem far away.
         """
+        if scale != 1.0 and np.isfinite(markers).any():
+            centre = np.nanmean(markers, axis=0)
+            pose = self.pose_of(centre + (markers - centre) / scale)
+            if pose is not None:
+                pose.world_from_palm[:3, 3] = centre + (pose.world_from_palm[:3, 3] - centre) * scale
+            return pose
         pose = self._fitted(markers)
         return pose if pose is not None and count_apart(markers, self._worn_at(pose), UNFIT_M) == 0 else None
 
@@ -108,12 +117,15 @@ class Starter:
 
 @njit(cache=True)
 def _locate_clear(flags: NDArray[np.int64], live: NDArray[np.bool_], pixels: Array, covariances: Array,
-                  intrinsics: Array, cameras: Array, focal: Array, shapes: Array, positions: Array) -> None:
-    """Fill `positions` (M, 3) m of one instant; arrays as in `Paired` and `RigArrays`."""
+                  intrinsics: Array, cameras: Array, focal: Array, shapes: Array, positions: Array,
+                  position_covariances: Array, clear: NDArray[np.bool_]) -> None:
+    """Fill what `Located` holds of one instant; arrays as in `Paired` and `RigArrays`."""
     used, count = np.empty(flags.shape, np.bool_), positions.shape[0]
-    choose_views(flags, live, used, np.empty(count, np.bool_))
-    locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, positions, np.empty((count, 3, 3)),
+    choose_views(flags, live, used, clear)
+    locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, positions, position_covariances,
                np.empty(count))
+    for m in range(count):
+        clear[m] = not (clear[m] or math.isnan(positions[m, 0]))
 
 
 @njit(cache=True)

@@ -13,8 +13,8 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
+from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
 from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
@@ -24,7 +24,7 @@ from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, Account, describe, empty_report, subject_of
-from rhot_app.tracking.model_start import Starter, count_apart
+from rhot_app.tracking.model_start import Located, Starter, count_apart
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.sights import Sights
 from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
@@ -61,7 +61,8 @@ class ModelTracker:
         self._rig, self._wearing = compile_rig(rig), compile_wearing(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
         self._hand = HandFilter(self._wearing.worn, self._wearing.cameras, self._wearing.habits, self._wearing.limits,
-                                self._wearing.bias_variance, float_scale=rig.tracker.float_scale)
+                                self._wearing.bias_variance)
+        self._size = HandSize(self._wearing) if rig.tracker.float_scale else None
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)
         self._sights = Sights(cameras, markers)
@@ -77,6 +78,9 @@ class ModelTracker:
         self._pending: list[CameraObservations] = []
         self._starter.reset()
         self._sights.reset()
+        if self._size is not None:
+            self._size.reset()
+            self._hand.resize(*self._size.known)
         self._tracking = self._ever = False
         self._believed_ns = self._plausible_ns = self._thumb_ns = self._behind = self._apart = 0
 
@@ -98,6 +102,9 @@ class ModelTracker:
         taken = [observations for observations in pending if self._take(observations)]
         if not taken:
             return None
+        if self._size is not None:
+            self._size.work()
+            self._hand.resize(*self._size.follow(taken[-1].t_row0_master_ns))
         return self._state(taken[-1], begun)
 
     def state_at(self, t_ns: int) -> HandState | None:
@@ -146,17 +153,17 @@ class ModelTracker:
 
     def _compare(self, estimated: Array) -> None:
         """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them."""
-        found = self._starter.locate()
-        if found is None:
+        located = self._starter.locate()
+        if located is None:
             return
-        t_ns, located = found
         speed = math.hypot(*self._hand.estimate.velocity[:3].tolist())
-        allowed = _APART_M + speed * 1e-9 * abs(self._timeline.t_ns - t_ns)
-        self._apart = self._apart + 1 if count_apart(located, estimated, allowed) >= _APART_MARKERS else 0
+        allowed = _APART_M + speed * 1e-9 * abs(self._timeline.t_ns - located.t_ns)
+        apart = count_apart(located.positions, estimated, allowed)
+        if self._size is not None and apart == 0:
+            self._size.look(located, self._hand.estimate.world, self._hand.estimate.angles)
+        self._apart = self._apart + 1 if apart >= _APART_MARKERS else 0
         if self._apart >= _APART_STATES:
-            pose = self._starter.pose_of(located)
-            if pose is not None:
-                self._begin(t_ns, pose)
+            self._begin(located)
 
     def _look_at_thumb(self) -> None:
         """A thumb that bends backwards may be one that bends forwards."""
@@ -174,12 +181,20 @@ class ModelTracker:
         return self._behind >= _BEHIND
 
     def _look_for_hand(self) -> None:
-        found = self._starter.find()
-        if found is not None:
-            self._begin(*found)
+        located = self._starter.locate()
+        if located is not None:
+            self._begin(located)
 
-    def _begin(self, t_ns: int, pose: HandPose) -> None:
-        """Start the filter from a pose, and weigh again what was seen since."""
+    def _begin(self, located: Located) -> None:
+        """Start the filter from what one instant shows, if it is enough, and weigh again what was seen since."""
+        pose = self._starter.pose_of(located.positions, 1.0 if self._size is None else self._size.scale)
+        if pose is None:
+            return
+        t_ns = located.t_ns
+        if self._size is not None:
+            self._size.settle()
+            self._size.look(located, pose.world_from_palm, pose.angles)
+            self._hand.resize(*self._size.known)
         self._hand.start(pose.world_from_palm, pose.angles)
         self._timeline.begin(t_ns)
         self._tracking = self._ever = True
@@ -232,8 +247,9 @@ class ModelTracker:
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
 
     def _nothing(self, newest: CameraObservations, begun: float) -> HandState:
-        """No hand: what the cameras see is all there is to tell."""
+        """No hand: what the cameras see is all there is to tell, and how large it was."""
         rig = self._rig
+        log_scale, variance = (0.0, math.nan) if self._size is None else self._size.known
         markers = len(rig.marker_ids)
         seen_pixels, seen_flags = self._sights.last_seen()
         unknown = int(Knowledge.UNKNOWN)
@@ -248,6 +264,7 @@ class ModelTracker:
             joint_knowledge=np.full(21, unknown, np.uint8), fingertip_positions=np.full((5, 3), np.nan),
             angles=np.full(21, np.nan), angle_knowledge=np.full(21, unknown, np.uint8),
             world_from_palm=np.full((4, 4), np.nan), palm_knowledge=Knowledge.UNKNOWN,
-            epipolar_error_px=np.full(markers, np.nan), **UNESTIMATED,
+            epipolar_error_px=np.full(markers, np.nan),
+            **UNESTIMATED | {"hand_scale": math.exp(log_scale), "hand_scale_sd": math.sqrt(variance)},
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": time.perf_counter() - begun, "solve": 0.0})

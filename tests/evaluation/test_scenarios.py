@@ -11,6 +11,7 @@ import pytest
 from rhot_app.evaluation import scenarios
 from rhot_app.evaluation.takes import Order, Take, take
 from rhot_app.evaluation.track import rig_with
+from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene import make_scene, twin_defaults
 
@@ -69,6 +70,16 @@ def test_a_hand_is_found_soon_wherever_the_log_begins(grasp: Take, rig: Rig) -> 
 def test_a_tracker_that_does_not_estimate_the_size_never_finds_it(grasp: Take, rig: Rig) -> None:
     figures = scenarios.growing(grasp, rig, 1.0 / 1.1)
     assert figures["error_at_1s_percent"] == pytest.approx(10.0) and figures["within_2_percent_after_s"] is None
+    assert figures["stated_percent"] is None and figures["max_off_in_sd"] is None
+
+
+@pytest.mark.parametrize("wrong", [1.1, 0.9])
+def test_a_tracker_that_estimates_the_size_finds_it_and_states_no_more_than_it_knows(grasp: Take, wrong: float) -> None:
+    estimating = rig_with(grasp.rig, TrackerSettings(kind="model", float_scale=True))
+    rig = msgspec.structs.replace(estimating, hand=scaled_hand(grasp.rig.hand, wrong))
+    figures = scenarios.growing(grasp, rig, 1.0 / wrong)
+    assert all(figures[key] is not None for key in ("within_2_percent_after_s", "stated_percent", "max_off_in_sd"))
+    assert (figures["stated_percent"] or 0.0) > 1.5 and (figures["max_off_in_sd"] or 9.0) < 2.0
 
 
 def test_computing_says_how_long_and_how_much(tmp_path: Path, rig: Rig) -> None:

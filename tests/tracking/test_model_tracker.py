@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from modelled_hand import after_s, deviations, model_rig, moving, seconds, sights, states_of
-from synthetic_rig import EPOCH_NS, LOST, Sight, altered, make_rig
+from synthetic_rig import EPOCH_NS, LOST, Sight, altered, make_rig, run
 
 from rhot_app.errors import RigError
 from rhot_app.hand.anthropometry import scaled_hand
@@ -202,15 +202,50 @@ def test_a_hand_that_leaves_is_lost_and_found_again():
     assert deviations(after_s(states, 2.5), moving()).rms_mm < 3.0
 
 
-def test_the_hands_size_is_found_while_it_moves():
-    """The hand's file has all lengths 5 % too large."""
-    right = model_rig("rhot8")
-    wrong = msgspec.structs.replace(model_rig("rhot8", float_scale=True), hand=scaled_hand(right.hand, 1.05))
-    truth = moving("grasp", 6.0, "rhot8")
-    last = states_of(wrong, sights(right, truth, 5.0))[-1]
-    assert last.hand_scale == pytest.approx(1.0 / 1.05, abs=0.02)
-    assert 0.0 < last.hand_scale_sd < 0.05
-    assert states_of(right, sights(right, truth, 0.5))[-1].hand_scale == 1.0
+def of_wrong_size(factor, markers="rhot6"):
+    """A rig whose hand file has all lengths `factor` times too large, and whose size is estimated."""
+    rig = model_rig(markers, float_scale=True)
+    return msgspec.structs.replace(rig, hand=scaled_hand(rig.hand, factor))
+
+
+def sizes_of(states):
+    """(N, 2) logarithm of the hand's scale and its standard deviation."""
+    return np.array([(np.log(state.hand_scale), state.hand_scale_sd) for state in states if state.condition in HERE])
+
+
+@pytest.mark.parametrize(("factor", "markers"), [(1.1, "rhot6"), (0.9, "rhot6"), (1.05, "rhot8")])
+def test_the_hands_size_is_found_while_it_moves_and_never_overstated(factor, markers):
+    truth = moving("grasp", 8.0, markers)
+    sizes = sizes_of(states_of(of_wrong_size(factor, markers), sights(model_rig(markers), truth, 7.0)))
+    off = sizes[:, 0] + np.log(factor)
+    assert np.abs(off[-1]) < 0.02 and 0.01 < sizes[-1, 1] < 0.025
+    assert (np.abs(off) < 2.0 * sizes[:, 1]).all()
+
+
+@pytest.mark.parametrize("factor", [1.1, 1.0, 0.9])
+def test_a_still_hand_leaves_its_size_open(factor):
+    sizes = sizes_of(states_of(of_wrong_size(factor), sights(RIG, moving("still"), SECONDS)))
+    assert (sizes[:, 1] > 0.03).all()
+    assert (np.abs(sizes[:, 0] + np.log(factor)) < 2.0 * sizes[:, 1]).all()
+
+
+def test_a_hand_found_again_has_the_size_that_it_had_and_a_reset_forgets_it():
+    def leave(t, _camera, _pixels, flags):
+        if 5.0 < t < 6.0:
+            flags[:] = LOST
+
+    tracker = make_tracker(of_wrong_size(1.1))
+    states = run(tracker, altered(sights(RIG, moving("grasp", 8.0), 7.0), leave))
+    assert any(state.condition is Condition.LOST for state in states)
+    before, after = (sizes_of(after_s(states, *span)) for span in ((4.0, 5.0), (6.2, 7.0)))
+    assert np.abs(after[0, 0] - before[-1, 0]) < 0.02 and after[0, 1] < before[0, 1] + 0.01
+    tracker.reset()
+    again = sizes_of(run(tracker, sights(RIG, moving(), 0.4)))
+    assert np.abs(again[0, 0]) < 1e-6 and again[0, 1] > 0.05
+
+
+def test_a_size_that_does_not_float_is_that_of_the_file():
+    assert (sizes_of(states_of(RIG, sights(RIG, moving(), 1.0))) == 0.0).all()
 
 
 def test_prediction_is_nearer_to_what_comes_than_the_newest_state():

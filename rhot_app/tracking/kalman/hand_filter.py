@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from rhot_app.tracking.kalman.estimate import (
     PALM_HELD,
     POSE,
     ROTATION,
+    SCALE,
     TURN_HELD,
     Estimate,
     displace,
@@ -25,7 +27,7 @@ from rhot_app.tracking.kalman.estimate import (
 )
 from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import Gain, contract, empty_gain, misfit, solve
-from rhot_app.tracking.kalman.holding import TURN_ALONE, hold, hold_turn, rest
+from rhot_app.tracking.kalman.holding import TURN_ALONE, hold, hold_size, hold_turn, rest
 from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
@@ -72,10 +74,6 @@ ASTRAY_M = 0.3
 FASTEST_M_S, FASTEST_RAD_S = 12.0, 40.0
 """No palm is faster: a boxer's fist peaks near 10 m/s, a forearm turns at 25 rad/s."""
 
-SCALE_SD = 0.1
-"""Of the hand's size at the start, when it may float."""
-
-
 class Desk(NamedTuple):
     """All that an update works with: the `estimate`, a `trial` of it, and room for what comes between."""
 
@@ -92,6 +90,7 @@ class Desk(NamedTuple):
     habits: Habits
     limits: Array
     bias_variance: Array
+    size: Array  # (2,): the logarithm of the hand's scale, and the variance of it, 0 for a size that is certain
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,38 +103,43 @@ class Outcome:
 
 
 class HandFilter:
-    """An iterated extended Kalman filter on the hand's pose, velocity, size and markers' biases.
+    """An iterated extended Kalman filter on the hand's pose, velocity and markers' biases, for a hand whose size it is
+    told.
 
     `worn`: the markers; `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance`
     (M,) m^2.
     """
 
-    def __init__(self, worn: Worn, cameras: Cameras, habits: Habits, limits: Array, bias_variance: Array, *,
-                 float_scale: bool = False) -> None:
+    def __init__(self, worn: Worn, cameras: Cameras, habits: Habits, limits: Array, bias_variance: Array) -> None:
         shape = len(cameras.pose), len(worn.part)
         size = BIAS + 3 * len(worn.part)
         self.estimate = empty_estimate(*shape)
         self._desk = Desk(self.estimate, empty_estimate(*shape), empty_rows(ROWS_MAX, size),
                           empty_gain(ROWS_MAX, size), empty_held(size), np.empty(size), np.empty(ROWS_MAX, np.bool_),
-                          np.empty(ROWS_MAX), worn, cameras, habits, limits, bias_variance)
+                          np.empty(ROWS_MAX), worn, cameras, habits, limits, bias_variance,
+                          np.zeros(2))
         self._shared = Share(self._desk)
         self._now, self._tried = (Share(Page(mean, self._desk.rows)) for mean in (self.estimate, self._desk.trial))
-        self._float_scale = float_scale
+
+    def resize(self, log_scale: float, variance: float) -> None:
+        """From the next update on the hand is exp(log_scale) times as large as its file says, with this variance of the
+        logarithm. The filter learns nothing about it: what is not known of the size is in what it says of the pose."""
+        self._desk.size[:] = log_scale, variance
 
     def start(self, world_from_palm: Array, angles: Array) -> None:
         """Begin at a pose (4, 4) m and (21,) rad that something rougher has found, knowing little else."""
         estimate, covariance = self.estimate, self.estimate.covariance
         estimate.world[:], estimate.angles[:] = world_from_palm, np.clip(angles, *self._desk.limits.T)
-        for array in (estimate.velocity, estimate.acceleration, estimate.log_scale, estimate.bias, estimate.trend,
-                      covariance):
+        for array in (estimate.velocity, estimate.acceleration, estimate.bias, estimate.trend, covariance):
             array[:] = 0.0
+        estimate.log_scale[0] = self._desk.size[0]
         estimate.agitation[:] = START_AGITATION
         estimate.unseen[:], estimate.unfaded[:], estimate.turning[:], estimate.held[:] = 0.0, 0.0, START_TURNING, FREE
         estimate.bias_variance[:] = self._desk.bias_variance
         place, turn, speed, spin, bend = START_SD
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),
-            np.sqrt(START_AGITATION)[GROUP_OF], [SCALE_SD if self._float_scale else 0.0],
+            np.sqrt(START_AGITATION)[GROUP_OF], [np.sqrt(self._desk.size[1])],
             np.repeat(np.sqrt(self._desk.bias_variance), 3)])
         np.fill_diagonal(covariance, diagonal**2)
         covariance[ANGLES:POSE, ANGLES:POSE] = self._desk.habits.usual[ANGLES:, ANGLES:]
@@ -185,7 +189,7 @@ class HandFilter:
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
         """Whether the hand as it is held cannot be where it is seen."""
         worst = MISFIT.get(int(self.estimate.held[0]))
-        if worst is None or self._desk.held.used[0] <= TURN_ALONE:
+        if worst is None or self._desk.held.used[0] <= TURN_ALONE + (self._desk.size[1] > 0.0):
             return False
         self._linearise(blocks, self._tried)
         return bool(misfit(self._desk.rows, self._desk.believed, self._desk.widening) > worst)
@@ -195,6 +199,22 @@ class HandFilter:
 def _carry_on(shared: Share, dt: float) -> None:
     desk: Desk = shared.of
     predict(desk.estimate, dt, desk.worn.part, desk.habits, desk.estimate.bias_variance)
+    if desk.size[1] > 0.0:
+        take_size(desk.estimate, desk.size)
+
+
+@njit(cache=True)
+def take_size(estimate: Estimate, size: Array) -> None:
+    """Make the hand as large as `size` (2,) says, as well known as that. What goes with the size is known better as it
+    is, but not worse all at once: the covariance must stay one."""
+    covariance = estimate.covariance
+    before = covariance[SCALE, SCALE]
+    if before > size[1]:
+        share = math.sqrt(size[1] / before)
+        covariance[SCALE] *= share
+        covariance[:, SCALE] *= share
+    covariance[SCALE, SCALE] = size[1]
+    estimate.log_scale[0] = size[0]
 
 
 @njit(cache=True)
@@ -204,6 +224,7 @@ def _prepare(shared: Share, dt: float) -> None:
     estimate, rows, part = desk.estimate, desk.rows, desk.worn.part
     hold(estimate, rows, part, desk.worn.palmar, desk.cameras.pose, desk.habits.stiff, desk.held)
     rest(estimate, dt)
+    hold_size(estimate.covariance, desk.held)
     loosen(estimate, part, rows, desk.habits.usual)
     appraise(rows, estimate, desk.habits.together, desk.believed, desk.widening)
     withhold(estimate.covariance, desk.held)
@@ -215,6 +236,7 @@ def _hold_turn_alone(shared: Share) -> None:
     desk: Desk = shared.of
     release(desk.estimate.covariance, desk.held)
     hold_turn(desk.held)
+    hold_size(desk.estimate.covariance, desk.held)
     withhold(desk.estimate.covariance, desk.held)
 
 
@@ -244,7 +266,7 @@ def _turn(one: Array, other: Array) -> float:
 
 @njit(cache=True)
 def _conclude(shared: Share, dt: float) -> None:
-    """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits."""
+    """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits; the size stays."""
     desk: Desk = shared.of
     estimate, worn, gain, step = desk.estimate, desk.worn, desk.gain, desk.step
     note_sights(estimate, worn.part, desk.rows, desk.believed)
@@ -258,3 +280,5 @@ def _conclude(shared: Share, dt: float) -> None:
     forget(estimate, dt, desk.habits, estimate.bias_variance, jacobian, gain, step)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], desk.limits, step)
     displace(estimate, step, estimate)
+    if desk.size[1] > 0.0:
+        estimate.log_scale[0], estimate.covariance[SCALE, SCALE] = desk.size[0], desk.size[1]

@@ -28,6 +28,7 @@ from rhot_app.tracking.kalman.estimate import (
     PALM_HELD,
     POSE,
     ROTATION,
+    SCALE,
     TURN,
     TURN_HELD,
     VELOCITY,
@@ -113,6 +114,14 @@ def hold_turn(held: Held) -> None:
     """Hold how the palm is turned and turns."""
     for i in range(ROTATION):
         _hold_number(ROTATION + i, held)
+
+
+@njit(cache=True)
+def hold_size(covariance: Array, held: Held) -> None:
+    """Hold how large the hand is, where that is not certain: no single frame tells (`hand_size.py`)."""
+    if covariance[SCALE, SCALE] > 0.0:
+        held.directions[held.used[0], SCALE] = 1.0
+        held.used[0] += 1
 
 
 @njit(cache=True)

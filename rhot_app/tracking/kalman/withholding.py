@@ -20,13 +20,13 @@ from rhot_app.tracking.kalman.gain import Gain
 
 Array = NDArray[np.float64]
 
-MOST = 63
-"""Directions held at most: all angles, their velocities and their accelerations."""
+MOST = 64
+"""Directions held at most: all angles, their velocities and their accelerations, and the hand's size."""
 
 
 class Held(NamedTuple):
-    """`used` (1,): directions held. `directions` (63, N): each of them, a row that the state is multiplied with;
-    `loads` (63, N): what is not known of each and what goes with it, P = P of the rest + loads^T loads."""
+    """`used` (1,): directions held. `directions` (64, N): each of them, a row that the state is multiplied with;
+    `loads` (64, N): what is not known of each and what goes with it, P = P of the rest + loads^T loads."""
 
     used: NDArray[np.int64]
     directions: Array

@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
-from known_hand import SETTLED, SIZE, WEARING, blocks, empty, filter_of_hand, settled
+from known_hand import SETTLED, SIZE, WEARING, blocks, empty, filter_of_hand, moving_estimate, settled
 
 from rhot_app.hand.skeleton import ANGLE_SLICES
 from rhot_app.tracking.kalman import hand_filter
@@ -12,12 +12,15 @@ from rhot_app.tracking.kalman.estimate import (
     FIRST_FINGER,
     LINEAR,
     PALM_HELD,
+    POSE,
+    SCALE,
     TURN,
     TURN_HELD,
     Estimate,
     copy_estimate,
 )
-from rhot_app.tracking.kalman.hand_filter import FASTEST_RAD_S
+from rhot_app.tracking.kalman.hand_filter import FASTEST_RAD_S, take_size
+from rhot_app.tracking.kalman.markers import place_markers
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.sighted import line_of_sight
 
@@ -155,3 +158,41 @@ def test_rounding_does_not_add_up():
     for earlier, block in pairwise([last, *blocks()[SETTLED:]]):
         hand.update(1e-9 * (block.t_ns - earlier.t_ns), [block])
     assert before > 1e-10 and skew() < 1e-3 * before
+
+
+def tracked_with(size):
+    """A hand that two cameras saw for a second, by a filter that was told its size, (log_scale, variance)."""
+    hand, frames, truth = filter_of_hand(), blocks()[:SETTLED], moving_estimate()
+    hand.resize(*size)
+    hand.start(truth.world, truth.angles)
+    for before, block in pairwise([frames[0], *frames]):
+        hand.update(1e-9 * (block.t_ns - before.t_ns), [block])
+    return hand.estimate
+
+
+def test_the_filter_learns_no_size_and_what_is_not_known_of_it_is_doubt_about_the_pose():
+    sure, unsure = tracked_with((0.05, 0.0)), tracked_with((0.05, 0.01))
+    assert unsure.log_scale[0] == 0.05 and unsure.covariance[SCALE, SCALE] == 0.01
+    np.testing.assert_allclose(unsure.covariance, unsure.covariance.T, atol=1e-12)
+    assert np.linalg.eigvalsh(unsure.covariance).min() > -1e-9
+    angles = [np.sqrt(one.covariance[ANGLES:POSE, ANGLES:POSE].diagonal().mean()) for one in (sure, unsure)]
+    assert angles[1] > 1.5 * angles[0]
+    tips = []
+    for estimate in (sure, unsure):  # where a tip is, cameras show, whatever the size
+        points, jacobian = np.empty((len(WEARING.roles), 3)), np.empty((len(WEARING.roles), 3, POSE))
+        place_markers(WEARING.worn, estimate, points, jacobian)
+        slope = np.zeros((3, SIZE))
+        slope[:, :POSE], slope[:, SCALE] = jacobian[MIDDLE], points[MIDDLE] - estimate.world[:3, 3]
+        tips.append(np.sqrt(np.trace(slope @ estimate.covariance @ slope.T)))
+    assert max(tips) < 2e-3 < 0.01 < 0.1 * np.linalg.norm(slope[:, SCALE])
+
+
+def test_a_size_that_is_better_known_takes_its_doubt_along():
+    estimate = moving_estimate()
+    before = estimate.covariance.copy()
+    for variance in (0.5, 0.1, 3.0):
+        size = np.array([0.07, variance * before[SCALE, SCALE]])
+        take_size(estimate, size)
+        assert estimate.log_scale[0] == 0.07 and estimate.covariance[SCALE, SCALE] == size[1]
+        assert np.linalg.eigvalsh(estimate.covariance).min() > 0.0
+    np.testing.assert_allclose(estimate.covariance[SCALE, :POSE], np.sqrt(0.1) * before[SCALE, :POSE])

@@ -16,12 +16,13 @@ from rhot_app.tracking.kalman.estimate import (
     LINEAR,
     PALM_HELD,
     POSE,
+    SCALE,
     TURN,
     TURN_HELD,
     VELOCITY,
     empty_estimate,
 )
-from rhot_app.tracking.kalman.holding import HURRIES_M_S, HURRIES_RAD_S, REST_S, TURNS_RAD_S, hold, rest
+from rhot_app.tracking.kalman.holding import HURRIES_M_S, HURRIES_RAD_S, REST_S, TURNS_RAD_S, hold, hold_size, rest
 from rhot_app.tracking.kalman.rows import PALM_PART
 from rhot_app.tracking.kalman.sighted import line_of_sight
 from rhot_app.tracking.kalman.withholding import MOST, empty_held
@@ -261,3 +262,12 @@ def test_a_palm_that_is_held_is_not_shaken_and_other_hands_do_not_rest():
     for how in (FREE, FINGERS_HELD):
         for before, after in zip(*rested(how), strict=True):
             np.testing.assert_array_equal(before, after)
+
+
+def test_a_size_is_held_where_it_is_in_doubt_and_beside_all_else():
+    for doubt, expected in ((0.0, 0), (0.01, 1)):
+        covariance, held = np.zeros((BIAS, BIAS)), empty_held(BIAS)
+        covariance[SCALE, SCALE], held.used[0] = doubt, MOST - 1
+        hold_size(covariance, held)
+        assert held.used[0] == MOST - 1 + expected
+        assert held.directions.sum() == expected == held.directions[-1, SCALE]

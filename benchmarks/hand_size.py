@@ -1,0 +1,141 @@
+"""How well shapes of a hand show its size, of people whose habits and proportions are not those of the hand file.
+
+    python benchmarks/hand_size.py [--people 25] [--seed 1] [--json FILE]
+
+Each person has a size (10 % about the file's), bones that differ by a share of their length, each for itself, and a
+mean pose that is some standard deviations of the natural pose off it; the shapes scatter about that mean, within the
+joints' limits. Markers are located to 0.5 mm. The true size is that of the mean length of all fingers with their
+metacarpals. Printed: how far `tracking.hand_size` is off, and what it states.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
+from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.project import Rig
+from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.tracking.hand_size import GRID, USUAL_SD, HandSize
+from rhot_app.tracking.kalman.wearing import Wearing, compile_wearing
+from rhot_app.tracking.model_start import Located
+
+Array = NDArray[np.float64]
+
+NOISE_M = 5e-4
+BEYOND_RAD = math.radians(8.0)
+DRAWS = 3000
+
+
+@dataclass(frozen=True)
+class People:
+    """`bones`: how far each bone is off, as a share; `habit`: how far the mean pose is off and `within`: how far shapes
+    are off that, in standard deviations of the natural pose."""
+
+    shapes: int
+    bones: float
+    habit: float
+    within: float
+
+
+GROUPS = (
+    People(1, 0.0, 0.0, 1.0), People(8, 0.0, 0.0, 1.0), People(8, 0.03, 0.0, 1.0), People(8, 0.05, 0.0, 1.0),
+    People(8, 0.0, 0.5, 1.0), People(8, 0.0, 1.0, 0.5), People(1, 0.05, 0.7, 0.7), People(2, 0.05, 0.7, 0.7),
+    People(8, 0.05, 0.7, 0.7))
+
+
+def main() -> int:
+    """Print a line per group of people, write JSON."""
+    parser = argparse.ArgumentParser(description="How well a hand's size is learnt, of people who differ.")
+    parser.add_argument("--people", type=int, default=25, help="in each group (default 25)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
+    args = parser.parse_args()
+    rig, lines = synthetic_rig(), []
+    wearing = compile_wearing(rig)
+    print(f"{'shapes':>6} {'bones':>6} {'habit':>6} {'within':>6}   error, worst, stated, %   in SD, worst")
+    for group in GROUPS:
+        rng = np.random.default_rng(args.seed)
+        found = np.array([learnt(group, rig, wearing, rng) for _ in range(args.people)])
+        error, stated = found[:, 0] - found[:, 2], found[:, 1]
+        line = {"shapes": group.shapes, "bones": group.bones, "habit": group.habit, "within": group.within,
+                "error_percent": 100.0 * rms(error), "worst_percent": float(100.0 * np.abs(error).max()),
+                "stated_percent": 100.0 * rms(stated), "in_sd": rms(error / stated),
+                "worst_in_sd": float(np.abs(error / stated).max())}
+        lines.append(line)
+        print("{shapes:6d} {bones:6.2f} {habit:6.1f} {within:6.1f}   {error_percent:5.1f}  {worst_percent:5.1f}  "
+              "{stated_percent:5.1f}       {in_sd:5.2f}  {worst_in_sd:5.1f}".format(**line), flush=True)
+    if args.json is not None:
+        args.json.write_text(json.dumps(lines, indent=1) + "\n")
+    return 0
+
+
+def learnt(group: People, rig: Rig, wearing: Wearing, rng: np.random.Generator) -> tuple[float, float, float]:
+    """Of one person: the logarithm of the size, its standard deviation, and the truth."""
+    log_scale, size = USUAL_SD * rng.normal(), HandSize(wearing)
+    hand = person(rig.hand, group.bones, rng)
+    worn = compile_wearing(msgspec.structs.replace(rig, hand=hand)).worn.dh
+    spread = np.linalg.cholesky(np.linalg.inv(wearing.habits.information))
+    mean = np.clip(wearing.habits.mean + group.habit * (spread @ rng.normal(size=21)), *wearing.limits.T)
+    for _ in range(group.shapes):
+        angles, points = pose(mean, group.within * spread, wearing.limits, rng), np.empty((len(wearing.roles), 3))
+        forward_arrays(worn, np.eye(4), angles, empty_frames(worn), points)
+        points = math.exp(log_scale) * points + NOISE_M * rng.normal(size=points.shape)
+        size.look(Located(0, points, np.tile(NOISE_M**2 * np.eye(3), (len(points), 1, 1)),
+                          np.ones(len(points), np.bool_)), np.eye(4), angles)
+        for _ in GRID:
+            size.work()
+    size.settle()
+    found, variance = size.known
+    return found, math.sqrt(variance), log_scale + math.log(reach(hand) / reach(rig.hand))
+
+
+def person(hand: HandAnatomy, bones: float, rng: np.random.Generator) -> HandAnatomy:
+    """The hand with each length off by a share of itself."""
+    fingers = {name: _other(finger, bones, rng) for name, finger in hand.fingers.items()}
+    return msgspec.structs.replace(hand, fingers=fingers)
+
+
+def _other(finger: FingerAnatomy, bones: float, rng: np.random.Generator) -> FingerAnatomy:
+    first, second, last, x, y = (1.0 + bones * rng.normal(size=5)).tolist()
+    return msgspec.structs.replace(
+        finger, base_mm=(x * finger.base_mm[0], y * finger.base_mm[1], finger.base_mm[2]),
+        bones_mm=(first * finger.bones_mm[0], second * finger.bones_mm[1], last * finger.bones_mm[2]),
+        marker_mm=last * finger.marker_mm)
+
+
+def reach(hand: HandAnatomy) -> float:
+    """Mean length of the fingers with their metacarpals, mm."""
+    return float(np.mean([sum(finger.bones_mm) + math.hypot(*finger.base_mm) for finger in hand.fingers.values()]))
+
+
+def pose(mean: Array, spread: Array, limits: Array, rng: np.random.Generator) -> Array:
+    """(21,) rad drawn about `mean`: the first of many draws that hardly leaves the `limits` (21, 2), else the best."""
+    best, least = mean, math.inf
+    for _ in range(DRAWS):
+        angles = mean + spread @ rng.normal(size=21)
+        bounded = np.clip(angles, *limits.T)
+        beyond = float(np.abs(angles - bounded).max())
+        if beyond < least:
+            best, least = bounded, beyond
+        if beyond < BEYOND_RAD:
+            break
+    return best
+
+
+def rms(values: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

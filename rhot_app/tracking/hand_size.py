@@ -1,0 +1,151 @@
+"""How large the hand is: learnt slowly, from many of its shapes, beside the filter.
+
+One frame hardly shows a hand's size, and a filter that takes every frame for new evidence soon believes to know it. So
+shapes of the hand are kept that differ from each other, each as all its markers were located at one instant; for each
+of them the evidence for a grid of sizes is worked out once, one size per datagram; and all shapes together are the
+evidence for the one size that they share. They are of one person, whose habits are not the natural pose's and who often
+repeats a movement, so they count for less than as many independent ones.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import chain, combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.hand.size_evidence import Posture, implausibility
+from rhot_app.tracking.kalman.wearing import Wearing
+from rhot_app.tracking.model_start import Located
+
+Array = NDArray[np.float64]
+
+GRID = 0.0125 * np.arange(-24, 25)
+"""(49,) logarithms of the scales that are weighed."""
+
+USUAL_SD = 0.1
+"""How far hands are from the size in their file, before anything is seen: standard deviation of the logarithm."""
+
+LEAST_SD = 0.015
+"""No size is known better: bones of hands of one length scatter by 3 to 8 %, so hands differ in proportion, and the one
+size is a mean over fifteen bones."""
+
+DISTINCT_M = 0.01
+"""A shape is another when the distance of two markers differs by as much from every shape that is kept."""
+
+SHARE, MOST = 0.25, 2.0
+"""How much each shape counts, in independent ones, and all of them at most: habits are a person's own, and movements
+return (`benchmarks/hand_size.py`)."""
+
+UNFIT = 20.0
+"""Least misfit and strain beyond which a shape is none of a hand of any size. Those of the twin have 0 to 10."""
+
+KEPT = 48
+LEAST_MARKERS = 5
+FOLLOW_S = 2.0
+"""The hand takes on another size with this time constant."""
+
+_PLACE_SD_M = 5e-4
+"""What is wrong with a located marker beside its noise, at the least."""
+
+_LONGEST_S = 0.1
+_ANEW_NS = 1_000_000_000
+"""So far back in time begins another timeline."""
+
+
+class HandSize:
+    """The logarithm of a hand's scale, from what its markers show when it moves."""
+
+    def __init__(self, wearing: Wearing) -> None:
+        self._posture = Posture(wearing.worn.dh, wearing.limits, wearing.habits.mean, wearing.habits.information)
+        self._doubt = (wearing.bias_variance + _PLACE_SD_M**2)[:, None, None] * np.eye(3)
+        self._pairs = np.array(list(combinations(range(len(wearing.roles)), 2))).reshape(-1, 2).T
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the hand."""
+        self._shapes: list[Array] = []  # each (P,) m, distances of all pairs of markers
+        self._curves: list[Array] = []  # each (49,), how implausible the grid's sizes are; zero where unfit
+        self._in_work: _Curve | None = None
+        self._aim, self._aim_variance = 0.0, USUAL_SD**2
+        self._log_scale, self._t_ns = 0.0, 0
+
+    @property
+    def known(self) -> tuple[float, float]:
+        """The logarithm of the scale and its variance; until it has followed, what it lags behind is doubt as well."""
+        return self._log_scale, self._aim_variance + (self._aim - self._log_scale) ** 2
+
+    @property
+    def scale(self) -> float:
+        """The factor on every length that is best known, followed or not."""
+        return math.exp(self._aim)
+
+    def settle(self) -> None:
+        """A hand that begins anew need not follow."""
+        self._log_scale = self._aim
+
+    def follow(self, t_ns: int) -> tuple[float, float]:
+        """`known` at `t_ns`, master ns, a while later; cameras that take turns are not always in the order of time."""
+        if not 0 <= self._t_ns - t_ns < _ANEW_NS:
+            dt = min(max(1e-9 * (t_ns - self._t_ns), 0.0), _LONGEST_S)
+            self._log_scale += (self._aim - self._log_scale) * -math.expm1(-dt / FOLLOW_S)
+            self._t_ns = t_ns
+        return self.known
+
+    def look(self, located: Located, world: Array, angles: Array) -> None:
+        """Keep the hand's shape if it is a new one; it may be as `world` (4, 4) m and `angles` (21,) rad say."""
+        if self._in_work is not None or np.count_nonzero(located.clear) < LEAST_MARKERS:
+            return
+        places = np.where(located.clear[:, None], located.positions, np.nan)
+        shape = np.linalg.norm(places[self._pairs[0]] - places[self._pairs[1]], axis=1)
+        if all(np.nanmax(np.abs(shape - other), initial=0.0) > DISTINCT_M for other in self._shapes):
+            self._shapes = [*self._shapes[1 - KEPT:], shape]
+            information = np.asarray(np.linalg.inv(located.covariances + self._doubt), dtype=np.float64)
+            self._in_work = _Curve(self._posture, places, information, world, angles, self._log_scale)
+
+    def work(self) -> None:
+        """Weigh one size of the shape in work; conclude when all are weighed."""
+        curve = self._in_work
+        if curve is not None and curve.step():
+            self._curves = [*self._curves[1 - KEPT:], curve.values if curve.least <= UNFIT else np.zeros(len(GRID))]
+            self._in_work = None
+            self._conclude()
+
+    def _conclude(self) -> None:
+        """Mean and standard deviation of the size by all shapes."""
+        counted = [curve for curve in self._curves if curve.any()]
+        if not counted:
+            return
+        weight = min(SHARE * len(counted), MOST)
+        total = weight * np.mean(counted, axis=0) + 0.5 * np.square(GRID / USUAL_SD)
+        likely = np.exp(total.min() - total)
+        likely /= likely.sum()
+        self._aim = float(likely @ GRID)
+        self._aim_variance = float(likely @ np.square(GRID - self._aim)) + LEAST_SD**2
+
+
+class _Curve:
+    """How implausible the sizes of the grid are for one shape: from the nearest size upwards, then downwards, each from
+    its neighbour's pose."""
+
+    def __init__(self, posture: Posture, places: Array, information: Array, world: Array, angles: Array,
+                 log_scale: float) -> None:
+        self.values, self.least = np.zeros(len(GRID)), math.inf
+        self._shape = posture, places, information
+        self._start = self._pose = world.copy(), angles.copy()
+        self._first = int(np.argmin(np.abs(GRID - log_scale)))
+        self._order = chain(range(self._first, len(GRID)), range(self._first - 1, -1, -1))
+        self._left = len(GRID)
+
+    def step(self) -> bool:
+        """Weigh the next size; returns whether it was the last one."""
+        k = next(self._order)
+        if k == self._first - 1:
+            self._pose = self._start
+        self.values[k], misfit = implausibility(*self._shape, GRID[k], *self._pose)
+        if k == self._first:
+            self._start = self._pose[0].copy(), self._pose[1].copy()
+        self.least = min(self.least, misfit)
+        self._left -= 1
+        return self._left == 0
