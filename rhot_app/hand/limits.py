@@ -24,10 +24,13 @@ MCP_PER_PIP = 0.7
 
 
 class NaturalPose(NamedTuple):
-    """`mean` (21,) rad and `information` (21, 21) 1/rad^2, the inverse of the covariance."""
+    """`mean` (21,) rad and `information` (21, 21) 1/rad^2, the inverse of the covariance: what single beliefs make
+    together. `rows` (K, 21) of factors and `values` (K,) are these, in standard deviations."""
 
     mean: Array
     information: Array
+    rows: Array
+    values: Array
 
 
 def natural_pose() -> NaturalPose:
@@ -56,9 +59,9 @@ def natural_pose() -> NaturalPose:
     for name, neighbour in pairwise(FINGERS[1:]):
         # Neighbours share tendons: one finger bends the next (RHOT 2.1.1, inter-finger constraints).
         expect(0.0, 20.0, **{f"{name}_mcp_flexion": 1.0, f"{neighbour}_mcp_flexion": -1.0})
-    matrix = np.array(rows)
+    matrix, right = np.array(rows), np.array(values)
     information = matrix.T @ matrix
-    return NaturalPose(np.linalg.solve(information, matrix.T @ np.array(values)), information)
+    return NaturalPose(np.linalg.solve(information, matrix.T @ right), information, matrix, right)
 
 
 @njit(cache=True)

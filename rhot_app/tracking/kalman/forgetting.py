@@ -23,14 +23,29 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
 from rhot_app.tracking.kalman.combine import add_rows, add_squares, mirror
-from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, FINGERS_HELD, PALM_HELD, POSE, ROTATION, TURN_HELD, Estimate
+from rhot_app.tracking.kalman.estimate import (
+    ANGLES,
+    BIAS,
+    FINGERS_HELD,
+    FIRST_FINGER,
+    GROUP_OF,
+    PALM_HELD,
+    POSE,
+    ROTATION,
+    TURN_HELD,
+    Estimate,
+)
 from rhot_app.tracking.kalman.gain import Gain, project_rows, whiten
 from rhot_app.tracking.kalman.motion import Habits
+from rhot_app.tracking.kalman.sighted import FRESH_S
 
 Array = NDArray[np.float64]
 
 FADE_S = 2.0
 """Time constant of what is known of a pose."""
+
+AWAY_S = 0.3
+"""The same of a finger out of sight: soon the others tell more of it than what it did."""
 
 OPEN_S = 0.05
 """Time constant of what seems to be known of directions that no marker shows."""
@@ -38,7 +53,7 @@ OPEN_S = 0.05
 SHAPE_S = 2.0
 """The same while a single camera sees the palm, and does not see its distance: its course tells more for a while."""
 
-HIDDEN_S = 0.5
+HIDDEN_S = 1.0
 """The same while none sees it: soon its fingertips tell more than its course."""
 
 SETTLED_RAD = 0.25
@@ -91,9 +106,9 @@ def open_directions(jacobian: Array, usual: Array, bias_variance: Array) -> Arra
 
 @njit(cache=True)
 def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, jacobian: Array, gain: Gain,
-           step: Array) -> None:
-    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. `gain` is room to work in, others as in
-    `open_directions`.
+           step: Array, away: Array) -> None:
+    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. `gain` is room to work in; `away` (5,):
+    s since each finger was seen; others as in `open_directions`.
 
     It depends on how the hand is held (`holding.py`).
     """
@@ -106,9 +121,10 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
             if how == PALM_HELD:
                 constant = SHAPE_S if _palm_shown(jacobian) else HIDDEN_S
             _open_up(estimate, -math.expm1(-estimate.unfaded[0] / constant), habits, bias_variance, jacobian, step)
-        _fade(estimate.covariance, estimate.unfaded[0])
+        fading = _fading(away)
+        _fade(estimate.covariance, estimate.unfaded[0], fading)
         if how < PALM_HELD:
-            _return_to_habits(estimate, -math.expm1(-estimate.unfaded[0] / FADE_S), habits, gain, step)
+            _return_to_habits(estimate, estimate.unfaded[0], fading, habits, gain, step)
         mirror(estimate.covariance)  # rounding must not make it unsymmetric: what fades would let it grow
         estimate.unfaded[0] = 0.0
 
@@ -185,11 +201,21 @@ def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Ar
 
 
 @njit(cache=True)
-def _fade(covariance: Array, dt: float) -> None:
+def _fading(away: Array) -> Array:
+    """(27,) s, the time constants of what is known of each pose number."""
+    out = np.full(POSE, FADE_S)
+    for i in range(ANGLES, POSE):
+        if away[GROUP_OF[i] - FIRST_FINGER] > FRESH_S:
+            out[i] = AWAY_S
+    return out
+
+
+@njit(cache=True)
+def _fade(covariance: Array, dt: float, fading: Array) -> None:
     """Give up a part of the information about the pose, but never so much that its place is not worth knowing."""
     size = covariance.shape[0]
-    grow = math.exp(0.5 * dt / FADE_S)
     for i in range(POSE):
+        grow = math.exp(0.5 * dt / fading[i])
         factor = grow
         if i < ANGLES and covariance[i, i] * grow * grow > WIDEST * WIDEST:
             factor = WIDEST / math.sqrt(covariance[i, i])
@@ -200,12 +226,16 @@ def _fade(covariance: Array, dt: float) -> None:
 
 
 @njit(cache=True)
-def _return_to_habits(estimate: Estimate, share: float, habits: Habits, gain: Gain, step: Array) -> None:
-    """Weigh a `share` of what habits say, in one linear update; `gain` is room for it."""
+def _return_to_habits(estimate: Estimate, dt: float, fading: Array, habits: Habits, gain: Gain, step: Array) -> None:
+    """Weigh what habits say of `dt` s, in one linear update: as much as fades. `gain` is room for it."""
     count = habits.rows.shape[0]
     noise, right = np.zeros((count, 2)), habits.values.copy()
-    noise[:, 0] = 1.0 / share
     for k in range(count):
+        shortest = FADE_S
+        for a in range(ANGLES, POSE):
+            if habits.rows[k, a - ANGLES] != 0.0:
+                shortest = min(shortest, fading[a])
+        noise[k, 0] = -1.0 / math.expm1(-dt / shortest)
         gain.jacobian[k] = 0.0
         gain.jacobian[k, ANGLES:POSE] = habits.rows[k]
         for a in range(ANGLES, POSE):

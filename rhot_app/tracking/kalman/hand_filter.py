@@ -34,7 +34,7 @@ from rhot_app.tracking.kalman.motion import MOST, Habits, predict
 from rhot_app.tracking.kalman.reappearing import loosen
 from rhot_app.tracking.kalman.rows import Page, ResidualBlock, Rows, empty_rows
 from rhot_app.tracking.kalman.share import Share
-from rhot_app.tracking.kalman.sighted import keep_shown, note_sights
+from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown, note_sights
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
 from rhot_app.tracking.kalman.withholding import Held, empty_held, release, restore, withhold
 
@@ -277,7 +277,8 @@ def _conclude(shared: Share, dt: float) -> None:
     points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
     place_markers(worn, estimate, points, jacobian)
     keep_shown(estimate, worn.part, worn.palmar, desk.cameras.pose, points, jacobian)
-    forget(estimate, dt, desk.habits, estimate.bias_variance, jacobian, gain, step)
+    away = fingers_away(estimate, worn.part)
+    forget(estimate, dt, desk.habits, estimate.bias_variance, jacobian, gain, step, away)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], desk.limits, step)
     displace(estimate, step, estimate)
     if desk.size[1] > 0.0:

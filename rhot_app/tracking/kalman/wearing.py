@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,9 @@ under it. A blob is paint on a knuckle that nobody measured."""
 FINGERS_TOGETHER, THUMB_WITH_FINGERS = 0.8, 0.5
 """Correlation of how fingers begin to bend: most of what hands do in daily life is one movement of all of them
 (Santello et al. 1998, Todorov and Ghahramani 2004)."""
+
+ALIKE_SD_RAD = np.radians(20.0)
+"""How much more one finger bends in a joint than its neighbour; one out of sight is looked for beside the others."""
 
 _COUPLED_SD_RAD = np.radians(0.02)
 
@@ -84,19 +88,30 @@ def _half_axes(marker: Marker, model: HandModel) -> Array:
 
 
 def habits_of(model: HandModel, variant: VariantName) -> Habits:
-    """What is believed of the angles: the natural pose, and the variant's couplings as good as exactly."""
-    natural = np.linalg.cholesky(model.natural.information).T
+    """What is believed of the angles: the natural pose, neighbours that bend alike, and the variant's couplings as good
+    as exactly."""
+    natural, alike = model.natural, _neighbours()
     chosen = make_variant(variant, model.anatomy.couplings)
     basis = chosen.basis
     bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
     bound = bound[np.abs(bound).max(axis=1) > 1e-9]
-    rows: Array = np.vstack([natural, bound])
-    values: Array = np.concatenate([natural @ model.natural.mean, bound @ chosen.mean])
+    rows: Array = np.vstack([natural.rows, alike, bound])
+    values: Array = np.concatenate([natural.values, np.zeros(len(alike)), bound @ chosen.mean])
     usual = np.diag([WIDEST**2] * POSE)
     information = rows.T @ rows
     usual[ANGLES:, ANGLES:] = np.linalg.inv(information)
     mean = np.asarray(np.linalg.solve(information, rows.T @ values), dtype=np.float64)
     return Habits(rows, values, mean, information, usual, _together(model), _stiff(model))
+
+
+def _neighbours() -> Array:
+    """(6, 21) MCP and PIP joints of neighbouring fingers bend alike, in standard deviations."""
+    rows = []
+    for one, other in pairwise(FLEXIONS[1:]):
+        for joint in range(2):
+            rows.append(np.zeros(ANGLE_SLICES[-1].stop))
+            rows[-1][one[joint]], rows[-1][other[joint]] = 1.0 / ALIKE_SD_RAD, -1.0 / ALIKE_SD_RAD
+    return np.array(rows)
 
 
 def _together(model: HandModel) -> Array:

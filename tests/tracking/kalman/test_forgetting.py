@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from known_hand import MARKERS, SIZE, WEARING, moved, moving_estimate
 
+from rhot_app.hand.skeleton import ANGLE_SLICES
 from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, FINGERS_HELD, FREE, PALM_HELD, POSE, ROTATION, TURN_HELD
 from rhot_app.tracking.kalman.forgetting import (
     FADING_S,
@@ -21,6 +22,7 @@ HABITS, BIAS_VARIANCE = WEARING.habits, WEARING.bias_variance
 KEPT = np.r_[0:POSE, BIAS:SIZE]  # pose and biases among the estimate's numbers
 GAIN = empty_gain(64, SIZE)
 WRIST = WEARING.roles.index("wrist")
+SEEN = np.zeros(5)
 NATURAL = np.sqrt(np.diag(HABITS.usual)[ANGLES:])
 
 
@@ -46,7 +48,7 @@ def faded(estimate, seconds, dt=0.05):
     """The estimate after `seconds` of forgetting alone."""
     for _ in range(round(seconds / dt)):
         step = np.zeros(SIZE)
-        forget(estimate, dt, HABITS, BIAS_VARIANCE, marker_jacobian(estimate), GAIN, step)
+        forget(estimate, dt, HABITS, BIAS_VARIANCE, marker_jacobian(estimate), GAIN, step, SEEN)
         estimate = moved(estimate, step)
     return estimate
 
@@ -118,7 +120,7 @@ def opened(estimate, how=FREE):
     place."""
     estimate.held[0], step, jacobian = how, np.zeros(SIZE), np.zeros((MARKERS, 3, POSE))
     jacobian[:, :, :ROTATION] = np.eye(3)
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
     return step
 
 
@@ -169,9 +171,24 @@ def test_a_palm_that_no_camera_sees_returns_to_habit_sooner():
         jacobian = marker_jacobian(estimate)
         if not shown:
             jacobian[WRIST] = 0.0
-        forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step)
+        forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
         steps.append(np.abs(step[ANGLES:POSE]).max())
     assert steps[1] > 1.5 * steps[0] > 0.0
+
+
+def test_a_finger_out_of_sight_soon_bends_as_its_neighbours_do():
+    """The ring finger was stretched when it was seen last; the others are bent, and known to be."""
+    ring, gone = ANGLE_SLICES[3], []
+    for away_s in (0.0, 1.0):
+        estimate, away = bent(0.5), SEEN.copy()
+        estimate.angles[ring], away[3] = 0.0, away_s
+        estimate.covariance[ANGLES + 13:ANGLES + 17, ANGLES + 13:ANGLES + 17] = 0.3**2 * np.eye(4)
+        for _ in range(10):
+            step = np.zeros(SIZE)
+            forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, np.zeros((MARKERS, 3, POSE)), GAIN, step, away)
+            estimate = moved(estimate, step)
+        gone.append(estimate.angles[ring][1:3].mean() / estimate.angles[ANGLE_SLICES[2]][1:3].mean())
+    assert 0.0 < 2.5 * gone[0] < gone[1] < 1.0
 
 
 @pytest.mark.parametrize(("how", "doubt_rad", "turns"), [(TURN_HELD, 0.5 * SETTLED_RAD, True),
@@ -183,7 +200,7 @@ def test_a_palm_that_habit_turns_is_taken_to_turn_once_it_has_been_found(how, do
     estimate.covariance[:] = 1e-8 * np.eye(SIZE)
     estimate.covariance[3, 3] = doubt_rad**2
     jacobian = marker_jacobian(estimate)
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
     assert (estimate.turning[0] > 0.01) == turns
 
 
@@ -192,5 +209,5 @@ def test_a_hand_of_which_hardly_anything_is_seen_is_not_opened():
     jacobian = np.zeros((MARKERS, 3, POSE))
     jacobian[:2, :, :ROTATION] = np.eye(3)
     before = estimate.covariance[:ROTATION, :ROTATION].copy()
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
     np.testing.assert_allclose(estimate.covariance[:ROTATION, :ROTATION], before, rtol=0.1)

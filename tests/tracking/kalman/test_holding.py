@@ -224,7 +224,7 @@ def test_a_finger_that_none_sees_is_not_stiff():
 
 
 def test_a_stiff_finger_may_stretch_aside_and_bend_all_its_joints_at_once():
-    natural = np.sqrt(np.diag(WEARING.habits.usual)[ANGLES:])
+    natural = np.sqrt(np.diag(np.linalg.inv(WEARING.model.natural.information)))
     for finger, columns in enumerate(ANGLE_SLICES):
         rows, bend, aside = stiff_of(finger), np.zeros(POSE), np.zeros(POSE)
         bend[ANGLES + np.array(FLEXIONS[finger])] = natural[list(FLEXIONS[finger])]
