@@ -53,11 +53,16 @@ def script(tmp_path):
     return path
 
 
+def heed_hang_ups() -> None:
+    """As in a terminal, though the tests were started with nohup: what is ignored then, a shell cannot take note of."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 def start(script: Path) -> tuple[subprocess.Popen[str], Path]:
     """The script with its window shown, and the folder of its screen."""
     environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "QT_QPA_PLATFORM")}
     process = subprocess.Popen(["bash", str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                               env=environment, start_new_session=True)
+                               env=environment, start_new_session=True, preexec_fn=heed_hang_ups)
     assert process.stderr is not None and process.stdout is not None
     where = re.search(r"XAUTHORITY=(.*)/client", process.stderr.readline())
     assert where is not None and process.stdout.readline() == "shown\n"
