@@ -13,6 +13,7 @@ from rhot_app.tracking.kalman.hand_filter import Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock, Sighting
 from rhot_app.tracking.kalman.markers import Cameras, project_marker
 from rhot_app.tracking.kalman.share import Share
+from rhot_app.tracking.kalman.surprise import PLAUSIBLE, ROBUST
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
@@ -21,6 +22,9 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.uint16]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+UNLIKELY = PLAUSIBLE / ROBUST
+"""A sight whose noise was widened by more to fit is not beyond doubt: 5 in 100,000 are so by chance."""
 
 _SAME_FRAME_NS = 1_000_000
 _RECENT = 12
@@ -32,7 +36,8 @@ _NEVER = -(1 << 62)  # ns
 
 class Seen(NamedTuple):
     """The last believed sight of each of M markers by each of C cameras: `times` (C, M) ns, -1 for never; `pixels`
-    (C, M, 2) raw px with `covariances` (C, M, 2, 2); `doubtful` (C, M), for what its flags say."""
+    (C, M, 2) raw px with `covariances` (C, M, 2, 2); `doubtful` (C, M), for what its flags say or for how unlikely it
+    was."""
 
     times: Indices
     pixels: Array
@@ -88,7 +93,8 @@ class Sights:
 
     def believe(self, block: MarkerBlock, outcome: Outcome) -> int:
         """Note which sights of a frame were believed, under the names that the hand gave them; returns how many."""
-        return int(_believe(self._shared, block.shared, block.t_ns, outcome.believed, outcome.source))
+        return int(_believe(self._shared, block.shared, block.t_ns, outcome.believed, outcome.widening,
+                            outcome.source))
 
     def last_seen(self) -> tuple[Array, Flags]:
         """(C, M, 2) px of each camera's newest frame, NaN where lost, and (C, M) its flags."""
@@ -96,8 +102,8 @@ class Sights:
 
 
 @njit(cache=True)
-def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, source: Indices) -> int:
-    """Enter a frame, a shared `Sighting` of `t_ns`, into a shared `Seen`; `believed` and `source` as in `Outcome`."""
+def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, widening: Array, source: Indices) -> int:
+    """Enter a frame, a shared `Sighting` of `t_ns`, into a shared `Seen`; the others as in `Outcome`."""
     seen: Seen = shared.of
     sighting: Sighting = block.of
     frame = sighting.frame
@@ -115,7 +121,8 @@ def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, source: Ind
                 seen.pixels[camera, marker, i] = frame.pixels[sight, i]
                 for j in range(2):
                     seen.covariances[camera, marker, i, j] = frame.covariances[sight, i, j]
-            seen.doubtful[camera, marker] = (sighting.flags[sight] & DOUBTFUL) != 0
+            seen.doubtful[camera, marker] = ((sighting.flags[sight] & DOUBTFUL) != 0
+                                             or widening[observation] > UNLIKELY)
     return count
 
 

@@ -12,7 +12,7 @@ from rhot_app.tracking.kalman.markers import place_markers, project_marker
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.model_start import count_apart
-from rhot_app.tracking.sights import Seen, Sights, bring_together, seen_clearly
+from rhot_app.tracking.sights import UNLIKELY, Seen, Sights, bring_together, seen_clearly
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
 
@@ -34,7 +34,8 @@ def twin(seen, block, outcome):
     found.times[camera, marker] = times[newer]
     found.pixels[camera, marker] = frame.pixels[sight]
     found.covariances[camera, marker] = frame.covariances[sight]
-    found.doubtful[camera, marker] = (block.observations.flags[sight] & DOUBTFUL) != 0
+    unlikely = outcome.widening[outcome.believed][newer] > UNLIKELY
+    found.doubtful[camera, marker] = ((block.observations.flags[sight] & DOUBTFUL) != 0) | unlikely
     return found
 
 
@@ -48,7 +49,8 @@ def random_frames(seed):
         block.frame.label[:] = rng.permutation(MARKERS)
         shown = np.flatnonzero(block.frame.seen)
         source = np.array([(block.observations.camera, sight, block.frame.label[sight]) for sight in shown])
-        yield block, Outcome(rng.random(len(shown)) < 0.7, source.reshape(-1, 3).astype(np.int64))
+        yield block, Outcome(rng.random(len(shown)) < 0.7, rng.choice([1.0, 2.0, 3.0], len(shown)),
+                             source.reshape(-1, 3).astype(np.int64))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -95,10 +95,12 @@ class Desk(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of an update's L observations, in the order of the blocks: `believed` (L,), and `source` (L, 3) as in
-    `Rows`. Views that the next update overwrites."""
+    """What became of an update's L observations, in the order of the blocks: `believed` (L,), `widening` (L,) the
+    factor on their noise, above 1 for what was unlikely, `source` (L, 3) as in `Rows`. Views that the next update
+    overwrites."""
 
     believed: Mask
+    widening: Array
     source: NDArray[np.int64]
 
 
@@ -166,8 +168,8 @@ class HandFilter:
             self._linearise(blocks, self._now)
             self._settle(blocks)
         _conclude(self._shared, dt)
-        observations = int(rows.used[1])
-        return Outcome(self._desk.believed[:observations], rows.source[:observations])
+        count = int(rows.used[1])
+        return Outcome(self._desk.believed[:count], self._desk.widening[:count], rows.source[:count])
 
     def _linearise(self, blocks: Sequence[ResidualBlock], page: Share) -> None:
         self._desk.rows.used[:] = 0
