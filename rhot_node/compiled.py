@@ -2,7 +2,8 @@
 
 numba recompiles a function when its own file changes, but not when a function that it calls, in another file, does:
 after an update, old and new code would run mixed and nobody would notice. A folder named by a hash of all sources that
-numba compiles makes that impossible, and it is writable where the package is not.
+numba compiles makes that impossible, and it is writable where the package is not. The hash is of their place as well:
+numba does not find what it compiled of the same sources in another one.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ _COMPLETE = "complete"
 
 
 def sources_hash(folders: Sequence[Path]) -> str:
-    """16 hex digits that change with any source file in `folders` that uses numba."""
+    """16 hex digits that change with any source file in `folders` that uses numba, and with where they lie."""
     digest = hashlib.sha256()
     for folder in folders:
+        digest.update(bytes(folder.resolve()))
         for path in sorted(folder.rglob("*.py")):
             text = path.read_bytes()
             if b"numba" in text:

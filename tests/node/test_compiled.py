@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -30,6 +31,12 @@ def test_the_hash_follows_compiled_sources_only(package: Path) -> None:
     assert changed != before
     (package / "fast.py").rename(package / "other.py")
     assert sources_hash([package]) not in (before, changed)
+
+
+def test_the_same_sources_in_another_place_are_compiled_anew(package: Path) -> None:
+    before = sources_hash([package])
+    twin = Path(shutil.copytree(package, package.parent / "clone" / package.name))
+    assert sources_hash([twin]) != before == sources_hash([package.parent / "clone" / ".." / package.name])
 
 
 def start(cache: Path, **more: str) -> str:
