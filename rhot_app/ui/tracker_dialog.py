@@ -233,6 +233,12 @@ class TrackerDialog(QDialog):
         self.kinds["model"].setEnabled(resting and possible)
         self.details.setEnabled(resting and possible)
         self.undo_button.setEnabled(resting and bool(self._made))
+        self.close_button.setEnabled(resting)
+
+    def reject(self) -> None:
+        """Close, but not while the engine changes over: what comes of that is written to the rig file, or told."""
+        if self._job is None:
+            super().reject()
 
     def look(self) -> None:
         """The hand's size as it is estimated now."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,6 +82,22 @@ def test_the_model_tracker_is_one_click_away_and_taken_back_with_one_key(opened)
     desk.settled("Taken back.")
     assert load_rig(path).tracker.kind == "classic" and desk.engine.rig.tracker.kind == "classic"
     assert dialog.kinds["classic"].isChecked() and not dialog.undo_button.isEnabled()
+
+
+def test_it_stays_open_until_the_engine_has_changed_over(opened, qtbot):
+    desk, go_on = opened(synthetic_rig()), threading.Event()
+    connect = desk.dialog._connect
+    desk.dialog._connect = lambda: connect() if go_on.wait(PATIENCE_MS / 1e3) else None
+    click_on_word(desk.dialog.kinds["model"])
+    assert not desk.dialog.close_button.isEnabled()
+    desk.dialog.close()
+    QTest.keyClick(desk.dialog, Qt.Key.Key_Escape)
+    assert desk.dialog.isVisible()
+    go_on.set()
+    desk.settled("In force.")
+    assert load_rig(desk.path).tracker == MODEL
+    qtbot.mouseClick(desk.dialog.close_button, Qt.MouseButton.LeftButton)
+    assert not desk.dialog.isVisible()
 
 
 def test_fingers_and_limits_are_chosen_from_lists(opened):
