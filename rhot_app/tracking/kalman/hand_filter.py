@@ -74,6 +74,7 @@ ASTRAY_M = 0.3
 FASTEST_M_S, FASTEST_RAD_S = 12.0, 40.0
 """No palm is faster: a boxer's fist peaks near 10 m/s, a forearm turns at 25 rad/s."""
 
+
 class Desk(NamedTuple):
     """All that an update works with: the `estimate`, a `trial` of it, and room for what comes between."""
 
