@@ -84,8 +84,8 @@ def learnt(group: People, rig: Rig, wearing: Wearing, rng: np.random.Generator) 
     log_scale, size = USUAL_SD * rng.normal(), HandSize(wearing)
     hand = person(rig.hand, group.bones, rng)
     worn = compile_wearing(msgspec.structs.replace(rig, hand=hand)).worn.dh
-    spread = np.linalg.cholesky(np.linalg.inv(wearing.habits.information))
-    mean = np.clip(wearing.habits.mean + group.habit * (spread @ rng.normal(size=21)), *wearing.limits.T)
+    spread = np.linalg.cholesky(np.linalg.inv(wearing.natural.information))
+    mean = np.clip(wearing.natural.mean + group.habit * (spread @ rng.normal(size=21)), *wearing.limits.T)
     for _ in range(group.shapes):
         angles, points = pose(mean, group.within * spread, wearing.limits, rng), np.empty((len(wearing.roles), 3))
         forward_arrays(worn, np.eye(4), angles, empty_frames(worn), points)

@@ -1,6 +1,7 @@
 """Trackers in trouble, side by side: the same raw logs of the twin, altered, through the classic and the model tracker.
 
-    python benchmarks/trackers.py [--only NAME ...] [--seeds 5] [--markers rhot6] [--sketched] [--json FILE]
+    python benchmarks/trackers.py [--only NAME ...] [--seeds 5] [--motion grasp] [--markers rhot6]
+                                  [--sketched] [--json FILE]
 
 Trials: `blind` and `silent` (one camera, for a second), `hidden` and `hidden-apart` (each marker 30 % of the time, from
 all cameras at once or from each by itself), `mixed` (index and middle taken for each other 30 % of the time), `cross`
@@ -55,6 +56,7 @@ class Bench:
     sketched: bool
     folder: Path
     minutes: float
+    motion: str
 
     def takes(self, motion: str, seconds: float | None = None, seeds: Iterable[int] | None = None) -> Iterable[Take]:
         """One take per seed, filmed where it is not there yet."""
@@ -74,13 +76,13 @@ class Bench:
 
 
 def blind(bench: Bench, *, says_so: bool) -> Results:
-    """One camera, for a second, in a hand that grasps."""
-    return bench.each(bench.takes("grasp"), partial(scenarios.one_camera_blind, says_so=says_so))
+    """One camera, for a second, of a movement."""
+    return bench.each(bench.takes(bench.motion), partial(scenarios.one_camera_blind, says_so=says_so))
 
 
 def hidden(bench: Bench, *, together: bool) -> Results:
     """Each marker 30 % of the time."""
-    return bench.each(bench.takes("grasp"), partial(scenarios.markers_hidden, share=0.3, together=together))
+    return bench.each(bench.takes(bench.motion), partial(scenarios.markers_hidden, share=0.3, together=together))
 
 
 def mixed(bench: Bench) -> Results:
@@ -89,7 +91,7 @@ def mixed(bench: Bench) -> Results:
         roles = [marker.role for marker in rig.markers.markers]
         pair = roles.index(TIP_ROLES[1]), roles.index(TIP_ROLES[2])
         return scenarios.names_mixed_up(one, rig, pair=pair, share=0.3)
-    return bench.each(bench.takes("grasp"), trial)
+    return bench.each(bench.takes(bench.motion), trial)
 
 
 def cross(bench: Bench) -> Results:
@@ -113,7 +115,7 @@ def curve(bench: Bench) -> Results:
 
 
 def scale(bench: Bench) -> Results:
-    """A hand file 10 % too long and too short, corrected while a hand grasps."""
+    """A hand file 10 % too long and too short, corrected while a hand moves."""
     floating = {name: msgspec.structs.replace(settings, float_scale=True) for name, settings in TRACKERS.items()
                 if settings.kind == "model"}
     results: Results = {}
@@ -121,7 +123,7 @@ def scale(bench: Bench) -> Results:
         def trial(one: Take, rig: Rig, wrong: float = wrong) -> Figures:
             other = msgspec.structs.replace(rig, hand=scaled_hand(rig.hand, wrong))
             return scenarios.growing(one, other, 1.0 / wrong)
-        for name, figures in bench.each(bench.takes("grasp", SCALE_S), trial, floating).items():
+        for name, figures in bench.each(bench.takes(bench.motion, SCALE_S), trial, floating).items():
             results[f"{name}, hand x {wrong:g}"] = figures
     return results
 
@@ -143,14 +145,14 @@ def start(bench: Bench) -> Results:
 
 def compute(bench: Bench) -> Results:
     """Time per datagram, and memory."""
-    first = next(iter(bench.takes("grasp")))
+    first = next(iter(bench.takes(bench.motion)))
     return bench.each([first], partial(scenarios.computing, minutes=bench.minutes))
 
 
 TRIALS: dict[str, Callable[[Bench], Results]] = {
     "blind": partial(blind, says_so=True), "silent": partial(blind, says_so=False),
     "hidden": partial(hidden, together=True), "hidden-apart": partial(hidden, together=False), "mixed": mixed,
-    "cross": cross, "wrist": lambda bench: bench.each(bench.takes("grasp"), scenarios.wrist_alone),
+    "cross": cross, "wrist": lambda bench: bench.each(bench.takes(bench.motion), scenarios.wrist_alone),
     "still": lambda bench: bench.each(bench.takes("still", 12.0), scenarios.standing_still),
     "ramp": lambda bench: bench.each(bench.takes(RAMP), partial(scenarios.lagging, speeding_up=True)),
     "fast": lambda bench: bench.each(bench.takes("fast"), partial(scenarios.lagging, speeding_up=False)),
@@ -166,6 +168,7 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1, help="the first one")
     parser.add_argument("--seconds", type=float, default=8.0, help="length of a take (default 8)")
+    parser.add_argument("--motion", default="grasp", help="of the trials that need none of their own (default grasp)")
     parser.add_argument("--markers", "--marker-set", default="rhot6", metavar="SET")
     parser.add_argument("--minutes", type=float, default=10.0, help="of crossing, and of computing (default 10)")
     parser.add_argument("--sketched", action="store_true", help="logs without pictures (rhot_app/simulator/sights.py)")
@@ -173,7 +176,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     bench = Bench(tuple(range(args.seed, args.seed + args.seeds)), args.seconds, args.markers, args.sketched, args.logs,
-                  args.minutes)
+                  args.minutes, args.motion)
     done: dict[str, Results] = {}
     for name in args.only:
         try:

@@ -105,8 +105,8 @@ def lagging(take: Take, rig: Rig, *, speeding_up: bool) -> Figures:
 
 def growing(take: Take, rig: Rig, true_scale: float) -> Figures:
     """How the estimated size of the hand nears the truth: its error at SCALE_TIMES_S, when it stays within
-    SCALE_TOLERANCE, what standard deviation is stated in the end, and how many of them it was ever off, None where none
-    is stated. `true_scale`: true length over that of the rig's hand."""
+    SCALE_TOLERANCE, whether it is at the last of these times, what standard deviation is stated in the end, and how many
+    of them it was ever off, None where none is stated. `true_scale`: true length over that of the rig's hand."""
     track = tracked(take.records(), rig)
     ratios, stated = track.hand_scale / true_scale, track.hand_scale_sd
     at = np.minimum(np.searchsorted(track.times_s, SCALE_TIMES_S), len(ratios) - 1)
@@ -114,6 +114,7 @@ def growing(take: Take, rig: Rig, true_scale: float) -> Figures:
                         for t, k in zip(SCALE_TIMES_S, at, strict=True) if t <= track.times_s[-1]}
     known = stated > 0.0
     return figures | {"within_2_percent_after_s": settled_after(track.times_s, ratios, SCALE_TOLERANCE),
+                      "within_2_percent_share": float(abs(ratios[at[-1]] - 1.0) <= SCALE_TOLERANCE),
                       "stated_percent": float(100.0 * stated[-1]) if known[-1] else None,
                       "max_off_in_sd": float(np.abs(np.log(ratios[known]) / stated[known]).max(initial=0.0))
                       if known.any() else None}

@@ -32,6 +32,17 @@ class NaturalPose(NamedTuple):
     rows: Array
     values: Array
 
+    def and_also(self, rows: Array, values: Array) -> NaturalPose:
+        """The same with more beliefs: `rows` (K, 21) of factors and `values` (K,), in standard deviations."""
+        return gathered(np.vstack([self.rows, rows]), np.concatenate([self.values, values]))
+
+
+def gathered(rows: Array, values: Array) -> NaturalPose:
+    """What `rows` (K, 21) of factors and `values` (K,), in standard deviations, make together."""
+    information = rows.T @ rows
+    mean = np.asarray(np.linalg.solve(information, rows.T @ values), dtype=np.float64)
+    return NaturalPose(mean, information, rows, values)
+
 
 def natural_pose() -> NaturalPose:
     """What a relaxed hand's angles are and how they go together."""
@@ -59,9 +70,7 @@ def natural_pose() -> NaturalPose:
     for name, neighbour in pairwise(FINGERS[1:]):
         # Neighbours share tendons: one finger bends the next (RHOT 2.1.1, inter-finger constraints).
         expect(0.0, 20.0, **{f"{name}_mcp_flexion": 1.0, f"{neighbour}_mcp_flexion": -1.0})
-    matrix, right = np.array(rows), np.array(values)
-    information = matrix.T @ matrix
-    return NaturalPose(np.linalg.solve(information, matrix.T @ right), information, matrix, right)
+    return gathered(np.array(rows), np.array(values))
 
 
 @njit(cache=True)

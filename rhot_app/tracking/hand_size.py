@@ -58,7 +58,7 @@ class HandSize:
     """The logarithm of a hand's scale, from what its markers show when it moves."""
 
     def __init__(self, wearing: Wearing) -> None:
-        self._posture = Posture(wearing.worn.dh, wearing.limits, wearing.habits.mean, wearing.habits.information)
+        self._posture = Posture(wearing.worn.dh, wearing.limits, wearing.natural.mean, wearing.natural.information)
         self._doubt = (wearing.bias_variance + _PLACE_SD_M**2)[:, None, None] * np.eye(3)
         self._pairs = np.array(list(combinations(range(len(wearing.roles)), 2))).reshape(-1, 2).T
         self.reset()

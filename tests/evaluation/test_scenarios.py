@@ -71,6 +71,7 @@ def test_a_tracker_that_does_not_estimate_the_size_never_finds_it(grasp: Take, r
     figures = scenarios.growing(grasp, rig, 1.0 / 1.1)
     assert figures["error_at_1s_percent"] == pytest.approx(10.0) and figures["within_2_percent_after_s"] is None
     assert figures["stated_percent"] is None and figures["max_off_in_sd"] is None
+    assert figures["within_2_percent_share"] == 0.0
 
 
 @pytest.mark.parametrize("wrong", [1.1, 0.9])

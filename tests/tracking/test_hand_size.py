@@ -19,9 +19,9 @@ INDEX, LITTLE = 1, 4
 def natural_poses(count, seed):
     """(count, 21) rad, drawn from the natural pose within the limits, about."""
     rng, poses = np.random.default_rng(seed), []
-    root = np.linalg.cholesky(np.linalg.inv(WEARING.habits.information))
+    root = np.linalg.cholesky(np.linalg.inv(WEARING.natural.information))
     while len(poses) < count:
-        angles = WEARING.habits.mean + root @ rng.normal(size=21)
+        angles = WEARING.natural.mean + root @ rng.normal(size=21)
         bounded = np.clip(angles, *WEARING.limits.T)
         if np.abs(angles - bounded).max() < np.radians(8.0):
             poses.append(bounded)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.limits import NaturalPose
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import KNUCKLE_ROLES, Place, place_of
 from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS
@@ -40,11 +41,13 @@ _COUPLED_SD_RAD = np.radians(0.02)
 
 @dataclass(frozen=True, slots=True)
 class Wearing:
-    """`roles` (M,) of the markers, `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places."""
+    """`natural`: what is believed of any hand's angles, `habits`: of one that is not seen; `roles` (M,) of the markers,
+    `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places."""
 
     model: HandModel
     worn: Worn
     cameras: Cameras
+    natural: NaturalPose
     habits: Habits
     limits: Array  # (21, 2) rad
     roles: tuple[str, ...]
@@ -55,6 +58,7 @@ class Wearing:
 def compile_wearing(rig: Rig) -> Wearing:
     """The arrays of a validated rig. Raises RigError when a marker has no place on the hand."""
     model = build_model(rig.hand)
+    natural = natural_of(model, rig.tracker.variant)
     places = tuple(place_of(marker, model) for marker in rig.markers.markers)
     models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     worn = Worn(points_on(model.dh, places), np.array([place.finger for place in places], dtype=np.int64),
@@ -64,7 +68,7 @@ def compile_wearing(rig: Rig) -> Wearing:
         model, worn,
         Cameras(np.array([camera.camera_from_world[:3] for camera in models]),
                 np.array([camera.intrinsics for camera in models])),
-        habits_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
+        natural, habits_of(model, natural), limit_set(model, rig.tracker.limits),
         tuple(marker.role or "" for marker in rig.markers.markers), places,
         np.array([PLACE_SD_M[marker.shape] ** 2 for marker in rig.markers.markers]))
 
@@ -87,20 +91,21 @@ def _half_axes(marker: Marker, model: HandModel) -> Array:
     return np.full(3, radius)
 
 
-def habits_of(model: HandModel, variant: VariantName) -> Habits:
-    """What is believed of the angles: the natural pose, neighbours that bend alike, and the variant's couplings as good
-    as exactly."""
-    natural, alike = model.natural, _neighbours()
+def natural_of(model: HandModel, variant: VariantName) -> NaturalPose:
+    """The natural pose with the variant's couplings, these as good as exactly."""
     chosen = make_variant(variant, model.anatomy.couplings)
     basis = chosen.basis
     bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
     bound = bound[np.abs(bound).max(axis=1) > 1e-9]
-    rows: Array = np.vstack([natural.rows, alike, bound])
-    values: Array = np.concatenate([natural.values, np.zeros(len(alike)), bound @ chosen.mean])
+    return model.natural.and_also(bound, bound @ chosen.mean)
+
+
+def habits_of(model: HandModel, natural: NaturalPose) -> Habits:
+    """What is believed of the angles of a hand that is not seen: `natural`, and neighbours that bend alike."""
+    alike = _neighbours()
+    mean, information, rows, values = natural.and_also(alike, np.zeros(len(alike)))
     usual = np.diag([WIDEST**2] * POSE)
-    information = rows.T @ rows
     usual[ANGLES:, ANGLES:] = np.linalg.inv(information)
-    mean = np.asarray(np.linalg.solve(information, rows.T @ values), dtype=np.float64)
     return Habits(rows, values, mean, information, usual, _together(model), _stiff(model))
 
 
