@@ -105,8 +105,8 @@ def lagging(take: Take, rig: Rig, *, speeding_up: bool) -> Figures:
 
 def growing(take: Take, rig: Rig, true_scale: float) -> Figures:
     """How the estimated size of the hand nears the truth: its error at SCALE_TIMES_S, when it stays within
-    SCALE_TOLERANCE, whether it is at the last of these times, what standard deviation is stated in the end, and how many
-    of them it was ever off, None where none is stated. `true_scale`: true length over that of the rig's hand."""
+    SCALE_TOLERANCE, whether it is at the last of these times, what standard deviation is stated in the end, and how
+    many of them it was ever off, None where none is stated. `true_scale`: true length over that of the rig's hand."""
     track = tracked(take.records(), rig)
     ratios, stated = track.hand_scale / true_scale, track.hand_scale_sd
     at = np.minimum(np.searchsorted(track.times_s, SCALE_TIMES_S), len(ratios) - 1)
