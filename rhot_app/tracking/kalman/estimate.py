@@ -44,6 +44,10 @@ UNSEEN_S = 3600.0
 """What was never seen counts as unseen for this long."""
 
 
+LOOK_WIDTH, LOOK_X, LOOK_Y, LOOK_VARIANCE, LOOK_AGE = 0, 1, 2, 3, 4
+"""Columns of `Estimate.looks`."""
+
+
 class Estimate(NamedTuple):
     """The mean and covariance at one instant; arrays are changed in place.
 
@@ -54,7 +58,8 @@ class Estimate(NamedTuple):
     last believed to see each marker. `held` (1,): how the last update held the hand
     (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s. `width` (M,) m: how wide paint on the inner
     side of the palm is known to be, 0 where nobody knows; `bias_variance` (M,) m^2: what the biases' variances tend to
-    now (both: `covering.py`).
+    now (both: `covering.py`). `looks` (C, M, 5): what each camera saw of each marker last, its width m (0 where it says
+    little), place px (2), variance px^2, and s since then (`partial.py`).
     """
 
     world: Array
@@ -72,6 +77,7 @@ class Estimate(NamedTuple):
     turning: Array
     width: Array
     bias_variance: Array
+    looks: Array
 
 
 def empty_estimate(cameras: int, markers: int) -> Estimate:
@@ -80,7 +86,7 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
                     np.zeros((size, size)), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1),
                     np.full((cameras, markers), UNSEEN_S), np.zeros(1, np.int64), np.zeros(1), np.zeros(markers),
-                    np.zeros(markers))
+                    np.zeros(markers), np.zeros((cameras, markers, 5)))
 
 
 def copy_estimate(source: Estimate, target: Estimate) -> None:

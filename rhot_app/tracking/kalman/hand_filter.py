@@ -138,7 +138,7 @@ class HandFilter:
         estimate.log_scale[0] = self._desk.size[0]
         estimate.agitation[:] = START_AGITATION
         estimate.unseen[:], estimate.unfaded[:], estimate.turning[:], estimate.held[:] = 0.0, 0.0, START_TURNING, FREE
-        estimate.bias_variance[:] = self._desk.bias_variance
+        estimate.bias_variance[:], estimate.looks[:] = self._desk.bias_variance, 0.0
         place, turn, speed, spin, bend = START_SD
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),

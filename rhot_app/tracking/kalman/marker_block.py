@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rhot_app.tracking.kalman.association import relabel
 from rhot_app.tracking.kalman.covering import leave_out_covered
 from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, append_markers
+from rhot_app.tracking.kalman.partial import doubt_partial
 from rhot_app.tracking.kalman.rows import Page
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.wearing import Wearing
@@ -43,15 +44,15 @@ class MarkerBlock:
         self.frame = Frame(np.array([observations.camera]), np.empty(count, np.bool_), observations.pixels,
                            observations.covariances, np.empty(count), np.empty(count, np.int64),
                            observations.diameters if sized else np.zeros(count), observations.flags == 0,
-                           np.zeros(count, np.bool_))
+                           np.zeros(count, np.bool_), np.zeros(count))
         self.shared = Share(Sighting(wearing.worn, wearing.cameras, self.frame, observations.flags,
                                      wearing.bias_variance))
         after_ns, self.sights = _read(self.shared, 1e-9 * observations.row_time_ns)
         self.t_ns = observations.t_row0_master_ns + int(after_ns)
 
     def associate(self, page: Share) -> int:
-        """Ask the hand, carried to this frame's instant, which marker each sight is of, and whether it shows enough of
-        it; returns how many changed. The hand learns how wide its paint is."""
+        """Ask the hand, carried to this frame's instant, which marker each sight is of, and how much of it it shows;
+        returns how many changed. The hand learns how wide its markers are."""
         return int(_associate(self.shared, page))
 
     def linearise(self, page: Share) -> None:
@@ -65,6 +66,7 @@ def _associate(shared: Share, page: Share) -> int:
     there: Page = page.of
     changed = relabel(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
     leave_out_covered(sighting.worn, sighting.cameras, sighting.frame, there.estimate, sighting.made)
+    doubt_partial(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
     return changed
 
 

@@ -67,7 +67,8 @@ class Frame(NamedTuple):
     """What one camera saw: `camera` (1,) its index; `seen` (M,) which markers count; `pixels` (M, 2) raw px with
     `covariances` (M, 2, 2); `late_s` (M,): when each was seen, s after the estimate's instant (before: negative).
     `label` (M,): which of the hand's markers the m-th sight is of. `widths` (M,) px: diameters of discs of their areas,
-    0 where unknown; `plain` (M,): without any flag; `covered` (M,): shows too little of its marker to be weighed."""
+    0 where unknown; `plain` (M,): without any flag; `covered` (M,): shows too little of its marker to be weighed;
+    `doubt` (M,) px^2: how far off, per axis, what is covered of it may have brought it."""
 
     camera: Indices
     seen: NDArray[np.bool_]
@@ -78,6 +79,7 @@ class Frame(NamedTuple):
     widths: Array
     plain: NDArray[np.bool_]
     covered: NDArray[np.bool_]
+    doubt: Array
 
 
 @njit(cache=True)
@@ -163,7 +165,7 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
             _fill(rows.jacobian[row + r], slope[r], jacobian[m], late, points[m], estimate, m)
             rows.residual[row + r] = frame.pixels[sight, r] - pixel[r]
             spread = slope[r, 0] ** 2 + slope[r, 1] ** 2 + slope[r, 2] ** 2
-            rows.noise[row + r, 0] = (frame.covariances[sight, r, r] + FLOOR_PX**2
+            rows.noise[row + r, 0] = (frame.covariances[sight, r, r] + FLOOR_PX**2 + frame.doubt[sight]
                                       + spread * strayed * abs(late) ** 5 / (10.0 * ACCELERATION_S))
             rows.noise[row + r, 1] = frame.covariances[sight, 0, 1]
         rows.part[observation] = worn.part[m]
