@@ -89,6 +89,34 @@ class Starter:
         pose = self._fitted(markers)
         return pose if pose is not None and count_apart(markers, self._worn_at(pose), UNFIT_M) == 0 else None
 
+    def pose_near(self, markers: Array, before: HandPose, dt_s: float, scale: float = 1.0) -> HandPose | None:
+        """The hand, `scale` times as large as its file says, that was `before` `dt_s` seconds ago and has its `markers`
+        (M, 3) m, NaN where not located, be they few.
+
+        None when they are where no hand has them.
+        """
+        if scale != 1.0 and np.isfinite(markers).any():
+            centre = np.nanmean(markers, axis=0)
+            nearer = before.world_from_palm.copy()
+            nearer[:3, 3] = centre + (nearer[:3, 3] - centre) / scale
+            pose = self.pose_near(centre + (markers - centre) / scale, HandPose(nearer, before.angles), dt_s)
+            if pose is not None:
+                pose.world_from_palm[:3, 3] = centre + (pose.world_from_palm[:3, 3] - centre) * scale
+            return pose
+        tips, wrist = self._tips_and_wrist(markers)
+        fit = fit_palm(self._wearing.model, wrist, tips, before, dt_s)
+        if fit is None:
+            return None
+        solution = solve_fingers(self._wearing.model, fit.pose, tips, target_sd=_TARGET_SD_M)
+        pose = HandPose(fit.pose.world_from_palm, solution.angles)
+        return pose if count_apart(markers, self._worn_at(pose), UNFIT_M) == 0 else None
+
+    def _tips_and_wrist(self, markers: Array) -> tuple[Array, Array]:
+        """(5, 3) m of the fingertips and (3,) m of the wrist, NaN where not located."""
+        nowhere = np.full(3, np.nan)
+        return (np.array([markers[m] if m >= 0 else nowhere for m in self._tips]),
+                markers[self._wrist] if self._wrist >= 0 else nowhere)
+
     def _worn_at(self, pose: HandPose) -> Array:
         """(M, 3) m where a hand in `pose` has its markers."""
         dh, out = self._wearing.worn.dh, np.empty((len(self._rig.marker_ids), 3))
@@ -100,7 +128,7 @@ class Starter:
         located = np.isfinite(markers[:, 0])
         if np.count_nonzero(located) < min(LEAST_MARKERS, len(markers)):
             return None
-        tips = np.array([markers[m] if m >= 0 else np.full(3, np.nan) for m in self._tips])
+        tips, wrist = self._tips_and_wrist(markers)
         on_palm = self._on_palm[located[self._on_palm]]
         if len(on_palm) >= 3:
             own = np.array([self._wearing.places[m].point for m in on_palm])
@@ -108,7 +136,6 @@ class Starter:
                 pose = neutral_pose(fit_rigid(own, markers[on_palm]))
                 solution = solve_fingers(self._wearing.model, pose, tips, target_sd=_TARGET_SD_M)
                 return HandPose(pose.world_from_palm, solution.angles)
-        wrist = markers[self._wrist] if self._wrist >= 0 else np.full(3, np.nan)
         if not np.isfinite(wrist[0]) and np.count_nonzero(np.isfinite(tips[:, 0])) < TIPS_WITHOUT_WRIST:
             return None
         fit = fit_palm(self._wearing.model, wrist, tips, None, 0.0)

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import math
 import time
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
-from rhot_app.tracking.kalman.estimate import ANGLES, SCALE, Estimate, copy_estimate, empty_estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, ROTATION, SCALE, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
@@ -50,8 +52,21 @@ _APART_M, _APART_MARKERS, _APART_STATES = 0.012, 3, 3
 """So many markers so far from where all cameras see them, so often in a row, are those of a hand that is elsewhere: two
 may have changed names."""
 
+_SOUND_MARKERS = 3
+"""With so many markers where all cameras see them a hand is sound."""
+
+_STRAY = 0.25
+"""A marker's way since differs by this part from the palm's."""
+
 _THUMB_NS = 200_000_000
 """How often a thumb that bends backwards is looked at."""
+
+
+class Sound(NamedTuple):
+    """The hand as it was at `t_ns`, master ns, when its markers were where all cameras saw them."""
+
+    t_ns: int
+    pose: HandPose
 
 
 class ModelTracker:
@@ -83,6 +98,7 @@ class ModelTracker:
             self._hand.resize(*self._size.known)
         self._tracking = self._ever = False
         self._believed_ns = self._plausible_ns = self._thumb_ns = self._behind = self._apart = 0
+        self._sound: Sound | None = None
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
@@ -156,11 +172,14 @@ class ModelTracker:
         located = self._starter.locate()
         if located is None:
             return
-        speed = math.hypot(*self._hand.estimate.velocity[:3].tolist())
-        allowed = _APART_M + speed * 1e-9 * abs(self._timeline.t_ns - located.t_ns)
-        apart = count_apart(located.positions, estimated, allowed)
+        since = 1e-9 * (self._timeline.t_ns - located.t_ns)
+        way = since * self._hand.estimate.velocity[:ROTATION]
+        apart = count_apart(located.positions, estimated - way, _APART_M + _STRAY * math.hypot(*way.tolist()))
         if self._size is not None and apart == 0:
             self._size.look(located, self._hand.estimate.world, self._hand.estimate.angles)
+        if apart == 0 and np.count_nonzero(located.clear) >= _SOUND_MARKERS:
+            self._sound = Sound(self._timeline.t_ns, HandPose(self._hand.estimate.world.copy(),
+                                                              self._hand.estimate.angles.copy()))
         self._apart = self._apart + 1 if apart >= _APART_MARKERS else 0
         if self._apart >= _APART_STATES:
             self._begin(located)
@@ -186,10 +205,18 @@ class ModelTracker:
             self._begin(located)
 
     def _begin(self, located: Located) -> None:
-        """Start the filter from what one instant shows, if it is enough, and weigh again what was seen since."""
-        pose = self._starter.pose_of(located.positions, 1.0 if self._size is None else self._size.scale)
-        if pose is None:
-            return
+        """Start from what one instant shows, if it is enough, or enough for a hand that was sound a moment ago."""
+        scale = 1.0 if self._size is None else self._size.scale
+        pose = self._starter.pose_of(located.positions, scale)
+        if pose is None and self._sound is not None:
+            since_ns = located.t_ns - self._sound.t_ns
+            if 0 <= since_ns < LOST_AFTER_NS:
+                pose = self._starter.pose_near(located.positions, self._sound.pose, 1e-9 * since_ns, scale)
+        if pose is not None:
+            self._start(located, pose)
+
+    def _start(self, located: Located, pose: HandPose) -> None:
+        """Start the filter at a pose and weigh again what was seen since."""
         t_ns = located.t_ns
         if self._size is not None:
             self._size.settle()
