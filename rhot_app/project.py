@@ -6,7 +6,7 @@ docs/rig.md describes the format. Nothing else on the master is configured anywh
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
@@ -176,6 +176,30 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.other_hand is not None and not 0 < sum(other) < len(other):
             raise ValueError("the rig has a hand and an other_hand, but not both wear markers; those of other_hand "
                              f"have roles that begin with \"{OTHER_HAND}\"")
+
+
+class Obstacle(NamedTuple):
+    """What stands in the way, and what to do about it: a sentence each."""
+
+    why: str
+    remedy: str
+
+
+def model_tracker_obstacle(rig: Rig) -> Obstacle | None:
+    """Why the model tracker cannot work with a rig, None when nothing is known to stand in its way.
+
+    A marker that sits nowhere on the hand is refused by the tracker itself.
+    """
+    if rig.depth.mode == "disparity":
+        return Obstacle("The model tracker needs calibrated cameras; this rig takes distance from disparity alone "
+                        "(depth.mode).",
+                        "Use Calibrate, Put the cameras together, or the classic tracker (tracker.kind).")
+    text = next((node.name for node in rig.nodes if node.text_datagrams), None)
+    if text is not None:
+        return Obstacle(f"The model tracker needs the time of every picture; node {text} sends text datagrams, which "
+                        "carry none.", "Run rhot-node there and take text_datagrams out of the rig file, or use the "
+                        "classic tracker (tracker.kind).")
+    return None
 
 
 def load_rig(path: Path) -> Rig:

@@ -14,7 +14,7 @@ from rhot_app.calibration.rig_camera_checks import (
 )
 from rhot_app.calibration.rig_setup_checks import filter_findings, hand_findings, link_findings, marker_findings
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
-from rhot_app.project import Rig
+from rhot_app.project import Rig, model_tracker_obstacle
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ def check_rig(rig: Rig) -> RigReport:
     lenses = tuple(lens_figures(node) for node in rig.nodes) if calibrated else ()
     pairs = tuple(all_pairs(rig)) if calibrated else ()
     findings = [*_camera_findings(rig, lenses, pairs), *marker_findings(rig), *hand_findings(rig),
-                *filter_findings(rig), *link_findings(rig)]
+                *filter_findings(rig), *link_findings(rig), *_tracker_findings(rig)]
     if len(rig.nodes) < 2:
         findings.append(Finding("one_camera", Grade.FAIR, "The rig has one camera.", "Depth needs two.",
                                 "Add a second node."))
@@ -49,6 +49,11 @@ def _camera_findings(rig: Rig, lenses: tuple[LensFigures, ...], pairs: tuple[Pai
     by_lens = [finding for node, figures in zip(rig.nodes, lenses, strict=False)
                for finding in lens_findings(node, figures)]
     return [*by_lens, *(pair_findings(rig, list(pairs)) if lenses else [])]
+
+
+def _tracker_findings(rig: Rig) -> list[Finding]:
+    obstacle = model_tracker_obstacle(rig) if rig.tracker.kind == "model" else None
+    return [] if obstacle is None else [Finding("tracker", Grade.POOR, obstacle.why, remedy=obstacle.remedy)]
 
 
 def _summary(rig: Rig, findings: list[Finding]) -> str:

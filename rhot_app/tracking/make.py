@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rhot_app.errors import RigError
-from rhot_app.project import Rig
+from rhot_app.project import Rig, model_tracker_obstacle
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.model_tracker import ModelTracker
 from rhot_app.tracking.tracker import Tracker
@@ -15,13 +15,7 @@ def make_tracker(rig: Rig) -> Tracker:
     nodes."""
     if rig.tracker.kind == "classic":
         return ClassicTracker(rig)
-    if rig.depth.mode == "disparity":
-        raise RigError(f"rig {rig.name!r}: the model tracker needs calibrated cameras, but depth.mode is "
-                       "\"disparity\"; calibrate lenses and poses and set it to \"stereo\", or set tracker.kind to "
-                       "\"classic\".")
-    text = next((node.name for node in rig.nodes if node.text_datagrams), None)
-    if text is not None:
-        raise RigError(f"rig {rig.name!r}: the model tracker needs the time of every picture, but node {text!r} sends "
-                       "text datagrams, which carry none; run rhot-node there and take text_datagrams out, or set "
-                       "tracker.kind to \"classic\".")
+    obstacle = model_tracker_obstacle(rig)
+    if obstacle is not None:
+        raise RigError(f"rig {rig.name!r}: {obstacle.why} {obstacle.remedy}")
     return ModelTracker(rig) if rig.other_hand is None else TwoHands(rig)

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.hand.anthropometry import scaled_hand
-from rhot_app.project import Rig, TrackerSettings
+from rhot_app.project import Rig, TrackerSettings, model_tracker_obstacle
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.backend.session import Asker
 from rhot_app.ui.job import Job
@@ -31,7 +31,6 @@ from rhot_app.ui.models.tracker_words import (
     LIMITS,
     SIZE_MEANING,
     VARIANTS,
-    obstacle,
     settings_text,
     size_settled,
     size_text,
@@ -212,7 +211,8 @@ class TrackerDialog(QDialog):
         self.size_check.setChecked(settings.float_scale)
         self.variant_words.setText(VARIANTS[settings.variant][1])
         self.limits_words.setText(LIMITS[settings.limits][1])
-        self.obstacle_label.setText(obstacle(self._rig))
+        obstacle = model_tracker_obstacle(self._rig)
+        self.obstacle_label.setText("" if obstacle is None else f"{obstacle.why} {obstacle.remedy}")
         self.obstacle_label.setVisible(bool(self.obstacle_label.text()))
         self.details.setVisible(settings.kind == "model")
         self._enable()

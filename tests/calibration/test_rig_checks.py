@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import pytest
@@ -12,7 +13,16 @@ import pytest
 from rhot_app.__main__ import main
 from rhot_app.calibration.rig_checks import check_rig
 from rhot_app.calibration.verdict import Grade
-from rhot_app.project import CameraPose, Intrinsics, OneEuroSettings, Rig, RigNode, load_rig, save_rig
+from rhot_app.project import (
+    CameraPose,
+    Intrinsics,
+    OneEuroSettings,
+    Rig,
+    RigNode,
+    TrackerSettings,
+    load_rig,
+    save_rig,
+)
 from rhot_node.files import resource_path
 
 LENS = Intrinsics(640, 480, 533.0, 533.5, 341.0, 235.0, (-0.28, 0.09, 0.001, 0.0, 0.0))
@@ -116,6 +126,16 @@ def test_markers_hand_filters_and_ports_are_looked_at(rig: Rig) -> None:
 def test_a_rig_that_measures_disparity_needs_no_lenses(rig: Rig) -> None:
     blind = with_lens(change(rig, depth=change(rig.depth, mode="disparity")), fx=3.6)  # type: ignore[arg-type]
     assert check_rig(blind).verdict.grade is Grade.GOOD
+
+
+@pytest.mark.parametrize("kind", ["classic", "model"])
+def test_nodes_that_the_chosen_tracker_cannot_use_are_named(rig: Rig, kind: Literal["classic", "model"]) -> None:
+    left = msgspec.structs.replace(rig.nodes[0], text_datagrams=True)
+    verdict = check_rig(msgspec.structs.replace(rig, nodes=(left, rig.nodes[1]),
+                                                tracker=TrackerSettings(kind=kind))).verdict
+    found = [finding.sentence for finding in verdict.findings if finding.code == "tracker"]
+    assert verdict.acceptable == (kind == "classic") and len(found) == (kind == "model")
+    assert all(f"node {left.name} sends text" in sentence and "tracker.kind" in sentence for sentence in found)
 
 
 def test_the_command_says_it_and_ends_with_code_2(rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

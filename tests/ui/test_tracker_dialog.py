@@ -16,7 +16,7 @@ from PySide6.QtTest import QTest
 from rhot_app.hand.anthropometry import hand_length
 from rhot_app.project import DepthSettings, TrackerSettings, load_rig, save_rig
 from rhot_app.rig_history import versions
-from rhot_app.ui.models.tracker_words import obstacle, scale_text, size_text
+from rhot_app.ui.models.tracker_words import scale_text, size_text
 from rhot_app.ui.tracker_dialog import TrackerDialog
 from rhot_app.ui.wizards.models.rig_rows import rig_rows
 
@@ -147,13 +147,6 @@ def test_what_stands_in_the_way_is_said(opened):
     dialog = opened(msgspec.structs.replace(synthetic_rig(), depth=DepthSettings(mode="disparity"))).dialog
     assert not dialog.kinds["model"].isEnabled() and dialog.obstacle_label.isVisible()
     assert "distance from disparity" in dialog.obstacle_label.text()
-
-
-def test_nodes_that_send_text_have_no_times():
-    rig = synthetic_rig()
-    left = msgspec.structs.replace(rig.nodes[0], text_datagrams=True)
-    assert "node left sends text" in obstacle(msgspec.structs.replace(rig, nodes=(left, rig.nodes[1])))
-    assert obstacle(rig) == ""
 
 
 def test_a_refusal_changes_nothing(opened):

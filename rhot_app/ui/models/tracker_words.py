@@ -33,21 +33,6 @@ SETTLED_SD = 0.02
 """A size that is not known to 2 % is no better than a hand chosen by its length."""
 
 
-def obstacle(rig: Rig) -> str:
-    """Why the model tracker cannot work with this rig and what to do, "" when nothing is known to stand in its way.
-
-    A marker that sits nowhere on the hand is refused by the tracker itself.
-    """
-    if rig.depth.mode == "disparity":
-        return ("The model tracker needs calibrated cameras; this rig takes distance from disparity alone. Use "
-                "Calibrate, Put the cameras together.")
-    text = [node.name for node in rig.nodes if node.text_datagrams]
-    if text:
-        return (f"The model tracker needs the time of every picture; node {text[0]} sends text datagrams, which carry "
-                "none. Run rhot-node there and take text_datagrams out of the rig file.")
-    return ""
-
-
 def settings_text(settings: TrackerSettings) -> str:
     """One line, e.g. "model, full, anatomical limits, size estimated"."""
     if settings.kind == "classic":
