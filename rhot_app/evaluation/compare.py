@@ -12,6 +12,7 @@ from rhot_app.evaluation.honesty import DEGREES, Consistency, Squares, consisten
 from rhot_app.evaluation.report import SETTLE_S
 from rhot_app.evaluation.takes import Order, Take, Told, take
 from rhot_app.evaluation.track import rig_with, tracked
+from rhot_app.progress import Progress, silent
 from rhot_app.project import TrackerSettings
 from rhot_app.simulator.node_log import CABLE, Network
 from rhot_app.simulator.scene import Scene, make_scene
@@ -75,14 +76,17 @@ def orders(scene: Scene, motions: Iterable[str], seeds: Iterable[int], seconds: 
 
 
 def compare(wanted: Sequence[Order], folder: Path, trackers: dict[str, TrackerSettings],
-            told: Told = lambda title: None) -> Comparison:
+            told: Told = lambda title: None, progress: Progress = silent) -> Comparison:
     """Put every take through every tracker; takes that are not in `folder` are filmed. Raises RhotError."""
     runs: list[Run] = []
     outdated = 0
-    for order in wanted:
+    for number, order in enumerate(wanted):
         recorded = take(order, folder, told)
         outdated += recorded.outdated
-        judged = {name: judge(recorded, settings) for name, settings in trackers.items()}
+        judged = {}
+        for place, (name, settings) in enumerate(trackers.items()):
+            progress(f"{name} tracker, {order.title}", (number + place / len(trackers)) / len(wanted))
+            judged[name] = judge(recorded, settings)
         runs.append(Run(Path(order.motion).stem, order.scene.seed, judged))
     return Comparison(tuple(runs), outdated)
 

@@ -29,6 +29,15 @@ COLUMNS = (
 )
 _CELL = 7
 
+LEGEND = """\
+Root mean squares over all states after the first second; ratio: the last tracker's figure to the first one's.
+  tips       fingertips: visible to both cameras in truth, called measured by the tracker, as a 60 Hz display shows them
+  markers    that both cameras see in truth
+  angles     joint angles of the fingers that wear markers
+  palm turn  between the palm and the true one
+  measured   part of what both cameras see that the tracker calls measured
+NEES is 1 where covariances are true, more where they are too small, less where they are too large."""
+
 
 def table(comparison: Comparison, columns: Sequence[Column] = COLUMNS) -> str:
     """One line per run, and one for all seeds of each motion; under each figure the trackers and the ratio of the last

@@ -70,7 +70,7 @@ def _evaluate(args: argparse.Namespace) -> int:
 def _compare(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
     from rhot_app.evaluation.compare import MOTIONS, TRACKERS, as_fields, compare, orders
-    from rhot_app.evaluation.compare_table import honesty_table, table
+    from rhot_app.evaluation.compare_table import LEGEND, honesty_table, table
     from rhot_app.evaluation.report import SETTLE_S
     from rhot_app.evaluation.takes import takes_folder
     from rhot_app.progress import ProgressLine
@@ -90,10 +90,14 @@ def _compare(args: argparse.Namespace) -> int:
     wanted = orders(scene_of(args), motions, range(args.seed, args.seed + args.seeds), seconds,
                     network=Network(loss=args.loss), sketched=args.sketched)
     folder = args.logs or takes_folder()
+    line = ProgressLine("")
     result = compare(wanted, folder, {name: TRACKERS[name] for name in names},
-                     lambda title: ProgressLine(f"filming {title}"))
+                     lambda title: ProgressLine(f"filming {title}"), line.report)
+    line.report("comparing", 1.0)
+    line.finish()
     if result.outdated:
         print(f"{result.outdated} logs in {folder} were filmed with another detector or twin than today's; "
               "remove them, or choose another --logs, to film anew.", file=sys.stderr)
-    print(json.dumps(as_fields(result)) if args.json else f"{table(result)}\n\n{honesty_table(result)}")
+    print(json.dumps(as_fields(result)) if args.json else
+          f"{table(result)}\n\n{LEGEND}\n\n{honesty_table(result)}")
     return 0

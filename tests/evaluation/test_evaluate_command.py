@@ -15,9 +15,11 @@ QUICK = ("evaluate", "--compare", "--sketched", "--trackers", "classic", "--moti
 
 def test_a_comparison_prints_tables_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*QUICK, "--logs", str(tmp_path / "logs")]) == 0
-    table, honesty = capsys.readouterr().out.split("\n\n")
+    printed = capsys.readouterr()
+    table, legend, honesty = printed.out.split("\n\n")
     assert [line.split()[0] for line in table.splitlines()[2:]] == ["rest"] * 3 + ["pinch"] * 3
-    assert honesty.startswith("NEES")
+    assert legend.startswith("Root mean squares") and honesty.startswith("NEES")
+    assert "comparing: done in" in printed.err
     assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["outdated"] == 0 and len(found["runs"]) == 4
