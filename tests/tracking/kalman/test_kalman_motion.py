@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from known_hand import SIZE, WEARING, difference, moved, moving_estimate, twin
+from known_hand import SIZE, WEARING, difference, empty, moved, moving_estimate, twin
 
 from rhot_app.hand.skeleton import FLEXIONS
 from rhot_app.tracking.kalman.estimate import (
@@ -104,6 +104,15 @@ def test_still_hands_are_calm_and_fast_ones_no_livelier_than_hands_are():
     np.testing.assert_array_equal(brisk[1:], calm[1:])
     estimate.velocity[:] = 1e4
     np.testing.assert_array_equal(liveliness(estimate), MOST)
+
+
+def test_a_palm_that_hurries_to_and_fro_turns_as_hard_as_it_must():
+    """A swing of 2.3 Hz has 2 m/s and 29 m/s^2, amplitude or rms. At a walking speed hands do not swing like that."""
+    estimate, turn_hz = empty(), 2.3  # its covariance is zero: all of the speed counts
+    for speed, share in ((0.1, (0.3, 0.6)), (2.0, (0.8, 1.2))):
+        estimate.velocity[0] = speed
+        found = np.sqrt(liveliness(estimate)[LINEAR]) / (2.0 * np.pi * turn_hz * speed)
+        assert share[0] < found < share[1]
 
 
 def test_biases_tend_to_what_their_markers_have():
