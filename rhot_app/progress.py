@@ -45,11 +45,11 @@ class ProgressLine:
         self._shown = now
         elapsed = now - self._began
         left = f", {elapsed * (total - done) / done:.0f} s left" if done else ""
-        self._stream.write(f"\r{self._what}: {100 * done // max(total, 1)} %{left}   ")
+        self._stream.write(f"\r{self._what}: {100 * done // max(total, 1)} %{left}\x1b[K")
         self._stream.flush()
 
     def finish(self) -> None:
         """End the line and say how long it took."""
-        start = "\r" if self._stream.isatty() else ""
-        self._stream.write(f"{start}{self._what}: done in {time.monotonic() - self._began:.1f} s   \n")
+        start, end = ("\r", "\x1b[K") if self._stream.isatty() else ("", "")
+        self._stream.write(f"{start}{self._what}: done in {time.monotonic() - self._began:.1f} s{end}\n")
         self._stream.flush()

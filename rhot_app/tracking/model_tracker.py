@@ -52,11 +52,11 @@ _APART_M, _APART_MARKERS, _APART_STATES = 0.012, 3, 3
 """So many markers so far from where all cameras see them, so often in a row, are those of a hand that is elsewhere: two
 may have changed names."""
 
-_SOUND_MARKERS = 3
-"""With so many markers where all cameras see them a hand is sound."""
+_SOUND_MARKERS, _LEAST_CLEAR = 3, 2
+"""With so many markers where all cameras see them a hand is sound; so many set it back. One may be something else."""
 
-_STRAY = 0.25
-"""A marker's way since differs by this part from the palm's."""
+_STRAY, _REACH_M = 0.25, 0.1
+"""A marker's way since differs by this part from the palm's, and by so much per radian that the palm turns."""
 
 _THUMB_NS = 200_000_000
 """How often a thumb that bends backwards is looked at."""
@@ -154,6 +154,7 @@ class ModelTracker:
         if self._tracking and self._other_time(block.t_ns):
             self._give_up()
             self._sights.reset()
+            self._sound = None
         if not self._sights.enter(block):
             return False
         self._starter.ingest(observations)
@@ -173,8 +174,9 @@ class ModelTracker:
         if located is None:
             return
         since = 1e-9 * (self._timeline.t_ns - located.t_ns)
-        way = since * self._hand.estimate.velocity[:ROTATION]
-        apart = count_apart(located.positions, estimated - way, _APART_M + _STRAY * math.hypot(*way.tolist()))
+        way, turned = np.split(since * self._hand.estimate.velocity[:ANGLES], [ROTATION])
+        allowed = _APART_M + _STRAY * math.hypot(*way.tolist()) + _REACH_M * math.hypot(*turned.tolist())
+        apart = count_apart(located.positions, estimated - way, allowed)
         if self._size is not None and apart == 0:
             self._size.look(located, self._hand.estimate.world, self._hand.estimate.angles)
         if apart == 0 and np.count_nonzero(located.clear) >= _SOUND_MARKERS:
@@ -208,10 +210,11 @@ class ModelTracker:
         """Start from what one instant shows, if it is enough, or enough for a hand that was sound a moment ago."""
         scale = 1.0 if self._size is None else self._size.scale
         pose = self._starter.pose_of(located.positions, scale)
-        if pose is None and self._sound is not None:
+        if pose is None and self._sound is not None and np.count_nonzero(located.clear) >= _LEAST_CLEAR:
+            clear = np.where(located.clear[:, None], located.positions, np.nan)
             since_ns = located.t_ns - self._sound.t_ns
             if 0 <= since_ns < LOST_AFTER_NS:
-                pose = self._starter.pose_near(located.positions, self._sound.pose, 1e-9 * since_ns, scale)
+                pose = self._starter.pose_near(clear, self._sound.pose, 1e-9 * since_ns, scale)
         if pose is not None:
             self._start(located, pose)
 

@@ -36,8 +36,8 @@ _NEVER = -(1 << 62)  # ns
 
 class Seen(NamedTuple):
     """The last believed sight of each of M markers by each of C cameras: `times` (C, M) ns, -1 for never; `pixels`
-    (C, M, 2) raw px with `covariances` (C, M, 2, 2); `doubtful` (C, M), for what its flags say or for how unlikely it
-    was."""
+    (C, M, 2) raw px with `covariances` (C, M, 2, 2); `doubtful` (C, M), for what its flags say, for how unlikely it
+    was, or because another camera sees more of it."""
 
     times: Indices
     pixels: Array
@@ -121,8 +121,9 @@ def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, widening: A
                 seen.pixels[camera, marker, i] = frame.pixels[sight, i]
                 for j in range(2):
                     seen.covariances[camera, marker, i, j] = frame.covariances[sight, i, j]
+                seen.covariances[camera, marker, i, i] += frame.doubt[sight]
             seen.doubtful[camera, marker] = ((sighting.flags[sight] & DOUBTFUL) != 0
-                                             or widening[observation] > UNLIKELY)
+                                             or widening[observation] > UNLIKELY or frame.doubt[sight] > 0.0)
     return count
 
 

@@ -31,15 +31,15 @@ STRAYS_M_S = 0.007
 
 @njit(cache=True)
 def leave_out_covered(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, made: Array) -> None:
-    """Set `frame.covered`, learn sizes (`estimate.width`), and set the biases' variances of paint that was away.
+    """Set more of `frame.covered`, learn sizes (`estimate.width`), and set the biases' variances of paint that was
+    away.
 
     To be called when `frame.label` is known. `made` (M,) m^2: variance of the markers' places by their making.
     """
     for sight in range(worn.part.shape[0]):
         m = frame.label[sight]
-        frame.covered[sight] = False
         if frame.seen[sight] and worn.palmar[m] and frame.widths[sight] > 0.0:
-            frame.covered[sight] = _is_covered(worn, cameras, frame, estimate, sight, m)
+            frame.covered[sight] |= _is_covered(worn, cameras, frame, estimate, sight, m)
             if not frame.covered[sight]:
                 set_bias_variance(estimate, m, made[m])
     for m in range(worn.part.shape[0]):

@@ -65,8 +65,8 @@ def _associate(shared: Share, page: Share) -> int:
     sighting: Sighting = shared.of
     there: Page = page.of
     changed = relabel(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
-    leave_out_covered(sighting.worn, sighting.cameras, sighting.frame, there.estimate, sighting.made)
     doubt_partial(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
+    leave_out_covered(sighting.worn, sighting.cameras, sighting.frame, there.estimate, sighting.made)
     return changed
 
 

@@ -159,8 +159,7 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
                               cameras.intrinsics[camera], pixel, slope):
             pixel[:] = np.nan
             slope[:] = 0.0
-        strayed = (lively[LINEAR] + lively[TURN] * _REACH_M**2
-                   + (lively[FIRST_FINGER + worn.part[m]] * _FINGER_M**2 if worn.part[m] >= 0 else 0.0))
+        strayed = straying(lively, worn.part[m])
         for r in range(2):
             _fill(rows.jacobian[row + r], slope[r], jacobian[m], late, points[m], estimate, m)
             rows.residual[row + r] = frame.pixels[sight, r] - pixel[r]
@@ -172,6 +171,14 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
         rows.source[observation, 0], rows.source[observation, 1], rows.source[observation, 2] = camera, sight, m
         rows.first[observation + 1] = row + 2
         rows.used[0], rows.used[1] = row + 2, observation + 1
+
+
+@njit(cache=True)
+def straying(lively: Array, part: int) -> float:
+    """Variance of the acceleration of a marker on a finger or the palm (`Worn.part`), (m/s^2)^2, of a hand that is so
+    `lively` (7,)."""
+    finger = lively[FIRST_FINGER + part] * _FINGER_M**2 if part >= 0 else 0.0
+    return float(lively[LINEAR] + lively[TURN] * _REACH_M**2 + finger)
 
 
 @njit(cache=True)

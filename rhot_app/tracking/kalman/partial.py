@@ -16,23 +16,26 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import (
-    LINEAR,
     LOOK_AGE,
     LOOK_VARIANCE,
     LOOK_WIDTH,
     LOOK_X,
     LOOK_Y,
     POSE,
+    VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.markers import NEAREST_M, Cameras, Frame, Worn, place_markers, project_marker
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, place_markers, project_marker, straying
 from rhot_app.tracking.kalman.motion import liveliness
-from rhot_app.tracking.kalman.sighted import FRESH_S
+from rhot_app.tracking.kalman.sighted import FRESH_S, line_of_sight
 
 Array = NDArray[np.float64]
 
 AGREE = 0.05
 """Areas of a marker in plain view differ by less than this part between two cameras, with few exceptions."""
+
+ALIKE_COS = math.cos(math.radians(12.0))
+"""Cosine of the angle between two lines of sight up to which they show equally much of markers that are no balls."""
 
 LESS = 0.02
 """A sight that shows so much less is left out when its ray misses the other one's."""
@@ -44,6 +47,7 @@ SHIFT, BAND_SHIFT = 1.0, 2.0
 """By how many of its radii the middle of a marker's rest lies off, per part of its area that is covered; a band is
 longer than it is wide."""
 
+
 class View(NamedTuple):
     """One camera's sight of a marker that the hand has at some place: `residual` (2,) px and `slope` (2, 3) px/m."""
 
@@ -53,27 +57,27 @@ class View(NamedTuple):
 
 @njit(cache=True)
 def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate) -> None:
-    """Set `frame.doubt`, px^2, and more of `frame.covered`; remember what this camera sees, `estimate.looks`.
+    """Set `frame.doubt`, px^2, and `frame.covered`; remember what this camera sees, `estimate.looks`.
 
-    To be called when `frame.label` is known. Sights with a flag are widened by their node, and are no standard.
+    To be called when `frame.label` is known. Sights with a flag are widened by their node, and are no standard, and
+    neither are those that were not believed.
     """
     camera, count = frame.camera[0], worn.part.shape[0]
     points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
     place_markers(worn, estimate, points, jacobian)
     for sight in range(count):
-        frame.doubt[sight] = 0.0
+        frame.doubt[sight], frame.covered[sight] = 0.0, False
         if not frame.seen[sight] or not frame.widths[sight] > 0.0:
             continue
         m = frame.label[sight]
-        width = frame.widths[sight] * _metres_per_px(cameras, camera, points[m])
-        rival = _widest_other(estimate, camera, m)
+        width = frame.widths[sight] * metres_per_px(worn, cameras, estimate, m, camera, points[m])
+        rival = _widest_other(cameras, estimate, camera, m, points[m])
         missing = 1.0 - (width / max(width, estimate.looks[rival, m, LOOK_WIDTH])) ** 2 if rival >= 0 else 0.0
         if missing > AGREE:
             shift = SHIFT if worn.half_axes[m, 0] == worn.half_axes[m, 1] else BAND_SHIFT
             frame.doubt[sight] = (0.5 * shift * frame.widths[sight]) ** 2 * (missing**2 - AGREE**2)
         if missing > LESS:
-            speed = jacobian[m] @ estimate.velocity
-            frame.covered[sight] |= _misses(worn, cameras, frame, estimate, sight, rival, points[m], speed)
+            frame.covered[sight] = _misses(worn, cameras, frame, estimate, sight, rival, points[m], jacobian[m])
         _remember(estimate.looks[camera, m], frame, sight, width)
 
 
@@ -94,40 +98,58 @@ def _variance(frame: Frame, sight: int) -> float:
 
 @njit(cache=True)
 def _misses(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, sight: int, rival: int, point: Array,
-            speed: Array) -> bool:
-    """Whether no place of a marker that is about at `point` (3,) m, moving at `speed` (3,) m/s, explains this sight and
-    the last one of camera `rival`."""
+            jacobian: Array) -> bool:
+    """Whether no place of a marker that is about at `point` (3,) m, with `jacobian` (3, 27) per pose number, explains
+    this sight and the last one of camera `rival`."""
     own, other = View(np.empty(2), np.empty((2, 3))), View(np.empty(2), np.empty((2, 3)))
     m, late = frame.label[sight], frame.late_s[sight]
-    look = estimate.looks[rival, m]
+    look, speed = estimate.looks[rival, m], jacobian @ estimate.velocity
     if not (_view(worn, cameras, estimate, m, frame.camera[0], point + late * speed, frame.pixels[sight], own)
             and _view(worn, cameras, estimate, m, rival, point - look[LOOK_AGE] * speed, look[LOOK_X:LOOK_Y + 1],
                       other)):
         return False
-    strayed_m = 0.5 * math.sqrt(liveliness(estimate)[LINEAR]) * (look[LOOK_AGE] + late) ** 2
-    strayed_px = strayed_m * math.hypot(own.slope[0, 0], own.slope[0, 1])
-    allowed = MISS_PX + MISS * math.sqrt(_variance(frame, sight) + look[LOOK_VARIANCE] + strayed_px**2)
-    return disagreement(own, other) > allowed
+    between = look[LOOK_AGE] + late
+    strayed = (0.25 * between**4 * straying(liveliness(estimate), worn.part[m])
+               + between**2 * _unsteadiness(estimate, jacobian))
+    spread = own.slope[0, 0] ** 2 + own.slope[0, 1] ** 2 + own.slope[0, 2] ** 2
+    variance = _variance(frame, sight) + look[LOOK_VARIANCE] + spread * strayed
+    return disagreement(own, other) > MISS_PX + MISS * math.sqrt(variance)
 
 
 @njit(cache=True)
-def _metres_per_px(cameras: Cameras, camera: int, point: Array) -> float:
-    """How large a pixel of a camera is at a point (3,) m; 0 behind the camera."""
-    pose = cameras.pose[camera]
-    depth = pose[2, 3] + pose[2, 0] * point[0] + pose[2, 1] * point[1] + pose[2, 2] * point[2]
-    if depth < NEAREST_M:
+def _unsteadiness(estimate: Estimate, jacobian: Array) -> float:
+    """Variance per axis, (m/s)^2, of the speed of what has `jacobian` (3, 27), as if no velocities went together."""
+    total = 0.0
+    for j in range(POSE):
+        lever = jacobian[0, j] ** 2 + jacobian[1, j] ** 2 + jacobian[2, j] ** 2
+        total += lever * estimate.covariance[VELOCITY + j, VELOCITY + j]
+    return total / 3.0
+
+
+@njit(cache=True)
+def metres_per_px(worn: Worn, cameras: Cameras, estimate: Estimate, m: int, camera: int, point: Array) -> float:
+    """How large a pixel is, as a ball at `point` (3,) m covers them, wherever in the picture; 0 behind the camera."""
+    view = View(np.empty(2), np.empty((2, 3)))
+    if not _view(worn, cameras, estimate, m, camera, point, np.zeros(2), view):
         return 0.0
-    return depth / math.sqrt(cameras.intrinsics[camera, 0] * cameras.intrinsics[camera, 1])
+    u, v = view.slope[0], view.slope[1]
+    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    return 1.0 / math.sqrt(math.sqrt(x * x + y * y + z * z))
 
 
 @njit(cache=True)
-def _widest_other(estimate: Estimate, camera: int, m: int) -> int:
-    """The other camera that sees most of marker `m` just now, -1 if none does."""
+def _widest_other(cameras: Cameras, estimate: Estimate, camera: int, m: int, point: Array) -> int:
+    """The other camera that sees most of marker `m`, at `point` (3,) m, just now and from nearly the same side; -1 if
+    none does."""
     widest, which = 0.0, -1
+    one, two = np.empty(3), np.empty(3)
+    line_of_sight(cameras.pose[camera], point, one)
     for other in range(estimate.looks.shape[0]):
         look = estimate.looks[other, m]
-        if other != camera and look[LOOK_AGE] < FRESH_S and look[LOOK_WIDTH] > widest:
-            widest, which = look[LOOK_WIDTH], other
+        if other != camera and max(look[LOOK_AGE], estimate.unseen[other, m]) < FRESH_S and look[LOOK_WIDTH] > widest:
+            line_of_sight(cameras.pose[other], point, two)
+            if one[0] * two[0] + one[1] * two[1] + one[2] * two[2] > ALIKE_COS:
+                widest, which = look[LOOK_WIDTH], other
     return which
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,7 +16,7 @@ from rhot_app.simulator.motion import FACING
 from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_WIDTH, POSE, empty_estimate
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.markers import place_markers, project_marker
-from rhot_app.tracking.kalman.partial import AGREE, LESS, MISS_PX, View, disagreement, doubt_partial
+from rhot_app.tracking.kalman.partial import AGREE, LESS, MISS_PX, View, disagreement, doubt_partial, metres_per_px
 from rhot_app.tracking.kalman.sighted import FRESH_S
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_node.wire.messages import MarkerFlag
@@ -42,6 +43,7 @@ def hand(speed_m_s=0.0):
     estimate.world[:3, :3], estimate.world[:3, 3] = FACING, (0.03, 0.08, 0.6)
     estimate.angles[:] = neutral_pose().angles
     estimate.velocity[0] = speed_m_s
+    estimate.unseen[:] = 0.0
     return estimate
 
 
@@ -51,18 +53,18 @@ def seen(estimate, camera, shares=(), shift=(0.0, 0.0), flag=0, late_s=0.0):
     points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
     place_markers(WEARING.worn, estimate, points, jacobian)
     pixels, slope, area, flags = np.empty((COUNT, 2)), np.empty((2, 3)), np.ones(COUNT), np.zeros(COUNT, np.uint16)
+    px_per_m = np.empty(COUNT)
     for m in range(COUNT):
         project_marker(points[m] + late_s * estimate.velocity[:3], estimate.world, WEARING.worn.half_axes[m],
                        WEARING.cameras.pose[camera], WEARING.cameras.intrinsics[camera], pixels[m], slope)
+        px_per_m[m] = np.sqrt(np.linalg.norm(np.cross(*slope)))
     for m, share in dict(shares).items():
         area[m], flags[m] = share, flag
         pixels[m] += shift
-    depth = np.array([(CAMERAS[camera].camera_from_world @ [*point, 1.0])[2] for point in points])
-    focal = np.sqrt(CAMERAS[camera].intrinsics[0] * CAMERAS[camera].intrinsics[1])
     frame = sights(RIG, moving(), 0.1)[camera]
     return MarkerBlock(WEARING, replace(
         frame, camera=camera, pixels=pixels, row_time_ns=0, flags=flags,
-        covariances=np.tile(0.05**2 * np.eye(2), (COUNT, 1, 1)), diameters=WIDTH_M * np.sqrt(area) * focal / depth))
+        covariances=np.tile(0.05**2 * np.eye(2), (COUNT, 1, 1)), diameters=WIDTH_M * np.sqrt(area) * px_per_m))
 
 
 def judged(block, estimate):
@@ -139,3 +141,23 @@ def test_no_place_of_the_marker_is_a_disagreement(turned, off):
 def test_sights_that_no_place_explains_disagree_by_how_far_they_must_move():
     up, down = np.array([0.3, 1.0]), np.array([-0.2, -1.0])
     assert disagreement(View(up, ABREAST[0]), View(down, ABREAST[1])) == pytest.approx(np.sqrt(2.0))
+
+
+@pytest.mark.parametrize("place_m", [(0.0, 0.0, 0.6), (0.3, 0.1, 0.6), (-0.25, -0.15, 0.5)])
+def test_a_ball_looks_equally_wide_wherever_it_is_before_any_lens(place_m):
+    """Its silhouette grows towards the picture's edge and shrinks with a barrel's distortion."""
+    nodes = [msgspec.structs.replace(node, intrinsics=msgspec.structs.replace(
+        node.intrinsics, distortion=(-0.28, 0.09, 0.0, 0.0, 0.0))) for node in RIG.nodes]
+    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in nodes]
+    there = WEARING.cameras._replace(intrinsics=np.array([camera.intrinsics for camera in cameras]))
+    angles = np.linspace(0.0, 2.0 * np.pi, 200)
+    for camera, model in enumerate(cameras):
+        sight = (model.camera_from_world @ [*place_m, 1.0])[:3]
+        across = np.linalg.svd(sight[None])[2][1:]  # the outline is a circle about the line of sight
+        circle = 0.5 * WIDTH_M * np.column_stack([np.cos(angles), np.sin(angles)])
+        outline = np.array(place_m) + circle @ across @ model.camera_from_world[:3, :3]
+        x, y = model.project(outline).T
+        area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
+        width = np.sqrt(4.0 * area / np.pi) * metres_per_px(WEARING.worn, there, hand(), INDEX, camera,
+                                                            np.array(place_m))
+        assert width == pytest.approx(WIDTH_M, rel=0.004)
