@@ -44,7 +44,7 @@ class MarkerBlock:
         self.frame = Frame(np.array([observations.camera]), np.empty(count, np.bool_), observations.pixels,
                            observations.covariances, np.empty(count), np.empty(count, np.int64),
                            observations.diameters if sized else np.zeros(count), observations.flags == 0,
-                           np.zeros(count, np.bool_), np.zeros(count))
+                           np.zeros(count, np.bool_), np.zeros(count), np.ones(count))
         self.shared = Share(Sighting(wearing.worn, wearing.cameras, self.frame, observations.flags,
                                      wearing.bias_variance))
         after_ns, self.sights = _read(self.shared, 1e-9 * observations.row_time_ns)
