@@ -1,7 +1,7 @@
 """Trials of a tracker on one take, each with a misfortune or a question of its own. Figures' keys end in their unit.
 
-A tracker is given as the rig that asks for it (`Rig.tracker`, `Rig.filters`, `Rig.hand`); the take's log, altered or
-not, goes through the door into it. Figures of several takes are put together by `gather`.
+A tracker is given as the rig that asks for it (`Rig.tracker`, `Rig.filters`, `Rig.hand`), or as itself; the take's
+log, altered or not, goes through the door into it. Figures of several takes are put together by `gather`.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from rhot_app.project import Rig
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.sources.replay import LogDoor
 from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.tracker import Tracker
 
 Array = NDArray[np.float64]
 
@@ -38,12 +39,12 @@ SCALE_TOLERANCE = 0.02
 SCALE_TIMES_S = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)
 
 
-def one_camera_blind(take: Take, rig: Rig, *, says_so: bool) -> Figures:
+def one_camera_blind(take: Take, rig: Rig, tracker: Tracker | None = None, *, says_so: bool) -> Figures:
     """Fingertips while the first camera is covered for a second; `says_so` False: while its node is silent."""
     node = rig.nodes[0].node_id
     records = (alter.changed(take.records(), alter.blind(node, *BLIND_S)) if says_so
                else alter.silent(take.records(), node, *BLIND_S))
-    track = tracked(records, rig)
+    track = tracked(records, rig, tracker)
     during = track.where((track.times_s >= BLIND_S[0]) & (track.times_s < BLIND_S[1]))
     tips = distances(_off(during, take).tips)
     span_s = BLIND_S[1] - BLIND_S[0]
@@ -52,11 +53,12 @@ def one_camera_blind(take: Take, rig: Rig, *, says_so: bool) -> Figures:
             "states_per_s": len(during.times_s) / span_s}
 
 
-def markers_hidden(take: Take, rig: Rig, *, share: float, together: bool) -> Figures:
+def markers_hidden(take: Take, rig: Rig, tracker: Tracker | None = None, *, share: float,
+                   together: bool) -> Figures:
     """Fingertips of every state when each marker is hidden for a share of the time."""
     change = alter.hidden(share, take.seconds, [node.node_id for node in rig.nodes], len(rig.markers.markers),
                           _seed(take), together=together)
-    return _all_states(take, rig, alter.changed(take.records(), change))
+    return _all_states(take, rig, alter.changed(take.records(), change), tracker)
 
 
 def names_mixed_up(take: Take, rig: Rig, *, pair: tuple[int, int], share: float) -> Figures:
@@ -190,8 +192,8 @@ def _resident_bytes() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
-def _all_states(take: Take, rig: Rig, records: Sequence[Record]) -> Figures:
-    track = tracked(records, rig)
+def _all_states(take: Take, rig: Rig, records: Sequence[Record], tracker: Tracker | None = None) -> Figures:
+    track = tracked(records, rig, tracker)
     track = track.where((track.times_s >= SETTLE_S) & (track.times_s <= take.seconds))
     off, true = _off(track, take), take.truth.markers_at(track.times_s)
     tips = distances(off.tips)
