@@ -134,7 +134,7 @@ class HandFilter:
         estimate, covariance = self.estimate, self.estimate.covariance
         estimate.world[:], estimate.angles[:] = world_from_palm, np.clip(angles, *self._desk.limits.T)
         for array in (estimate.velocity, estimate.acceleration, estimate.bias, estimate.trend, estimate.left_open,
-                      covariance):
+                      estimate.untroubled, covariance):
             array[:] = 0.0
         estimate.log_scale[0] = self._desk.size[0]
         estimate.agitation[:] = START_AGITATION

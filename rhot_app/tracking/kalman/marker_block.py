@@ -65,6 +65,8 @@ def _associate(shared: Share, page: Share) -> int:
     sighting: Sighting = shared.of
     there: Page = page.of
     changed = relabel(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
+    if changed > 0:
+        there.estimate.untroubled[0] = 0.0
     doubt_partial(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
     leave_out_covered(sighting.worn, sighting.cameras, sighting.frame, there.estimate, sighting.made)
     return changed

@@ -53,6 +53,9 @@ OWN = 0.5
 another one as well. The rest moves markers in all pictures alike: their biases, which the filter knows anyway.
 (Measured: a fifth, but one that lasts for some frames.) What is half hidden is better understood with caution."""
 
+CALM_S = 0.5
+"""So is what is seen this soon after a sight that had another name or was not believed as it was."""
+
 
 class View(NamedTuple):
     """One camera's sight of a marker that the hand has at some place: `residual` (2,) px and `slope` (2, 3) px/m."""
@@ -71,7 +74,7 @@ def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate
     camera, count = frame.camera[0], worn.part.shape[0]
     points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
     place_markers(worn, estimate, points, jacobian)
-    alike = True  # everything is in plain view of two cameras
+    alike = estimate.untroubled[0] > CALM_S  # and everything is in plain view of two cameras
     for sight in range(count):
         frame.doubt[sight], frame.own[sight], frame.covered[sight] = 0.0, 1.0, False
         if not frame.seen[sight] or not frame.widths[sight] > 0.0:

@@ -16,7 +16,17 @@ from rhot_app.simulator.motion import FACING
 from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_WIDTH, POSE, empty_estimate
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.markers import place_markers, project_marker
-from rhot_app.tracking.kalman.partial import AGREE, LESS, MISS_PX, OWN, View, disagreement, doubt_partial, metres_per_px
+from rhot_app.tracking.kalman.partial import (
+    AGREE,
+    CALM_S,
+    LESS,
+    MISS_PX,
+    OWN,
+    View,
+    disagreement,
+    doubt_partial,
+    metres_per_px,
+)
 from rhot_app.tracking.kalman.sighted import FRESH_S
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_node.wire.messages import MarkerFlag
@@ -131,11 +141,13 @@ def test_what_is_no_standard_raises_no_doubt(reason):
 ABREAST = np.array([[[900.0, 0.0, 60.0], [0.0, 900.0, 20.0]], [[900.0, 0.0, -60.0], [0.0, 900.0, 20.0]]])  # px/m
 
 
-@pytest.mark.parametrize(("other", "flag", "away_s", "own"), [
-    ({}, 0, 0.0, OWN), ({INDEX: 0.5}, int(MarkerFlag.EDGE), 0.0, 1.0), ({}, 0, 1.1 * FRESH_S, 1.0)],
-    ids=["in plain view", "one flagged", "seen before"])
-def test_half_of_the_noise_is_both_cameras_while_both_see_the_whole_hand(other, flag, away_s, own):
+@pytest.mark.parametrize(("other", "flag", "away_s", "calm_s", "own"), [
+    ({}, 0, 0.0, 1.1 * CALM_S, OWN), ({INDEX: 0.5}, int(MarkerFlag.EDGE), 0.0, 1.1 * CALM_S, 1.0),
+    ({}, 0, 1.1 * FRESH_S, 1.1 * CALM_S, 1.0), ({}, 0, 0.0, 0.9 * CALM_S, 1.0)],
+    ids=["in plain view", "one flagged", "seen before", "after trouble"])
+def test_half_of_the_noise_is_both_cameras_while_both_see_the_whole_hand(other, flag, away_s, calm_s, own):
     estimate = hand()
+    estimate.untroubled[0] = calm_s
     first = seen(estimate, 0, other, flag=flag)
     judged(first, estimate)
     assert (first.frame.own == 1.0).all()  # nobody else has seen anything yet
