@@ -20,10 +20,11 @@ from rhot_app.keys import load_master_keys
 from rhot_node.config import NodeSettings, save_settings
 from rhot_node.trust import keys_path, pair_beforehand
 
-READY_TIMEOUT_S = 90.0
-"""The first start of all compiles the detector; later ones take about two seconds."""
+READY_TIMEOUT_S = 300.0
+"""The first start of all compiles the detector, minutes on a busy machine; later ones take about two seconds."""
 
 _END_TIMEOUT_S = 3.0
+_CLOSING_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +82,7 @@ class TwinNode:
         if self._ports is None:
             line = _read_line(self._process.stdout, deadline_s)
             if line is None:
-                raise SimulatorError(f"the simulated node {self.name} did not become ready: {self._last_words()}")
+                raise SimulatorError(self._why_not_ready())
             try:
                 ready = json.loads(line)
                 self._ports = NodePorts(ready["udp_port"], ready["control_port"], ready["preview_port"],
@@ -89,6 +90,14 @@ class TwinNode:
             except (ValueError, KeyError) as exc:
                 raise SimulatorError(f"the simulated node {self.name} said {line!r} instead of its ports.") from exc
         return self._ports
+
+    def _why_not_ready(self) -> str:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_CLOSING_S)  # the pipe of one that ends closes a moment before
+        if not self.alive:
+            return f"the simulated node {self.name} ended before it was ready: {self._last_words()}"
+        return (f"the simulated node {self.name} was not ready in time: compiling its detector takes minutes where "
+                f"others need the processors as well. What is compiled is kept; start again (log: {self._log_path}).")
 
     def _last_words(self) -> str:
         with contextlib.suppress(OSError):

@@ -105,7 +105,7 @@ class WelcomePage(QWidget):
         self.progress_bar.setRange(0, 100)
         self.progress_bar.setTextVisible(False)
         self.progress_bar.setFixedWidth(420)
-        self.compile_note = QLabel("The first start of all takes up to a minute: the numerical code is compiled once.")
+        self.compile_note = QLabel("The first start of all may take some minutes: the numerical code is compiled once.")
         self.compile_note.setProperty("muted", True)
         self.compile_note.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         self.cancel_button = QPushButton("Cancel")

@@ -32,7 +32,7 @@ from rhot_app.project import Rig, load_rig, parse_rig
 
 ENGINE_ROLE = "engine"
 TWIN_ROLE = "simulated nodes"
-START_TIMEOUT_S = 180.0
+START_TIMEOUT_S = 360.0
 """The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
 
 TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.live")
