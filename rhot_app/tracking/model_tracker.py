@@ -271,8 +271,7 @@ class ModelTracker:
             angle_knowledge=report.angle_knowledge, world_from_palm=estimate.world.copy(),
             palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors,
             joint_covariances=covariances[:FIRST_TIP], fingertip_covariances=covariances[FIRST_TIP:FIRST_MARKER],
-            angle_sd=report.angle_sd, palm_covariance=report.palm_covariance,
-            hand_scale=math.exp(estimate.log_scale[0]),
+            angle_sd=report.angle_sd, palm_covariance=report.palm_covariance, hand_scale=math.exp(estimate.log_scale[0]),
             hand_scale_sd=math.sqrt(max(estimate.covariance[SCALE, SCALE], 0.0)),
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
