@@ -269,9 +269,9 @@ class ModelTracker:
             joint_positions=points[:FIRST_TIP], joint_knowledge=report.joint_knowledge,
             fingertip_positions=points[FIRST_TIP:FIRST_MARKER], angles=estimate.angles.copy(),
             angle_knowledge=report.angle_knowledge, world_from_palm=estimate.world.copy(),
-            palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors,
+            palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors, angle_sd=report.angle_sd,
             joint_covariances=covariances[:FIRST_TIP], fingertip_covariances=covariances[FIRST_TIP:FIRST_MARKER],
-            angle_sd=report.angle_sd, palm_covariance=report.palm_covariance, hand_scale=math.exp(estimate.log_scale[0]),
+            palm_covariance=report.palm_covariance, hand_scale=math.exp(estimate.log_scale[0]),
             hand_scale_sd=math.sqrt(max(estimate.covariance[SCALE, SCALE], 0.0)),
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
