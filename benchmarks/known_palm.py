@@ -90,6 +90,8 @@ def main() -> int:
     parser.add_argument("--motion", default="grasp")
     parser.add_argument("--markers", default="rhot6", metavar="SET")
     args = parser.parse_args()
+    if args.seeds < 1:
+        parser.error("--seeds must be 1 or more")
     settings = msgspec.structs.replace(twin_defaults(), markers=args.markers)
     print(f"{'fingertips mm rms (worst)':28s}{'as it is':>16s}{'palm known':>16s}")
     try:

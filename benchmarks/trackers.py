@@ -175,6 +175,8 @@ def main() -> int:
     parser.add_argument("--logs", type=Path, metavar="DIR", default=takes_folder())
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
+    if args.seeds < 1:
+        parser.error("--seeds must be 1 or more")
     bench = Bench(tuple(range(args.seed, args.seed + args.seeds)), args.seconds, args.markers, args.sketched, args.logs,
                   args.minutes, args.motion)
     done: dict[str, Results] = {}

@@ -48,7 +48,7 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 class Subject(NamedTuple):
     """What states tell of, unchanging: `dh`, the hand's table with P = 26 + M points: joints, fingertips, M markers;
     `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in
-    `RigArrays`."""
+    `RigArrays`; `usual` (27,): variances of the pose by habit."""
 
     dh: DhArrays
     part: Indices
@@ -56,6 +56,7 @@ class Subject(NamedTuple):
     cameras: Cameras
     focal: Array
     shapes: Array
+    usual: Array
 
 
 class Report(NamedTuple):
@@ -78,7 +79,8 @@ def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
     one, other = wearing.model.dh, wearing.worn.dh
     dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
                       point_offset=np.concatenate([one.point_offset, other.point_offset]))
-    return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes)
+    return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes,
+                   np.diag(wearing.habits.usual).copy())
 
 
 def empty_report(markers: int) -> Report:
@@ -103,7 +105,7 @@ def describe(account: Share, fresh_ns: int, t_ns: int, report: Report) -> bool:
     `fresh_ns` are not of now. One call for all that is told of a state: each costs some microseconds."""
     told: Account = account.of
     estimate, subject, seen = told.estimate, told.subject, told.seen
-    world, covariance, count = estimate.world, _known_of(estimate), report.points.shape[0]
+    world, covariance, count = estimate.world, _known_of(estimate, subject.usual), report.points.shape[0]
     jacobian = np.empty((count, 3, POSE))
     _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
     _cover_all(world, covariance, jacobian, report.points, report.covariances)
@@ -119,14 +121,20 @@ def describe(account: Share, fresh_ns: int, t_ns: int, report: Report) -> bool:
 
 
 @njit(cache=True)
-def _known_of(estimate: Estimate) -> Array:
-    """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as it is told."""
+def _known_of(estimate: Estimate, usual: Array) -> Array:
+    """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as it is told: no angle is known
+    less than by habit, whose variances are `usual` (27,)."""
     covariance, out = estimate.covariance, np.empty((POSE + 1, POSE + 1))
     for i in range(POSE):
         for j in range(POSE):
             out[i, j] = covariance[i, j] + DOUBTED * estimate.left_open[i, j]
         out[i, POSE], out[POSE, i] = covariance[i, SCALE], covariance[SCALE, i]
     out[POSE, POSE] = covariance[SCALE, SCALE]
+    for i in range(ANGLES, POSE):
+        if out[i, i] > usual[i]:
+            known = math.sqrt(usual[i] / out[i, i])
+            out[i] *= known
+            out[:, i] *= known
     return out
 
 

@@ -283,3 +283,14 @@ def test_classic_and_model_tracker_are_exchangeable():
     for name in type(found[0]).__dataclass_fields__:
         a, b = (getattr(state, name) for state in found)
         assert np.shape(a) == np.shape(b) if isinstance(a, np.ndarray) else type(a) is type(b), name
+
+
+def test_no_angle_is_known_less_than_by_habit_however_little_is_seen():
+    def one_fingertip(t, _camera, _pixels, flags):
+        if t > 0.5:
+            flags[1:] = LOST
+
+    last = states_of(RIG, altered(sights(RIG, moving(), 2.5), one_fingertip))[-1]
+    usual = np.sqrt(np.diag(compile_wearing(RIG).habits.usual)[6:])
+    assert (last.angle_sd <= 1.001 * usual).all() and (last.angle_sd > 0.5 * usual).any()
+    assert np.sqrt(np.trace(last.fingertip_covariances[3])) < 1.0

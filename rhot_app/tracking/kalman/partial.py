@@ -48,10 +48,10 @@ SHIFT, BAND_SHIFT = 1.0, 2.0
 longer than it is wide."""
 
 
-OWN = 0.5
+OWN = 0.7
 """Part of the variance that a node states which is this camera's alone, while the whole hand is in plain view of
 another one as well. The rest moves markers in all pictures alike: their biases, which the filter knows anyway.
-(Measured: a fifth, but one that lasts for some frames.) What is half hidden is better understood with caution."""
+(Measured: a fifth, but one that lasts for many frames.) What is half hidden is better understood with caution."""
 
 CALM_S = 0.5
 """So is what is seen this soon after a sight that had another name or was not believed as it was."""
@@ -83,13 +83,13 @@ def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate
         m = frame.label[sight]
         width = frame.widths[sight] * metres_per_px(worn, cameras, estimate, m, camera, points[m])
         rival = _widest_other(cameras, estimate, camera, m, points[m])
-        alike &= rival >= 0 and frame.plain[sight]
         missing = 1.0 - (width / max(width, estimate.looks[rival, m, LOOK_WIDTH])) ** 2 if rival >= 0 else 0.0
         if missing > AGREE:
             shift = SHIFT if worn.half_axes[m, 0] == worn.half_axes[m, 1] else BAND_SHIFT
             frame.doubt[sight] = (0.5 * shift * frame.widths[sight]) ** 2 * (missing**2 - AGREE**2)
         if missing > LESS:
             frame.covered[sight] = _misses(worn, cameras, frame, estimate, sight, rival, points[m], jacobian[m])
+        alike &= rival >= 0 and frame.plain[sight] and missing <= AGREE and not frame.covered[sight]
         _remember(estimate.looks[camera, m], frame, sight, width)
     if alike:
         frame.own[:] = OWN
