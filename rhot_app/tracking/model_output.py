@@ -30,6 +30,10 @@ _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED
 MEASURED_M, INFERRED_M = 3e-3, 12e-3
 """Standard deviation along the worst axis up to which a place counts as measured (when it was seen) and as inferred."""
 
+DOUBTED = 0.25
+"""Of a palm that turns, and of which only fingers show how, more is believed to be known than is: linearised anew with
+every frame, fingers that bend pass for a palm that turns. This part of what habit leaves open is told beside."""
+
 MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
 
 FIRST_TIP, FIRST_MARKER = 21, 26
@@ -44,7 +48,7 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 class Subject(NamedTuple):
     """What states tell of, unchanging: `dh`, the hand's table with P = 26 + M points: joints, fingertips, M markers;
     `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in
-    `RigArrays`."""
+    `RigArrays`; `usual` (27,): variances of the pose by habit."""
 
     dh: DhArrays
     part: Indices
@@ -52,6 +56,7 @@ class Subject(NamedTuple):
     cameras: Cameras
     focal: Array
     shapes: Array
+    usual: Array
 
 
 class Report(NamedTuple):
@@ -66,6 +71,7 @@ class Report(NamedTuple):
     joint_knowledge: Codes
     angle_knowledge: Codes
     palm: Codes  # (1,)
+    palm_covariance: Array  # (6, 6), palm translation m and rotation rad
 
 
 def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
@@ -73,7 +79,8 @@ def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
     one, other = wearing.model.dh, wearing.worn.dh
     dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
                       point_offset=np.concatenate([one.point_offset, other.point_offset]))
-    return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes)
+    return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes,
+                   np.diag(wearing.habits.usual).copy())
 
 
 def empty_report(markers: int) -> Report:
@@ -81,7 +88,7 @@ def empty_report(markers: int) -> Report:
     points = FIRST_MARKER + markers
     return Report(np.empty((points, 3)), np.empty((points, 3, 3)), np.empty((markers, 3)), np.empty(markers),
                   np.empty(21), np.empty(markers, np.uint8), np.empty(21, np.uint8), np.empty(21, np.uint8),
-                  np.empty(1, np.uint8))
+                  np.empty(1, np.uint8), np.empty((ANGLES, ANGLES)))
 
 
 class Account(NamedTuple):
@@ -98,7 +105,7 @@ def describe(account: Share, fresh_ns: int, t_ns: int, report: Report) -> bool:
     `fresh_ns` are not of now. One call for all that is told of a state: each costs some microseconds."""
     told: Account = account.of
     estimate, subject, seen = told.estimate, told.subject, told.seen
-    world, covariance, count = estimate.world, estimate.covariance, report.points.shape[0]
+    world, covariance, count = estimate.world, _known_of(estimate, subject.usual), report.points.shape[0]
     jacobian = np.empty((count, 3, POSE))
     _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
     _cover_all(world, covariance, jacobian, report.points, report.covariances)
@@ -111,6 +118,33 @@ def describe(account: Share, fresh_ns: int, t_ns: int, report: Report) -> bool:
         all_measured &= report.marker_knowledge[m] == _MEASURED
     _conclude(covariance, subject.part, report)
     return all_measured
+
+
+@njit(cache=True)
+def _known_of(estimate: Estimate, usual: Array) -> Array:
+    """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as it is told: no angle is known
+    less than by habit, whose variances are `usual` (27,)."""
+    covariance, out = estimate.covariance, np.empty((POSE + 1, POSE + 1))
+    for i in range(POSE):
+        for j in range(POSE):
+            out[i, j] = covariance[i, j] + DOUBTED * estimate.left_open[i, j]
+        out[i, POSE], out[POSE, i] = covariance[i, SCALE], covariance[SCALE, i]
+    out[POSE, POSE] = covariance[SCALE, SCALE]
+    for i in range(ANGLES, POSE):
+        _tell_of_habit(out, i, usual[i])
+    return out
+
+
+@njit(cache=True)
+def _tell_of_habit(covariance: Array, i: int, usual: float) -> None:
+    """Weigh so much of habit that number `i` is known to a variance of `usual`; nothing if it is already. What is known
+    of it together with others, as of a marker's place, stays known."""
+    excess = covariance[i, i] - usual
+    if excess > 0.0:
+        row = covariance[i] / covariance[i, i]
+        for j in range(row.shape[0]):
+            for k in range(row.shape[0]):
+                covariance[j, k] -= excess * row[j] * row[k]
 
 
 @njit(cache=True)
@@ -159,6 +193,7 @@ def _conclude(covariance: Array, part: Indices, report: Report) -> None:
         report.angle_sd[angle] = sd
         report.angle_knowledge[angle] = _know(sd, turn and shown[_FINGER_OF_ANGLE[angle] + 1] >= 2, MEASURED_RAD,
                                               INFERRED_RAD)
+    report.palm_covariance[:] = covariance[:ANGLES, :ANGLES]
     sd = _worst(covariance[ROTATION:ANGLES, ROTATION:ANGLES])
     report.palm[0] = _know(sd, turn, MEASURED_RAD, INFERRED_RAD)
 
@@ -178,9 +213,10 @@ def _worst(covariance: Array) -> float:
 
 @njit(cache=True)
 def _cover_all(world: Array, covariance: Array, jacobian: Array, points: Array, out: Array) -> None:
-    """Fill `out` (P, 3, 3) m^2 with the covariances of `points` (P, 3) m with `jacobian` (P, 3, 27)."""
+    """Fill `out` (P, 3, 3) m^2 with the covariances of `points` (P, 3) m with `jacobian` (P, 3, 27); `covariance`
+    (28, 28) as in `_known_of`."""
     columns, slopes = np.empty(POSE + 1, np.int64), np.empty((POSE + 1, 3))
-    scaled = covariance[SCALE, SCALE] > 0.0
+    scaled = covariance[POSE, POSE] > 0.0
     for p in range(points.shape[0]):
         count = 0
         for j in range(POSE):  # zeros cost nothing
@@ -190,7 +226,7 @@ def _cover_all(world: Array, covariance: Array, jacobian: Array, points: Array, 
                 slopes[count, 0], slopes[count, 1], slopes[count, 2] = x, y, z
                 count += 1
         if scaled:
-            columns[count] = SCALE
+            columns[count] = POSE
             for i in range(3):
                 slopes[count, i] = points[p, i] - world[i, 3]
             count += 1

@@ -253,7 +253,7 @@ class ModelTracker:
         return state
 
     def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
-        rig, sights, covariance = self._rig, self._sights, estimate.covariance
+        rig, sights = self._rig, self._sights
         told = self._told if estimate is self._hand.estimate else self._told_ahead
         solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
         complete = describe(told, sights.fresh_ns, t_ns, report)
@@ -269,10 +269,10 @@ class ModelTracker:
             joint_positions=points[:FIRST_TIP], joint_knowledge=report.joint_knowledge,
             fingertip_positions=points[FIRST_TIP:FIRST_MARKER], angles=estimate.angles.copy(),
             angle_knowledge=report.angle_knowledge, world_from_palm=estimate.world.copy(),
-            palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors,
+            palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors, angle_sd=report.angle_sd,
             joint_covariances=covariances[:FIRST_TIP], fingertip_covariances=covariances[FIRST_TIP:FIRST_MARKER],
-            angle_sd=report.angle_sd, palm_covariance=covariance[:ANGLES, :ANGLES].copy(),
-            hand_scale=math.exp(estimate.log_scale[0]), hand_scale_sd=math.sqrt(max(covariance[SCALE, SCALE], 0.0)),
+            palm_covariance=report.palm_covariance, hand_scale=math.exp(estimate.log_scale[0]),
+            hand_scale_sd=math.sqrt(max(estimate.covariance[SCALE, SCALE], 0.0)),
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
 

@@ -154,7 +154,8 @@ def test_it_stops_no_node_and_takes_none_over(attack: Attack) -> None:
 
 def test_it_moves_no_marker(attack: Attack) -> None:
     client, rig = attack.client, attack.bench.rig
-    wait_until(client, attack.tracks, PATIENCE_S, "states from both nodes")
+    wait_until(client, lambda: attack.tracks() and client.state is not None
+               and bool((client.state.marker_knowledge == Knowledge.MEASURED).all()), PATIENCE_S, "all markers' places")
     status, node = client.status, node_status(client, "left")
     assert status is not None and node is not None and node.clock_offset_s is not None and client.state is not None
     clock = NodeClock(round(1e9 * node.clock_offset_s))
@@ -168,7 +169,8 @@ def test_it_moves_no_marker(attack: Attack) -> None:
         for seal in (None, Seal(bytes(32))):
             attack.udp.sendto(encode(forged, seal), ("127.0.0.1", rig.nodes[0].data_port))
         states += [state for state in client.poll(0.005) if hasattr(state, "marker_positions")]
-    assert len(states) > 10
+    while len(states) <= 10:  # a busy machine solves few in half a second
+        states += [state for state in client.poll(0.05) if hasattr(state, "marker_positions")]
     for state in states:
         measured = state.marker_knowledge == Knowledge.MEASURED
         np.testing.assert_allclose(state.marker_positions[measured], before[measured], atol=0.004)

@@ -8,10 +8,8 @@ import pytest
 from modelled_hand import after_s, deviations, model_rig, moving, seconds, sights, states_of
 from synthetic_rig import EPOCH_NS, LOST, Sight, altered, make_rig, run
 
-from rhot_app.errors import RigError
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.project import DepthSettings
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.make import make_tracker
@@ -285,23 +283,3 @@ def test_classic_and_model_tracker_are_exchangeable():
     for name in type(found[0]).__dataclass_fields__:
         a, b = (getattr(state, name) for state in found)
         assert np.shape(a) == np.shape(b) if isinstance(a, np.ndarray) else type(a) is type(b), name
-
-
-def test_a_marker_without_a_place_on_the_hand_is_refused_with_a_sentence():
-    markers = (*RIG.markers.markers[:5], msgspec.structs.replace(RIG.markers.markers[5], role="elbow"))
-    rig = msgspec.structs.replace(RIG, markers=msgspec.structs.replace(RIG.markers, markers=markers))
-    with pytest.raises(RigError, match=r"marker '.*' has the role 'elbow'; a hand wears markers at thumb_tip"):
-        make_tracker(rig)
-
-
-def test_a_rig_without_calibration_is_refused_with_a_sentence():
-    rig = msgspec.structs.replace(RIG, depth=DepthSettings(mode="disparity"))
-    with pytest.raises(RigError, match=r"The model tracker needs calibrated cameras.*tracker\.kind"):
-        make_tracker(rig)
-
-
-def test_a_rig_with_text_datagrams_is_refused_with_a_sentence():
-    left, right = RIG.nodes
-    rig = msgspec.structs.replace(RIG, nodes=(left, msgspec.structs.replace(right, text_datagrams=True)))
-    with pytest.raises(RigError, match=rf"needs the time of every picture; node {right.name} .*tracker\.kind"):
-        make_tracker(rig)

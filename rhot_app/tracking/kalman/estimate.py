@@ -59,7 +59,9 @@ class Estimate(NamedTuple):
     (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s. `width` (M,) m: how wide paint on the inner
     side of the palm is known to be, 0 where nobody knows; `bias_variance` (M,) m^2: what the biases' variances tend to
     now (both: `covering.py`). `looks` (C, M, 5): what each camera saw of each marker last, its width m (0 where it says
-    little), place px (2), variance px^2, and s since then (`partial.py`).
+    little), place px (2), variance px^2, and s since then (`partial.py`). `left_open` (27, 27): what habit leaves to
+    the pose of a hand whose palm's turn only its fingers show, else zero (`forgetting.py`). `untroubled` (1,): s since
+    a sight was renamed, or not believed as it was.
     """
 
     world: Array
@@ -78,6 +80,8 @@ class Estimate(NamedTuple):
     width: Array
     bias_variance: Array
     looks: Array
+    left_open: Array
+    untroubled: Array
 
 
 def empty_estimate(cameras: int, markers: int) -> Estimate:
@@ -86,7 +90,8 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
                     np.zeros((size, size)), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1),
                     np.full((cameras, markers), UNSEEN_S), np.zeros(1, np.int64), np.zeros(1), np.zeros(markers),
-                    np.zeros(markers), np.zeros((cameras, markers, 5)))
+                    np.zeros(markers), np.zeros((cameras, markers, 5)), np.zeros((POSE, POSE)),
+                    np.zeros(1))
 
 
 def copy_estimate(source: Estimate, target: Estimate) -> None:

@@ -28,6 +28,7 @@ from rhot_app.tracking.kalman.estimate import (
     BIAS,
     FINGERS_HELD,
     FIRST_FINGER,
+    FREE,
     GROUP_OF,
     PALM_HELD,
     POSE,
@@ -36,6 +37,7 @@ from rhot_app.tracking.kalman.estimate import (
     Estimate,
 )
 from rhot_app.tracking.kalman.gain import Gain, project_rows, whiten
+from rhot_app.tracking.kalman.holding import ENOUGH
 from rhot_app.tracking.kalman.motion import Habits
 from rhot_app.tracking.kalman.sighted import FRESH_S
 
@@ -119,7 +121,7 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
         if how != FINGERS_HELD and _shown(jacobian) >= LEAST_SHOWN:
             constant = OPEN_S
             if how == PALM_HELD:
-                constant = SHAPE_S if _palm_shown(jacobian) else HIDDEN_S
+                constant = SHAPE_S if _palm_shown(jacobian) > 0 else HIDDEN_S
             _open_up(estimate, -math.expm1(-estimate.unfaded[0] / constant), habits, bias_variance, jacobian, step)
         fading = _fading(away)
         _fade(estimate.covariance, estimate.unfaded[0], fading)
@@ -127,6 +129,8 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
             _return_to_habits(estimate, estimate.unfaded[0], fading, habits, gain, step)
         mirror(estimate.covariance)  # rounding must not make it unsymmetric: what fades would let it grow
         estimate.unfaded[0] = 0.0
+    if how != FREE or _palm_shown(jacobian) >= ENOUGH:
+        estimate.left_open[:] = 0.0
 
 
 @njit(cache=True)
@@ -140,12 +144,13 @@ def _shown(jacobian: Array) -> int:
 
 
 @njit(cache=True)
-def _palm_shown(jacobian: Array) -> bool:
-    """Whether a marker is seen that goes with the palm alone."""
+def _palm_shown(jacobian: Array) -> int:
+    """How many markers are seen that go with the palm alone."""
+    count = 0
     for m in range(jacobian.shape[0]):
         if np.any(jacobian[m, :, :ROTATION] != 0.0) and not np.any(jacobian[m, :, ANGLES:] != 0.0):
-            return True
-    return False
+            count += 1
+    return count
 
 
 @njit(cache=True)
@@ -165,6 +170,7 @@ def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Ar
     """A `share` of the way back to habit, within the open directions."""
     covariance = estimate.covariance
     left_open = open_directions(jacobian, habits.usual, bias_variance)
+    estimate.left_open[:] = left_open[:POSE, :POSE]
     size, chosen = left_open.shape[0], left_open.shape[0] - POSE
     back = np.zeros((size, size))  # how far each number goes back, per how far each is from its habit
     back[:, ANGLES:POSE] = share * (np.ascontiguousarray(left_open[:, ANGLES:POSE]) @ habits.information)

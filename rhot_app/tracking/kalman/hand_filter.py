@@ -31,7 +31,7 @@ from rhot_app.tracking.kalman.holding import TURN_ALONE, hold, hold_size, hold_t
 from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
-from rhot_app.tracking.kalman.reappearing import loosen
+from rhot_app.tracking.kalman.reappearing import loosen, loosen_palm
 from rhot_app.tracking.kalman.rows import Page, ResidualBlock, Rows, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown, note_sights
@@ -133,7 +133,8 @@ class HandFilter:
         """Begin at a pose (4, 4) m and (21,) rad that something rougher has found, knowing little else."""
         estimate, covariance = self.estimate, self.estimate.covariance
         estimate.world[:], estimate.angles[:] = world_from_palm, np.clip(angles, *self._desk.limits.T)
-        for array in (estimate.velocity, estimate.acceleration, estimate.bias, estimate.trend, covariance):
+        for array in (estimate.velocity, estimate.acceleration, estimate.bias, estimate.trend, estimate.left_open,
+                      estimate.untroubled, covariance):
             array[:] = 0.0
         estimate.log_scale[0] = self._desk.size[0]
         estimate.agitation[:] = START_AGITATION
@@ -229,6 +230,7 @@ def _prepare(shared: Share, dt: float) -> None:
     rest(estimate, dt)
     hold_size(estimate.covariance, desk.held)
     loosen(estimate, part, rows, desk.habits.usual)
+    loosen_palm(estimate, rows, desk.habits.usual)
     appraise(rows, estimate, desk.habits.together, desk.believed, desk.widening)
     withhold(estimate.covariance, desk.held)
 

@@ -44,7 +44,7 @@ class MarkerBlock:
         self.frame = Frame(np.array([observations.camera]), np.empty(count, np.bool_), observations.pixels,
                            observations.covariances, np.empty(count), np.empty(count, np.int64),
                            observations.diameters if sized else np.zeros(count), observations.flags == 0,
-                           np.zeros(count, np.bool_), np.zeros(count))
+                           np.zeros(count, np.bool_), np.zeros(count), np.ones(count))
         self.shared = Share(Sighting(wearing.worn, wearing.cameras, self.frame, observations.flags,
                                      wearing.bias_variance))
         after_ns, self.sights = _read(self.shared, 1e-9 * observations.row_time_ns)
@@ -65,6 +65,8 @@ def _associate(shared: Share, page: Share) -> int:
     sighting: Sighting = shared.of
     there: Page = page.of
     changed = relabel(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
+    if changed > 0:
+        there.estimate.untroubled[0] = 0.0
     doubt_partial(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
     leave_out_covered(sighting.worn, sighting.cameras, sighting.frame, there.estimate, sighting.made)
     return changed

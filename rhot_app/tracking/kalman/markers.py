@@ -68,7 +68,8 @@ class Frame(NamedTuple):
     `covariances` (M, 2, 2); `late_s` (M,): when each was seen, s after the estimate's instant (before: negative).
     `label` (M,): which of the hand's markers the m-th sight is of. `widths` (M,) px: diameters of discs of their areas,
     0 where unknown; `plain` (M,): without any flag; `covered` (M,): shows too little of its marker to be weighed;
-    `doubt` (M,) px^2: how far off, per axis, what is covered of it may have brought it."""
+    `doubt` (M,) px^2: how far off, per axis, what is covered of it may have brought it; `own` (M,): the part of its
+    stated variance that is this camera's alone."""
 
     camera: Indices
     seen: NDArray[np.bool_]
@@ -80,6 +81,7 @@ class Frame(NamedTuple):
     plain: NDArray[np.bool_]
     covered: NDArray[np.bool_]
     doubt: Array
+    own: Array
 
 
 @njit(cache=True)
@@ -159,14 +161,14 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
                               cameras.intrinsics[camera], pixel, slope):
             pixel[:] = np.nan
             slope[:] = 0.0
-        strayed = straying(lively, worn.part[m])
+        strayed = straying(lively, worn.part[m]) * abs(late) ** 5 / (10.0 * ACCELERATION_S)
         for r in range(2):
             _fill(rows.jacobian[row + r], slope[r], jacobian[m], late, points[m], estimate, m)
             rows.residual[row + r] = frame.pixels[sight, r] - pixel[r]
             spread = slope[r, 0] ** 2 + slope[r, 1] ** 2 + slope[r, 2] ** 2
-            rows.noise[row + r, 0] = (frame.covariances[sight, r, r] + FLOOR_PX**2 + frame.doubt[sight]
-                                      + spread * strayed * abs(late) ** 5 / (10.0 * ACCELERATION_S))
-            rows.noise[row + r, 1] = frame.covariances[sight, 0, 1]
+            rows.noise[row + r, 0] = (frame.own[sight] * frame.covariances[sight, r, r] + FLOOR_PX**2
+                                      + frame.doubt[sight] + spread * strayed)
+            rows.noise[row + r, 1] = frame.own[sight] * frame.covariances[sight, 0, 1]
         rows.part[observation] = worn.part[m]
         rows.source[observation, 0], rows.source[observation, 1], rows.source[observation, 2] = camera, sight, m
         rows.first[observation + 1] = row + 2

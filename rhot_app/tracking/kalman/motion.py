@@ -103,6 +103,7 @@ def predict(estimate: Estimate, dt: float, part: Indices, habits: Habits, bias_v
     _move_covariance(estimate, dt)
     estimate.agitation[:] *= math.exp(-dt / CALM_S)
     estimate.unseen[:] += dt
+    estimate.untroubled[0] += dt
     estimate.looks[:, :, LOOK_AGE] += dt
     estimate.turning[0] = max(estimate.turning[0] * math.exp(-dt / TURNING_S), speeds(estimate)[TURN])
     estimate.width[:] *= math.exp(-dt / WIDTH_S)

@@ -1,4 +1,4 @@
-"""A finger that comes back into sight after a while: what seemed to be known of it meanwhile does not count."""
+"""What comes back into sight after a while: what seemed to be known of it meanwhile does not count."""
 
 from __future__ import annotations
 
@@ -16,14 +16,24 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.rows import Rows
+from rhot_app.tracking.kalman.gain import expected_noise
+from rhot_app.tracking.kalman.rows import PALM_PART, Rows
 from rhot_app.tracking.kalman.sighted import fingers_away
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 AWAY_S = 0.08
-"""A finger unseen for this long may be anywhere."""
+"""What was unseen for this long may be anywhere."""
+
+UNLIKELY = 4.0
+"""Squared normalised innovation (2 degrees of freedom) of a palm that is not where it was carried on to."""
+
+DRIFT_M_S = 1.0
+"""A palm out of sight strays no faster from where it is expected."""
+
+ELSEWHERE_M = 0.01
+"""A palm that is so far from where it was expected has other fingers than were expected, too."""
 
 SPEED, HASTE = 3.0, 30.0
 """Standard deviations of its angles' velocities, rad/s, and accelerations, rad/s^2."""
@@ -62,3 +72,36 @@ def forget_finger(estimate: Estimate, finger: int, usual: Array) -> None:
                     covariance[i, j] = usual[i, j]
             covariance[VELOCITY + i, VELOCITY + i] = SPEED * SPEED
             covariance[ACCELERATION + i, ACCELERATION + i] = HASTE * HASTE
+
+
+@njit(cache=True)
+def loosen_palm(estimate: Estimate, rows: Rows, usual: Array) -> None:
+    """Let a palm be where it is seen again, if it is not likely to be where it was carried on to.
+
+    It is the place that is wrong: were it not doubted, what is seen would be taken for an acceleration, and a palm that
+    has strayed by centimetres for one that moves at metres per second. Fingers were bent to suit the wrong place.
+    `usual` as in `loosen`.
+    """
+    noise, strayed = np.empty((rows.used[1], 3)), 0.0
+    known = False
+    for observation in range(rows.used[1]):
+        camera, marker = rows.source[observation, 0], rows.source[observation, 2]
+        if rows.part[observation] != PALM_PART or camera < 0 or estimate.unseen[camera, marker] < AWAY_S:
+            continue
+        if not known:
+            expected_noise(rows, estimate.covariance, noise)
+            known = True
+        row = rows.first[observation]
+        uu, uv, vv = noise[observation]
+        u, v = rows.residual[row], rows.residual[row + 1]
+        if (vv * u * u - 2.0 * uv * u * v + uu * v * v) / (uu * vv - uv * uv) > UNLIKELY:
+            slope = 0.0
+            for k in range(3):
+                slope += 0.5 * (rows.jacobian[row, k] ** 2 + rows.jacobian[row + 1, k] ** 2)
+            farthest = DRIFT_M_S * estimate.unseen[camera, marker]
+            strayed = max(strayed, min((u * u + v * v) / slope, farthest * farthest))
+    for k in range(3):
+        estimate.covariance[k, k] += strayed
+    if strayed > ELSEWHERE_M * ELSEWHERE_M:
+        for finger in range(FINGERS):
+            forget_finger(estimate, finger, usual)

@@ -92,6 +92,8 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
         value = _squared(rows, observation, noise, per_unit, added)
         believed[observation] = value < GATE
         widening[observation] = max(1.0, value / ROBUST)
+        if value > PLAUSIBLE:
+            estimate.untroubled[0] = 0.0
 
 
 @njit(cache=True)

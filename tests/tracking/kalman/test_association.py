@@ -1,8 +1,10 @@
 """Which marker a sight is of."""
 
-from known_hand import MARKERS, WEARING, next_frame
+import pytest
+from known_hand import MARKERS, WEARING, filter_of_hand, next_frame, twin
 
 from rhot_app.tracking.kalman.association import relabel
+from rhot_app.tracking.kalman.estimate import copy_estimate
 
 
 def carried():
@@ -44,3 +46,16 @@ def test_a_hand_that_jumps_as_a_whole_keeps_its_names():
     estimate, frame = carried()
     frame.pixels[:] += (25.0, 10.0)
     assert renamed(estimate, frame) == (0, list(range(MARKERS)))
+
+
+@pytest.mark.parametrize("trouble", ["none", "names exchanged", "one elsewhere"])
+def test_a_sight_that_is_not_what_it_says_troubles_the_hand(trouble):
+    hand, (estimate, block) = filter_of_hand(), next_frame()
+    copy_estimate(twin(estimate), hand.estimate)
+    if trouble == "names exchanged":
+        block.frame.pixels[[1, 2]], block.frame.late_s[[1, 2]] = block.frame.pixels[[2, 1]], block.frame.late_s[[2, 1]]
+    elif trouble == "one elsewhere":
+        block.frame.pixels[3] += (90.0, -60.0)
+    hand.estimate.untroubled[0] = 7.0
+    hand.update(0.0, [block])
+    assert hand.estimate.untroubled[0] == (7.0 if trouble == "none" else 0.0)

@@ -204,6 +204,20 @@ def test_a_palm_that_habit_turns_is_taken_to_turn_once_it_has_been_found(how, do
     assert (estimate.turning[0] > 0.01) == turns
 
 
+@pytest.mark.parametrize(("how", "knuckles", "told"), [(FREE, 0, True), (FREE, 2, False), (TURN_HELD, 0, False)])
+def test_what_is_open_of_a_palm_that_only_fingers_show_to_turn_is_told(how, knuckles, told):
+    estimate, step = moving_estimate(), np.zeros(SIZE)
+    estimate.held[0], estimate.left_open[:] = how, 7.0
+    jacobian = marker_jacobian(estimate)
+    jacobian[:knuckles] = jacobian[WRIST]  # so many more markers on the palm
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
+    if told:
+        np.testing.assert_array_equal(estimate.left_open,
+                                      open_directions(jacobian, HABITS.usual, BIAS_VARIANCE)[:POSE, :POSE])
+    else:
+        assert not estimate.left_open.any()
+
+
 def test_a_hand_of_which_hardly_anything_is_seen_is_not_opened():
     estimate, step = bent(0.5), np.zeros(SIZE)
     jacobian = np.zeros((MARKERS, 3, POSE))

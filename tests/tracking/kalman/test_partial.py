@@ -16,7 +16,17 @@ from rhot_app.simulator.motion import FACING
 from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_WIDTH, POSE, empty_estimate
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.markers import place_markers, project_marker
-from rhot_app.tracking.kalman.partial import AGREE, LESS, MISS_PX, View, disagreement, doubt_partial, metres_per_px
+from rhot_app.tracking.kalman.partial import (
+    AGREE,
+    CALM_S,
+    LESS,
+    MISS_PX,
+    OWN,
+    View,
+    disagreement,
+    doubt_partial,
+    metres_per_px,
+)
 from rhot_app.tracking.kalman.sighted import FRESH_S
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_node.wire.messages import MarkerFlag
@@ -38,11 +48,10 @@ def with_a_band():
 WEARING = with_a_band()
 
 
-def hand(speed_m_s=0.0):
+def hand():
     estimate = empty_estimate(2, COUNT)
     estimate.world[:3, :3], estimate.world[:3, 3] = FACING, (0.03, 0.08, 0.6)
     estimate.angles[:] = neutral_pose().angles
-    estimate.velocity[0] = speed_m_s
     estimate.unseen[:] = 0.0
     return estimate
 
@@ -105,7 +114,7 @@ def test_a_smaller_sight_whose_ray_misses_the_other_is_left_out():
 
 def test_a_hand_in_motion_is_where_it_is_seen_by_both_at_their_own_times():
     for speed, expected in ((1.0, []), (0.0, [INDEX])):  # the second one is told that the hand stands still
-        estimate = hand(1.0)
+        estimate = hand()
         estimate.world[:3, :3] = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1.0]]) @ estimate.world[:3, :3]
         estimate.velocity[:2] = 0.0, 1.0
         first = seen(estimate, 0, late_s=-0.012)
@@ -130,6 +139,22 @@ def test_what_is_no_standard_raises_no_doubt(reason):
 
 
 ABREAST = np.array([[[900.0, 0.0, 60.0], [0.0, 900.0, 20.0]], [[900.0, 0.0, -60.0], [0.0, 900.0, 20.0]]])  # px/m
+
+
+@pytest.mark.parametrize(("other", "flag", "away_s", "calm_s", "own"), [
+    ({}, 0, 0.0, 1.1 * CALM_S, OWN), ({INDEX: 0.5}, int(MarkerFlag.EDGE), 0.0, 1.1 * CALM_S, 1.0),
+    ({}, 0, 1.1 * FRESH_S, 1.1 * CALM_S, 1.0), ({}, 0, 0.0, 0.9 * CALM_S, 1.0)],
+    ids=["in plain view", "one flagged", "seen before", "after trouble"])
+def test_half_of_the_noise_is_both_cameras_while_both_see_the_whole_hand(other, flag, away_s, calm_s, own):
+    estimate = hand()
+    estimate.untroubled[0] = calm_s
+    first = seen(estimate, 0, other, flag=flag)
+    judged(first, estimate)
+    assert (first.frame.own == 1.0).all()  # nobody else has seen anything yet
+    estimate.looks[:, :, LOOK_AGE] += away_s
+    second = seen(estimate, 1)
+    judged(second, estimate)
+    assert (second.frame.own == own).all()
 
 
 @given(arrays(float, (2, 2, 3), elements=st.floats(-50.0, 50.0)), arrays(float, 3, elements=st.floats(-0.05, 0.05)))

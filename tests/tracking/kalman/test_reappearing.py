@@ -1,14 +1,24 @@
-"""What is forgotten of a finger that comes back into sight."""
+"""What is forgotten of a finger that comes back into sight, and of a palm."""
 
 import numpy as np
 import pytest
-from known_hand import SIZE, WEARING, moving_estimate, sighting
+from known_hand import SIZE, WEARING, filter_of_hand, moving_estimate, settled, sighting, twin
 
 from rhot_app.hand.skeleton import ANGLE_SLICES
-from rhot_app.tracking.kalman.estimate import ACCELERATION, ANGLES, VELOCITY
-from rhot_app.tracking.kalman.reappearing import AWAY_S, HASTE, SPEED, forget_finger, loosen
+from rhot_app.tracking.kalman.estimate import ACCELERATION, ANGLES, SCALE, VELOCITY, copy_estimate
+from rhot_app.tracking.kalman.reappearing import (
+    AWAY_S,
+    DRIFT_M_S,
+    ELSEWHERE_M,
+    HASTE,
+    SPEED,
+    forget_finger,
+    loosen,
+    loosen_palm,
+)
 
 PART, USUAL = WEARING.worn.part, WEARING.habits.usual
+WRIST = WEARING.roles.index("wrist")
 
 
 def own(finger):
@@ -75,3 +85,67 @@ def test_forgetting_a_finger_asks_nobody():
     before = estimate.covariance.copy()
     forget_finger(estimate, 4, USUAL)
     assert_forgotten(estimate.covariance, before, 4)
+
+
+PX_PER_M = 900.0
+
+
+def off_by(metres):
+    """The wrist is seen by the first camera so far across its line of sight from where it is expected."""
+    rows = sighting((0, 1), (0, WRIST))
+    rows.jacobian[2, 0] = rows.jacobian[3, 1] = PX_PER_M
+    rows.residual[3] = metres * PX_PER_M
+    rows.noise[:, 0] = 0.05**2
+    return rows
+
+
+def palm_back(metres, away_s):
+    """What an estimate knows, and knew, whose wrist is seen again after `away_s`."""
+    estimate = moving_estimate()
+    estimate.covariance[:] = 1e-6 * np.eye(SIZE)
+    estimate.unseen[:] = 0.0
+    estimate.unseen[0, WRIST] = away_s
+    before = estimate.covariance.copy()
+    loosen_palm(estimate, off_by(metres), USUAL)
+    return estimate.covariance, before
+
+
+def test_a_palm_that_is_back_elsewhere_may_be_there_with_other_fingers():
+    covariance, before = palm_back(0.04, 0.3)
+    np.testing.assert_allclose(np.diag(covariance)[:3], 1e-6 + 0.04**2, rtol=1e-6)
+    before[np.arange(3), np.arange(3)] = np.diag(covariance)[:3]
+    assert_forgotten(covariance, before, *range(5))
+
+
+def test_a_palm_that_is_back_near_by_has_the_fingers_that_it_had():
+    covariance, before = palm_back(0.9 * ELSEWHERE_M, 0.3)
+    assert covariance[0, 0] > 50.0 * before[0, 0]
+    np.testing.assert_array_equal(covariance[3:, 3:], before[3:, 3:])
+
+
+@pytest.mark.parametrize(("metres", "away_s"), [(0.0015, 0.3), (0.04, 0.9 * AWAY_S)], ids=["as expected", "not away"])
+def test_a_palm_that_is_where_it_was_expected_or_was_never_away_is_not_doubted(metres, away_s):
+    covariance, before = palm_back(metres, away_s)
+    np.testing.assert_array_equal(covariance, before)
+
+
+def test_a_palm_strays_no_faster_than_palms_do():
+    covariance, _ = palm_back(0.5, 0.1)
+    np.testing.assert_allclose(np.diag(covariance)[:3], 1e-6 + (0.1 * DRIFT_M_S) ** 2)
+
+
+def test_a_palm_that_strayed_is_put_where_it_is_seen_and_not_set_going():
+    """Taken for an acceleration, 4 cm would be several metres per second."""
+    hand, (estimate, block) = filter_of_hand(), settled()
+    copy_estimate(twin(estimate), hand.estimate)
+    there = estimate.world[:3, 3].copy()
+    hand.estimate.world[:2, 3] += 0.03, 0.025
+    hand.estimate.covariance[:3] = 0.0
+    hand.estimate.covariance[:, :3] = 0.0
+    hand.estimate.covariance[np.arange(3), np.arange(3)] = 0.005**2
+    hand.estimate.unseen[:, WRIST] = 0.4
+    speed = hand.estimate.velocity[:3].copy()
+    hand.update(0.0, [block])
+    assert np.linalg.norm(hand.estimate.world[:2, 3] - there[:2]) < 0.01
+    assert np.linalg.norm(hand.estimate.velocity[:3] - speed) < 0.3
+    assert np.isfinite(hand.estimate.covariance[:SCALE]).all()

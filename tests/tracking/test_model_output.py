@@ -1,0 +1,48 @@
+"""What the model tracker tells of how well it knows things."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from modelled_hand import model_rig, moving, sights, states_of
+from synthetic_rig import LOST, altered
+
+from rhot_app.tracking.kalman.wearing import compile_wearing
+from rhot_app.tracking.model_output import _tell_of_habit
+from rhot_app.tracking.state import Knowledge
+
+RIG = model_rig()
+
+
+def test_no_angle_is_known_less_than_by_habit_however_little_is_seen():
+    def one_fingertip(t, _camera, _pixels, flags):
+        if t > 0.5:
+            flags[1:] = LOST
+
+    last = states_of(RIG, altered(sights(RIG, moving(), 2.5), one_fingertip))[-1]
+    usual = np.sqrt(np.diag(compile_wearing(RIG).habits.usual)[6:])
+    assert (last.angle_sd <= 1.001 * usual).all() and (last.angle_sd > 0.5 * usual).any()
+    assert np.sqrt(np.trace(last.fingertip_covariances[3])) < 1.0
+
+
+def test_markers_in_plain_view_stay_measured_while_the_joints_behind_them_are_open():
+    states = states_of(RIG, sights(RIG, moving("rest"), 1.0))[10:]
+    usual = np.sqrt(np.diag(compile_wearing(RIG).habits.usual)[6:])
+    assert any((state.angle_sd > 0.999 * usual).any() for state in states)
+    for state in states:
+        assert (state.marker_knowledge == Knowledge.MEASURED).all()
+
+
+@given(seed=st.integers(0, 2**32 - 1), column=st.integers(0, 5), usual=st.floats(1e-3, 10.0))
+def test_telling_of_habit_adds_knowledge_and_takes_none_away(seed, column, usual):
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(6, 6))
+    known = rng.normal(size=6)
+    known /= np.linalg.norm(known)
+    root -= 0.999 * np.outer(known, known @ root)  # this combination is known well
+    before = root @ root.T
+    after = before.copy()
+    _tell_of_habit(after, column, usual)
+    assert after[column, column] <= usual * (1 + 1e-9) or after[column, column] == before[column, column]
+    assert np.linalg.eigvalsh(before - after).min() > -1e-9 * np.trace(before)
+    assert np.linalg.eigvalsh(after).min() > -1e-9 * np.trace(before)
+    assert known @ after @ known <= known @ before @ known + 1e-9 * np.trace(before)

@@ -1,0 +1,31 @@
+"""Rigs that the model tracker cannot work with are refused with a sentence."""
+
+import msgspec
+import pytest
+from modelled_hand import model_rig
+
+from rhot_app.errors import RigError
+from rhot_app.project import DepthSettings
+from rhot_app.tracking.make import make_tracker
+
+RIG = model_rig()
+
+
+def test_a_marker_without_a_place_on_the_hand_is_refused():
+    markers = (*RIG.markers.markers[:5], msgspec.structs.replace(RIG.markers.markers[5], role="elbow"))
+    rig = msgspec.structs.replace(RIG, markers=msgspec.structs.replace(RIG.markers, markers=markers))
+    with pytest.raises(RigError, match=r"marker '.*' has the role 'elbow'; a hand wears markers at thumb_tip"):
+        make_tracker(rig)
+
+
+def test_a_rig_without_calibration_is_refused():
+    rig = msgspec.structs.replace(RIG, depth=DepthSettings(mode="disparity"))
+    with pytest.raises(RigError, match=r"The model tracker needs calibrated cameras.*tracker\.kind"):
+        make_tracker(rig)
+
+
+def test_a_rig_with_text_datagrams_is_refused():
+    left, right = RIG.nodes
+    rig = msgspec.structs.replace(RIG, nodes=(left, msgspec.structs.replace(right, text_datagrams=True)))
+    with pytest.raises(RigError, match=rf"needs the time of every picture; node {right.name} .*tracker\.kind"):
+        make_tracker(rig)
