@@ -100,21 +100,21 @@ class Account(NamedTuple):
 
 
 @njit(cache=True)
-def describe(account: Share, fresh_ns: int, t_ns: int, report: Report) -> bool:
-    """Fill `report` from a shared `Account` of `t_ns`; returns whether all markers are measured. Sights older than
-    `fresh_ns` are not of now. One call for all that is told of a state: each costs some microseconds."""
+def describe(account: Share, t_ns: int, report: Report) -> bool:
+    """Fill `report` from a shared `Account` of `t_ns`; returns whether all markers are measured. One call for all
+    that is told of a state: each costs some microseconds."""
     told: Account = account.of
     estimate, subject, seen = told.estimate, told.subject, told.seen
     world, covariance, count = estimate.world, _known_of(estimate, subject.usual), report.points.shape[0]
     jacobian = np.empty((count, 3, POSE))
     _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
     _cover_all(world, covariance, jacobian, report.points, report.covariances)
-    _locate(world, estimate.velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, fresh_ns,
-            t_ns, report)
+    _locate(world, estimate.velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, t_ns,
+            report)
     all_measured = True
     for m in range(count - FIRST_MARKER):
         report.marker_knowledge[m] = _know(_worst(report.covariances[FIRST_MARKER + m]),
-                                           seen_clearly(seen, t_ns, fresh_ns, m), MEASURED_M, INFERRED_M)
+                                           seen_clearly(seen, t_ns, m), MEASURED_M, INFERRED_M)
         all_measured &= report.marker_knowledge[m] == _MEASURED
     _conclude(covariance, subject.part, report)
     return all_measured
@@ -162,12 +162,12 @@ def _place(world: Array, angles: Array, scale: float, dh: DhArrays, points: Arra
 
 
 @njit(cache=True)
-def _locate(world: Array, velocity: Array, subject: Subject, markers: Array, jacobian: Array, seen: Seen, fresh_ns: int,
-            t_ns: int, report: Report) -> None:
+def _locate(world: Array, velocity: Array, subject: Subject, markers: Array, jacobian: Array, seen: Seen, t_ns: int,
+            report: Report) -> None:
     """Where the sights alone have the markers: they are of several instants, and the hand says how it moved since."""
     shape, cameras = seen.times.shape, subject.cameras
     pixels, used = np.empty((shape[0], shape[1], 2)), np.empty(shape, np.bool_)
-    bring_together(subject.half_axes, cameras, world, velocity, markers, jacobian, t_ns, seen, fresh_ns, pixels, used)
+    bring_together(subject.half_axes, cameras, world, velocity, markers, jacobian, t_ns, seen, pixels, used)
     locate_all(pixels, seen.covariances, used, cameras.intrinsics, cameras.pose, subject.focal, subject.shapes,
                report.raw, np.empty((shape[1], 3, 3)), report.errors)
 

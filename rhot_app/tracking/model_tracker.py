@@ -18,7 +18,15 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
-from rhot_app.tracking.kalman.estimate import ANGLES, ROTATION, SCALE, Estimate, copy_estimate, empty_estimate
+from rhot_app.tracking.kalman.estimate import (
+    ANGLES,
+    ORDINARY_S,
+    ROTATION,
+    SCALE,
+    Estimate,
+    copy_estimate,
+    empty_estimate,
+)
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
@@ -34,11 +42,11 @@ from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
 
-LOST_AFTER_NS = 500_000_000
-"""No sight believed for this long: the hand is lost, and looked for anew."""
+LOST_AFTER_NS, LOST_AFTER_PERIODS = 500_000_000, 5.0
+"""No sight believed for this long, or for so many frame periods: the hand is lost, and looked for anew."""
 
-WRONG_AFTER_NS = 100_000_000
-"""Most sights disbelieved for this long: it is the hand that is wrong, not the sights."""
+WRONG_AFTER_NS, WRONG_AFTER_PERIODS = 100_000_000, 3.0
+"""Most sights disbelieved for this long, or for so many frame periods: it is the hand that is wrong, not the sights."""
 
 FARTHEST_AHEAD_S = 0.1
 """Predictions beyond this say little."""
@@ -161,12 +169,20 @@ class ModelTracker:
         if not self._tracking:
             self._look_for_hand()
             return True
+        period_ns = 1e9 * self._pace()
         self.observe(block)
         self._look_at_thumb()
-        if self._timeline.t_ns - self._believed_ns > LOST_AFTER_NS or (
-                self._timeline.t_ns - self._plausible_ns > WRONG_AFTER_NS) or self._hand.astray:
+        if (self._timeline.t_ns - self._believed_ns > max(LOST_AFTER_NS, LOST_AFTER_PERIODS * period_ns)
+                or self._timeline.t_ns - self._plausible_ns > max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns)
+                or self._hand.astray):
             self._give_up()
         return True
+
+    def _pace(self) -> float:
+        """Let the estimate know how fast the cameras are; returns the quickest one's frame period, s."""
+        periods_s = self._sights.periods_s
+        np.minimum(ORDINARY_S / periods_s, 1.0, out=self._hand.estimate.pace)
+        return float(periods_s.min())
 
     def _compare(self, estimated: Array) -> None:
         """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them."""
@@ -256,7 +272,7 @@ class ModelTracker:
         rig, sights = self._rig, self._sights
         told = self._told if estimate is self._hand.estimate else self._told_ahead
         solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
-        complete = describe(told, sights.fresh_ns, t_ns, report)
+        complete = describe(told, t_ns, report)
         points, covariances = report.points, report.covariances
         seen_pixels, seen_flags = sights.last_seen()
         self._sequence += 1

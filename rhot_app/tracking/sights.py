@@ -28,7 +28,8 @@ UNLIKELY = PLAUSIBLE / ROBUST
 
 _SAME_FRAME_NS = 1_000_000
 _RECENT = 12
-_PERIODS = 1.5
+_PERIODS, _LEARN = 1.5, 0.1
+_FRESH_NS = 60_000_000  # before a camera's second frame
 _SLOWEST_NS = 400_000_000
 _LOST = int(MarkerFlag.LOST)
 _NEVER = -(1 << 62)  # ns
@@ -37,22 +38,24 @@ _NEVER = -(1 << 62)  # ns
 class Seen(NamedTuple):
     """The last believed sight of each of M markers by each of C cameras: `times` (C, M) ns, -1 for never; `pixels`
     (C, M, 2) raw px with `covariances` (C, M, 2, 2); `doubtful` (C, M), for what its flags say, for how unlikely it
-    was, or because another camera sees more of it."""
+    was, or because another camera sees more of it. `fresh_ns` (C,): how old a sight may be that counts as of now."""
 
     times: Indices
     pixels: Array
     covariances: Array
     doubtful: Mask
+    fresh_ns: Indices
 
 
 class Sights:
-    """C cameras, M markers. `seen`: what was believed; `fresh_ns`: how old a sight may be that counts as of now;
-    `newest`: each camera's newest frame."""
+    """C cameras, M markers. `seen`: what was believed; `newest`: each camera's newest frame; `periods_s` (C,): from one
+    frame to the next."""
 
     def __init__(self, cameras: int, markers: int) -> None:
         shape = (cameras, markers)
         self.seen = Seen(np.empty(shape, np.int64), np.empty((*shape, 2)), np.empty((*shape, 2, 2)),
-                         np.empty(shape, np.bool_))
+                         np.empty(shape, np.bool_), np.empty(cameras, np.int64))
+        self.periods_s = np.empty(cameras)
         self._shared = Share(self.seen)
         self._newest_pixels, self._newest_flags = np.empty((*shape, 2)), np.empty(shape, np.uint16)
         self.reset()
@@ -61,7 +64,8 @@ class Sights:
         """Forget all; `seen` stays the same arrays."""
         self.seen.times[:], self.seen.pixels[:], self.seen.covariances[:], self.seen.doubtful[:] = (
             -1, np.nan, np.eye(2), False)
-        self.fresh_ns = 60_000_000
+        self.seen.fresh_ns[:], self.periods_s[:] = _FRESH_NS, 1e-9 * _FRESH_NS / _PERIODS
+        self._paced = [False] * len(self._newest_flags)
         self.newest: list[CameraObservations | None] = [None] * len(self._newest_flags)
         self._newest_pixels[:], self._newest_flags[:] = np.nan, _LOST
         self._latest = [_NEVER] * len(self._newest_flags)
@@ -81,11 +85,16 @@ class Sights:
         last = self.newest[camera]
         if last is None or begin > last.t_row0_master_ns or last.t_row0_master_ns - begin > _SLOWEST_NS:
             if last is not None and 0 < begin - last.t_row0_master_ns < _SLOWEST_NS:
-                period = _PERIODS * (begin - last.t_row0_master_ns)
-                self.fresh_ns += round(0.1 * (period - self.fresh_ns))
+                self._note_period(camera, 1e-9 * (begin - last.t_row0_master_ns))
             self.newest[camera] = observations
             self._newest_pixels[camera], self._newest_flags[camera] = observations.pixels, observations.flags
         return True
+
+    def _note_period(self, camera: int, period_s: float) -> None:
+        share = _LEARN if self._paced[camera] else 1.0
+        self._paced[camera] = True
+        self.periods_s[camera] += share * (period_s - self.periods_s[camera])
+        self.seen.fresh_ns[camera] = round(1e9 * _PERIODS * self.periods_s[camera])
 
     def recent(self, since_ns: int) -> list[MarkerBlock]:
         """The frames of the last moments that are not earlier than `since_ns`, in the order of time."""
@@ -128,27 +137,27 @@ def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, widening: A
 
 
 @njit(cache=True)
-def seen_clearly(seen: Seen, t_ns: int, fresh_ns: int, marker: int) -> bool:
-    """Whether two cameras or more see a marker beyond doubt at `t_ns`, by sights no older than `fresh_ns`."""
+def seen_clearly(seen: Seen, t_ns: int, marker: int) -> bool:
+    """Whether two cameras or more see a marker beyond doubt at `t_ns`, by fresh sights."""
     count = 0
     for c in range(seen.times.shape[0]):
-        count += is_fresh(seen, t_ns, fresh_ns, c, marker) and not seen.doubtful[c, marker]
+        count += is_fresh(seen, t_ns, c, marker) and not seen.doubtful[c, marker]
     return count >= 2
 
 
 @njit(cache=True)
-def is_fresh(seen: Seen, t_ns: int, fresh_ns: int, camera: int, marker: int) -> bool:
+def is_fresh(seen: Seen, t_ns: int, camera: int, marker: int) -> bool:
     """Whether a sight counts as of `t_ns`."""
-    return bool(seen.times[camera, marker] >= 0 and abs(t_ns - seen.times[camera, marker]) <= fresh_ns)
+    return bool(seen.times[camera, marker] >= 0 and abs(t_ns - seen.times[camera, marker]) <= seen.fresh_ns[camera])
 
 
 @njit(cache=True)
 def bring_together(half_axes: Array, cameras: Cameras, world: Array, velocity: Array, points: Array, jacobian: Array,
-                   t_ns: int, seen: Seen, fresh_ns: int, out: Array, used: Mask) -> None:
+                   t_ns: int, seen: Seen, out: Array, used: Mask) -> None:
     """Fill `out` (C, M, 2) px: each camera's last sight of each marker, carried to `t_ns` as the hand moved since.
 
     `half_axes` (M, 3) as in `Worn`, `world` and `velocity` as in `Estimate`, `points` (M, 3) m and `jacobian`
-    (M, 3, 27) as `place_markers` has them. Sights older than `fresh_ns` are NaN and not `used` (C, M).
+    (M, 3, 27) as `place_markers` has them. Sights that are not fresh are NaN and not `used` (C, M).
     """
     pixel, slope, speed = np.empty(2), np.empty((2, 3)), np.empty(3)
     for m in range(points.shape[0]):
@@ -157,7 +166,7 @@ def bring_together(half_axes: Array, cameras: Cameras, world: Array, velocity: A
             for j in range(POSE):
                 speed[i] += jacobian[m, i, j] * velocity[j]
         for c in range(out.shape[0]):
-            used[c, m] = is_fresh(seen, t_ns, fresh_ns, c, m) and project_marker(
+            used[c, m] = is_fresh(seen, t_ns, c, m) and project_marker(
                 points[m], world, half_axes[m], cameras.pose[c], cameras.intrinsics[c], pixel, slope)
             elapsed_s = 1e-9 * (t_ns - seen.times[c, m])
             for k in range(2):

@@ -68,12 +68,13 @@ def test_clearly_seen_is_what_two_cameras_see_beyond_doubt_just_now():
     rng = np.random.default_rng(4)
     found = []
     for _ in range(50):
-        seen = Seen(rng.choice([-1, 10**9, 10**9 + FRESH_NS, 10**9 + 2 * FRESH_NS], (3, MARKERS)),
-                    np.zeros((3, MARKERS, 2)), np.zeros((3, MARKERS, 2, 2)), rng.random((3, MARKERS)) < 0.2)
+        seen = Seen(rng.choice([-1, 10**9, 10**9 + FRESH_NS, 10**9 + 2 * FRESH_NS, 10**9 + 3 * FRESH_NS], (3, MARKERS)),
+                    np.zeros((3, MARKERS, 2)), np.zeros((3, MARKERS, 2, 2)), rng.random((3, MARKERS)) < 0.2,
+                    np.array([1, 1, 2]) * FRESH_NS)
         t_ns = 10**9 + FRESH_NS
-        fresh = (seen.times >= 0) & (np.abs(t_ns - seen.times) <= FRESH_NS) & ~seen.doubtful
+        fresh = (seen.times >= 0) & (np.abs(t_ns - seen.times) <= seen.fresh_ns[:, None]) & ~seen.doubtful
         found += (fresh.sum(axis=0) >= 2).tolist()
-        assert [seen_clearly(seen, t_ns, FRESH_NS, m) for m in range(MARKERS)] == found[-MARKERS:]
+        assert [seen_clearly(seen, t_ns, m) for m in range(MARKERS)] == found[-MARKERS:]
     assert any(found) and not all(found)
 
 
@@ -83,12 +84,12 @@ def test_sights_are_carried_along_as_the_hand_moves():
         tracker.ingest(frame)
         tracker.solve()
     estimate, seen, t_ns = tracker._hand.estimate, tracker._sights.seen, tracker._timeline.t_ns
-    seen.times[1, 2], seen.times[0, 3] = t_ns - FRESH_NS - 1, -1
+    seen.times[1, 2], seen.times[0, 3] = t_ns - seen.fresh_ns[1] - 1, -1
     points, jacobian = np.empty((MARKERS, 3)), np.empty((MARKERS, 3, 27))
     place_markers(WEARING.worn, estimate, points, jacobian)
     pixels, used = np.empty((CAMERAS, MARKERS, 2)), np.empty((CAMERAS, MARKERS), np.bool_)
     bring_together(WEARING.worn.half_axes, WEARING.cameras, estimate.world, estimate.velocity, points, jacobian, t_ns,
-                   seen, FRESH_NS, pixels, used)
+                   seen, pixels, used)
     expected, pixel, slope = np.full_like(pixels, np.nan), np.empty(2), np.empty((2, 3))
     for c in range(CAMERAS):
         for m in range(MARKERS):

@@ -43,6 +43,10 @@ FREE, TURN_HELD, PALM_HELD, FINGERS_HELD = 0, 1, 2, 3
 UNSEEN_S = 3600.0
 """What was never seen counts as unseen for this long."""
 
+ORDINARY_S = 1.0 / 30.0
+"""Frame period that what is said of sights' age was made for; of a camera whose frames come more slowly they age more
+slowly."""
+
 
 LOOK_WIDTH, LOOK_X, LOOK_Y, LOOK_VARIANCE, LOOK_AGE = 0, 1, 2, 3, 4
 """Columns of `Estimate.looks`."""
@@ -61,7 +65,8 @@ class Estimate(NamedTuple):
     now (both: `covering.py`). `looks` (C, M, 5): what each camera saw of each marker last, its width m (0 where it says
     little), place px (2), variance px^2, and s since then (`partial.py`). `left_open` (27, 27): what habit leaves to
     the pose of a hand whose palm's turn only its fingers show, else zero (`forgetting.py`). `untroubled` (1,): s since
-    a sight was renamed, or not believed as it was.
+    a sight was renamed, or not believed as it was. `pace` (C,): how fast the time since a sight runs, less than
+    1 for slow cameras.
     """
 
     world: Array
@@ -82,6 +87,7 @@ class Estimate(NamedTuple):
     looks: Array
     left_open: Array
     untroubled: Array
+    pace: Array
 
 
 def empty_estimate(cameras: int, markers: int) -> Estimate:
@@ -91,7 +97,7 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
                     np.zeros((size, size)), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1),
                     np.full((cameras, markers), UNSEEN_S), np.zeros(1, np.int64), np.zeros(1), np.zeros(markers),
                     np.zeros(markers), np.zeros((cameras, markers, 5)), np.zeros((POSE, POSE)),
-                    np.zeros(1))
+                    np.zeros(1), np.ones(cameras))
 
 
 def copy_estimate(source: Estimate, target: Estimate) -> None:

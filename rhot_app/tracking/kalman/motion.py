@@ -102,7 +102,8 @@ def predict(estimate: Estimate, dt: float, part: Indices, habits: Habits, bias_v
     _move_mean(estimate, dt)
     _move_covariance(estimate, dt)
     estimate.agitation[:] *= math.exp(-dt / CALM_S)
-    estimate.unseen[:] += dt
+    for camera in range(estimate.pace.shape[0]):
+        estimate.unseen[camera] += dt * estimate.pace[camera]
     estimate.untroubled[0] += dt
     estimate.looks[:, :, LOOK_AGE] += dt
     estimate.turning[0] = max(estimate.turning[0] * math.exp(-dt / TURNING_S), speeds(estimate)[TURN])

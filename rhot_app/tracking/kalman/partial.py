@@ -160,7 +160,8 @@ def _widest_other(cameras: Cameras, estimate: Estimate, camera: int, m: int, poi
     line_of_sight(cameras.pose[camera], point, one)
     for other in range(estimate.looks.shape[0]):
         look = estimate.looks[other, m]
-        if other != camera and max(look[LOOK_AGE], estimate.unseen[other, m]) < FRESH_S and look[LOOK_WIDTH] > widest:
+        since = max(look[LOOK_AGE] * estimate.pace[other], estimate.unseen[other, m])
+        if other != camera and since < FRESH_S and look[LOOK_WIDTH] > widest:
             line_of_sight(cameras.pose[other], point, two)
             if one[0] * two[0] + one[1] * two[1] + one[2] * two[2] > ALIKE_COS:
                 widest, which = look[LOOK_WIDTH], other

@@ -98,7 +98,7 @@ def loosen_palm(estimate: Estimate, rows: Rows, usual: Array) -> None:
             slope = 0.0
             for k in range(3):
                 slope += 0.5 * (rows.jacobian[row, k] ** 2 + rows.jacobian[row + 1, k] ** 2)
-            farthest = DRIFT_M_S * estimate.unseen[camera, marker]
+            farthest = DRIFT_M_S * estimate.unseen[camera, marker] / estimate.pace[camera]
             strayed = max(strayed, min((u * u + v * v) / slope, farthest * farthest))
     for k in range(3):
         estimate.covariance[k, k] += strayed

@@ -1,0 +1,58 @@
+"""The model tracker with cameras whose frames come slowly, and with those that differ: what counts as seen just
+now, and as out of sight, is a matter of their frame periods."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from modelled_hand import after_s, deviations, model_rig, moving, seconds, states_of
+from synthetic_rig import WIDE, Sight, observe
+
+from rhot_app.tracking.kalman.marker_block import MarkerBlock
+from rhot_app.tracking.kalman.wearing import compile_wearing
+from rhot_app.tracking.sights import Sights
+from rhot_app.tracking.state import Condition, Knowledge
+
+RIG = model_rig()
+SECONDS = 4.0
+
+
+def frames_at(left_fps, right_fps, motion, sight):
+    """What cameras of two frame rates see of a motion, in the order of arrival."""
+    found = [frame for camera, fps in enumerate((left_fps, right_fps))
+             for frame in observe(RIG, replace(WIDE, fps=fps), moving(motion), SECONDS, sight)
+             if frame.camera == camera]
+    return sorted(found, key=lambda frame: frame.t_receive_ns)
+
+
+def measured(states):
+    """Part of the markers that is called measured."""
+    return np.mean([state.marker_knowledge == Knowledge.MEASURED for state in states])
+
+
+@pytest.mark.parametrize(("left_fps", "right_fps", "motion", "worst_mm", "least"), [
+    (12.0, 12.0, "grasp", 2.0, 0.95), (12.0, 12.0, "wave", 3.0, 0.8), (8.0, 8.0, "grasp", 4.0, 0.7),
+    (40.0, 12.0, "wave", 1.5, 0.9)])
+def test_a_hand_is_followed_at_the_cameras_pace(left_fps, right_fps, motion, worst_mm, least):
+    states = states_of(RIG, frames_at(left_fps, right_fps, motion, Sight()))
+    found = next(state for state in states if state.condition not in (Condition.SEARCHING, Condition.LOST))
+    late = after_s(states, 1.0)
+    off = deviations(late, moving(motion))
+    assert seconds(found) < 2.0 / min(left_fps, right_fps)
+    assert off.rms_mm < worst_mm and off.within > 0.99 and measured(late) > least
+
+
+def test_a_lost_frame_of_a_slow_camera_is_no_lost_hand():
+    late = after_s(states_of(RIG, frames_at(12.0, 12.0, "grasp", Sight(frame_loss=0.1, marker_loss=0.05))), 1.0)
+    off = deviations(late, moving("grasp"))
+    assert np.median(off.mm) < 2.0 and off.rms_mm < 8.0 and off.within > 0.98
+
+
+def test_sights_are_fresh_for_one_and_a_half_of_each_cameras_periods():
+    memory, wearing = Sights(2, len(RIG.markers.markers)), compile_wearing(RIG)
+    for frame in frames_at(40.0, 8.0, "rest", Sight(frame_loss=0.05)):
+        memory.enter(MarkerBlock(wearing, frame))
+    np.testing.assert_allclose(memory.periods_s, [1 / 40, 1 / 8], rtol=0.25)
+    np.testing.assert_allclose(memory.seen.fresh_ns, 1.5e9 * memory.periods_s, atol=1.0)
+    memory.reset()
+    assert memory.periods_s[0] == memory.periods_s[1] == pytest.approx(0.04)
