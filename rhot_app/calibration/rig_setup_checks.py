@@ -66,7 +66,7 @@ def filter_findings(rig: Rig) -> list[Finding]:
 
 
 def link_findings(rig: Rig) -> list[Finding]:
-    """Ports that two nodes share, ports that need rights, and time offsets that cannot be."""
+    """Ports that two nodes share, that need rights or that nobody knows, and time offsets that cannot be."""
     found, used = [], dict[tuple[str, int, bool], str]()
     for node in rig.nodes:
         for what in ("udp_port", "control_port", "preview_port", "pairing_port"):
@@ -79,6 +79,10 @@ def link_findings(rig: Rig) -> list[Finding]:
             if 0 < port < _FREE_PORTS:
                 found.append(Finding("ports", Grade.FAIR, f"{label} is {port}.",
                                      "Ports below 1024 need special rights.", "Use one above 1024."))
+        if node.text_datagrams and node.data_port == 0:
+            found.append(Finding("ports", Grade.POOR, f"{node.name} sends text datagrams, and its data_port is 0.",
+                                 "A program that sends text cannot be told which port was free.",
+                                 "Choose a data_port, and send there."))
         if abs(node.time_offset_s) > _LONG_OFFSET_S:
             found.append(Finding("time", Grade.FAIR, f"{node.name}'s time offset is {node.time_offset_s * 1e3:.0f} ms.",
                                  "Cameras are late by some tens of milliseconds.", "Run the time calibration again."))

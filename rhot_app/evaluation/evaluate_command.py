@@ -10,6 +10,8 @@ from pathlib import Path
 
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 
+_OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs")
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot evaluate``."""
@@ -29,11 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="motions to compare on (default rest,wave,grasp,pinch,fast)")
     group.add_argument("--recording", metavar="FILE", default=None,
                        help="compare on this recording as well (Qualisys .tsv, Leap Motion .csv)")
-    group.add_argument("--seeds", type=int, default=5, metavar="N",
+    group.add_argument("--seeds", type=int, default=None, metavar="N",
                        help="how many seeds, beginning with --seed (default 5)")
-    group.add_argument("--trackers", metavar="T,T,...", default="classic,model",
+    group.add_argument("--trackers", metavar="T,T,...", default=None,
                        help="which trackers (default classic,model); the ratio is the last one's to the first one's")
-    group.add_argument("--sketched", action="store_true",
+    group.add_argument("--sketched", action="store_true", default=None,
                        help="logs without pictures: exact outlines, noise and bias put on, hidden parts counted; fast")
     group.add_argument("--logs", type=Path, metavar="DIR", default=None,
                        help="where logs are kept and found again (default ~/.cache/rhot/takes)")
@@ -41,7 +43,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Render (or take) the frames, play them, compare, print."""
-    return _compare(args) if args.compare else _evaluate(args)
+    if args.compare:
+        return _compare(args)
+    stray = next((name for name in _OF_COMPARE if getattr(args, name) is not None), None)
+    if stray is not None:
+        from rhot_app.errors import SimulatorError
+
+        raise SimulatorError(f"--{stray} is of --compare, which is not there; add it, or leave --{stray} out.")
+    return _evaluate(args)
 
 
 def _evaluate(args: argparse.Namespace) -> int:
@@ -78,17 +87,18 @@ def _compare(args: argparse.Namespace) -> int:
 
     if args.frames is not None or args.detector != "fast":
         raise SimulatorError("--compare films its own logs with the fast detector: leave out --frames and --detector.")
-    names = args.trackers.split(",")
+    names = (args.trackers or "classic,model").split(",")
+    seeds = 5 if args.seeds is None else args.seeds
     unknown = [name for name in names if name not in TRACKERS]
     if unknown:
         raise SimulatorError(f"there is no tracker {unknown[0]!r}; --trackers takes some of {', '.join(TRACKERS)}.")
     seconds = 8.0 if args.seconds is None else args.seconds
-    if seconds <= SETTLE_S or args.seeds < 1 or not 0.0 <= args.loss < 1.0:
+    if seconds <= SETTLE_S or seeds < 1 or not 0.0 <= args.loss < 1.0:
         raise SimulatorError(f"--seconds is more than {SETTLE_S:g}, --seeds 1 or more, --loss from 0 to below 1.")
     motions = [*(MOTIONS if args.motions is None else args.motions.split(",")),
                *([] if args.recording is None else [args.recording])]
-    wanted = orders(scene_of(args), motions, range(args.seed, args.seed + args.seeds), seconds,
-                    network=Network(loss=args.loss), sketched=args.sketched)
+    wanted = orders(scene_of(args), motions, range(args.seed, args.seed + seeds), seconds,
+                    network=Network(loss=args.loss), sketched=bool(args.sketched))
     folder = args.logs or takes_folder()
     line = ProgressLine("")
     result = compare(wanted, folder, {name: TRACKERS[name] for name in names},

@@ -130,12 +130,20 @@ def test_a_rig_that_measures_disparity_needs_no_lenses(rig: Rig) -> None:
 
 @pytest.mark.parametrize("kind", ["classic", "model"])
 def test_nodes_that_the_chosen_tracker_cannot_use_are_named(rig: Rig, kind: Literal["classic", "model"]) -> None:
-    left = msgspec.structs.replace(rig.nodes[0], text_datagrams=True)
+    left = msgspec.structs.replace(rig.nodes[0], text_datagrams=True, data_port=5005)
     verdict = check_rig(msgspec.structs.replace(rig, nodes=(left, rig.nodes[1]),
                                                 tracker=TrackerSettings(kind=kind))).verdict
     found = [finding.sentence for finding in verdict.findings if finding.code == "tracker"]
     assert verdict.acceptable == (kind == "classic") and len(found) == (kind == "model")
     assert all(f"node {left.name} sends text" in sentence and "tracker.kind" in sentence for sentence in found)
+
+
+def test_text_datagrams_need_a_port_that_their_sender_knows(rig: Rig) -> None:
+    text = with_nodes(rig, lambda node: change(node, text_datagrams=True), "left")
+    found = [finding for finding in check_rig(text).verdict.findings if finding.code == "ports"]
+    assert len(found) == 1 and found[0].sentence.startswith("left sends text datagrams, and its data_port is 0.")
+    known = with_nodes(rig, lambda node: change(node, text_datagrams=True, data_port=5005), "left")
+    assert "ports" not in check_rig(known).verdict.codes
 
 
 def test_the_command_says_it_and_ends_with_code_2(rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -33,3 +33,10 @@ def test_what_cannot_be_compared_is_said(wrong: tuple[str, str], tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*QUICK, "--logs", str(tmp_path), *wrong]) == 2
     assert capsys.readouterr().err.startswith("rhot: ") and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("stray", [("--sketched",), ("--seeds", "3"), ("--motions", "rest"), ("--trackers", "model")])
+def test_what_belongs_to_a_comparison_is_not_passed_over_without_one(stray: tuple[str, ...],
+                                                                    capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", *stray]) == 2
+    assert capsys.readouterr().err.startswith(f"rhot: {stray[0]} is of --compare")
