@@ -15,6 +15,7 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
+from rhot_app.tracking.kalman.estimate import ROTATION
 from rhot_app.tracking.kalman.rows import PALM_PART
 from rhot_app.tracking.kalman.wearing import Wearing
 from rhot_app.tracking.locate import choose_views, locate_all
@@ -30,6 +31,12 @@ FLATTEST_M2 = 1e-5
 
 UNFIT_M = 0.06
 """Markers so far from where the hand has them are something else. A first fit of a moving hand may be 3 cm off."""
+
+APART_M = 0.012
+"""So far from where it is estimated, a marker is elsewhere."""
+
+_STRAY, _REACH_M = 0.25, 0.1
+"""A marker's way since differs by this part from the palm's, and by so much per radian that the palm turns."""
 
 _TARGET_SD_M = 1e-3
 
@@ -163,3 +170,15 @@ def count_apart(one: Array, other: Array, allowed_m: float) -> int:
         x, y, z = one[m, 0] - other[m, 0], one[m, 1] - other[m, 1], one[m, 2] - other[m, 2]
         count += math.sqrt(x * x + y * y + z * z) > allowed_m
     return count
+
+
+@njit(cache=True)
+def count_elsewhere(located: Array, estimated: Array, velocity: Array, since_s: float) -> int:
+    """How many markers, `located` (M, 3) m `since_s` ago, are not where they are `estimated` (M, 3) m now, on a hand
+    with this `velocity` (27,); NaN is."""
+    way, straight, turned = np.empty(3), 0.0, 0.0
+    for i in range(3):
+        way[i] = since_s * velocity[i]
+        straight += way[i] ** 2
+        turned += (since_s * velocity[ROTATION + i]) ** 2
+    return count_apart(located, estimated - way, APART_M + _STRAY * math.sqrt(straight) + _REACH_M * math.sqrt(turned))

@@ -18,15 +18,7 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
-from rhot_app.tracking.kalman.estimate import (
-    ANGLES,
-    ORDINARY_S,
-    ROTATION,
-    SCALE,
-    Estimate,
-    copy_estimate,
-    empty_estimate,
-)
+from rhot_app.tracking.kalman.estimate import ORDINARY_S, SCALE, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
@@ -34,7 +26,7 @@ from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, Account, describe, empty_report, subject_of
-from rhot_app.tracking.model_start import Located, Starter, count_apart
+from rhot_app.tracking.model_start import Located, Starter, count_elsewhere
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.sights import Sights
 from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
@@ -56,15 +48,12 @@ _JUMP_NS = 1_000_000_000
 """A frame this far ahead of the last ones is of another timeline, and so are several this far behind."""
 
 _BEHIND = 5
-_APART_M, _APART_MARKERS, _APART_STATES = 0.012, 3, 3
+_APART_MARKERS, _APART_STATES = 3, 3
 """So many markers so far from where all cameras see them, so often in a row, are those of a hand that is elsewhere: two
 may have changed names."""
 
 _SOUND_MARKERS, _LEAST_CLEAR = 3, 2
 """With so many markers where all cameras see them a hand is sound; so many set it back. One may be something else."""
-
-_STRAY, _REACH_M = 0.25, 0.1
-"""A marker's way since differs by this part from the palm's, and by so much per radian that the palm turns."""
 
 _THUMB_NS = 200_000_000
 """How often a thumb that bends backwards is looked at."""
@@ -169,7 +158,7 @@ class ModelTracker:
         if not self._tracking:
             self._look_for_hand()
             return True
-        period_ns = 1e9 * self._pace()
+        period_ns = 1e9 * self._pace(observations.camera)
         self.observe(block)
         self._look_at_thumb()
         if (self._timeline.t_ns - self._believed_ns > max(LOST_AFTER_NS, LOST_AFTER_PERIODS * period_ns)
@@ -178,21 +167,19 @@ class ModelTracker:
             self._give_up()
         return True
 
-    def _pace(self) -> float:
-        """Let the estimate know how fast the cameras are; returns the quickest one's frame period, s."""
+    def _pace(self, camera: int) -> float:
+        """Let the estimate know how fast a camera is; returns the quickest one's frame period, s."""
         periods_s = self._sights.periods_s
-        np.minimum(ORDINARY_S / periods_s, 1.0, out=self._hand.estimate.pace)
-        return float(periods_s.min())
+        self._hand.estimate.pace[camera] = min(ORDINARY_S / periods_s[camera], 1.0)
+        return min(periods_s)
 
     def _compare(self, estimated: Array) -> None:
         """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them."""
         located = self._starter.locate()
         if located is None:
             return
-        since = 1e-9 * (self._timeline.t_ns - located.t_ns)
-        way, turned = np.split(since * self._hand.estimate.velocity[:ANGLES], [ROTATION])
-        allowed = _APART_M + _STRAY * math.hypot(*way.tolist()) + _REACH_M * math.hypot(*turned.tolist())
-        apart = count_apart(located.positions, estimated - way, allowed)
+        apart = count_elsewhere(located.positions, estimated, self._hand.estimate.velocity,
+                                1e-9 * (self._timeline.t_ns - located.t_ns))
         if self._size is not None and apart == 0:
             self._size.look(located, self._hand.estimate.world, self._hand.estimate.angles)
         if apart == 0 and np.count_nonzero(located.clear) >= _SOUND_MARKERS:

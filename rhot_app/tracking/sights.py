@@ -48,14 +48,13 @@ class Seen(NamedTuple):
 
 
 class Sights:
-    """C cameras, M markers. `seen`: what was believed; `newest`: each camera's newest frame; `periods_s` (C,): from one
-    frame to the next."""
+    """C cameras, M markers. `seen`: what was believed; `newest`: each camera's newest frame; `periods_s`: each
+    camera's time from one frame to the next."""
 
     def __init__(self, cameras: int, markers: int) -> None:
         shape = (cameras, markers)
         self.seen = Seen(np.empty(shape, np.int64), np.empty((*shape, 2)), np.empty((*shape, 2, 2)),
                          np.empty(shape, np.bool_), np.empty(cameras, np.int64))
-        self.periods_s = np.empty(cameras)
         self._shared = Share(self.seen)
         self._newest_pixels, self._newest_flags = np.empty((*shape, 2)), np.empty(shape, np.uint16)
         self.reset()
@@ -64,7 +63,8 @@ class Sights:
         """Forget all; `seen` stays the same arrays."""
         self.seen.times[:], self.seen.pixels[:], self.seen.covariances[:], self.seen.doubtful[:] = (
             -1, np.nan, np.eye(2), False)
-        self.seen.fresh_ns[:], self.periods_s[:] = _FRESH_NS, 1e-9 * _FRESH_NS / _PERIODS
+        self.seen.fresh_ns[:] = _FRESH_NS
+        self.periods_s = [1e-9 * _FRESH_NS / _PERIODS] * len(self._newest_flags)
         self._paced = [False] * len(self._newest_flags)
         self.newest: list[CameraObservations | None] = [None] * len(self._newest_flags)
         self._newest_pixels[:], self._newest_flags[:] = np.nan, _LOST

@@ -53,6 +53,6 @@ def test_sights_are_fresh_for_one_and_a_half_of_each_cameras_periods():
     for frame in frames_at(40.0, 8.0, "rest", Sight(frame_loss=0.05)):
         memory.enter(MarkerBlock(wearing, frame))
     np.testing.assert_allclose(memory.periods_s, [1 / 40, 1 / 8], rtol=0.25)
-    np.testing.assert_allclose(memory.seen.fresh_ns, 1.5e9 * memory.periods_s, atol=1.0)
+    np.testing.assert_allclose(memory.seen.fresh_ns, 1.5e9 * np.array(memory.periods_s), atol=1.0)
     memory.reset()
     assert memory.periods_s[0] == memory.periods_s[1] == pytest.approx(0.04)

@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import BIAS, POSE, Estimate
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, place_markers, project_marker
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, project_marker
 from rhot_app.tracking.kalman.reappearing import AWAY_S
 
 Array = NDArray[np.float64]
@@ -24,13 +24,12 @@ FAR, NEAR = 30.0, 12.0
 
 
 @njit(cache=True)
-def relabel(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate) -> int:
-    """Set `frame.label` anew; returns how many sights are taken for another marker than they say."""
+def relabel(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array) -> int:
+    """Set `frame.label` anew; returns how many sights are taken for another marker than they say. `points` (M, 3) m and
+    `jacobian` (M, 3, 27) as `place_markers` has them."""
     count = worn.part.shape[0]
     for m in range(count):
         frame.label[m] = m
-    points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
-    place_markers(worn, estimate, points, jacobian)
     expected, slopes = np.empty((count, 2)), np.empty((count, 2, 3))
     camera = frame.camera[0]
     for m in range(count):

@@ -29,7 +29,7 @@ _LEVERS = np.array([1.2, 0.6])  # what the root turns for a tip that stays, per 
 
 def bent_backwards(estimate: Estimate) -> bool:
     """Whether the thumb's outer joints bend the unusual way."""
-    return bool(estimate.angles[_OUTER].sum() < -BACKWARDS_RAD)
+    return sum(estimate.angles[_OUTER].tolist()) < -BACKWARDS_RAD
 
 
 def unbend(estimate: Estimate, model: HandModel, usual: Array) -> bool:

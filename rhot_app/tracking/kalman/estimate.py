@@ -9,7 +9,7 @@ place (3, m, world axes).
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -40,6 +40,9 @@ GROUP_OF = np.array([LINEAR] * 3 + [TURN] * 3 + [FIRST_FINGER] * 5 + [FIRST_FING
 FREE, TURN_HELD, PALM_HELD, FINGERS_HELD = 0, 1, 2, 3
 """How much of the hand an update holds to its course (`holding.py`)."""
 
+OPENING, FADING = 0, 1
+"""The two times of `Estimate.unfaded`."""
+
 UNSEEN_S = 3600.0
 """What was never seen counts as unseen for this long."""
 
@@ -58,7 +61,8 @@ class Estimate(NamedTuple):
     `world` (4, 4) world_from_palm m; `angles` (21,) rad; `velocity` (27,) m/s and rad/s; `acceleration` (27,) m/s^2
     and rad/s^2; `log_scale` (1,); `bias` (M, 3) m. `covariance` (N, N). `agitation` (7,): variance of the acceleration,
     (m/s^2)^2 or (rad/s^2)^2, that surprised in each group of late. `trend` (27,): leaky mean of the normalised
-    corrections of each velocity. `unfaded` (1,): s since knowledge last faded. `unseen` (C, M): s since each camera was
+    corrections of each velocity. `unfaded` (2,): s since open directions last went back to habit, and since
+    knowledge last faded (`forgetting.py`). `unseen` (C, M): s since each camera was
     last believed to see each marker. `held` (1,): how the last update held the hand
     (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s. `width` (M,) m: how wide paint on the inner
     side of the palm is known to be, 0 where nobody knows; `bias_variance` (M,) m^2: what the biases' variances tend to
@@ -66,7 +70,7 @@ class Estimate(NamedTuple):
     little), place px (2), variance px^2, and s since then (`partial.py`). `left_open` (27, 27): what habit leaves to
     the pose of a hand whose palm's turn only its fingers show, else zero (`forgetting.py`). `untroubled` (1,): s since
     a sight was renamed, or not believed as it was. `pace` (C,): how fast the time since a sight runs, less than
-    1 for slow cameras.
+    1 for slow cameras. `memory`: all of these again, one after the other.
     """
 
     world: Array
@@ -88,22 +92,31 @@ class Estimate(NamedTuple):
     left_open: Array
     untroubled: Array
     pace: Array
+    memory: Array
 
 
 def empty_estimate(cameras: int, markers: int) -> Estimate:
     """Room for an estimate; everything zero, the palm at the world's origin."""
     size = BIAS + 3 * markers
-    return Estimate(np.eye(4), np.zeros(21), np.zeros(POSE), np.zeros(POSE), np.zeros(1), np.zeros((markers, 3)),
-                    np.zeros((size, size)), np.zeros(GROUPS), np.zeros(POSE), np.zeros(1),
-                    np.full((cameras, markers), UNSEEN_S), np.zeros(1, np.int64), np.zeros(1), np.zeros(markers),
-                    np.zeros(markers), np.zeros((cameras, markers, 5)), np.zeros((POSE, POSE)),
-                    np.zeros(1), np.ones(cameras))
+    shapes = {"world": (4, 4), "angles": (21,), "velocity": (POSE,), "acceleration": (POSE,), "log_scale": (1,),
+              "bias": (markers, 3), "covariance": (size, size), "agitation": (GROUPS,), "trend": (POSE,),
+              "unfaded": (2,), "unseen": (cameras, markers), "held": (1,), "turning": (1,), "width": (markers,),
+              "bias_variance": (markers,), "looks": (cameras, markers, 5), "left_open": (POSE, POSE),
+              "untroubled": (1,), "pace": (cameras,)}
+    memory, end = np.zeros(sum(map(math.prod, shapes.values()))), 0
+    arrays: dict[str, Any] = {}
+    for name, shape in shapes.items():
+        begin, end = end, end + math.prod(shape)
+        arrays[name] = memory[begin:end].reshape(shape)
+    arrays["held"] = arrays["held"].view(np.int64)
+    estimate = Estimate(**arrays, memory=memory)
+    estimate.world[:], estimate.unseen[:], estimate.pace[:] = np.eye(4), UNSEEN_S, 1.0
+    return estimate
 
 
 def copy_estimate(source: Estimate, target: Estimate) -> None:
-    """Copy every array of `source` into `target`: the covariance, 80 KB, goes as one block of memory."""
-    for one, other in zip(source, target, strict=True):
-        other[...] = one
+    """Copy every array of `source` into `target`, 90 KB, as one block of memory."""
+    target.memory[:] = source.memory
 
 
 @njit(cache=True)

@@ -26,10 +26,12 @@ from rhot_app.tracking.kalman.combine import add_rows, add_squares, mirror
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
+    FADING,
     FINGERS_HELD,
     FIRST_FINGER,
     FREE,
     GROUP_OF,
+    OPENING,
     PALM_HELD,
     POSE,
     ROTATION,
@@ -71,7 +73,7 @@ SHARPNESS_M = 3e-5
 """What moves no marker by more than this counts as open."""
 
 FADING_S = 0.04
-"""Fading is done in steps of this: it is as good, and costs less."""
+"""Both are done in steps of this: it is as good, and costs less."""
 
 WIDEST = 0.7
 """Standard deviation, m and rad, beyond which a palm's place is not worth knowing."""
@@ -115,20 +117,22 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
     It depends on how the hand is held (`holding.py`).
     """
     step[:] = 0.0
-    estimate.unfaded[0] += dt
-    how = estimate.held[0]
-    if estimate.unfaded[0] >= FADING_S:
-        if how != FINGERS_HELD and _shown(jacobian) >= LEAST_SHOWN:
+    estimate.unfaded[:] += dt
+    how, what = estimate.held[0], OPENING if estimate.unfaded[OPENING] >= estimate.unfaded[FADING] else FADING
+    passed = estimate.unfaded[what]
+    if passed >= FADING_S:  # in turns, lest one update in three take twice as long as the others
+        if what == FADING:
+            fading = _fading(away)
+            _fade(estimate.covariance, passed, fading)
+            if how < PALM_HELD:
+                _return_to_habits(estimate, passed, fading, habits, gain, step)
+        elif how != FINGERS_HELD and _shown(jacobian) >= LEAST_SHOWN:
             constant = OPEN_S
             if how == PALM_HELD:
                 constant = SHAPE_S if _palm_shown(jacobian) > 0 else HIDDEN_S
-            _open_up(estimate, -math.expm1(-estimate.unfaded[0] / constant), habits, bias_variance, jacobian, step)
-        fading = _fading(away)
-        _fade(estimate.covariance, estimate.unfaded[0], fading)
-        if how < PALM_HELD:
-            _return_to_habits(estimate, estimate.unfaded[0], fading, habits, gain, step)
+            _open_up(estimate, -math.expm1(-passed / constant), habits, bias_variance, jacobian, step)
         mirror(estimate.covariance)  # rounding must not make it unsymmetric: what fades would let it grow
-        estimate.unfaded[0] = 0.0
+        estimate.unfaded[what] = 0.0
     if how != FREE or _palm_shown(jacobian) >= ENOUGH:
         estimate.left_open[:] = 0.0
 
@@ -160,7 +164,7 @@ def _note_turning(estimate: Estimate, turned: Array) -> None:
     for i in range(ROTATION, ANGLES):
         doubt += estimate.covariance[i, i]
     if estimate.held[0] == TURN_HELD and doubt < SETTLED_RAD * SETTLED_RAD:
-        rate = math.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2) / estimate.unfaded[0]
+        rate = math.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2) / estimate.unfaded[OPENING]
         estimate.turning[0] = max(estimate.turning[0], rate)
 
 
@@ -220,15 +224,16 @@ def _fading(away: Array) -> Array:
 def _fade(covariance: Array, dt: float, fading: Array) -> None:
     """Give up a part of the information about the pose, but never so much that its place is not worth knowing."""
     size = covariance.shape[0]
+    factor = np.ones(size)
     for i in range(POSE):
         grow = math.exp(0.5 * dt / fading[i])
-        factor = grow
+        factor[i] = grow
         if i < ANGLES and covariance[i, i] * grow * grow > WIDEST * WIDEST:
-            factor = WIDEST / math.sqrt(covariance[i, i])
+            factor[i] = WIDEST / math.sqrt(covariance[i, i])
+    for i in range(size):
+        row, own = covariance[i], factor[i]
         for j in range(size):
-            covariance[i, j] *= factor
-        for j in range(size):
-            covariance[j, i] *= factor
+            row[j] *= own * factor[j]
 
 
 @njit(cache=True)

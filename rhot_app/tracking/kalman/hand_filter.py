@@ -151,10 +151,9 @@ class HandFilter:
     @property
     def astray(self) -> bool:
         """Whether the estimate is worth nothing any more: nobody's hand is so fast or so lost."""
-        covariance, velocity = self.estimate.covariance, self.estimate.velocity
-        return not (float(covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) < ASTRAY_M**2
-                    and float(velocity[:ROTATION] @ velocity[:ROTATION]) < FASTEST_M_S**2
-                    and float(velocity[ROTATION:ANGLES] @ velocity[ROTATION:ANGLES]) < FASTEST_RAD_S**2)
+        variances, velocity = self.estimate.covariance.diagonal()[:ROTATION].tolist(), self.estimate.velocity.tolist()
+        return not (sum(variances) < ASTRAY_M**2 and math.hypot(*velocity[:ROTATION]) < FASTEST_M_S
+                    and math.hypot(*velocity[ROTATION:ANGLES]) < FASTEST_RAD_S)
 
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""

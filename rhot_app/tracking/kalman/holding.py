@@ -83,8 +83,8 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: A
                 most, eye = eyes, last
     moving = speeds(estimate)
     hurries = moving[LINEAR] > HURRIES_M_S or moving[TURN] > HURRIES_RAD_S
+    held.directions[:held.used[0]] = 0.0
     held.used[0] = 0
-    held.directions[:] = 0.0
     before, estimate.held[0] = estimate.held[0], FREE
     if on_palm == 0:
         return

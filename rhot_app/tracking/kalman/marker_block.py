@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.association import relabel
 from rhot_app.tracking.kalman.covering import leave_out_covered
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, append_markers
+from rhot_app.tracking.kalman.estimate import POSE
+from rhot_app.tracking.kalman.markers import Frame, Outfit, append_markers, place_markers
 from rhot_app.tracking.kalman.partial import doubt_partial
 from rhot_app.tracking.kalman.rows import Page
 from rhot_app.tracking.kalman.share import Share
@@ -23,14 +24,10 @@ _LOST = int(MarkerFlag.LOST)
 
 
 class Sighting(NamedTuple):
-    """One frame with all that it takes to understand it; `flags` (M,) MarkerFlag of its sights; `made` (M,) m^2: the
-    variance of the markers' places by their making."""
+    """One frame; `flags` (M,) MarkerFlag of its sights."""
 
-    worn: Worn
-    cameras: Cameras
     frame: Frame
     flags: NDArray[np.uint16]
-    made: NDArray[np.float64]
 
 
 class MarkerBlock:
@@ -45,44 +42,49 @@ class MarkerBlock:
                            observations.covariances, np.empty(count), np.empty(count, np.int64),
                            observations.diameters if sized else np.zeros(count), observations.flags == 0,
                            np.zeros(count, np.bool_), np.zeros(count), np.ones(count))
-        self.shared = Share(Sighting(wearing.worn, wearing.cameras, self.frame, observations.flags,
-                                     wearing.bias_variance))
-        after_ns, self.sights = _read(self.shared, 1e-9 * observations.row_time_ns)
+        self.shared, self._outfit = Share(Sighting(self.frame, observations.flags)), wearing.outfit
+        after_ns, self.sights = _read(self._outfit, self.shared, 1e-9 * observations.row_time_ns)
         self.t_ns = observations.t_row0_master_ns + int(after_ns)
 
     def associate(self, page: Share) -> int:
         """Ask the hand, carried to this frame's instant, which marker each sight is of, and how much of it it shows;
         returns how many changed. The hand learns how wide its markers are."""
-        return int(_associate(self.shared, page))
+        return int(_associate(self._outfit, self.shared, page))
 
     def linearise(self, page: Share) -> None:
         """Append the frame's observations; see `ResidualBlock`."""
-        _linearise(self.shared, page)
+        _linearise(self._outfit, self.shared, page)
 
 
 @njit(cache=True)
-def _associate(shared: Share, page: Share) -> int:
+def _associate(outfit: Share, shared: Share, page: Share) -> int:
+    worn_by: Outfit = outfit.of
     sighting: Sighting = shared.of
     there: Page = page.of
-    changed = relabel(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
+    worn, cameras, frame, estimate = worn_by.worn, worn_by.cameras, sighting.frame, there.estimate
+    points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
+    place_markers(worn, estimate, points, jacobian)
+    changed = relabel(worn, cameras, frame, estimate, points, jacobian)
     if changed > 0:
-        there.estimate.untroubled[0] = 0.0
-    doubt_partial(sighting.worn, sighting.cameras, sighting.frame, there.estimate)
-    leave_out_covered(sighting.worn, sighting.cameras, sighting.frame, there.estimate, sighting.made)
+        estimate.untroubled[0] = 0.0
+    doubt_partial(worn, cameras, frame, estimate, points, jacobian)
+    leave_out_covered(worn, cameras, frame, estimate, worn_by.made)
     return changed
 
 
 @njit(cache=True)
-def _linearise(shared: Share, page: Share) -> None:
+def _linearise(outfit: Share, shared: Share, page: Share) -> None:
+    worn_by: Outfit = outfit.of
     sighting: Sighting = shared.of
     there: Page = page.of
-    append_markers(sighting.worn, sighting.cameras, sighting.frame, there.estimate, there.rows)
+    append_markers(worn_by.worn, worn_by.cameras, sighting.frame, there.estimate, there.rows)
 
 
 @njit(cache=True)
-def _read(shared: Share, row_time_s: float) -> tuple[float, int]:
+def _read(outfit: Share, shared: Share, row_time_s: float) -> tuple[float, int]:
     """Fill the frame's `seen`, `late_s` and, as the sights say themselves, `label`; returns the mean time of the sights
     after row 0, ns, and how many they are. The middle row is that of the optical axis."""
+    worn_by: Outfit = outfit.of
     sighting: Sighting = shared.of
     frame = sighting.frame
     total, count = 0.0, 0
@@ -94,7 +96,7 @@ def _read(shared: Share, row_time_s: float) -> tuple[float, int]:
             frame.late_s[m] = y * row_time_s
             total += frame.late_s[m]
             count += 1
-    mean = total / count if count else sighting.cameras.intrinsics[frame.camera[0], 3] * row_time_s
+    mean = total / count if count else worn_by.cameras.intrinsics[frame.camera[0], 3] * row_time_s
     for m in range(frame.seen.shape[0]):
         frame.late_s[m] -= mean
     return 1e9 * mean, count

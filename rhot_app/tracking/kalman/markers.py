@@ -63,6 +63,14 @@ class Worn(NamedTuple):
     palmar: NDArray[np.bool_]
 
 
+class Outfit(NamedTuple):
+    """What never changes: `made` (M,) m^2, the variance of the markers' places by their making."""
+
+    worn: Worn
+    cameras: Cameras
+    made: Array
+
+
 class Frame(NamedTuple):
     """What one camera saw: `camera` (1,) its index; `seen` (M,) which markers count; `pixels` (M, 2) raw px with
     `covariances` (M, 2, 2); `late_s` (M,): when each was seen, s after the estimate's instant (before: negative).

@@ -25,7 +25,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, place_markers, project_marker, straying
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, project_marker, straying
 from rhot_app.tracking.kalman.motion import liveliness
 from rhot_app.tracking.kalman.sighted import FRESH_S, line_of_sight
 
@@ -65,15 +65,14 @@ class View(NamedTuple):
 
 
 @njit(cache=True)
-def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate) -> None:
+def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array,
+                  jacobian: Array) -> None:
     """Set `frame.doubt`, px^2, `frame.own` and `frame.covered`; remember what this camera sees, `estimate.looks`.
 
     To be called when `frame.label` is known. Sights with a flag are widened by their node, and are no standard, and
-    neither are those that were not believed.
+    neither are those that were not believed. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them.
     """
     camera, count = frame.camera[0], worn.part.shape[0]
-    points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
-    place_markers(worn, estimate, points, jacobian)
     alike = estimate.untroubled[0] > CALM_S  # and everything is in plain view of two cameras
     for sight in range(count):
         frame.doubt[sight], frame.own[sight], frame.covered[sight] = 0.0, 1.0, False

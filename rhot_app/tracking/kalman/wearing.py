@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -18,8 +18,9 @@ from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
 from rhot_app.tracking.kalman.forgetting import WIDEST
-from rhot_app.tracking.kalman.markers import Cameras, Worn
+from rhot_app.tracking.kalman.markers import Cameras, Outfit, Worn
 from rhot_app.tracking.kalman.motion import Habits
+from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.rig_arrays import band_axes
 from rhot_node.markers import Marker, MarkerSet
 
@@ -42,7 +43,8 @@ _COUPLED_SD_RAD = np.radians(0.02)
 @dataclass(frozen=True, slots=True)
 class Wearing:
     """`natural`: what is believed of any hand's angles, `habits`: of one that is not seen; `roles` (M,) of the markers,
-    `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places."""
+    `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places. `outfit`: an `Outfit`, for compiled
+    functions."""
 
     model: HandModel
     worn: Worn
@@ -53,6 +55,10 @@ class Wearing:
     roles: tuple[str, ...]
     places: tuple[Place, ...]
     bias_variance: Array
+    outfit: Share = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outfit", Share(Outfit(self.worn, self.cameras, self.bias_variance)))
 
 
 def compile_wearing(rig: Rig) -> Wearing:

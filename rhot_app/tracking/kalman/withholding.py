@@ -25,7 +25,8 @@ MOST = 64
 
 
 class Held(NamedTuple):
-    """`used` (1,): directions held. `directions` (64, N): each of them, a row that the state is multiplied with;
+    """`used` (1,): directions held. `directions` (64, N): each of them, a row that the state is multiplied with, zero
+    beyond those that are used;
     `loads` (64, N): what is not known of each and what goes with it, P = P of the rest + loads^T loads."""
 
     used: NDArray[np.int64]
@@ -60,8 +61,8 @@ def withhold(covariance: Array, held: Held) -> None:
 def release(covariance: Array, held: Held) -> None:
     """Undo `withhold`; nothing is held any more."""
     add_squares(covariance, held.loads, held.used[0], 1.0)
+    held.directions[:held.used[0]] = 0.0
     held.used[0] = 0
-    held.directions[:] = 0.0
 
 
 @njit(cache=True)

@@ -26,6 +26,7 @@ from rhot_app.tracking.kalman.estimate import (
 )
 from rhot_app.tracking.kalman.hand_filter import HandFilter
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
+from rhot_app.tracking.kalman.markers import place_markers
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.rows import Rows, empty_rows
 from rhot_app.tracking.kalman.wearing import compile_wearing
@@ -39,6 +40,13 @@ SIZE = BIAS + 3 * MARKERS
 
 def filter_of_hand() -> HandFilter:
     return HandFilter(WEARING.worn, WEARING.cameras, WEARING.habits, WEARING.limits, WEARING.bias_variance)
+
+
+def placed(estimate: Estimate) -> tuple[np.ndarray, np.ndarray]:
+    """(M, 3) m and (M, 3, 27): its markers' places, and what they are per pose number."""
+    points, jacobian = np.empty((MARKERS, 3)), np.empty((MARKERS, 3, POSE))
+    place_markers(WEARING.worn, estimate, points, jacobian)
+    return points, jacobian
 
 
 def empty() -> Estimate:

@@ -34,7 +34,7 @@ def weighed(change):
     hand, expected, (known, last), block = filter_of_hand(), empty(), settled(), blocks()[SETTLED]
     for estimate in (hand.estimate, expected):
         copy_estimate(known, estimate)
-        estimate.unfaded[0] = 0.0
+        estimate.unfaded[:] = 0.0
         estimate.velocity[:ANGLES], estimate.acceleration[:ANGLES], estimate.turning[0] = 0.0, 0.0, 0.0
         change(estimate, block)
     dt = 1e-9 * (block.t_ns - last.t_ns)
@@ -109,7 +109,7 @@ def test_a_finger_that_cannot_bend_as_it_is_held_to_is_let_go(monkeypatch):
         rows = slice(ANGLES + ANGLE_SLICES[MIDDLE].start, ANGLES + ANGLE_SLICES[MIDDLE].stop)
         estimate.covariance[rows] = estimate.covariance[:, rows] = 0.0
         estimate.covariance[rows, rows] = 0.3**2 * np.eye(4)
-        block.frame.pixels[MIDDLE] += (-6.0, 25.0)
+        block.frame.pixels[MIDDLE] += (-8.0, 20.0)
 
     def bend():
         """How far the finger bends in each of its joints, rad."""

@@ -78,7 +78,9 @@ def seen(estimate, camera, shares=(), shift=(0.0, 0.0), flag=0, late_s=0.0):
 
 def judged(block, estimate):
     """Standard deviations (M,) of the doubt, px, and which markers are left out."""
-    doubt_partial(WEARING.worn, WEARING.cameras, block.frame, estimate)
+    points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
+    place_markers(WEARING.worn, estimate, points, jacobian)
+    doubt_partial(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
     return np.sqrt(block.frame.doubt), np.flatnonzero(block.frame.covered).tolist()
 
 
