@@ -7,8 +7,8 @@ shape and habits tell, with the covariance that says how well that is.
 
 from __future__ import annotations
 
-import math
 import time
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -18,18 +18,18 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
-from rhot_app.tracking.kalman.estimate import ORDINARY_S, SCALE, Estimate, copy_estimate, empty_estimate
+from rhot_app.tracking.kalman.estimate import ORDINARY_S, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
-from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline
 from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, Account, describe, empty_report, subject_of
+from rhot_app.tracking.model_output import subject_of
 from rhot_app.tracking.model_start import Located, Starter, count_elsewhere
+from rhot_app.tracking.model_states import Teller, tell_of_none
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.sights import Sights
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
@@ -79,10 +79,9 @@ class ModelTracker:
         self._starter = Starter(self._rig, self._wearing)
         self._sights = Sights(cameras, markers)
         self._ahead = empty_estimate(cameras, markers)
-        subject = subject_of(self._wearing, self._rig)
-        self._told = Share(Account(self._hand.estimate, subject, self._sights.seen))
-        self._told_ahead = Share(Account(self._ahead, subject, self._sights.seen))
-        self._sequence = 0
+        subject, self._sequence = subject_of(self._wearing, self._rig), count()
+        self._told, self._told_ahead = (Teller(self._rig, self._sights, subject, estimate, self._sequence)
+                                        for estimate in (self._hand.estimate, self._ahead))
         self.reset()
 
     def reset(self) -> None:
@@ -132,7 +131,7 @@ class ModelTracker:
         copy_estimate(self._hand.estimate, self._ahead)
         ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
         predict(self._ahead, ahead, self._wearing.worn.part, self._wearing.habits, self._ahead.bias_variance)
-        return self._describe(self._ahead, self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
+        return self._told_ahead.tell(self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
 
     def observe(self, block: TimedBlock) -> None:
         """Weigh anything that tells about the hand, where it belongs in time; without a hand it is lost.
@@ -250,54 +249,9 @@ class ModelTracker:
 
     def _state(self, newest: CameraObservations, begun: float) -> HandState:
         if not self._tracking:
-            return self._nothing(newest, begun)
-        state = self._describe(self._hand.estimate, self._timeline.t_ns, newest, begun)
+            return tell_of_none(self._rig, self._sights, next(self._sequence),
+                                Condition.LOST if self._ever else Condition.SEARCHING,
+                                None if self._size is None else self._size.known, newest, begun)
+        state = self._told.tell(self._timeline.t_ns, newest, begun)
         self._compare(state.marker_positions)
         return state
-
-    def _describe(self, estimate: Estimate, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
-        rig, sights = self._rig, self._sights
-        told = self._told if estimate is self._hand.estimate else self._told_ahead
-        solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
-        complete = describe(told, t_ns, report)
-        points, covariances = report.points, report.covariances
-        seen_pixels, seen_flags = sights.last_seen()
-        self._sequence += 1
-        return HandState(
-            sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
-            condition=Condition.TRACKING if complete else Condition.PARTIAL, marker_ids=rig.marker_ids,
-            marker_positions=points[FIRST_MARKER:], marker_raw_positions=report.raw,
-            marker_covariances=covariances[FIRST_MARKER:], marker_knowledge=report.marker_knowledge,
-            camera_names=rig.camera_names, camera_pixels=seen_pixels, camera_flags=seen_flags,
-            joint_positions=points[:FIRST_TIP], joint_knowledge=report.joint_knowledge,
-            fingertip_positions=points[FIRST_TIP:FIRST_MARKER], angles=estimate.angles.copy(),
-            angle_knowledge=report.angle_knowledge, world_from_palm=estimate.world.copy(),
-            palm_knowledge=Knowledge(int(report.palm[0])), epipolar_error_px=report.errors, angle_sd=report.angle_sd,
-            joint_covariances=covariances[:FIRST_TIP], fingertip_covariances=covariances[FIRST_TIP:FIRST_MARKER],
-            palm_covariance=report.palm_covariance, hand_scale=math.exp(estimate.log_scale[0]),
-            hand_scale_sd=math.sqrt(max(estimate.covariance[SCALE, SCALE], 0.0)),
-            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
-                       "filter": solved - begun, "solve": time.perf_counter() - solved})
-
-    def _nothing(self, newest: CameraObservations, begun: float) -> HandState:
-        """No hand: what the cameras see is all there is to tell, and how large it was."""
-        rig = self._rig
-        log_scale, variance = (0.0, math.nan) if self._size is None else self._size.known
-        markers = len(rig.marker_ids)
-        seen_pixels, seen_flags = self._sights.last_seen()
-        unknown = int(Knowledge.UNKNOWN)
-        self._sequence += 1
-        return HandState(
-            sequence=self._sequence - 1, t_master_ns=newest.t_row0_master_ns, t_receive_ns=newest.t_receive_ns,
-            condition=Condition.LOST if self._ever else Condition.SEARCHING, marker_ids=rig.marker_ids,
-            marker_positions=np.full((markers, 3), np.nan), marker_raw_positions=np.full((markers, 3), np.nan),
-            marker_covariances=np.full((markers, 3, 3), np.nan),
-            marker_knowledge=np.full(markers, unknown, np.uint8), camera_names=rig.camera_names,
-            camera_pixels=seen_pixels, camera_flags=seen_flags, joint_positions=np.full((21, 3), np.nan),
-            joint_knowledge=np.full(21, unknown, np.uint8), fingertip_positions=np.full((5, 3), np.nan),
-            angles=np.full(21, np.nan), angle_knowledge=np.full(21, unknown, np.uint8),
-            world_from_palm=np.full((4, 4), np.nan), palm_knowledge=Knowledge.UNKNOWN,
-            epipolar_error_px=np.full(markers, np.nan),
-            **UNESTIMATED | {"hand_scale": math.exp(log_scale), "hand_scale_sd": math.sqrt(variance)},
-            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
-                       "filter": time.perf_counter() - begun, "solve": 0.0})

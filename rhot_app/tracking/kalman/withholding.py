@@ -25,9 +25,9 @@ MOST = 64
 
 
 class Held(NamedTuple):
-    """`used` (1,): directions held. `directions` (64, N): each of them, a row that the state is multiplied with, zero
-    beyond those that are used;
-    `loads` (64, N): what is not known of each and what goes with it, P = P of the rest + loads^T loads."""
+    """`used` (1,): directions held. `directions` (64, N): each of them, a row that the state is multiplied with; zero
+    beyond the used ones. `loads` (64, N): what is not known of each and what goes with it, P = P of the rest +
+    loads^T loads."""
 
     used: NDArray[np.int64]
     directions: Array
