@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -10,18 +12,28 @@ from rhot_app.tracking.kalman.estimate import ANGLES, VELOCITY
 
 Array = NDArray[np.float64]
 
+FASTEST_RAD_S = 12.0
+"""No finger bends faster for long. Without a bound cameras that take turns can drive one another on: a wrong speed is
+wrong distance, which is a wrong speed at the next frame, and a thumb in plain view thrashes for a second."""
+
 _ROUNDS = 4
 
 
 @njit(cache=True)
 def project(angles: Array, velocity: Array, covariance: Array, gains: Array, limits: Array, step: Array) -> None:
-    """Change `step` (N,) so that `angles` (21,) + step keep their `limits` (21, 2).
+    """Change `step` (N,) so that `angles` (21,) + step keep their `limits` (21, 2), and before that their speeds,
+    `velocity` (27,) + step, `FASTEST_RAD_S`.
 
-    The most plausible state with the offending angle on its limit (Simon and Chia 2002), one angle after the other,
-    the farthest first; plausible by `covariance` less what `gains` (K, N) will take from it, P - G^T G. The covariance
-    stays: to know that a joint is within its limits would make it smaller, so it is on the safe side. A joint at its
-    limit does not move on beyond it: `velocity` (27,) + step is stopped likewise.
+    The most plausible state with the offending number on its limit (Simon and Chia 2002), one after the other, of the
+    angles the farthest first; plausible by `covariance` less what `gains` (K, N) will take from it, P - G^T G. The
+    covariance stays: to know that a joint is within its limits would make it smaller, so it is on the safe side. A
+    joint at its limit does not move on beyond it: its speed is stopped likewise.
     """
+    for i in range(angles.shape[0]):
+        row = VELOCITY + ANGLES + i
+        speed = velocity[ANGLES + i] + step[row]
+        if abs(speed) > FASTEST_RAD_S:
+            _pull(covariance, gains, row, math.copysign(FASTEST_RAD_S, speed) - velocity[ANGLES + i], step)
     for _ in range(_ROUNDS * angles.shape[0]):
         worst, which, target = 1e-9, -1, 0.0
         for i in range(angles.shape[0]):

@@ -6,7 +6,7 @@ from known_hand import SIZE, WEARING, moving_estimate
 
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE, VELOCITY
 from rhot_app.tracking.kalman.gain import contract, empty_gain
-from rhot_app.tracking.kalman.limits import project
+from rhot_app.tracking.kalman.limits import FASTEST_RAD_S, project
 
 LIMITS, NO_GAINS = WEARING.limits, np.empty((0, SIZE))
 SMALL = 1e-8  # rad
@@ -36,6 +36,20 @@ def test_a_step_within_the_limits_is_not_touched():
     estimate.angles[:] = LIMITS.mean(axis=1)
     step = 0.01 * np.random.default_rng(0).normal(size=SIZE)
     np.testing.assert_array_equal(projected(estimate, step), step)
+
+
+@pytest.mark.parametrize("speed", [-40.0, -FASTEST_RAD_S, 11.9, 15.0])
+def test_a_finger_bends_no_faster_than_fingers_do_and_is_where_that_leaves_it(speed):
+    estimate, joint = moving_estimate(), 6
+    estimate.angles[:], estimate.velocity[:] = LIMITS.mean(axis=1), 0.0
+    estimate.covariance[:] = 1e-2 * np.eye(SIZE)
+    at, fast = ANGLES + joint, VELOCITY + ANGLES + joint
+    estimate.covariance[at, fast] = estimate.covariance[fast, at] = 1e-4
+    step = np.zeros(SIZE)
+    step[fast] = speed
+    end, kept = projected(estimate, step), np.clip(speed, -FASTEST_RAD_S, FASTEST_RAD_S)
+    assert end[fast] == kept and end[at] == pytest.approx(0.01 * (kept - speed))
+    np.testing.assert_array_equal(np.delete(end, [at, fast]), 0.0)
 
 
 def test_the_correction_goes_where_least_is_known():
