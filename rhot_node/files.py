@@ -55,6 +55,13 @@ def decode_document(data: bytes, kind: type[T], *, format_name: str, version: in
         return msgspec.json.decode(data, type=kind)
     except msgspec.ValidationError as exc:
         raise error(f"{where}: {_in_words(str(exc))}") from exc
+    except msgspec.DecodeError as exc:
+        raise error(f"{where}: {_not_strict(exc)}") from exc
+
+
+def _not_strict(exc: msgspec.DecodeError) -> str:
+    """JSON that Python's own reader lets pass: NaN and infinite numbers."""
+    return f"not valid JSON ({exc}). NaN and Infinity are no numbers there."
 
 
 def _in_words(message: str) -> str:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 
 _OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs")
+_OF_PICTURES = ("background", "lamp", "kelvin", "mains")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot evaluate``."""
     add_scene_arguments(parser)
+    parser.set_defaults(motion=None)  # so that one that --compare would pass over is seen
     parser.add_argument("--seconds", type=float, default=None, metavar="S",
                         help="length of a run; its first second is not judged (default 20, with --compare 8)")
     parser.add_argument("--loss", type=float, default=0.0, metavar="P",
@@ -59,8 +63,9 @@ def _evaluate(args: argparse.Namespace) -> int:
     from rhot_app.evaluation.runner import evaluate, evaluate_frames
 
     seconds = 20.0 if args.seconds is None else args.seconds
-    if seconds <= SETTLE_S and args.frames is None:
-        raise SimulatorError(f"a run of {seconds:g} s is too short: the first {SETTLE_S:g} s are not judged.")
+    if not SETTLE_S < seconds < math.inf and args.frames is None:
+        raise SimulatorError(f"a run of {seconds:g} s cannot be judged: the first {SETTLE_S:g} s are not, and it must "
+                             "end.")
     if not 0.0 <= args.loss < 1.0:
         raise SimulatorError(f"--loss is a probability from 0 to below 1, not {args.loss:g}.")
     with tempfile.TemporaryDirectory(prefix="rhot-") as work:
@@ -68,12 +73,26 @@ def _evaluate(args: argparse.Namespace) -> int:
         if args.frames is not None:
             figures = evaluate_frames(args.frames.absolute(), Path(work), **options)
         else:
-            figures = evaluate(scene_of(args), args.motion, seconds, Path(work), **options)
+            figures = evaluate(scene_of(args), args.motion or "grasp", seconds, Path(work), **options)
     if args.json:
         print(json.dumps(figures))
     else:
         print(table([(figures["motion"], figures)]), details(figures), sep="\n\n")
     return 0
+
+
+def _motions_of(args: argparse.Namespace, usual: Sequence[str]) -> list[str]:
+    """What is compared on. Raises SimulatorError for what is not there, or would be passed over."""
+    from rhot_app.errors import SimulatorError
+
+    if args.motion is not None:
+        raise SimulatorError(f"--compare takes --motions, a list: write --motions {args.motion} instead of --motion.")
+    motions = list(usual) if args.motions is None else args.motions.split(",")
+    if not all(motions):
+        raise SimulatorError(f"--motions {args.motions!r}: put commas between names of motions only.")
+    if args.recording is not None and not Path(args.recording).is_file():
+        raise SimulatorError(f"--recording {args.recording}: there is no such file.")
+    return motions if args.recording is None else [*motions, args.recording]
 
 
 def _compare(args: argparse.Namespace) -> int:
@@ -85,6 +104,10 @@ def _compare(args: argparse.Namespace) -> int:
     from rhot_app.progress import ProgressLine
     from rhot_app.simulator.node_log import Network
 
+    unseen = [name for name in _OF_PICTURES if getattr(args, name) is not None]
+    if args.sketched and unseen:
+        raise SimulatorError(f"--sketched goes without pictures, in which --{unseen[0]} would show: leave out one of "
+                             "them.")
     if args.frames is not None or args.detector != "fast":
         raise SimulatorError("--compare films its own logs with the fast detector: leave out --frames and --detector.")
     names = (args.trackers or "classic,model").split(",")
@@ -93,13 +116,14 @@ def _compare(args: argparse.Namespace) -> int:
     if unknown:
         raise SimulatorError(f"there is no tracker {unknown[0]!r}; --trackers takes some of {', '.join(TRACKERS)}.")
     seconds = 8.0 if args.seconds is None else args.seconds
-    if seconds <= SETTLE_S or seeds < 1 or not 0.0 <= args.loss < 1.0:
+    if not SETTLE_S < seconds < math.inf or seeds < 1 or not 0.0 <= args.loss < 1.0:
         raise SimulatorError(f"--seconds is more than {SETTLE_S:g}, --seeds 1 or more, --loss from 0 to below 1.")
-    motions = [*(MOTIONS if args.motions is None else args.motions.split(",")),
-               *([] if args.recording is None else [args.recording])]
+    motions = _motions_of(args, MOTIONS)
     wanted = orders(scene_of(args), motions, range(args.seed, args.seed + seeds), seconds,
                     network=Network(loss=args.loss), sketched=bool(args.sketched))
     folder = args.logs or takes_folder()
+    if folder.exists() and not folder.is_dir():
+        raise SimulatorError(f"--logs {folder} is no folder.")
     line = ProgressLine("")
     result = compare(wanted, folder, {name: TRACKERS[name] for name in names},
                      lambda title: ProgressLine(f"filming {title}"), line.report)

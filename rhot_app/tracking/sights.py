@@ -26,6 +26,10 @@ Mask = NDArray[np.bool_]
 UNLIKELY = PLAUSIBLE / ROBUST
 """A sight whose noise was widened by more to fit is not beyond doubt: 5 in 100,000 are so by chance."""
 
+SLOWEST_CLEAR_NS = 150_000_000
+"""Sights that stay fresh for longer, those of a camera of fewer than 10 frames/s, measure nothing: where a hand went
+from one to the next is guessed, and the covariances guess with it."""
+
 _SAME_FRAME_NS = 1_000_000
 _RECENT = 12
 _PERIODS, _LEARN = 1.5, 0.1
@@ -138,10 +142,12 @@ def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, widening: A
 
 @njit(cache=True)
 def seen_clearly(seen: Seen, t_ns: int, marker: int) -> bool:
-    """Whether two cameras or more see a marker beyond doubt at `t_ns`, by fresh sights."""
+    """Whether two cameras or more see a marker beyond doubt at `t_ns`, by fresh sights of cameras that are not too
+    slow."""
     count = 0
     for c in range(seen.times.shape[0]):
-        count += is_fresh(seen, t_ns, c, marker) and not seen.doubtful[c, marker]
+        count += (is_fresh(seen, t_ns, c, marker) and not seen.doubtful[c, marker]
+                  and seen.fresh_ns[c] <= SLOWEST_CLEAR_NS)
     return count >= 2
 
 

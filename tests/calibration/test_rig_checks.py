@@ -138,6 +138,15 @@ def test_nodes_that_the_chosen_tracker_cannot_use_are_named(rig: Rig, kind: Lite
     assert all(f"node {left.name} sends text" in sentence and "tracker.kind" in sentence for sentence in found)
 
 
+def test_a_marker_that_the_model_tracker_cannot_place_is_named(rig: Rig) -> None:
+    first, *others = rig.markers.markers
+    markers = change(rig.markers, markers=(change(first, role=None), *others))
+    for kind, named in (("classic", False), ("model", True)):
+        verdict = check_rig(change(rig, markers=markers, tracker=TrackerSettings(kind=kind))).verdict  # type: ignore[arg-type]
+        found = [finding.sentence for finding in verdict.findings if finding.code == "tracker"]
+        assert verdict.acceptable != named and [first.id in sentence for sentence in found] == [True] * named
+
+
 def test_text_datagrams_need_a_port_that_their_sender_knows(rig: Rig) -> None:
     text = with_nodes(rig, lambda node: change(node, text_datagrams=True), "left")
     found = [finding for finding in check_rig(text).verdict.findings if finding.code == "ports"]
@@ -156,3 +165,14 @@ def test_the_command_says_it_and_ends_with_code_2(rig: Rig, tmp_path: Path, caps
     save_rig(path, with_right_at(rig, -0.075, 0.0, 0.0))
     assert main(["check", str(path)]) == 2
     assert "calibrated from mirrored pictures" in capsys.readouterr().out
+
+
+def test_a_rig_with_what_only_pythons_json_takes_for_a_number_is_refused(rig: Rig, tmp_path: Path,
+                                                                        capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "rig.json"
+    save_rig(path, rig)
+    document = json.loads(path.read_text())
+    document["nodes"][0]["intrinsics"]["fx"] = float("nan")
+    path.write_text(json.dumps(document))
+    assert main(["check", str(path)]) == 2
+    assert f"{path}: not valid JSON" in capsys.readouterr().err

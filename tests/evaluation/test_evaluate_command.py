@@ -28,7 +28,10 @@ def test_a_comparison_prints_tables_and_json(tmp_path: Path, capsys: pytest.Capt
 
 
 @pytest.mark.parametrize("wrong", [("--trackers", "magic"), ("--seconds", "0.5"), ("--seeds", "0"), ("--loss", "1"),
-                                   ("--frames", "somewhere"), ("--detector", "reference"), ("--motions", "flight")])
+                                   ("--frames", "somewhere"), ("--detector", "reference"), ("--motions", "flight"),
+                                   ("--motions", "rest,"), ("--motion", "rest"), ("--recording", "nowhere.tsv"),
+                                   ("--seconds", "inf"), ("--lamp", "0.1"), ("--background", "clutter"),
+                                   ("--logs", __file__)])
 def test_what_cannot_be_compared_is_said(wrong: tuple[str, str], tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*QUICK, "--logs", str(tmp_path), *wrong]) == 2
