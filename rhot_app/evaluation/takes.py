@@ -26,7 +26,7 @@ from rhot_app.simulator.film import TRUTH_NAME, new_folder
 from rhot_app.simulator.node_log import CABLE, Network, NodeVoice, write_node_log
 from rhot_app.simulator.scene import Scene, node_settings
 from rhot_app.simulator.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
-from rhot_app.simulator.sights import sights
+from rhot_app.simulator.sights import ORDINARY, sights
 from rhot_app.simulator.truth import FrameTruth, Truth, load_truth, save_truth, true_act
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
@@ -63,7 +63,7 @@ class Order:
     def name(self) -> str:
         """A folder name that differs with the order."""
         facts = [msgspec.to_builtins(self.scene.settings), self.scene.seed, self.seconds, asdict(self.network),
-                 self.sketched, _motion_digest(self.motion)]
+                 asdict(ORDINARY) if self.sketched else False, _motion_digest(self.motion)]
         digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
         kind = "sketched" if self.sketched else self.scene.settings.markers
         return f"{Path(self.motion).stem}-{self.seconds:g}s-{kind}-{self.scene.seed}-{digest[:12]}"

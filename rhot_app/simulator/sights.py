@@ -2,7 +2,7 @@
 
 Each marker's silhouette is where it was at its own row's time; what other fingers and the palm hide is left out of it.
 White noise and a bias that varies slowly, mostly alike in all cameras as limb shading makes it, are added; the stated
-covariance knows of the noise alone, as the real detector's. Colours are never mixed up.
+covariance is larger than either, as the detector's (`benchmarks/sight_errors.py`). Colours are never mixed up.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ class SightNoise:
     """px per axis. `white`: from frame to frame; `stated`: what the covariance says of it. `common` and `own`: rms of
     the slow bias that all cameras share, and of each one's own; `slow_s`: how long a bias lasts."""
 
-    white: float = 0.03
-    stated: float = 0.025
-    common: float = 0.05
-    own: float = 0.03
+    white: float = 0.02
+    stated: float = 0.045
+    common: float = 0.04
+    own: float = 0.015
     slow_s: float = 0.7
 
 
