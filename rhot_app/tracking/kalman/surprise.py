@@ -68,13 +68,15 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
     count, how, grown = rows.used[1], estimate.held[0], jerk_gains(ONSET_S)
     if count == 0:
         return
-    noise, per_unit, surprise = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count)
+    noise, per_unit, surprise = np.empty((count, 3)), np.zeros((count, 3, 3)), np.empty(count)
     expected_noise(rows, estimate.covariance, noise)
+    added = np.zeros(GROUPS)
+    if _as_expected(rows, estimate, noise, per_unit, added, believed, widening):
+        return
     for observation in range(count):
         for kind in range(3):
             group = kind if kind < FIRST_FINGER else FIRST_FINGER + rows.part[observation]
             _effect(rows, observation, group, grown, together, per_unit[observation, kind])
-    added = np.zeros(GROUPS)
     if how != PALM_HELD:
         _raise_palm(rows, estimate, noise, per_unit, LINEAR, added, surprise)
         if how != TURN_HELD:
@@ -97,11 +99,33 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
 
 
 @njit(cache=True)
-def _follow_trends(estimate: Estimate, added: Array) -> None:
-    """Wake the groups whose velocities were corrected the same way for long; a new trend begins."""
+def _as_expected(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, added: Array, believed: Mask,
+                 widening: Array) -> bool:
+    """Whether nothing surprises, as with most frames: then all is believed, and what acceleration would do need not be
+    known."""
+    if np.max(_trends(estimate)) > TREND:
+        return False
+    for observation in range(rows.used[1]):
+        value = _squared(rows, observation, noise, per_unit, added)
+        if not value <= PLAUSIBLE:
+            return False
+        believed[observation], widening[observation] = True, max(1.0, value / ROBUST)
+    return True
+
+
+@njit(cache=True)
+def _trends(estimate: Estimate) -> Array:
+    """(7,) the largest squared normalised trend of each group's velocities."""
     total = np.zeros(GROUPS)
     for i in range(POSE):
         total[GROUP_OF[i]] = max(total[GROUP_OF[i]], estimate.trend[i] ** 2 * (2.0 - LEAK) / LEAK)
+    return total
+
+
+@njit(cache=True)
+def _follow_trends(estimate: Estimate, added: Array) -> None:
+    """Wake the groups whose velocities were corrected the same way for long; a new trend begins."""
+    total = _trends(estimate)
     for group in range(GROUPS):
         if total[group] > TREND:
             added[group] = max(added[group], AWAKE[group] ** 2)
