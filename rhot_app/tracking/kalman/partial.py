@@ -43,15 +43,15 @@ LESS = 0.02
 MISS, MISS_PX = 4.0, 0.5
 """Rays miss each other when they are so many standard deviations apart, and so many px."""
 
-SHIFT, BAND_SHIFT = 1.0, 2.0
-"""By how many of its radii the middle of a marker's rest lies off, per part of its area that is covered; a band is
-longer than it is wide."""
+SHIFT, BAND_SHIFT = 0.5, 2.0
+"""By how many of its radii the middle of a marker's rest lies off, per part of its area that is covered. A centroid's
+moves by one, that of a fitted outline by half of it; a band is longer than it is wide."""
 
-
-OWN = 0.7
+OWN = 0.35
 """Part of the variance that a node states which is this camera's alone, while the whole hand is in plain view of
 another one as well. The rest moves markers in all pictures alike: their biases, which the filter knows anyway.
-(Measured: a fifth, but one that lasts for many frames.) What is half hidden is better understood with caution."""
+(Measured: 0.1 to 0.4, in closing hands as much that lasts for many frames.) What is half hidden is better understood
+with caution."""
 
 CALM_S = 0.5
 """So is what is seen this soon after a sight that had another name or was not believed as it was."""

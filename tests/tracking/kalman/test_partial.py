@@ -18,10 +18,12 @@ from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.markers import place_markers, project_marker
 from rhot_app.tracking.kalman.partial import (
     AGREE,
+    BAND_SHIFT,
     CALM_S,
     LESS,
     MISS_PX,
     OWN,
+    SHIFT,
     View,
     disagreement,
     doubt_partial,
@@ -98,8 +100,8 @@ def test_the_smaller_of_two_sights_is_doubted_by_as_much_as_its_middle_may_have_
     doubt, left_out = judged(seen(estimate, 1, {INDEX: 0.8, WRIST: 0.8}), estimate)
     assert np.flatnonzero(doubt).tolist() == [INDEX, WRIST] and left_out == []
     radius_px = 0.5 * WIDTH_M * np.sqrt(0.8) * CAMERAS[1].intrinsics[0] / 0.6
-    assert doubt[INDEX] == pytest.approx(radius_px * np.sqrt(0.2**2 - AGREE**2), rel=0.2)
-    assert doubt[WRIST] == pytest.approx(2.0 * doubt[INDEX], rel=0.2)  # bands are longer than wide
+    assert doubt[INDEX] == pytest.approx(SHIFT * radius_px * np.sqrt(0.2**2 - AGREE**2), rel=0.2)
+    assert doubt[WRIST] == pytest.approx(BAND_SHIFT / SHIFT * doubt[INDEX], rel=0.2)  # bands are longer than wide
     doubt, _ = judged(seen(estimate, 0), estimate)
     assert not doubt.any()
 
