@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES
-from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, SCALE, Estimate, scale_of
+from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, Estimate, scale_of
 from rhot_app.tracking.kalman.markers import Cameras
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.wearing import Wearing
+from rhot_app.tracking.known import known_of
 from rhot_app.tracking.locate import locate_all
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.sights import Seen, bring_together, seen_clearly
@@ -29,10 +30,6 @@ _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED
 
 MEASURED_M, INFERRED_M = 3e-3, 12e-3
 """Standard deviation along the worst axis up to which a place counts as measured (when it was seen) and as inferred."""
-
-DOUBTED = 0.25
-"""Of a palm that turns, and of which only fingers show how, more is believed to be known than is: linearised anew with
-every frame, fingers that bend pass for a palm that turns. This part of what habit leaves open is told beside."""
 
 MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
 
@@ -48,7 +45,7 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 class Subject(NamedTuple):
     """What states tell of, unchanging: `dh`, the hand's table with P = 26 + M points: joints, fingertips, M markers;
     `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in
-    `RigArrays`; `usual` (27,): variances of the pose by habit."""
+    `RigArrays`; `paint` (M,) m^2 and `usual` (27,) as in `known_of`."""
 
     dh: DhArrays
     part: Indices
@@ -56,6 +53,7 @@ class Subject(NamedTuple):
     cameras: Cameras
     focal: Array
     shapes: Array
+    paint: Array
     usual: Array
 
 
@@ -80,7 +78,7 @@ def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
     dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
                       point_offset=np.concatenate([one.point_offset, other.point_offset]))
     return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes,
-                   np.diag(wearing.habits.usual).copy())
+                   wearing.paint_variance, np.diag(wearing.habits.usual).copy())
 
 
 def empty_report(markers: int) -> Report:
@@ -105,7 +103,8 @@ def describe(account: Share, t_ns: int, report: Report) -> bool:
     that is told of a state: each costs some microseconds."""
     told: Account = account.of
     estimate, subject, seen = told.estimate, told.subject, told.seen
-    world, covariance, count = estimate.world, _known_of(estimate, subject.usual), report.points.shape[0]
+    world, count = estimate.world, report.points.shape[0]
+    covariance = known_of(estimate, subject.cameras, subject.paint, subject.usual)
     jacobian = np.empty((count, 3, POSE))
     _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
     _cover_all(world, covariance, jacobian, report.points, report.covariances)
@@ -118,33 +117,6 @@ def describe(account: Share, t_ns: int, report: Report) -> bool:
         all_measured &= report.marker_knowledge[m] == _MEASURED
     _conclude(covariance, subject.part, report)
     return all_measured
-
-
-@njit(cache=True)
-def _known_of(estimate: Estimate, usual: Array) -> Array:
-    """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as it is told: no angle is known
-    less than by habit, whose variances are `usual` (27,)."""
-    covariance, out = estimate.covariance, np.empty((POSE + 1, POSE + 1))
-    for i in range(POSE):
-        for j in range(POSE):
-            out[i, j] = covariance[i, j] + DOUBTED * estimate.left_open[i, j]
-        out[i, POSE], out[POSE, i] = covariance[i, SCALE], covariance[SCALE, i]
-    out[POSE, POSE] = covariance[SCALE, SCALE]
-    for i in range(ANGLES, POSE):
-        _tell_of_habit(out, i, usual[i])
-    return out
-
-
-@njit(cache=True)
-def _tell_of_habit(covariance: Array, i: int, usual: float) -> None:
-    """Weigh so much of habit that number `i` is known to a variance of `usual`; nothing if it is already. What is known
-    of it together with others, as of a marker's place, stays known."""
-    excess = covariance[i, i] - usual
-    if excess > 0.0:
-        row = covariance[i] / covariance[i, i]
-        for j in range(row.shape[0]):
-            for k in range(row.shape[0]):
-                covariance[j, k] -= excess * row[j] * row[k]
 
 
 @njit(cache=True)
@@ -214,7 +186,7 @@ def _worst(covariance: Array) -> float:
 @njit(cache=True)
 def _cover_all(world: Array, covariance: Array, jacobian: Array, points: Array, out: Array) -> None:
     """Fill `out` (P, 3, 3) m^2 with the covariances of `points` (P, 3) m with `jacobian` (P, 3, 27); `covariance`
-    (28, 28) as in `_known_of`."""
+    (28, 28) as in `known_of`."""
     columns, slopes = np.empty(POSE + 1, np.int64), np.empty((POSE + 1, 3))
     scaled = covariance[POSE, POSE] > 0.0
     for p in range(points.shape[0]):

@@ -1,13 +1,10 @@
 """What the model tracker tells of how well it knows things."""
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
 from modelled_hand import model_rig, moving, sights, states_of
 from synthetic_rig import LOST, altered
 
 from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.model_output import _tell_of_habit
 from rhot_app.tracking.state import Knowledge
 
 RIG = model_rig()
@@ -30,19 +27,3 @@ def test_markers_in_plain_view_stay_measured_while_the_joints_behind_them_are_op
     assert any((state.angle_sd > 0.999 * usual).any() for state in states)
     measured = np.array([state.marker_knowledge == Knowledge.MEASURED for state in states])
     assert measured.mean() > 0.98  # a thumb that is bent the other way is known by the next frame
-
-
-@given(seed=st.integers(0, 2**32 - 1), column=st.integers(0, 5), usual=st.floats(1e-3, 10.0))
-def test_telling_of_habit_adds_knowledge_and_takes_none_away(seed, column, usual):
-    rng = np.random.default_rng(seed)
-    root = rng.normal(size=(6, 6))
-    known = rng.normal(size=6)
-    known /= np.linalg.norm(known)
-    root -= 0.999 * np.outer(known, known @ root)  # this combination is known well
-    before = root @ root.T
-    after = before.copy()
-    _tell_of_habit(after, column, usual)
-    assert after[column, column] <= usual * (1 + 1e-9) or after[column, column] == before[column, column]
-    assert np.linalg.eigvalsh(before - after).min() > -1e-9 * np.trace(before)
-    assert np.linalg.eigvalsh(after).min() > -1e-9 * np.trace(before)
-    assert known @ after @ known <= known @ before @ known + 1e-9 * np.trace(before)

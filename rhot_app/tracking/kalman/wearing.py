@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -27,8 +28,11 @@ from rhot_node.markers import Marker, MarkerSet
 Array = NDArray[np.float64]
 
 PLACE_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3}
-"""How far a marker's seen middle lies from where the hand file has it, by its shape: paint, its shading, and the skin
-under it. A blob is paint on a knuckle that nobody measured."""
+"""How far a marker's seen middle lies from where the hand file has it, by its shape, as the filter takes it: paint, its
+shading, and the skin under it. A blob is paint on a knuckle that nobody measured."""
+
+PAINT_SD_M = {"capsule": 0.04e-3, "band": 0.2e-3}
+"""The same without its shading, as it is told (`known.py`), of shapes that were measured."""
 
 FINGERS_TOGETHER, THUMB_WITH_FINGERS = 0.8, 0.5
 """Correlation of how fingers begin to bend: most of what hands do in daily life is one movement of all of them
@@ -43,8 +47,8 @@ _COUPLED_SD_RAD = np.radians(0.02)
 @dataclass(frozen=True, slots=True)
 class Wearing:
     """`natural`: what is believed of any hand's angles, `habits`: of one that is not seen; `roles` (M,) of the markers,
-    `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places. `outfit`: an `Outfit`, for compiled
-    functions."""
+    `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places, `paint_variance` (M,) m^2 of them as it is
+    told, infinite where nobody knows. `outfit`: an `Outfit`, for compiled functions."""
 
     model: HandModel
     worn: Worn
@@ -55,6 +59,7 @@ class Wearing:
     roles: tuple[str, ...]
     places: tuple[Place, ...]
     bias_variance: Array
+    paint_variance: Array
     outfit: Share = field(init=False)
 
     def __post_init__(self) -> None:
@@ -76,7 +81,8 @@ def compile_wearing(rig: Rig) -> Wearing:
                 np.array([camera.intrinsics for camera in models])),
         natural, habits_of(model, natural), limit_set(model, rig.tracker.limits),
         tuple(marker.role or "" for marker in rig.markers.markers), places,
-        np.array([PLACE_SD_M[marker.shape] ** 2 for marker in rig.markers.markers]))
+        np.array([PLACE_SD_M[marker.shape] ** 2 for marker in rig.markers.markers]),
+        np.array([PAINT_SD_M.get(marker.shape, math.inf) ** 2 for marker in rig.markers.markers]))
 
 
 def points_on(dh: DhArrays, places: tuple[Place, ...]) -> DhArrays:

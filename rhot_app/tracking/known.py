@@ -1,0 +1,106 @@
+"""What is known of a hand's pose as it is told, which is not quite what the filter works with.
+
+Three things differ. The filter is more careful about how far markers' seen middles lie from their places than they
+turn out to be: a hand that trusts its fingertips too far follows them where its palm does not go. Nobody is told that.
+Of a palm that turns, and of which only fingers show how, more is believed to be known than is. And no angle is known
+less than by habit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.linear import factorise
+from rhot_app.tracking.kalman.combine import add_rows, add_squares
+from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, LOOK_VARIANCE, POSE, SCALE, Estimate
+from rhot_app.tracking.kalman.markers import NEAREST_M, Cameras
+
+Array = NDArray[np.float64]
+
+DOUBTED = 0.25
+"""Of a palm that turns, and of which only fingers show how, more is believed to be known than is: linearised anew with
+every frame, fingers that bend pass for a palm that turns. This part of what habit leaves open is told beside."""
+
+COMMON = 0.6
+"""Light and paint move a marker's middle in all pictures alike by so many of the standard deviations that nodes state
+(measured: 0.4 to 0.9 in `rest`, `wave` and `grasp`, less in `fast`)."""
+
+
+@njit(cache=True)
+def known_of(estimate: Estimate, cameras: Cameras, paint: Array, usual: Array) -> Array:
+    """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as it is told.
+
+    `paint` (M,) m^2: variances of the markers' seen middles about their places, without what light does to them,
+    infinite where nobody knows; `usual` (27,): variances of the pose by habit.
+    """
+    covariance, out = estimate.covariance, np.empty((POSE + 1, POSE + 1))
+    for i in range(POSE):
+        for j in range(POSE):
+            out[i, j] = covariance[i, j]
+        out[i, POSE], out[POSE, i] = covariance[i, SCALE], covariance[SCALE, i]
+    out[POSE, POSE] = covariance[SCALE, SCALE]
+    tell_of_paint(estimate, cameras, paint, out)
+    for i in range(POSE):
+        for j in range(POSE):
+            out[i, j] += DOUBTED * estimate.left_open[i, j]
+    for i in range(ANGLES, POSE):
+        tell_of_habit(out, i, usual[i])
+    return out
+
+
+@njit(cache=True)
+def tell_of_paint(estimate: Estimate, cameras: Cameras, paint: Array, out: Array) -> None:
+    """Weigh in `out` (28, 28), the covariance of pose and size, that markers are nearer to their places than the filter
+    takes them to be: a measurement of each bias, of no other value than it has."""
+    covariance, count = estimate.covariance, 0
+    numbers, noise = np.empty(3 * paint.shape[0], np.int64), np.empty(3 * paint.shape[0])
+    for m in range(paint.shape[0]):
+        worked, told = estimate.bias_variance[m], paint[m] + _lit(estimate, cameras, m)
+        if told < worked:
+            for k in range(3):
+                numbers[count], noise[count] = BIAS + 3 * m + k, 1.0 / (1.0 / told - 1.0 / worked)
+                count += 1
+    factor, rows, order = np.empty((count, count)), np.empty((count, POSE + 1)), np.arange(count)
+    for a in range(count):
+        row = covariance[numbers[a]]
+        for b in range(a + 1):
+            factor[a, b] = row[numbers[b]]
+        factor[a, a] += noise[a]
+        rows[a, :POSE] = row[:POSE]
+        rows[a, POSE] = row[SCALE]
+    factorise(factor)
+    for a in range(count):
+        add_rows(rows[a], -factor[a, :a], rows, order[:a], 0)
+        rows[a] /= factor[a, a]
+    add_squares(out, rows, count, -1.0)
+
+
+@njit(cache=True)
+def _lit(estimate: Estimate, cameras: Cameras, m: int) -> float:
+    """How far light moves the middle of marker `m`, m^2 per axis; infinite while no camera tells what it sees."""
+    most = 0.0
+    for camera in range(cameras.pose.shape[0]):
+        variance = estimate.looks[camera, m, LOOK_VARIANCE]
+        if variance > 0.0:
+            depth = cameras.pose[camera, 2, 3]
+            for k in range(3):
+                depth += cameras.pose[camera, 2, k] * estimate.world[k, 3]
+            if depth > NEAREST_M:
+                most = max(most, variance * (depth / cameras.intrinsics[camera, 0]) ** 2)
+    return COMMON * COMMON * most if most > 0.0 else math.inf
+
+
+@njit(cache=True)
+def tell_of_habit(covariance: Array, i: int, usual: float) -> None:
+    """Weigh so much of habit that number `i` is known to a variance of `usual`; nothing if it is already. What is known
+    of it together with others, as of a marker's place, stays known."""
+    excess = covariance[i, i] - usual
+    if excess > 0.0:
+        row = covariance[i] / covariance[i, i]
+        for j in range(row.shape[0]):
+            for k in range(row.shape[0]):
+                covariance[j, k] -= excess * row[j] * row[k]
