@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
-from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES
+from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, Estimate, scale_of
 from rhot_app.tracking.kalman.markers import Cameras
 from rhot_app.tracking.kalman.share import Share
@@ -31,6 +31,13 @@ _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED
 MEASURED_M, INFERRED_M = 3e-3, 12e-3
 """Standard deviation along the worst axis up to which a place counts as measured (when it was seen) and as inferred."""
 
+LASTING = 0.3
+"""Of the standard deviation that nodes state, so much is an error of one camera that lasts: in a fingertip of which
+little shows it makes half a millimetre of distance for as long as the hand rests."""
+
+CHANGES_M_S = 0.5
+"""A marker that moves so fast looks otherwise with every frame, and what lasts of its errors is half as much."""
+
 MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
 
 FIRST_TIP, FIRST_MARKER = 21, 26
@@ -45,7 +52,8 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 class Subject(NamedTuple):
     """What states tell of, unchanging: `dh`, the hand's table with P = 26 + M points: joints, fingertips, M markers;
     `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in
-    `RigArrays`; `paint` (M,) m^2 and `usual` (27,) as in `known_of`."""
+    `RigArrays`; `paint` (M,) m^2 and `usual` (27,) as in `known_of`. `tips` (5,) and `wrist`: the markers on the
+    fingertips and on the wrist, -1 where there is none."""
 
     dh: DhArrays
     part: Indices
@@ -55,6 +63,8 @@ class Subject(NamedTuple):
     shapes: Array
     paint: Array
     usual: Array
+    tips: Indices
+    wrist: int
 
 
 class Report(NamedTuple):
@@ -78,7 +88,13 @@ def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
     dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
                       point_offset=np.concatenate([one.point_offset, other.point_offset]))
     return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes,
-                   wearing.paint_variance, np.diag(wearing.habits.usual).copy())
+                   wearing.paint_variance, np.diag(wearing.habits.usual).copy(),
+                   np.array([_worn(wearing, role) for role in TIP_ROLES]), _worn(wearing, WRIST_ROLE))
+
+
+def _worn(wearing: Wearing, role: str) -> int:
+    """The marker with a role, -1 without."""
+    return wearing.roles.index(role) if role in wearing.roles else -1
 
 
 def empty_report(markers: int) -> Report:
@@ -105,11 +121,14 @@ def describe(account: Share, t_ns: int, report: Report) -> bool:
     estimate, subject, seen = told.estimate, told.subject, told.seen
     world, count = estimate.world, report.points.shape[0]
     covariance = known_of(estimate, subject.cameras, subject.paint, subject.usual)
+    report.palm_covariance[:] = covariance[:ANGLES, :ANGLES]
     jacobian = np.empty((count, 3, POSE))
     _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
     _cover_all(world, covariance, jacobian, report.points, report.covariances)
+    located = np.empty((count - FIRST_MARKER, 3, 3))
     _locate(world, estimate.velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, t_ns,
-            report)
+            report, located)
+    tell_of_lasting(estimate.velocity, subject, jacobian[FIRST_MARKER:], located, report)
     all_measured = True
     for m in range(count - FIRST_MARKER):
         report.marker_knowledge[m] = _know(_worst(report.covariances[FIRST_MARKER + m]),
@@ -135,13 +154,37 @@ def _place(world: Array, angles: Array, scale: float, dh: DhArrays, points: Arra
 
 @njit(cache=True)
 def _locate(world: Array, velocity: Array, subject: Subject, markers: Array, jacobian: Array, seen: Seen, t_ns: int,
-            report: Report) -> None:
-    """Where the sights alone have the markers: they are of several instants, and the hand says how it moved since."""
+            report: Report, covariances: Array) -> None:
+    """Where the sights alone have the markers, with `covariances` (M, 3, 3) m^2: they are of several instants, and the
+    hand says how it moved since."""
     shape, cameras = seen.times.shape, subject.cameras
     pixels, used = np.empty((shape[0], shape[1], 2)), np.empty(shape, np.bool_)
     bring_together(subject.half_axes, cameras, world, velocity, markers, jacobian, t_ns, seen, pixels, used)
     locate_all(pixels, seen.covariances, used, cameras.intrinsics, cameras.pose, subject.focal, subject.shapes,
-               report.raw, np.empty((shape[1], 3, 3)), report.errors)
+               report.raw, covariances, report.errors)
+
+
+@njit(cache=True)
+def tell_of_lasting(velocity: Array, subject: Subject, jacobian: Array, located: Array, report: Report) -> None:
+    """Add to what is told of markers, the fingertips and the wrist that wear them what no waiting takes away: errors of
+    one camera that last, part of the covariances (M, 3, 3) m^2 of the places that its sights have."""
+    for m in range(located.shape[0]):
+        if not np.isfinite(located[m, 0, 0]):
+            continue
+        square = 0.0
+        for i in range(3):
+            speed = 0.0
+            for j in range(POSE):
+                speed += jacobian[m, i, j] * velocity[j]
+            square += speed * speed
+        lasting = LASTING * LASTING / (1.0 + square / CHANGES_M_S**2) * located[m]
+        report.covariances[FIRST_MARKER + m] += lasting
+        if m == subject.wrist:
+            report.covariances[0] += lasting
+            report.palm_covariance[:3, :3] += lasting
+        for finger in range(subject.tips.shape[0]):
+            if m == subject.tips[finger]:
+                report.covariances[FIRST_TIP + finger] += lasting
 
 
 @njit(cache=True)
@@ -165,7 +208,6 @@ def _conclude(covariance: Array, part: Indices, report: Report) -> None:
         report.angle_sd[angle] = sd
         report.angle_knowledge[angle] = _know(sd, turn and shown[_FINGER_OF_ANGLE[angle] + 1] >= 2, MEASURED_RAD,
                                               INFERRED_RAD)
-    report.palm_covariance[:] = covariance[:ANGLES, :ANGLES]
     sd = _worst(covariance[ROTATION:ANGLES, ROTATION:ANGLES])
     report.palm[0] = _know(sd, turn, MEASURED_RAD, INFERRED_RAD)
 

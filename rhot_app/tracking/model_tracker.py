@@ -168,9 +168,9 @@ class ModelTracker:
 
     def _pace(self, camera: int) -> float:
         """Let the estimate know how fast a camera is; returns the quickest one's frame period, s."""
-        periods_s = self._sights.periods_s
+        periods_s, newest = self._sights.periods_s, self._sights.newest
         self._hand.estimate.pace[camera] = min(ORDINARY_S / periods_s[camera], 1.0)
-        return min(periods_s)
+        return min(period_s for period_s, frame in zip(periods_s, newest, strict=True) if frame is not None)
 
     def _compare(self, estimated: Array) -> None:
         """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them."""

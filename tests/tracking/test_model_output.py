@@ -1,10 +1,22 @@
 """What the model tracker tells of how well it knows things."""
 
 import numpy as np
+import pytest
 from modelled_hand import model_rig, moving, sights, states_of
 from synthetic_rig import LOST, altered
 
 from rhot_app.tracking.kalman.wearing import compile_wearing
+from rhot_app.tracking.model_output import (
+    CHANGES_M_S,
+    FIRST_MARKER,
+    FIRST_TIP,
+    LASTING,
+    Report,
+    empty_report,
+    subject_of,
+    tell_of_lasting,
+)
+from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.state import Knowledge
 
 RIG = model_rig()
@@ -27,3 +39,37 @@ def test_markers_in_plain_view_stay_measured_while_the_joints_behind_them_are_op
     assert any((state.angle_sd > 0.999 * usual).any() for state in states)
     measured = np.array([state.marker_knowledge == Knowledge.MEASURED for state in states])
     assert measured.mean() > 0.98  # a thumb that is bent the other way is known by the next frame
+
+
+WEARING = compile_wearing(RIG)
+TIPS = [WEARING.roles.index(f"{finger}_tip") for finger in ("thumb", "index", "middle", "ring", "little")]
+WRIST = WEARING.roles.index("wrist")
+
+
+def told_of_lasting(located: np.ndarray, speed_m_s: float = 0.0) -> Report:
+    """What is told of a hand that is known exactly but for errors that last; its markers move alike."""
+    count = len(WEARING.roles)
+    report, jacobian, velocity = empty_report(count), np.zeros((count, 3, 27)), np.zeros(27)
+    report.covariances[:], report.palm_covariance[:] = 0.0, 0.0
+    jacobian[:, 0, 0], velocity[0] = 1.0, speed_m_s
+    tell_of_lasting(velocity, subject_of(WEARING, compile_rig(RIG)), jacobian, located, report)
+    return report
+
+
+def test_what_lasts_of_one_cameras_errors_is_told_of_markers_and_of_what_wears_them():
+    rng = np.random.default_rng(1)
+    located = np.array([root @ root.T for root in rng.normal(size=(len(WEARING.roles), 3, 3))])
+    located[TIPS[1]] = np.nan  # two cameras do not see it
+    report = told_of_lasting(located)
+    expected = LASTING**2 * np.nan_to_num(located)
+    np.testing.assert_allclose(report.covariances[FIRST_MARKER:], expected)
+    np.testing.assert_allclose(report.covariances[FIRST_TIP:FIRST_MARKER], expected[TIPS])
+    np.testing.assert_allclose(report.covariances[0], expected[WRIST])
+    np.testing.assert_allclose(report.palm_covariance[:3, :3], expected[WRIST])
+    assert not report.covariances[1:FIRST_TIP].any() and not report.palm_covariance[3:].any()
+
+
+def test_a_marker_in_motion_looks_otherwise_with_every_frame_and_less_lasts():
+    located = np.tile(np.eye(3), (len(WEARING.roles), 1, 1))
+    for speed, share in ((0.0, 1.0), (CHANGES_M_S, 0.5), (4.0 * CHANGES_M_S, 1.0 / 17.0)):
+        assert told_of_lasting(located, speed).covariances[FIRST_MARKER, 0, 0] == pytest.approx(share * LASTING**2)

@@ -47,10 +47,10 @@ SHIFT, BAND_SHIFT = 0.5, 2.0
 """By how many of its radii the middle of a marker's rest lies off, per part of its area that is covered. A centroid's
 moves by one, that of a fitted outline by half of it; a band is longer than it is wide."""
 
-OWN = 0.35
+OWN = 0.7
 """Part of the variance that a node states which is this camera's alone, while the whole hand is in plain view of
 another one as well. The rest moves markers in all pictures alike: their biases, which the filter knows anyway.
-(Measured: 0.1 to 0.4, in closing hands as much that lasts for many frames.) What is half hidden is better understood
+(Measured: 0.1 to 0.5, but in closing hands one that lasts for many frames.) What is half hidden is better understood
 with caution."""
 
 CALM_S = 0.5

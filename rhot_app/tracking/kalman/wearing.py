@@ -31,7 +31,7 @@ PLACE_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e
 """How far a marker's seen middle lies from where the hand file has it, by its shape, as the filter takes it: paint, its
 shading, and the skin under it. A blob is paint on a knuckle that nobody measured."""
 
-PAINT_SD_M = {"capsule": 0.04e-3, "band": 0.2e-3}
+PAINT_SD_M = {"capsule": 0.04e-3, "band": 0.3e-3}
 """The same without its shading, as it is told (`known.py`), of shapes that were measured."""
 
 FINGERS_TOGETHER, THUMB_WITH_FINGERS = 0.8, 0.5
