@@ -54,7 +54,7 @@ def decode_document(data: bytes, kind: type[T], *, format_name: str, version: in
     try:
         return msgspec.json.decode(data, type=kind)
     except msgspec.ValidationError as exc:
-        raise error(f"{where}: {_in_words(str(exc))}") from exc
+        raise error(f"{where}: {_in_words(str(exc), kind)}") from exc
     except msgspec.DecodeError as exc:
         raise error(f"{where}: {_not_strict(exc)}") from exc
 
@@ -64,15 +64,38 @@ def _not_strict(exc: msgspec.DecodeError) -> str:
     return f"not valid JSON ({exc}). NaN and Infinity are no numbers there."
 
 
-def _in_words(message: str) -> str:
+def _in_words(message: str, kind: type) -> str:
     """What msgspec found wrong, field first, for people who edit the file; a message that is not its own stays."""
     match = _PLACE.fullmatch(message)
     what, place = (match["what"], match["place"]) if match else (message, "")
+    values = _values_at(kind, place) if what.startswith("Invalid") else []
     for pattern, words in _COMPLAINTS:
         what = pattern.sub(words, what)
     if what.startswith("Expected `"):
         what = "expected" + _KIND.sub(_kind_in_words, what.removeprefix("Expected")).replace(", got", ", not") + "."
+    if values:
+        what = f"{what.removesuffix('.')}: {' or '.join(values)}."
     return f"{place}: {what}" if place else what
+
+
+def _values_at(kind: type, place: str) -> list[str]:
+    """The values that a field can have, as JSON, if they are few and known; `place` as in `nodes[...].kind`."""
+    kinds = [msgspec.inspect.type_info(kind)]
+    for name in [re.sub(r"\[.*", "", part) for part in place.split(".")]:
+        kinds = [inner for one in kinds for inner in _members(one)]
+        kinds = [field.type for one in kinds if isinstance(one, msgspec.inspect.StructType)
+                 for field in one.fields if field.encode_name == name]
+    return [json.dumps(value) for one in kinds for inner in _members(one)
+            if isinstance(inner, msgspec.inspect.LiteralType) for value in inner.values]
+
+
+def _members(kind: msgspec.inspect.Type) -> list[msgspec.inspect.Type]:
+    """A type, or those that it is a union or a list of."""
+    if isinstance(kind, msgspec.inspect.UnionType):
+        return [inner for one in kind.types for inner in _members(one)]
+    if isinstance(kind, msgspec.inspect.ListType | msgspec.inspect.VarTupleType):
+        return _members(kind.item_type)
+    return [kind]
 
 
 def _kind_in_words(kinds: re.Match[str]) -> str:

@@ -116,14 +116,19 @@ def _compare(args: argparse.Namespace) -> int:
     if unknown:
         raise SimulatorError(f"there is no tracker {unknown[0]!r}; --trackers takes some of {', '.join(TRACKERS)}.")
     seconds = 8.0 if args.seconds is None else args.seconds
-    if not SETTLE_S < seconds < math.inf or seeds < 1 or not 0.0 <= args.loss < 1.0:
-        raise SimulatorError(f"--seconds is more than {SETTLE_S:g}, --seeds 1 or more, --loss from 0 to below 1.")
+    for good, rule in ((SETTLE_S < seconds < math.inf, f"--seconds is more than {SETTLE_S:g}, and finite"),
+                       (seeds >= 1, "--seeds is 1 or more"), (0.0 <= args.loss < 1.0, "--loss is from 0 to below 1")):
+        if not good:
+            raise SimulatorError(f"{rule}.")
     motions = _motions_of(args, MOTIONS)
     wanted = orders(scene_of(args), motions, range(args.seed, args.seed + seeds), seconds,
                     network=Network(loss=args.loss), sketched=bool(args.sketched))
     folder = args.logs or takes_folder()
-    if folder.exists() and not folder.is_dir():
-        raise SimulatorError(f"--logs {folder} is no folder.")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as exc:
+        raise SimulatorError(f"--logs {folder}: logs cannot be kept there ({exc.strerror}); choose another folder."
+                             ) from exc
     line = ProgressLine("")
     result = compare(wanted, folder, {name: TRACKERS[name] for name in names},
                      lambda title: ProgressLine(f"filming {title}"), line.report)

@@ -31,7 +31,7 @@ def test_a_comparison_prints_tables_and_json(tmp_path: Path, capsys: pytest.Capt
                                    ("--frames", "somewhere"), ("--detector", "reference"), ("--motions", "flight"),
                                    ("--motions", "rest,"), ("--motion", "rest"), ("--recording", "nowhere.tsv"),
                                    ("--seconds", "inf"), ("--lamp", "0.1"), ("--background", "clutter"),
-                                   ("--logs", __file__)])
+                                   ("--logs", __file__), ("--logs", f"{__file__}/logs")])
 def test_what_cannot_be_compared_is_said(wrong: tuple[str, str], tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*QUICK, "--logs", str(tmp_path), *wrong]) == 2

@@ -58,7 +58,8 @@ SAID: list[tuple[dict[str, Any], str]] = [
     ({"node_id": "a"}, "node_id: expected a whole number, not text."),
     ({"camera": {"gain": "a"}}, "camera.gain: expected a number or null, not text."),
     ({"node_id": 0}, "node_id: expected a whole number >= 1."),
-    ({"detector": "magic"}, "detector: 'magic' is not one of the values that this field can have."),
+    ({"detector": "magic"},
+     """detector: 'magic' is not one of the values that this field can have: "fast" or "reference"."""),
 ]
 
 
