@@ -26,6 +26,9 @@ calibration has drifted: such a place is inferred, not measured."""
 
 GATE_SIGMAS = 6.0
 
+EXACT_PX2 = 1e-6
+"""Variance, per axis, of a sight that is said to be exact: to a thousandth of a pixel."""
+
 
 @njit(cache=True)
 def choose_views(flags: NDArray[np.int64], live: Mask, used: Mask, doubtful: Mask) -> None:
@@ -85,7 +88,8 @@ def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array,
             views[c] = used[c, m]
             x, y, xu, xv, yu, yv = undistort_point(pixels[c, m, 0], pixels[c, m, 1], intrinsics[c])
             rays[c, 0], rays[c, 1] = x, y
-            uu, uv, vv = covariances[c, m, 0, 0], covariances[c, m, 0, 1], covariances[c, m, 1, 1]
+            uu, vv = max(covariances[c, m, 0, 0], EXACT_PX2), max(covariances[c, m, 1, 1], EXACT_PX2)
+            uv = covariances[c, m, 0, 1]
             ray_covariances[c, 0, 0] = xu * xu * uu + 2.0 * xu * xv * uv + xv * xv * vv
             ray_covariances[c, 1, 1] = yu * yu * uu + 2.0 * yu * yv * uv + yv * yv * vv
             ray_covariances[c, 0, 1] = xu * yu * uu + (xu * yv + xv * yu) * uv + xv * yv * vv

@@ -161,7 +161,7 @@ def ingest_frame(times: Times, pixels: Array, covariances: Array, flags: Flags, 
             continue
         covariance[:] = new_covariances[m]
         determinant = covariance[0, 0] * covariance[1, 1] - covariance[0, 1] * covariance[1, 0]
-        if not (determinant > 0.0 and 0.0 < covariance[0, 0] < 1e8 and 0.0 < covariance[1, 1] < 1e8):
+        if not (determinant >= 0.0 and 0.0 <= covariance[0, 0] < 1e8 and 0.0 <= covariance[1, 1] < 1e8):
             continue
         covariance[0, 0] += floor
         covariance[1, 1] += floor

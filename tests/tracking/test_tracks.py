@@ -165,7 +165,7 @@ def test_each_marker_has_its_own_rows_time():
 def test_what_is_lost_or_not_a_number_is_no_sample(poison):
     covariances = np.tile(np.eye(2), (5, 1, 1))
     covariances[2, 0, 0] = poison if poison != 1e30 else -1.0
-    covariances[3] = 0.0
+    covariances[3, 0, 1] = covariances[3, 1, 0] = 2.0
     flags = np.array([0, 0, 0, 0, 1], np.uint16)
     pixels = [[1.0, poison], [poison, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0]]
     taken, newest, track = ingest(pixels, flags, covariances)
