@@ -92,6 +92,8 @@ def main() -> int:
     args = parser.parse_args()
     if args.seeds < 1:
         parser.error("--seeds must be 1 or more")
+    if not 2.0 <= args.seconds < float("inf"):
+        parser.error("--seconds must be 2 or more")
     settings = msgspec.structs.replace(twin_defaults(), markers=args.markers)
     print(f"{'fingertips mm rms (worst)':28s}{'as it is':>16s}{'palm known':>16s}")
     try:

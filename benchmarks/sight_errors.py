@@ -99,6 +99,8 @@ def main() -> int:
     args = parser.parse_args()
     if args.seeds < 1:
         parser.error("--seeds must be 1 or more")
+    if not 2.0 <= args.seconds < float("inf") or not all(args.motions.split(",")):
+        parser.error("--seconds must be 2 or more, and --motions names with commas between them")
     print(f"{'px':16s}{'stated':>9s}{'common':>9s}{'own':>9s}{'share':>9s}{'lasts':>9s}")
     try:
         for motion in args.motions.split(","):

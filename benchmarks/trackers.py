@@ -175,8 +175,14 @@ def main() -> int:
     parser.add_argument("--logs", type=Path, metavar="DIR", default=takes_folder())
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
-    if args.seeds < 1:
-        parser.error("--seeds must be 1 or more")
+    if args.seeds < 1 or args.seed < 0:
+        parser.error("--seeds must be 1 or more, --seed 0 or more")
+    if not 2.0 <= args.seconds < float("inf") or not 0.0 < args.minutes < float("inf"):
+        parser.error("--seconds must be 2 or more, --minutes more than 0, and both must end")
+    try:
+        args.logs.mkdir(parents=True, exist_ok=True)
+    except OSError as exc:
+        parser.error(f"--logs {args.logs}: logs cannot be kept there ({exc.strerror})")
     bench = Bench(tuple(range(args.seed, args.seed + args.seeds)), args.seconds, args.markers, args.sketched, args.logs,
                   args.minutes, args.motion)
     done: dict[str, Results] = {}

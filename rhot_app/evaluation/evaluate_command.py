@@ -13,6 +13,7 @@ from pathlib import Path
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 
 _OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs")
+_JUDGED_S = 0.1  # shorter is no run
 _OF_PICTURES = ("background", "lamp", "kelvin", "mains")
 
 
@@ -63,7 +64,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     from rhot_app.evaluation.runner import evaluate, evaluate_frames
 
     seconds = 20.0 if args.seconds is None else args.seconds
-    if not SETTLE_S < seconds < math.inf and args.frames is None:
+    if not SETTLE_S + _JUDGED_S <= seconds < math.inf and args.frames is None:
         raise SimulatorError(f"a run of {seconds:g} s cannot be judged: the first {SETTLE_S:g} s are not, and it must "
                              "end.")
     if not 0.0 <= args.loss < 1.0:
@@ -87,7 +88,7 @@ def _motions_of(args: argparse.Namespace, usual: Sequence[str]) -> list[str]:
 
     if args.motion is not None:
         raise SimulatorError(f"--compare takes --motions, a list: write --motions {args.motion} instead of --motion.")
-    motions = list(usual) if args.motions is None else args.motions.split(",")
+    motions = list(usual) if args.motions is None else list(dict.fromkeys(args.motions.split(",")))
     if not all(motions):
         raise SimulatorError(f"--motions {args.motions!r}: put commas between names of motions only.")
     if args.recording is not None and not Path(args.recording).is_file():
@@ -116,8 +117,10 @@ def _compare(args: argparse.Namespace) -> int:
     if unknown:
         raise SimulatorError(f"there is no tracker {unknown[0]!r}; --trackers takes some of {', '.join(TRACKERS)}.")
     seconds = 8.0 if args.seconds is None else args.seconds
-    for good, rule in ((SETTLE_S < seconds < math.inf, f"--seconds is more than {SETTLE_S:g}, and finite"),
-                       (seeds >= 1, "--seeds is 1 or more"), (0.0 <= args.loss < 1.0, "--loss is from 0 to below 1")):
+    least_s = SETTLE_S + _JUDGED_S
+    for good, rule in ((least_s <= seconds < math.inf, f"--seconds is {least_s:g} or more, and finite"),
+                       (seeds >= 1, "--seeds is 1 or more"),
+                       (0.0 <= args.loss < 1.0, "--loss is from 0 to below 1")):
         if not good:
             raise SimulatorError(f"{rule}.")
     motions = _motions_of(args, MOTIONS)

@@ -48,6 +48,8 @@ def scene_of(args: argparse.Namespace) -> Scene:
     from rhot_app.errors import SimulatorError
     from rhot_app.simulator.scene import TwinSettings, make_scene, twin_defaults
 
+    if args.seed < 0:
+        raise SimulatorError(f"--seed is 0 or more, not {args.seed}.")
     chosen = {"preset": args.preset, "distance_m": args.distance, "background": args.background,
               "markers": args.markers}
     lamp = {"brightness": args.lamp, "kelvin": args.kelvin, "mains_hz": args.mains}

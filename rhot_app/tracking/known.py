@@ -1,7 +1,8 @@
 """What is known of a hand's pose as it is told, which is not quite what the filter works with.
 
-Three things differ. The filter is more careful about how far markers' seen middles lie from their places than they
-turn out to be: a hand that trusts its fingertips too far follows them where its palm does not go. Nobody is told that.
+Three things differ. The filter takes markers' seen middles to lie farther from their places than they turn out to: a
+hand that trusts its fingertips too far follows them where its palm does not go. What is told takes them to lie as near
+as they do.
 Of a palm that turns, and of which only fingers show how, more is believed to be known than is. And no angle is known
 less than by habit.
 """
@@ -27,7 +28,8 @@ every frame, fingers that bend pass for a palm that turns. This part of what hab
 
 COMMON = 0.8
 """Light and paint move a marker's middle in all pictures alike by so many of the standard deviations that nodes state
-(measured: 0.4 to 1 where nothing hurries, of thumbs more, in `fast` less)."""
+(measured: 0.4 to 1 where nothing hurries, 1.4 of thumbs and wristbands, whose paint is taken to lie farther off; in
+`fast` less)."""
 
 
 @njit(cache=True)

@@ -29,14 +29,16 @@ Indices = NDArray[np.int64]
 _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED), int(Knowledge.GUESSED)
 
 MEASURED_M, INFERRED_M = 3e-3, 12e-3
-"""Standard deviation along the worst axis up to which a place counts as measured (when it was seen) and as inferred."""
+"""Standard deviation, the root of the summed variances of its axes, up to which a place counts as measured (when it was
+seen) and as inferred."""
 
 LASTING = 0.3
 """Of the standard deviation that nodes state, so much is an error of one camera that lasts: in a fingertip of which
 little shows it makes half a millimetre of distance for as long as the hand rests."""
 
 CHANGES_M_S = 0.5
-"""A marker that moves so fast looks otherwise with every frame, and what lasts of its errors is half as much."""
+"""A marker that moves so fast looks otherwise with every frame, and what lasts of its errors has half the
+variance."""
 
 MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
 

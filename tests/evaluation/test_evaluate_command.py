@@ -28,6 +28,7 @@ def test_a_comparison_prints_tables_and_json(tmp_path: Path, capsys: pytest.Capt
 
 
 @pytest.mark.parametrize("wrong", [("--trackers", "magic"), ("--seconds", "0.5"), ("--seeds", "0"), ("--loss", "1"),
+                                   ("--seconds", "1.01"), ("--seed", "-1"),
                                    ("--frames", "somewhere"), ("--detector", "reference"), ("--motions", "flight"),
                                    ("--motions", "rest,"), ("--motion", "rest"), ("--recording", "nowhere.tsv"),
                                    ("--seconds", "inf"), ("--lamp", "0.1"), ("--background", "clutter"),

@@ -47,11 +47,14 @@ SHIFT, BAND_SHIFT = 0.5, 2.0
 """By how many of its radii the middle of a marker's rest lies off, per part of its area that is covered. A centroid's
 moves by one, that of a fitted outline by half of it; a band is longer than it is wide."""
 
+EXACT_PX2 = 1e-6
+"""No sight is remembered as better than this: zero is for those that were not seen."""
+
 OWN = 0.7
 """Part of the variance that a node states which is this camera's alone, while the whole hand is in plain view of
 another one as well. The rest moves markers in all pictures alike: their biases, which the filter knows anyway.
-(Measured: 0.1 to 0.5, but in closing hands one that lasts for many frames.) What is half hidden is better understood
-with caution."""
+(Measured: 0.1 to 0.6, which lasts for many frames in closing hands and wristbands.) What is half hidden is better
+understood with caution."""
 
 CALM_S = 0.5
 """So is what is seen this soon after a sight that had another name or was not believed as it was."""
@@ -99,7 +102,7 @@ def _remember(look: Array, frame: Frame, sight: int, width: float) -> None:
     """Fill `look` (5,) with what a frame shows of a marker."""
     look[LOOK_WIDTH] = width if frame.plain[sight] else 0.0
     look[LOOK_X], look[LOOK_Y] = frame.pixels[sight]
-    look[LOOK_VARIANCE] = _variance(frame, sight)
+    look[LOOK_VARIANCE] = max(_variance(frame, sight), EXACT_PX2)
     look[LOOK_AGE] = -frame.late_s[sight]
 
 
