@@ -91,12 +91,7 @@ def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
                       point_offset=np.concatenate([one.point_offset, other.point_offset]))
     return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes,
                    wearing.paint_variance, np.diag(wearing.habits.usual).copy(),
-                   np.array([_worn(wearing, role) for role in TIP_ROLES]), _worn(wearing, WRIST_ROLE))
-
-
-def _worn(wearing: Wearing, role: str) -> int:
-    """The marker with a role, -1 without."""
-    return wearing.roles.index(role) if role in wearing.roles else -1
+                   np.array([wearing.marker_of(role) for role in TIP_ROLES]), wearing.marker_of(WRIST_ROLE))
 
 
 def empty_report(markers: int) -> Report:

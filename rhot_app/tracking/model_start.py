@@ -57,8 +57,8 @@ class Starter:
     def __init__(self, rig: RigArrays, wearing: Wearing) -> None:
         self._rig, self._wearing = rig, wearing
         self._pairing = Pairing(len(rig.cameras), len(rig.marker_ids))
-        self._tips = [wearing.roles.index(role) if role in wearing.roles else -1 for role in TIP_ROLES]
-        self._wrist = wearing.roles.index(WRIST_ROLE) if WRIST_ROLE in wearing.roles else -1
+        self._tips = [wearing.marker_of(role) for role in TIP_ROLES]
+        self._wrist = wearing.marker_of(WRIST_ROLE)
         self._on_palm = np.flatnonzero(wearing.worn.part == PALM_PART)
 
     def reset(self) -> None:

@@ -28,6 +28,7 @@ from rhot_app.tracking.kalman.estimate import (
 from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, project_marker, straying
 from rhot_app.tracking.kalman.motion import liveliness
 from rhot_app.tracking.kalman.sighted import FRESH_S, line_of_sight
+from rhot_app.tracking.locate import EXACT_PX2
 
 Array = NDArray[np.float64]
 
@@ -46,9 +47,6 @@ MISS, MISS_PX = 4.0, 0.5
 SHIFT, BAND_SHIFT = 0.5, 2.0
 """By how many of its radii the middle of a marker's rest lies off, per part of its area that is covered. A centroid's
 moves by one, that of a fitted outline by half of it; a band is longer than it is wide."""
-
-EXACT_PX2 = 1e-6
-"""No sight is remembered as better than this: zero is for those that were not seen."""
 
 OWN = 0.7
 """Part of the variance that a node states which is this camera's alone, while the whole hand is in plain view of
@@ -102,7 +100,7 @@ def _remember(look: Array, frame: Frame, sight: int, width: float) -> None:
     """Fill `look` (5,) with what a frame shows of a marker."""
     look[LOOK_WIDTH] = width if frame.plain[sight] else 0.0
     look[LOOK_X], look[LOOK_Y] = frame.pixels[sight]
-    look[LOOK_VARIANCE] = max(_variance(frame, sight), EXACT_PX2)
+    look[LOOK_VARIANCE] = max(_variance(frame, sight), EXACT_PX2)  # zero is for what was never seen
     look[LOOK_AGE] = -frame.late_s[sight]
 
 

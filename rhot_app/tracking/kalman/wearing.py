@@ -65,6 +65,10 @@ class Wearing:
     def __post_init__(self) -> None:
         object.__setattr__(self, "outfit", Share(Outfit(self.worn, self.cameras, self.bias_variance)))
 
+    def marker_of(self, role: str) -> int:
+        """The index of the marker with a role, -1 without."""
+        return self.roles.index(role) if role in self.roles else -1
+
 
 def compile_wearing(rig: Rig) -> Wearing:
     """The arrays of a validated rig. Raises RigError when a marker has no place on the hand."""
