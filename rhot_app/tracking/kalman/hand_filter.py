@@ -16,7 +16,6 @@ from rhot_app.tracking.kalman.estimate import (
     BIAS,
     FREE,
     GROUP_OF,
-    PALM_HELD,
     POSE,
     ROTATION,
     SCALE,
@@ -51,8 +50,9 @@ would be led off it."""
 MOST_STEPS = 12
 """Short ones and whole ones together."""
 
-MISFIT = {PALM_HELD: 1000.0, TURN_HELD: 200.0}
-"""Squared normalised residual of one row beyond which the palm's place, and how fingers bend, are held no more."""
+MISFIT = 50.0
+"""Squared normalised residual of one row beyond which it is held no more how fingers bend that one camera sees: what
+they cannot explain would be put down to the palm, by each camera in another direction."""
 
 NEAR_RAD = 0.02
 """Steps whose turns are smaller are taken without linearising again: what is left is 0.1 px or less."""
@@ -191,11 +191,11 @@ class HandFilter:
 
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
         """Whether the hand as it is held cannot be where it is seen."""
-        worst = MISFIT.get(int(self.estimate.held[0]))
-        if worst is None or self._desk.held.used[0] <= TURN_ALONE + (self._desk.size[1] > 0.0):
+        stiff = self._desk.held.used[0] > TURN_ALONE + (self._desk.size[1] > 0.0)
+        if self.estimate.held[0] != TURN_HELD or not stiff:
             return False
         self._linearise(blocks, self._tried)
-        return bool(misfit(self._desk.rows, self._desk.believed, self._desk.widening) > worst)
+        return bool(misfit(self._desk.rows, self._desk.believed, self._desk.widening) > MISFIT)
 
 
 @njit(cache=True)

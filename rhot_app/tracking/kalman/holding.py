@@ -103,7 +103,7 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: A
         estimate.held[0] = PALM_HELD
         if most == 1:
             _hold_distance(estimate, cameras[eye], held)
-        else:
+        elif eyes_of.max() < 2:
             for i in range(ROTATION):
                 _hold_number(i, held)
         hold_turn(held)

@@ -111,9 +111,17 @@ def test_a_palm_that_one_camera_sees_keeps_its_distance_and_its_turn(eye):
     assert_holds(directions, np.vstack([orders(np.r_[sight, np.zeros(POSE - 3)]), TURNED]))
 
 
-def test_a_palm_out_of_sight_is_held_whole():
+def test_a_palm_out_of_sight_is_placed_by_a_fingertip_that_two_cameras_see():
     estimate, part = hand_with()
     estimate.unseen[:, WRIST] = HIDDEN
+    directions = held_of(estimate, part)
+    assert estimate.held[0] == PALM_HELD
+    assert_holds(directions, TURNED)
+
+
+def test_a_palm_out_of_sight_whose_fingertips_one_camera_sees_is_held_whole():
+    estimate, part = hand_with()
+    estimate.unseen[:, WRIST] = estimate.unseen[0] = HIDDEN
     directions = held_of(estimate, part)
     assert estimate.held[0] == PALM_HELD
     assert_holds(directions, np.vstack([numbers(0, 1, 2), TURNED]))
