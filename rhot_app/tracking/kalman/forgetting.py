@@ -57,6 +57,10 @@ OPEN_S = 0.05
 SHAPE_S = 2.0
 """The same while a single camera sees the palm, and does not see its distance: its course tells more for a while."""
 
+ALONE_S = 40.0
+"""The same while that camera alone sees all of the hand: how a hand looks that is nearer or farther away is so much
+like one that bends its fingers otherwise that habit would move it by centimetres."""
+
 HIDDEN_S = 1.0
 """The same while none sees it: soon its fingertips tell more than its course."""
 
@@ -129,7 +133,9 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
         elif how != FINGERS_HELD and _shown(jacobian) >= LEAST_SHOWN:
             constant = OPEN_S
             if how == PALM_HELD:
-                constant = SHAPE_S if _palm_shown(jacobian) > 0 else HIDDEN_S
+                constant = HIDDEN_S
+                if _palm_shown(jacobian) > 0:
+                    constant = SHAPE_S if _placed(jacobian) else ALONE_S
             _open_up(estimate, -math.expm1(-passed / constant), habits, bias_variance, jacobian, step)
         mirror(estimate.covariance)  # rounding must not make it unsymmetric: what fades would let it grow
         estimate.unfaded[what] = 0.0
@@ -155,6 +161,15 @@ def _palm_shown(jacobian: Array) -> int:
         if np.any(jacobian[m, :, :ROTATION] != 0.0) and not np.any(jacobian[m, :, ANGLES:] != 0.0):
             count += 1
     return count
+
+
+@njit(cache=True)
+def _placed(jacobian: Array) -> bool:
+    """Whether any marker is seen by two cameras: then none of its three directions has been left out."""
+    most = 0.0
+    for m in range(jacobian.shape[0]):
+        most = max(most, jacobian[m, 0, 0] + jacobian[m, 1, 1] + jacobian[m, 2, 2])
+    return most > 2.5
 
 
 @njit(cache=True)

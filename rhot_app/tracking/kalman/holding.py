@@ -3,7 +3,8 @@
 One camera does not see distance, one marker on the palm does not show how it is turned, and fingertips alone do not say
 where the palm is: a finger that bends, a palm that turns and one that withdraws look alike. A filter that linearises
 anew with every frame soon believes to tell them apart. So the palm of a hand that moves slowly goes on as it went in
-the directions that its own markers leave open, and the fingers are taken to do what is seen; what is truly not known
+the directions that its own markers leave open - its place only while no fingertip is placed either -, and the fingers
+are taken to do what is seen; what is truly not known
 goes into the covariance (`withholding.py`), and habit brings the whole hand to what is natural (`forgetting.py`). A
 palm that hurries carries its fingers along: then they are held.
 """
@@ -101,11 +102,8 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: A
             _hold_number(i, held)
     else:
         estimate.held[0] = PALM_HELD
-        if most == 1:
-            _hold_distance(estimate, cameras[eye], held)
-        elif eyes_of.max() < 2:
-            for i in range(ROTATION):
-                _hold_number(i, held)
+        if eyes_of.max() < 2:  # else fingertips show where the palm is
+            _hold_place(estimate, most, cameras[eye], held)
         hold_turn(held)
 
 
@@ -133,8 +131,13 @@ def _hold_number(number: int, held: Held) -> None:
 
 
 @njit(cache=True)
-def _hold_distance(estimate: Estimate, camera: Array, held: Held) -> None:
-    """Hold the palm along its line of sight from `camera` (3, 4)."""
+def _hold_place(estimate: Estimate, eyes: int, camera: Array, held: Held) -> None:
+    """Hold what is not seen of the palm's place: all of it without `eyes` on it, with one, `camera` (3, 4), how far
+    away it is."""
+    if eyes == 0:
+        for i in range(ROTATION):
+            _hold_number(i, held)
+        return
     sight = np.empty(3)
     line_of_sight(camera, estimate.world[:3, 3], sight)
     for base in (0, VELOCITY, ACCELERATION):

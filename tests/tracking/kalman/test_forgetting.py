@@ -163,17 +163,19 @@ def test_the_rest_of_a_hand_that_is_held_is_forgotten_more_slowly_or_not_at_all(
     assert steps[3] == 0.0 and doubts[3] == pytest.approx(1e-4, rel=0.05)
 
 
-def test_a_palm_that_no_camera_sees_returns_to_habit_sooner():
+def test_a_palm_that_no_camera_sees_returns_to_habit_sooner_and_later_when_one_sees_all():
     steps = []
-    for shown in (True, False):
+    for wrist, fingers in ((1, 2), (0, 2), (1, 1)):  # cameras that see them
         estimate, step = bent(0.05), np.zeros(SIZE)
         estimate.held[0] = PALM_HELD
         jacobian = marker_jacobian(estimate)
-        if not shown:
+        if wrist == 0:
             jacobian[WRIST] = 0.0
+        if fingers == 1:
+            jacobian[:, 2] = 0.0  # along the line of sight
         forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
         steps.append(np.abs(step[ANGLES:POSE]).max())
-    assert steps[1] > 1.5 * steps[0] > 0.0
+    assert steps[1] > 1.5 * steps[0] and 0.3 * steps[0] > steps[2] > 0.0
 
 
 def test_a_finger_out_of_sight_soon_bends_as_its_neighbours_do():

@@ -111,9 +111,11 @@ def test_a_palm_that_one_camera_sees_keeps_its_distance_and_its_turn(eye):
     assert_holds(directions, np.vstack([orders(np.r_[sight, np.zeros(POSE - 3)]), TURNED]))
 
 
-def test_a_palm_out_of_sight_is_placed_by_a_fingertip_that_two_cameras_see():
+@pytest.mark.parametrize("hidden_from", [(0, 1), (0,), (1,)])
+def test_a_palm_is_placed_by_a_fingertip_that_two_cameras_see(hidden_from):
     estimate, part = hand_with()
-    estimate.unseen[:, WRIST] = HIDDEN
+    estimate.unseen[list(hidden_from), WRIST] = HIDDEN
+    estimate.unseen[0, [0, 2, 3, 4]] = HIDDEN
     directions = held_of(estimate, part)
     assert estimate.held[0] == PALM_HELD
     assert_holds(directions, TURNED)
