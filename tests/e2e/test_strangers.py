@@ -159,7 +159,7 @@ def test_it_moves_no_marker(attack: Attack) -> None:
     status, node = client.status, node_status(client, "left")
     assert status is not None and node is not None and node.clock_offset_s is not None and client.state is not None
     clock = NodeClock(round(1e9 * node.clock_offset_s))
-    before, refused = client.state.marker_positions.copy(), sum(attack.dropped().values())
+    before = client.state.marker_positions.copy()
     markers = tuple(MarkerObservation(k, 20.0 + 90 * k, 400.0, 16.0, 1e-4, 0.0, 1e-4, 1.0) for k in range(6))
     states = []
     for k in range(100):
@@ -174,9 +174,12 @@ def test_it_moves_no_marker(attack: Attack) -> None:
     for state in states:
         measured = state.marker_knowledge == Knowledge.MEASURED
         np.testing.assert_allclose(state.marker_positions[measured], before[measured], atol=0.004)
-    wait_until(client, lambda: sum(attack.dropped().values()) >= refused + 200, PATIENCE_S, "all forgeries are counted")
-    dropped = attack.dropped()
-    assert (dropped["untagged"], dropped["tag"]) == (100, 100) and sum(dropped.values()) == refused + 200
+    def forged_ones() -> list[int]:
+        return [attack.dropped().get(kind, 0) for kind in ("untagged", "tag")]
+
+    wait_until(client, lambda: sum(forged_ones()) >= 200, PATIENCE_S, "all forgeries are counted")
+    assert forged_ones() == [100, 100]
+    assert {kind for kind, count in attack.dropped().items() if count} <= {"untagged", "tag", "clock_in_doubt"}
 
 
 def test_it_pairs_with_nobody_without_a_code(attack: Attack) -> None:
