@@ -190,7 +190,7 @@ class HandFilter:
                 return
 
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
-        """Whether the hand as it is held cannot be where it is seen."""
+        """Whether fingers that are held to bend in all joints at once cannot be where they are seen."""
         stiff = self._desk.held.used[0] > TURN_ALONE + (self._desk.size[1] > 0.0)
         if self.estimate.held[0] != TURN_HELD or not stiff:
             return False

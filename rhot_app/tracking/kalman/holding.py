@@ -4,9 +4,8 @@ One camera does not see distance, one marker on the palm does not show how it is
 where the palm is: a finger that bends, a palm that turns and one that withdraws look alike. A filter that linearises
 anew with every frame soon believes to tell them apart. So the palm of a hand that moves slowly goes on as it went in
 the directions that its own markers leave open - its place only while no fingertip is placed either -, and the fingers
-are taken to do what is seen; what is truly not known
-goes into the covariance (`withholding.py`), and habit brings the whole hand to what is natural (`forgetting.py`). A
-palm that hurries carries its fingers along: then they are held.
+are taken to do what is seen; what is truly not known goes into the covariance (`withholding.py`), and habit brings the
+whole hand to what is natural (`forgetting.py`). A palm that hurries carries its fingers along: then they are held.
 """
 
 from __future__ import annotations
