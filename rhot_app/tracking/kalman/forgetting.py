@@ -32,7 +32,7 @@ from rhot_app.tracking.kalman.estimate import (
     FREE,
     GROUP_OF,
     OPENING,
-    PALM_HELD,
+    PLACED,
     POSE,
     ROTATION,
     TURN_HELD,
@@ -128,11 +128,11 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
         if what == FADING:
             fading = _fading(away)
             _fade(estimate.covariance, passed, fading)
-            if how < PALM_HELD:
+            if how < PLACED:
                 _return_to_habits(estimate, passed, fading, habits, gain, step)
         elif how != FINGERS_HELD and _shown(jacobian) >= LEAST_SHOWN:
             constant = OPEN_S
-            if how == PALM_HELD:
+            if how >= PLACED:
                 constant = HIDDEN_S
                 if _palm_shown(jacobian) > 0:
                     constant = SHAPE_S if _placed(jacobian) else ALONE_S

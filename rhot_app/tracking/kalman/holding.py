@@ -26,6 +26,7 @@ from rhot_app.tracking.kalman.estimate import (
     GROUP_OF,
     LINEAR,
     PALM_HELD,
+    PLACED,
     POSE,
     ROTATION,
     SCALE,
@@ -95,13 +96,13 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: A
         if placed < ENOUGH:
             estimate.held[0] = TURN_HELD
             hold_turn(held)
-    elif hurries and before != PALM_HELD:
+    elif hurries and before not in (PLACED, PALM_HELD):
         estimate.held[0] = FINGERS_HELD
         for i in range(ANGLES, POSE):
             _hold_number(i, held)
     else:
-        estimate.held[0] = PALM_HELD
-        if eyes_of.max() < 2:  # else fingertips show where the palm is
+        estimate.held[0] = PLACED if eyes_of.max() > 1 else PALM_HELD
+        if estimate.held[0] == PALM_HELD:
             _hold_place(estimate, most, cameras[eye], held)
         hold_turn(held)
 
@@ -161,7 +162,7 @@ def _hold_stiff(stiff: Array, eyes_of: Indices, held: Held) -> None:
 @njit(cache=True)
 def rest(estimate: Estimate, dt: float) -> None:
     """What is held of the palm is not shaken, and its turn comes to rest."""
-    if estimate.held[0] != TURN_HELD and estimate.held[0] != PALM_HELD:
+    if estimate.held[0] not in (TURN_HELD, PLACED, PALM_HELD):
         return
     share, covariance = math.exp(-dt / REST_S), estimate.covariance
     for i in range(ROTATION, ANGLES):

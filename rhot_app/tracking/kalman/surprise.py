@@ -22,6 +22,7 @@ from rhot_app.tracking.kalman.estimate import (
     GROUPS,
     LINEAR,
     PALM_HELD,
+    PLACED,
     POSE,
     TURN,
     TURN_HELD,
@@ -77,16 +78,16 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
         for kind in range(3):
             group = kind if kind < FIRST_FINGER else FIRST_FINGER + rows.part[observation]
             _effect(rows, observation, group, grown, together, per_unit[observation, kind])
-    if how != PALM_HELD:
+    if how not in (PLACED, PALM_HELD):
         _raise_palm(rows, estimate, noise, per_unit, LINEAR, added, surprise)
         if how != TURN_HELD:
             _raise_palm(rows, estimate, noise, per_unit, TURN, added, surprise)
     for finger in range(GROUPS - FIRST_FINGER):
         _raise_finger(rows, estimate, noise, per_unit, finger, added, surprise)
     _follow_trends(estimate, added)
-    if how == PALM_HELD:
+    if how in (PLACED, PALM_HELD):
         added[LINEAR] = 0.0
-    if how in (PALM_HELD, TURN_HELD):
+    if how in (TURN_HELD, PLACED, PALM_HELD):
         added[TURN] = 0.0
     _wake(estimate, added)
     shake(estimate.covariance, added, together, ONSET_S)

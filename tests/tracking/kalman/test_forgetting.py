@@ -5,7 +5,17 @@ import pytest
 from known_hand import MARKERS, SIZE, WEARING, moved, moving_estimate
 
 from rhot_app.hand.skeleton import ANGLE_SLICES
-from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, FINGERS_HELD, FREE, PALM_HELD, POSE, ROTATION, TURN_HELD
+from rhot_app.tracking.kalman.estimate import (
+    ANGLES,
+    BIAS,
+    FINGERS_HELD,
+    FREE,
+    PALM_HELD,
+    PLACED,
+    POSE,
+    ROTATION,
+    TURN_HELD,
+)
 from rhot_app.tracking.kalman.forgetting import (
     FADING_S,
     SETTLED_RAD,
@@ -154,7 +164,7 @@ def test_a_short_stride_keeps_the_spread_of_habit():
 
 def test_the_rest_of_a_hand_that_is_held_is_forgotten_more_slowly_or_not_at_all():
     steps, doubts = [], []
-    for how in (FREE, TURN_HELD, PALM_HELD, FINGERS_HELD):
+    for how in (FREE, TURN_HELD, PLACED, FINGERS_HELD):
         estimate = bent(0.05)
         steps.append(np.abs(opened(estimate, how)[ANGLES:POSE]).max())
         doubts.append(np.sqrt(np.diag(estimate.covariance)[ANGLES:POSE].max()))

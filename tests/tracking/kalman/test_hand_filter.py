@@ -12,6 +12,7 @@ from rhot_app.tracking.kalman.estimate import (
     FIRST_FINGER,
     LINEAR,
     PALM_HELD,
+    PLACED,
     POSE,
     SCALE,
     TURN,
@@ -79,7 +80,7 @@ def test_a_jump_of_a_palm_that_is_held_is_taken_for_one_of_its_fingers():
         return change
 
     held, free = weighed(jump(hide=True))[0], weighed(jump(hide=False))[0]
-    assert held.held[0] == PALM_HELD and not held.agitation[[LINEAR, TURN]].any()
+    assert held.held[0] == PLACED and not held.agitation[[LINEAR, TURN]].any()
     assert (held.agitation[FIRST_FINGER:] > free.agitation[FIRST_FINGER:]).all()
     assert free.agitation[LINEAR] > 0.1
 
@@ -91,7 +92,7 @@ def test_a_palm_out_of_sight_goes_along_with_fingertips_that_two_cameras_see():
         block.frame.pixels[:, 0] += 0.3
 
     after, expected, outcome = weighed(hide)
-    assert after.held[0] == PALM_HELD and outcome.believed.all()
+    assert after.held[0] == PLACED and outcome.believed.all()
     assert np.linalg.norm(after.world[:3, 3] - expected.world[:3, 3]) > 5e-5
     np.testing.assert_allclose(after.world[:3, :3], expected.world[:3, :3], atol=1e-8)
 

@@ -15,6 +15,7 @@ from rhot_app.tracking.kalman.estimate import (
     FREE,
     LINEAR,
     PALM_HELD,
+    PLACED,
     POSE,
     SCALE,
     TURN,
@@ -117,7 +118,7 @@ def test_a_palm_is_placed_by_a_fingertip_that_two_cameras_see(hidden_from):
     estimate.unseen[list(hidden_from), WRIST] = HIDDEN
     estimate.unseen[0, [0, 2, 3, 4]] = HIDDEN
     directions = held_of(estimate, part)
-    assert estimate.held[0] == PALM_HELD
+    assert estimate.held[0] == PLACED
     assert_holds(directions, TURNED)
 
 
@@ -134,7 +135,7 @@ def test_what_this_update_sees_counts():
     estimate, part = hand_with()
     estimate.unseen[:, WRIST] = HIDDEN
     held_of(estimate, part, (0, WRIST))
-    assert estimate.held[0] == PALM_HELD
+    assert estimate.held[0] == PLACED
     estimate.unseen[1, WRIST] = 0.01
     held_of(estimate, part, (0, WRIST))
     assert estimate.held[0] == TURN_HELD
@@ -147,7 +148,7 @@ def faster(estimate, part, palm_m_s=0.0, palm_rad_s=0.0):
 
 
 @pytest.mark.parametrize("hidden_from", [(0, 1), (0,)])
-@pytest.mark.parametrize(("speed", "how"), [((0.9 * HURRIES_M_S, 0.9 * HURRIES_RAD_S), PALM_HELD),
+@pytest.mark.parametrize(("speed", "how"), [((0.9 * HURRIES_M_S, 0.9 * HURRIES_RAD_S), PLACED),
                                             ((1.2 * HURRIES_M_S, 0.0), FINGERS_HELD),
                                             ((0.0, 1.2 * HURRIES_RAD_S), FINGERS_HELD)])
 def test_a_palm_out_of_sight_that_hurries_carries_its_fingers_along(hidden_from, speed, how):
@@ -163,9 +164,10 @@ def test_a_palm_that_seems_to_hurry_only_since_it_was_held_does_not_carry_its_fi
     """Its speed is what fingertips made of it."""
     estimate, part = hand_with()
     estimate.unseen[:, WRIST] = HIDDEN
-    estimate.held[0] = PALM_HELD
-    faster(estimate, part, 2.0 * HURRIES_M_S)
-    assert estimate.held[0] == PALM_HELD
+    for before in (PLACED, PALM_HELD):
+        estimate.held[0] = before
+        faster(estimate, part, 2.0 * HURRIES_M_S)
+        assert estimate.held[0] == PLACED
     estimate.held[0] = TURN_HELD
     faster(estimate, part, 2.0 * HURRIES_M_S)
     faster(estimate, part, 2.0 * HURRIES_M_S)
@@ -177,7 +179,7 @@ def test_a_speed_that_may_be_noise_is_none():
     estimate.unseen[:, WRIST] = HIDDEN
     estimate.covariance[VELOCITY + 1, VELOCITY + 1] = HURRIES_M_S**2
     faster(estimate, part, 1.9 * HURRIES_M_S)
-    assert estimate.held[0] == PALM_HELD
+    assert estimate.held[0] == PLACED
     estimate.held[0] = TURN_HELD
     faster(estimate, part, 2.3 * HURRIES_M_S)
     assert estimate.held[0] == FINGERS_HELD
@@ -269,6 +271,8 @@ def test_a_turn_that_is_held_comes_to_rest_and_its_covariance_with_it():
 
 def test_a_palm_that_is_held_is_not_shaken_and_other_hands_do_not_rest():
     assert (rested(PALM_HELD)[1].agitation[[LINEAR, TURN]] == 0.0).all()
+    placed = rested(PLACED)[1].agitation
+    assert placed[LINEAR] == 1.0 and placed[TURN] == 0.0
     for how in (FREE, FINGERS_HELD):
         for before, after in zip(*rested(how), strict=True):
             np.testing.assert_array_equal(before, after)

@@ -10,9 +10,11 @@ from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
     FIRST_FINGER,
+    FREE,
     GROUP_OF,
     LINEAR,
     PALM_HELD,
+    PLACED,
     POSE,
     SCALE,
     TURN,
@@ -191,10 +193,10 @@ def test_a_palm_that_turned_is_taken_to_turn_for_a_while():
     assert carried(turns, 0.2).turning[0] == pytest.approx(turns.turning[0] * np.exp(-0.2 / TURNING_S))
 
 
-@pytest.mark.parametrize("held", [True, False])
-def test_a_palm_that_is_held_does_not_wake_by_moving(held):
+@pytest.mark.parametrize("how", [FREE, PLACED, PALM_HELD])
+def test_a_palm_that_is_held_does_not_wake_by_moving(how):
     estimate = still()
     estimate.velocity[[0, 4, ANGLES + 6]] = 0.1, 1.0, 2.0
-    estimate.held[0] = PALM_HELD if held else 0
+    estimate.held[0] = how
     awake = carried(estimate).agitation > 0.0
-    assert awake[FIRST_FINGER + 1] and awake[LINEAR] == awake[TURN] == (not held)
+    assert awake[FIRST_FINGER + 1] and awake[LINEAR] == awake[TURN] == (how != PALM_HELD)
