@@ -52,6 +52,9 @@ _APART_MARKERS, _APART_STATES = 3, 3
 """So many markers so far from where all cameras see them, so often in a row, are those of a hand that is elsewhere: two
 may have changed names."""
 
+_STRANGEST = 100.0
+"""`HandFilter.strangeness` of a hand that is not as it is estimated to be; one that crosses its fingers has 70."""
+
 _SOUND_MARKERS, _LEAST_CLEAR = 3, 2
 """With so many markers where all cameras see them a hand is sound; so many set it back. One may be something else."""
 
@@ -93,7 +96,7 @@ class ModelTracker:
             self._size.reset()
             self._hand.resize(*self._size.known)
         self._tracking = self._ever = False
-        self._believed_ns = self._plausible_ns = self._thumb_ns = self._behind = self._apart = 0
+        self._believed_ns = self._plausible_ns = self._thumb_ns = self._behind = self._apart = self._strange = 0
         self._sound: Sound | None = None
 
     def ingest(self, observations: CameraObservations) -> None:
@@ -173,7 +176,8 @@ class ModelTracker:
         return min(period_s for period_s, frame in zip(periods_s, newest, strict=True) if frame is not None)
 
     def _compare(self, estimated: Array) -> None:
-        """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them."""
+        """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them, or its
+        fingers stay bent as nobody's are."""
         located = self._starter.locate()
         if located is None:
             return
@@ -185,7 +189,8 @@ class ModelTracker:
             self._sound = Sound(self._timeline.t_ns, HandPose(self._hand.estimate.world.copy(),
                                                               self._hand.estimate.angles.copy()))
         self._apart = self._apart + 1 if apart >= _APART_MARKERS else 0
-        if self._apart >= _APART_STATES:
+        self._strange = self._strange + 1 if self._hand.strangeness > _STRANGEST else 0
+        if max(self._apart, self._strange) >= _APART_STATES:
             self._begin(located)
 
     def _look_at_thumb(self) -> None:
@@ -231,7 +236,7 @@ class ModelTracker:
         self._timeline.begin(t_ns)
         self._tracking = self._ever = True
         self._believed_ns = self._plausible_ns = t_ns
-        self._apart = 0
+        self._apart = self._strange = 0
         for block in self._sights.recent(t_ns):
             self.observe(block)
 

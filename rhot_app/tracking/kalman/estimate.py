@@ -37,7 +37,7 @@ GROUP_OF = np.array([LINEAR] * 3 + [TURN] * 3 + [FIRST_FINGER] * 5 + [FIRST_FING
 """(27,) the group of each pose number."""
 
 
-FREE, TURN_HELD, PLACED, PALM_HELD, FINGERS_HELD = 0, 1, 2, 3, 4
+FREE, TURN_HELD, PLACED, PALM_HELD = 0, 1, 2, 3
 """How much of the hand an update holds to its course (`holding.py`); where a palm is that is placed, fingertips
 show, and its turn is held."""
 

@@ -27,7 +27,6 @@ from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
     FADING,
-    FINGERS_HELD,
     FIRST_FINGER,
     FREE,
     GROUP_OF,
@@ -130,7 +129,7 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
             _fade(estimate.covariance, passed, fading)
             if how < PLACED:
                 _return_to_habits(estimate, passed, fading, habits, gain, step)
-        elif how != FINGERS_HELD and _shown(jacobian) >= LEAST_SHOWN:
+        elif _shown(jacobian) >= LEAST_SHOWN:
             constant = OPEN_S
             if how >= PLACED:
                 constant = HIDDEN_S

@@ -26,7 +26,7 @@ from rhot_app.tracking.kalman.estimate import (
 )
 from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import Gain, contract, empty_gain, misfit, solve
-from rhot_app.tracking.kalman.holding import TURN_ALONE, hold, hold_size, hold_turn, rest
+from rhot_app.tracking.kalman.holding import TURN_ALONE, hold, hold_size, hold_turn, let_go, rest, strangeness
 from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
@@ -155,6 +155,11 @@ class HandFilter:
         return not (sum(variances) < ASTRAY_M**2 and math.hypot(*velocity[:ROTATION]) < FASTEST_M_S
                     and math.hypot(*velocity[ROTATION:ANGLES]) < FASTEST_RAD_S)
 
+    @property
+    def strangeness(self) -> float:
+        """How far from habit the fingers are bent, as `holding.strangeness` has it."""
+        return float(strangeness.py_func(self.estimate.angles, self._desk.habits))
+
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""
         rows = self._desk.rows
@@ -225,11 +230,13 @@ def _prepare(shared: Share, dt: float) -> None:
     """Decide what is held of the hand and which observations are believed."""
     desk: Desk = shared.of
     estimate, rows, part = desk.estimate, desk.rows, desk.worn.part
-    hold(estimate, rows, part, desk.worn.palmar, desk.cameras.pose, desk.habits.stiff, desk.held)
+    hold(estimate, rows, part, desk.worn.palmar, desk.cameras.pose, desk.habits, desk.held)
     rest(estimate, dt)
-    hold_size(estimate.covariance, desk.held)
     loosen(estimate, part, rows, desk.habits.usual)
-    loosen_palm(estimate, rows, desk.habits.usual)
+    if loosen_palm(estimate, desk.worn, desk.cameras.pose, rows, desk.habits.usual):
+        estimate.held[0] = FREE
+        let_go(desk.held)
+    hold_size(estimate.covariance, desk.held)
     appraise(rows, estimate, desk.habits.together, desk.believed, desk.widening)
     withhold(estimate.covariance, desk.held)
 

@@ -5,7 +5,8 @@ where the palm is: a finger that bends, a palm that turns and one that withdraws
 anew with every frame soon believes to tell them apart. So the palm of a hand that moves slowly goes on as it went in
 the directions that its own markers leave open - its place only while no fingertip is placed either -, and the fingers
 are taken to do what is seen; what is truly not known goes into the covariance (`withholding.py`), and habit brings the
-whole hand to what is natural (`forgetting.py`). A palm that hurries carries its fingers along: then they are held.
+whole hand to what is natural (`forgetting.py`). A palm that hurries or turns is not held, nor one whose fingers would
+have to be bent as no hand bends them: it has turned meanwhile.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.tracking.kalman.combine import dot
 from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     ANGLES,
     FINGERS,
-    FINGERS_HELD,
     FIRST_FINGER,
     FREE,
     GROUP_OF,
@@ -35,7 +36,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.motion import speeds
+from rhot_app.tracking.kalman.motion import Habits, speeds
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
 from rhot_app.tracking.kalman.sighted import eyes_on, line_of_sight, unseen_now
 from rhot_app.tracking.kalman.withholding import Held
@@ -48,11 +49,16 @@ ENOUGH = 3
 """This many markers on a palm, seen by two cameras, show how it is turned."""
 
 HURRIES_M_S, HURRIES_RAD_S = 0.15, 1.5
-"""A palm that moves or turns faster carries its fingers along."""
+"""A palm that moves or turns faster goes on turning as its fingertips show it."""
 
-TURNS_RAD_S = 0.5
-"""A palm that turns faster, while two cameras see all markers, is known by its fingertips to do so. Paint on its inner
+TURNS_RAD_S, TURNED_RAD_S = 0.5, 0.7
+"""So does one that turned faster of late, while two cameras see all markers, and while they do not. Paint on its inner
 side may be covered."""
+
+STRANGE = 30.0
+"""`strangeness` of fingers that are bent as they are because something is held that is not so: hands that grasp, pinch,
+point and spread their fingers have up to 28, those whose palm has turned by 20 degrees unseen twice as much. A hand
+that crosses its fingers may have more, and is then held less."""
 
 TURN_ALONE = 9
 """Directions that are held when nothing but the palm's turn is: three angles, their velocities and accelerations."""
@@ -62,12 +68,11 @@ REST_S = 0.1
 
 
 @njit(cache=True)
-def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: Array, stiff: Array,
+def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: Array, habits: Habits,
          held: Held) -> None:
     """Decide how the hand is to be held, `estimate.held`, and fill `held.directions`.
 
-    `rows` of this update; `part` and `palmar` (M,) as in `Worn`; `cameras` (C, 3, 4) camera_from_world m; `stiff`
-    (R, 27) as in `Habits`.
+    `rows` of this update; `part` and `palmar` (M,) as in `Worn`; `cameras` (C, 3, 4) camera_from_world m.
     """
     unseen = unseen_now(estimate, rows)
     on_palm, placed, most, eye, all_placed = 0, 0, 0, -1, True
@@ -83,28 +88,39 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: A
             if eyes > most:
                 most, eye = eyes, last
     moving = speeds(estimate)
-    hurries = moving[LINEAR] > HURRIES_M_S or moving[TURN] > HURRIES_RAD_S
-    held.directions[:held.used[0]] = 0.0
-    held.used[0] = 0
+    goes_on = (moving[LINEAR] > HURRIES_M_S or moving[TURN] > HURRIES_RAD_S
+               or estimate.turning[0] > (TURNS_RAD_S if all_placed else TURNED_RAD_S))
+    strange = strangeness(estimate.angles, habits) > STRANGE
+    let_go(held)
     before, estimate.held[0] = estimate.held[0], FREE
-    if on_palm == 0:
+    if on_palm == 0 or (strange and (most > 1 or eyes_of.max() > 1)):
         return
     if most > 1:
-        if all_placed and (hurries or estimate.turning[0] > TURNS_RAD_S):
-            return
-        _hold_stiff(stiff, eyes_of, held)
-        if placed < ENOUGH:
+        _hold_stiff(habits.stiff, eyes_of, held)
+        if not goes_on and placed < ENOUGH:
             estimate.held[0] = TURN_HELD
             hold_turn(held)
-    elif hurries and before not in (PLACED, PALM_HELD):
-        estimate.held[0] = FINGERS_HELD
-        for i in range(ANGLES, POSE):
-            _hold_number(i, held)
+    elif goes_on and not strange and before not in (PLACED, PALM_HELD):
+        _hold_stiff(habits.stiff, eyes_of, held)
     else:
         estimate.held[0] = PLACED if eyes_of.max() > 1 else PALM_HELD
         if estimate.held[0] == PALM_HELD:
             _hold_place(estimate, most, cameras[eye], held)
         hold_turn(held)
+
+
+@njit(cache=True)
+def strangeness(angles: Array, habits: Habits) -> float:
+    """How far from habit `angles` (21,) rad are: the square of the distance, in standard deviations."""
+    away = angles - habits.mean
+    return dot(away, habits.information @ away)
+
+
+@njit(cache=True)
+def let_go(held: Held) -> None:
+    """Hold nothing any more."""
+    held.directions[:held.used[0]] = 0.0
+    held.used[0] = 0
 
 
 @njit(cache=True)

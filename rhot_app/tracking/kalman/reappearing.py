@@ -16,9 +16,11 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
+from rhot_app.tracking.kalman.forgetting import open_directions
 from rhot_app.tracking.kalman.gain import expected_noise
+from rhot_app.tracking.kalman.markers import Worn, place_markers
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
-from rhot_app.tracking.kalman.sighted import fingers_away
+from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -29,11 +31,12 @@ AWAY_S = 0.08
 UNLIKELY = 4.0
 """Squared normalised innovation (2 degrees of freedom) of a palm that is not where it was carried on to."""
 
-DRIFT_M_S = 1.0
-"""A palm out of sight strays no faster from where it is expected."""
-
 ELSEWHERE_M = 0.01
-"""A palm that is so far from where it was expected has other fingers than were expected, too."""
+"""A palm that is so far from where it was expected is turned otherwise, too, and has other fingers: all that is known
+is where the other markers are that were in sight."""
+
+STRAYED_S = 0.3
+"""It has come there in about this time."""
 
 SPEED, HASTE = 3.0, 30.0
 """Standard deviations of its angles' velocities, rad/s, and accelerations, rad/s^2."""
@@ -58,10 +61,12 @@ def loosen(estimate: Estimate, part: Indices, rows: Rows, usual: Array) -> None:
 
 @njit(cache=True)
 def forget_finger(estimate: Estimate, finger: int, usual: Array) -> None:
-    """Leave of what is known of a finger's angles only `usual` (27, 27), and of their velocities nothing."""
+    """Leave of what is known of a finger's angles only `usual` (27, 27), and of their velocities nothing, not even what
+    they seemed to be: a finger seen twice within a moment may seem to move at any speed."""
     covariance = estimate.covariance
     for i in range(ANGLES, POSE):
         if GROUP_OF[i] == FIRST_FINGER + finger:
+            estimate.velocity[i], estimate.acceleration[i] = 0.0, 0.0
             for base in (0, VELOCITY, ACCELERATION):
                 covariance[base + i] = 0.0
                 covariance[:, base + i] = 0.0
@@ -75,15 +80,16 @@ def forget_finger(estimate: Estimate, finger: int, usual: Array) -> None:
 
 
 @njit(cache=True)
-def loosen_palm(estimate: Estimate, rows: Rows, usual: Array) -> None:
-    """Let a palm be where it is seen again, if it is not likely to be where it was carried on to.
+def loosen_palm(estimate: Estimate, worn: Worn, cameras: Array, rows: Rows, usual: Array) -> bool:
+    """Let a palm be where it is seen again, if it is not likely to be where it was carried on to. True if it is so far
+    off that nothing must be held of it.
 
     It is the place that is wrong: were it not doubted, what is seen would be taken for an acceleration, and a palm that
-    has strayed by centimetres for one that moves at metres per second. Fingers were bent to suit the wrong place.
-    `usual` as in `loosen`.
+    has strayed by centimetres for one that moves at metres per second. Fingertips that were seen meanwhile stay where
+    they are. `cameras` (C, 3, 4) camera_from_world m; `usual` as in `loosen`.
     """
     noise, strayed = np.empty((rows.used[1], 3)), 0.0
-    known = False
+    known, back = False, np.zeros(worn.part.shape[0], np.bool_)
     for observation in range(rows.used[1]):
         camera, marker = rows.source[observation, 0], rows.source[observation, 2]
         if rows.part[observation] != PALM_PART or camera < 0 or estimate.unseen[camera, marker] < AWAY_S:
@@ -98,10 +104,20 @@ def loosen_palm(estimate: Estimate, rows: Rows, usual: Array) -> None:
             slope = 0.0
             for k in range(3):
                 slope += 0.5 * (rows.jacobian[row, k] ** 2 + rows.jacobian[row + 1, k] ** 2)
-            farthest = DRIFT_M_S * estimate.unseen[camera, marker] / estimate.pace[camera]
-            strayed = max(strayed, min((u * u + v * v) / slope, farthest * farthest))
-    for k in range(3):
-        estimate.covariance[k, k] += strayed
-    if strayed > ELSEWHERE_M * ELSEWHERE_M:
-        for finger in range(FINGERS):
-            forget_finger(estimate, finger, usual)
+            strayed = max(strayed, (u * u + v * v) / slope)
+            back[marker] = True
+    if strayed <= ELSEWHERE_M * ELSEWHERE_M:
+        for k in range(3):
+            estimate.covariance[k, k] += strayed
+        return False
+    points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
+    place_markers(worn, estimate, points, jacobian)
+    keep_shown(estimate, worn.part, worn.palmar, cameras, points, jacobian)
+    for m in np.flatnonzero(back):
+        jacobian[m] = 0.0
+    left_open = open_directions(jacobian, usual, estimate.bias_variance)
+    for i in range(POSE):
+        for j in range(POSE):
+            estimate.covariance[i, j] += left_open[i, j]
+            estimate.covariance[VELOCITY + i, VELOCITY + j] += left_open[i, j] / (STRAYED_S * STRAYED_S)
+    return True

@@ -122,7 +122,7 @@ def test_a_finger_that_cannot_bend_as_it_is_held_to_is_let_go(monkeypatch):
         rows = slice(ANGLES + ANGLE_SLICES[MIDDLE].start, ANGLES + ANGLE_SLICES[MIDDLE].stop)
         estimate.covariance[rows] = estimate.covariance[:, rows] = 0.0
         estimate.covariance[rows, rows] = 0.3**2 * np.eye(4)
-        block.frame.pixels[MIDDLE] += (-8.0, 20.0)
+        block.frame.pixels[MIDDLE] += (-16.0, 40.0)
 
     def bend():
         """How far the finger bends in each of its joints, rad."""

@@ -10,7 +10,6 @@ from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     ANGLES,
     BIAS,
-    FINGERS_HELD,
     FIRST_FINGER,
     FREE,
     LINEAR,
@@ -23,7 +22,18 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     empty_estimate,
 )
-from rhot_app.tracking.kalman.holding import HURRIES_M_S, HURRIES_RAD_S, REST_S, TURNS_RAD_S, hold, hold_size, rest
+from rhot_app.tracking.kalman.holding import (
+    HURRIES_M_S,
+    HURRIES_RAD_S,
+    REST_S,
+    STRANGE,
+    TURNED_RAD_S,
+    TURNS_RAD_S,
+    hold,
+    hold_size,
+    rest,
+    strangeness,
+)
 from rhot_app.tracking.kalman.rows import PALM_PART
 from rhot_app.tracking.kalman.sighted import line_of_sight
 from rhot_app.tracking.kalman.withholding import MOST, empty_held
@@ -39,7 +49,7 @@ def hand_with(on_palm=1):
     estimate = empty_estimate(2, 5 + on_palm)
     estimate.world[:3, :3], estimate.world[:3, 3] = FACING, (0.03, 0.08, 0.6)
     estimate.covariance[:] = 1e-6 * np.eye(len(estimate.covariance))
-    estimate.unseen[:] = 0.0
+    estimate.unseen[:], estimate.angles[:] = 0.0, WEARING.habits.mean
     return estimate, np.array([*TIPS, *[PALM_PART] * on_palm])
 
 
@@ -48,7 +58,7 @@ def held_of(estimate, part, *seen, palmar=()):
     the markers `palmar`."""
     held = empty_held(BIAS + 3 * len(part))
     held.used[0], held.directions[:7] = 7, 3.0  # of an earlier update
-    hold(estimate, sighting(*seen, part=part), part, np.isin(np.arange(len(part)), palmar), POSES, STIFF, held)
+    hold(estimate, sighting(*seen, part=part), part, np.isin(np.arange(len(part)), palmar), POSES, WEARING.habits, held)
     count = held.used[0]
     assert count <= MOST and not held.directions[count:].any()
     return held.directions[:count]
@@ -149,18 +159,52 @@ def faster(estimate, part, palm_m_s=0.0, palm_rad_s=0.0):
 
 @pytest.mark.parametrize("hidden_from", [(0, 1), (0,)])
 @pytest.mark.parametrize(("speed", "how"), [((0.9 * HURRIES_M_S, 0.9 * HURRIES_RAD_S), PLACED),
-                                            ((1.2 * HURRIES_M_S, 0.0), FINGERS_HELD),
-                                            ((0.0, 1.2 * HURRIES_RAD_S), FINGERS_HELD)])
-def test_a_palm_out_of_sight_that_hurries_carries_its_fingers_along(hidden_from, speed, how):
+                                            ((1.2 * HURRIES_M_S, 0.0), FREE),
+                                            ((0.0, 1.2 * HURRIES_RAD_S), FREE)])
+def test_a_palm_out_of_sight_that_hurries_is_not_held_but_its_half_seen_fingers_are_stiff(hidden_from, speed, how):
     estimate, part = hand_with()
-    estimate.unseen[list(hidden_from), WRIST] = HIDDEN
+    estimate.unseen[list(hidden_from), WRIST] = estimate.unseen[0, INDEX] = HIDDEN
     directions = faster(estimate, part, *speed)
     assert estimate.held[0] == how
-    if how == FINGERS_HELD:
-        assert_holds(directions, numbers(*range(ANGLES, POSE)))
+    assert_holds(directions, orders(*stiff_of(INDEX)) if how == FREE else TURNED)
 
 
-def test_a_palm_that_seems_to_hurry_only_since_it_was_held_does_not_carry_its_fingers_along():
+@pytest.mark.parametrize("hidden_from", [(0, 1), (0,)])
+def test_a_palm_out_of_sight_that_turned_just_now_is_not_held(hidden_from):
+    estimate, part = hand_with()
+    estimate.unseen[list(hidden_from), WRIST] = HIDDEN
+    for turning, how in ((0.9, PLACED), (1.1, FREE)):
+        estimate.held[0], estimate.turning[0] = FREE, turning * TURNED_RAD_S
+        held_of(estimate, part)
+        assert estimate.held[0] == how
+
+
+def bent_strangely(estimate):
+    """All fingers to one side, as a palm looks that turned: nobody's hand."""
+    estimate.angles[[5, 9, 13, 17]] += 0.5
+
+
+@pytest.mark.parametrize("hidden", [(), ((0, WRIST),), ((0, WRIST), (1, WRIST)), ((0, INDEX),)])
+def test_nothing_is_held_of_a_hand_that_would_have_to_be_bent_strangely(hidden):
+    estimate, part = hand_with()
+    for camera, marker in hidden:
+        estimate.unseen[camera, marker] = HIDDEN
+    assert strangeness(estimate.angles, WEARING.habits) < 0.1 * STRANGE
+    assert len(held_of(estimate, part)) > 0 and estimate.held[0] != FREE
+    bent_strangely(estimate)
+    assert strangeness(estimate.angles, WEARING.habits) > STRANGE
+    assert len(held_of(estimate, part)) == 0 and estimate.held[0] == FREE
+
+
+def test_the_distance_of_a_hand_that_one_camera_sees_is_held_however_it_is_bent():
+    estimate, part = hand_with()
+    bent_strangely(estimate)
+    estimate.unseen[0] = HIDDEN
+    held_of(estimate, part)
+    assert estimate.held[0] == PALM_HELD
+
+
+def test_a_palm_that_seems_to_hurry_only_since_it_was_held_is_still_held():
     """Its speed is what fingertips made of it."""
     estimate, part = hand_with()
     estimate.unseen[:, WRIST] = HIDDEN
@@ -171,7 +215,7 @@ def test_a_palm_that_seems_to_hurry_only_since_it_was_held_does_not_carry_its_fi
     estimate.held[0] = TURN_HELD
     faster(estimate, part, 2.0 * HURRIES_M_S)
     faster(estimate, part, 2.0 * HURRIES_M_S)
-    assert estimate.held[0] == FINGERS_HELD
+    assert estimate.held[0] == FREE
 
 
 def test_a_speed_that_may_be_noise_is_none():
@@ -182,7 +226,7 @@ def test_a_speed_that_may_be_noise_is_none():
     assert estimate.held[0] == PLACED
     estimate.held[0] = TURN_HELD
     faster(estimate, part, 2.3 * HURRIES_M_S)
-    assert estimate.held[0] == FINGERS_HELD
+    assert estimate.held[0] == FREE
 
 
 def test_the_turn_of_a_hand_that_moves_in_sight_is_not_held():
@@ -193,6 +237,9 @@ def test_the_turn_of_a_hand_that_moves_in_sight_is_not_held():
     estimate.unseen[0, 2] = HIDDEN  # the other camera still sees it, but not where it is along its line of sight
     held_of(estimate, part)
     assert estimate.held[0] == TURN_HELD
+    estimate.turning[0] = 1.1 * TURNED_RAD_S
+    assert_holds(held_of(estimate, part), orders(*stiff_of(2)))
+    assert estimate.held[0] == FREE
 
 
 def test_covered_paint_does_not_keep_a_turning_palm_from_being_known_by_its_fingertips():
@@ -273,9 +320,8 @@ def test_a_palm_that_is_held_is_not_shaken_and_other_hands_do_not_rest():
     assert (rested(PALM_HELD)[1].agitation[[LINEAR, TURN]] == 0.0).all()
     placed = rested(PLACED)[1].agitation
     assert placed[LINEAR] == 1.0 and placed[TURN] == 0.0
-    for how in (FREE, FINGERS_HELD):
-        for before, after in zip(*rested(how), strict=True):
-            np.testing.assert_array_equal(before, after)
+    for before, after in zip(*rested(FREE), strict=True):
+        np.testing.assert_array_equal(before, after)
 
 
 def test_a_size_is_held_where_it_is_in_doubt_and_beside_all_else():
