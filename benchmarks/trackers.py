@@ -27,6 +27,7 @@ import numpy as np
 from rhot_app.errors import RhotError
 from rhot_app.evaluation import scenarios
 from rhot_app.evaluation.accuracy import Figures
+from rhot_app.evaluation.alterations import EPISODE_S
 from rhot_app.evaluation.compare import TRACKERS
 from rhot_app.evaluation.compare_table import cell
 from rhot_app.evaluation.takes import Order, Take, take, takes_folder
@@ -57,6 +58,7 @@ class Bench:
     folder: Path
     minutes: float
     motion: str
+    hidden_s: tuple[float, float]
 
     def takes(self, motion: str, seconds: float | None = None, seeds: Iterable[int] | None = None) -> Iterable[Take]:
         """One take per seed, filmed where it is not there yet."""
@@ -82,7 +84,8 @@ def blind(bench: Bench, *, says_so: bool) -> Results:
 
 def hidden(bench: Bench, *, together: bool) -> Results:
     """Each marker 30 % of the time."""
-    return bench.each(bench.takes(bench.motion), partial(scenarios.markers_hidden, share=0.3, together=together))
+    return bench.each(bench.takes(bench.motion), partial(scenarios.markers_hidden, share=0.3, together=together,
+                                                         lasting_s=bench.hidden_s))
 
 
 def mixed(bench: Bench) -> Results:
@@ -171,6 +174,8 @@ def main() -> int:
     parser.add_argument("--motion", default="grasp", help="of the trials that need none of their own (default grasp)")
     parser.add_argument("--markers", "--marker-set", default="rhot6", metavar="SET")
     parser.add_argument("--minutes", type=float, default=10.0, help="of crossing, and of computing (default 10)")
+    parser.add_argument("--hidden-for", type=float, nargs=2, metavar=("MIN", "MAX"), default=EPISODE_S,
+                        help=f"s, how long markers stay hidden at a time (default {EPISODE_S[0]} to {EPISODE_S[1]})")
     parser.add_argument("--sketched", action="store_true", help="logs without pictures (rhot_app/simulator/sights.py)")
     parser.add_argument("--logs", type=Path, metavar="DIR", default=takes_folder())
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
@@ -179,12 +184,14 @@ def main() -> int:
         parser.error("--seeds must be 1 or more, --seed 0 or more")
     if not 2.0 <= args.seconds < float("inf") or not 0.0 < args.minutes < float("inf"):
         parser.error("--seconds must be 2 or more, --minutes more than 0, and both must end")
+    if not 0.001 <= args.hidden_for[0] <= args.hidden_for[1] <= args.seconds:
+        parser.error("--hidden-for must be 0.001 s or more, the shorter time first, and within --seconds")
     try:
         args.logs.mkdir(parents=True, exist_ok=True)
     except OSError as exc:
         parser.error(f"--logs {args.logs}: logs cannot be kept there ({exc.strerror})")
     bench = Bench(tuple(range(args.seed, args.seed + args.seeds)), args.seconds, args.markers, args.sketched, args.logs,
-                  args.minutes, args.motion)
+                  args.minutes, args.motion, tuple(args.hidden_for))
     done: dict[str, Results] = {}
     for name in args.only:
         try:

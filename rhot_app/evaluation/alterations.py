@@ -22,7 +22,7 @@ Change = Callable[[float, int, Sequence[MarkerObservation]], Sequence[MarkerObse
 """Given the scene time of arrival, s, the node's id and what it saw, what it shall have seen instead."""
 
 EPISODE_S = (0.1, 0.8)
-"""How long a marker stays hidden at a time: evenly between these."""
+"""How long a marker stays hidden at a time, unless told otherwise: evenly between these."""
 
 
 def lost(index: int) -> MarkerObservation:
@@ -58,12 +58,14 @@ def begun_at(records: Sequence[Record], start_s: float) -> list[Record]:
     return [record for record in records if record.kind is not RecordKind.DATAGRAM or arrival_s(record) >= start_s]
 
 
-def hidden(share: float, seconds: float, nodes: Sequence[int], markers: int, seed: int, *, together: bool) -> Change:
-    """Every marker is hidden for this share of the time, in episodes of EPISODE_S at random; `together`: from all
-    cameras at once, otherwise from each at its own times."""
+def hidden(share: float, seconds: float, nodes: Sequence[int], markers: int, seed: int, *, together: bool,
+           lasting_s: tuple[float, float] = EPISODE_S) -> Change:
+    """Every marker is hidden for this share of the time, at random, for as long at a time as `episodes` says;
+    `together`: from all cameras at once, otherwise from each at its own times."""
     rng = np.random.default_rng([seed, 0x41D])
-    shared = [episodes(share, seconds, rng) for _ in range(markers)]
-    spells = {node: shared if together else [episodes(share, seconds, rng) for _ in range(markers)] for node in nodes}
+    shared = [episodes(share, seconds, rng, lasting_s) for _ in range(markers)]
+    spells = {node: shared if together else [episodes(share, seconds, rng, lasting_s) for _ in range(markers)]
+              for node in nodes}
 
     def change(t_s: float, node: int, seen: Sequence[MarkerObservation]) -> Sequence[MarkerObservation]:
         return [lost(marker.index) if _within(spells[node][marker.index], t_s) else marker for marker in seen]
@@ -84,13 +86,15 @@ def mixed_up(pair: tuple[int, int], share: float, seconds: float, nodes: Sequenc
     return change
 
 
-def episodes(share: float, seconds: float, rng: np.random.Generator) -> Array:
-    """(E, 2) begin and end, s: episodes of EPISODE_S that fill about this share of the time."""
-    mean = 0.5 * sum(EPISODE_S)
+def episodes(share: float, seconds: float, rng: np.random.Generator,
+             lasting_s: tuple[float, float] = EPISODE_S) -> Array:
+    """(E, 2) begin and end, s: episodes that fill about this share of the time, each `lasting_s`, evenly between the
+    two."""
+    mean = 0.5 * sum(lasting_s)
     spells: list[tuple[float, float]] = []
     t = rng.exponential(mean / share) * (1.0 - share)
     while t < seconds:
-        length = rng.uniform(*EPISODE_S)
+        length = rng.uniform(*lasting_s)
         spells.append((t, t + length))
         t += length + rng.exponential(mean * (1.0 - share) / share)
     return np.array(spells).reshape(-1, 2)

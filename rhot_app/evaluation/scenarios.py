@@ -54,10 +54,10 @@ def one_camera_blind(take: Take, rig: Rig, tracker: Tracker | None = None, *, sa
 
 
 def markers_hidden(take: Take, rig: Rig, tracker: Tracker | None = None, *, share: float,
-                   together: bool) -> Figures:
-    """Fingertips of every state when each marker is hidden for a share of the time."""
+                   together: bool, lasting_s: tuple[float, float] = alter.EPISODE_S) -> Figures:
+    """Fingertips of every state when each marker is hidden for a share of the time, for `lasting_s` at a time."""
     change = alter.hidden(share, take.seconds, [node.node_id for node in rig.nodes], len(rig.markers.markers),
-                          _seed(take), together=together)
+                          _seed(take), together=together, lasting_s=lasting_s)
     return _all_states(take, rig, alter.changed(take.records(), change), tracker)
 
 

@@ -112,11 +112,13 @@ def test_a_covered_camera_sees_nothing_and_a_silent_one_says_nothing(grasp: Take
     assert len(grasp.records()) - len(quiet) == pytest.approx(40, abs=1)
 
 
-def test_episodes_fill_their_share_of_the_time() -> None:
-    spells = alter.episodes(0.3, 2000.0, np.random.default_rng(5))
+@pytest.mark.parametrize("lasting_s", [alter.EPISODE_S, (0.2, 0.2)])
+def test_episodes_fill_their_share_of_the_time(lasting_s: tuple[float, float]) -> None:
+    spells = alter.episodes(0.3, 2000.0, np.random.default_rng(5), lasting_s)
     lengths = spells[:, 1] - spells[:, 0]
     assert lengths.sum() / 2000.0 == pytest.approx(0.3, abs=0.03)
-    assert lengths.min() >= 0.1 and lengths.max() <= 0.8 and (spells[1:, 0] > spells[:-1, 1]).all()
+    assert lengths.min() >= lasting_s[0] - 1e-9 and lengths.max() <= lasting_s[1] + 1e-9
+    assert (spells[1:, 0] > spells[:-1, 1]).all()
 
 
 @pytest.mark.parametrize("together", [True, False])

@@ -10,9 +10,11 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.simulator.motion import FACING
+from rhot_app.tracking.kalman.hand_filter import HandFilter
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.model_start import Starter
+from rhot_app.tracking.model_tracker import _STRANGEST
 from rhot_app.tracking.rig_arrays import compile_rig
 
 RIG = model_rig()
@@ -73,3 +75,30 @@ def test_a_hand_that_has_leapt_away_is_soon_set_back(seen, speed_m_s):
             estimate.covariance[:3, :3] = 1e-8 * np.eye(3)
     fingers = [m for m in seen if m != WRIST]
     assert deviations(after_s(states, 1.45), moving()).mm[:, fingers].max() < 10.0
+
+
+@pytest.mark.parametrize(("lasting", "begun"), [(4, 1), (8, 2)])
+def test_a_hand_whose_fingers_stay_bent_as_nobodys_is_begun_anew(monkeypatch, lasting, begun):
+    """Its markers are where they are seen all the time."""
+    starts, left = [], [0]
+    start = HandFilter.start
+    monkeypatch.setattr(HandFilter, "start", lambda hand, *pose: (starts.append(pose), start(hand, *pose)))
+    monkeypatch.setattr(HandFilter, "strangeness", property(lambda _: _STRANGEST + 1.0 if left[0] > 0 else _STRANGEST))
+    tracker, states = make_tracker(RIG), []
+    for frame in sights(RIG, moving(), 1.3):
+        tracker.ingest(frame)
+        if len(states) == 60:
+            left[0] = lasting
+        states.append(tracker.solve())
+        left[0] -= 1
+    assert len(starts) == begun
+    assert deviations(after_s(states, 1.1), moving()).mm.max() < 5.0
+
+
+def test_how_strange_fingers_are_is_their_distance_from_habit():
+    habits = WEARING.habits
+    hand = HandFilter(WEARING.worn, WEARING.cameras, habits, WEARING.limits, WEARING.bias_variance)
+    spread = np.linalg.cholesky(np.linalg.inv(habits.information))
+    for sd in (0.0, 1.0, 5.0):
+        hand.estimate.angles[:] = habits.mean + sd * spread[:, 7]
+        assert hand.strangeness == pytest.approx(sd**2, abs=1e-9)

@@ -37,9 +37,9 @@ GROUP_OF = np.array([LINEAR] * 3 + [TURN] * 3 + [FIRST_FINGER] * 5 + [FIRST_FING
 """(27,) the group of each pose number."""
 
 
-FREE, TURN_HELD, PLACED, PALM_HELD = 0, 1, 2, 3
+FREE, TURN_HELD, PLACED, PALM_HELD, GOES_ON = 0, 1, 2, 3, 4
 """How much of the hand an update holds to its course (`holding.py`); where a palm is that is placed, fingertips
-show, and its turn is held."""
+show, and its turn is held; one that goes on is held at its distance, or place, while it turns."""
 
 OPENING, FADING = 0, 1
 """The two times of `Estimate.unfaded`."""

@@ -29,6 +29,7 @@ from rhot_app.tracking.kalman.estimate import (
     FADING,
     FIRST_FINGER,
     FREE,
+    GOES_ON,
     GROUP_OF,
     OPENING,
     PLACED,
@@ -129,7 +130,7 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
             _fade(estimate.covariance, passed, fading)
             if how < PLACED:
                 _return_to_habits(estimate, passed, fading, habits, gain, step)
-        elif _shown(jacobian) >= LEAST_SHOWN:
+        elif how != GOES_ON and _shown(jacobian) >= LEAST_SHOWN:
             constant = OPEN_S
             if how >= PLACED:
                 constant = HIDDEN_S

@@ -24,6 +24,7 @@ from rhot_app.tracking.kalman.estimate import (
     FINGERS,
     FIRST_FINGER,
     FREE,
+    GOES_ON,
     GROUP_OF,
     LINEAR,
     PALM_HELD,
@@ -102,6 +103,9 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: A
             hold_turn(held)
     elif goes_on and not strange and before not in (PLACED, PALM_HELD):
         _hold_stiff(habits.stiff, eyes_of, held)
+        if eyes_of.max() < 2:
+            estimate.held[0] = GOES_ON
+            _hold_place(estimate, most, cameras[eye], held)
     else:
         estimate.held[0] = PLACED if eyes_of.max() > 1 else PALM_HELD
         if estimate.held[0] == PALM_HELD:

@@ -21,7 +21,7 @@ from rhot_app.tracking.kalman.gain import Gain
 Array = NDArray[np.float64]
 
 MOST = 64
-"""Directions held at most: all angles, their velocities and their accelerations, and the hand's size."""
+"""Directions held at most; all fingers stiff, the palm held whole and the hand's size make 52."""
 
 
 class Held(NamedTuple):

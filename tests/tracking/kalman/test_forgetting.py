@@ -9,6 +9,7 @@ from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
     FREE,
+    GOES_ON,
     PALM_HELD,
     PLACED,
     POSE,
@@ -161,14 +162,15 @@ def test_a_short_stride_keeps_the_spread_of_habit():
     np.testing.assert_allclose(np.diag(estimate.covariance)[ANGLES:POSE], NATURAL**2, rtol=0.05)
 
 
-def test_the_rest_of_a_hand_whose_palm_is_held_is_forgotten_more_slowly():
+def test_the_rest_of_a_hand_that_is_held_is_forgotten_more_slowly_or_not_at_all():
     steps, doubts = [], []
-    for how in (FREE, TURN_HELD, PLACED):
+    for how in (FREE, TURN_HELD, PLACED, GOES_ON):
         estimate = bent(0.05)
         steps.append(np.abs(opened(estimate, how)[ANGLES:POSE]).max())
         doubts.append(np.sqrt(np.diag(estimate.covariance)[ANGLES:POSE].max()))
     assert steps[0] == pytest.approx(steps[1]) and doubts[0] == pytest.approx(doubts[1])
     assert 0.0 < steps[2] < 0.2 * steps[0] and 1e-3 < doubts[2] < 0.5 * doubts[0]
+    assert steps[3] == 0.0 and doubts[3] == pytest.approx(1e-4, rel=0.05)
 
 
 def test_a_palm_that_no_camera_sees_returns_to_habit_sooner_and_later_when_one_sees_all():

@@ -12,6 +12,7 @@ from rhot_app.tracking.kalman.estimate import (
     BIAS,
     FIRST_FINGER,
     FREE,
+    GOES_ON,
     LINEAR,
     PALM_HELD,
     PLACED,
@@ -177,6 +178,17 @@ def test_a_palm_out_of_sight_that_turned_just_now_is_not_held(hidden_from):
         estimate.held[0], estimate.turning[0] = FREE, turning * TURNED_RAD_S
         held_of(estimate, part)
         assert estimate.held[0] == how
+
+
+def test_a_palm_that_goes_on_before_one_camera_keeps_its_distance_and_turns():
+    estimate, part = hand_with()
+    estimate.unseen[0] = HIDDEN
+    sight = np.empty(3)
+    line_of_sight(POSES[1], estimate.world[:3, 3], sight)
+    for _ in range(2):  # it does not pass for one that only seems to hurry since it was held
+        directions = faster(estimate, part, palm_rad_s=1.2 * HURRIES_RAD_S)
+        assert estimate.held[0] == GOES_ON
+        assert_holds(directions, np.vstack([orders(*STIFF), orders(np.r_[sight, np.zeros(POSE - 3)])]))
 
 
 def bent_strangely(estimate):
