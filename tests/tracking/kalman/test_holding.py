@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from known_hand import WEARING, moving_estimate, sighting, twin
+from known_hand import WEARING, sighting
 
 from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS
 from rhot_app.simulator.motion import FACING
@@ -10,15 +10,11 @@ from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     ANGLES,
     BIAS,
-    FIRST_FINGER,
     FREE,
     GOES_ON,
-    LINEAR,
     PALM_HELD,
     PLACED,
     POSE,
-    SCALE,
-    TURN,
     TURN_HELD,
     VELOCITY,
     empty_estimate,
@@ -26,13 +22,10 @@ from rhot_app.tracking.kalman.estimate import (
 from rhot_app.tracking.kalman.holding import (
     HURRIES_M_S,
     HURRIES_RAD_S,
-    REST_S,
     STRANGE,
     TURNED_RAD_S,
     TURNS_RAD_S,
     hold,
-    hold_size,
-    rest,
     strangeness,
 )
 from rhot_app.tracking.kalman.rows import PALM_PART
@@ -303,43 +296,3 @@ def test_a_stiff_finger_may_stretch_aside_and_bend_all_its_joints_at_once():
         np.testing.assert_allclose(rows @ rows.T, np.eye(columns.stop - columns.start - 2), atol=1e-12)
         np.testing.assert_allclose(rows @ np.array([bend, aside]).T, 0.0, atol=1e-6)
     assert len(STIFF) == sum(len(stiff_of(finger)) for finger in TIPS)
-
-
-def rested(how, dt=0.0125):
-    before = moving_estimate()
-    before.held[0], before.agitation[:] = how, 1.0
-    after = twin(before)
-    rest(after, dt)
-    return before, after
-
-
-def test_a_turn_that_is_held_comes_to_rest_and_its_covariance_with_it():
-    before, after = rested(TURN_HELD)
-    share = np.exp(-0.0125 / REST_S)
-    slower = np.ones(len(before.covariance))
-    slower[[*range(VELOCITY + 3, VELOCITY + 6), *range(ACCELERATION + 3, ACCELERATION + 6)]] = share
-    np.testing.assert_allclose(after.velocity, slower[VELOCITY:ACCELERATION] * before.velocity)
-    np.testing.assert_allclose(after.acceleration, slower[VELOCITY:ACCELERATION] * before.acceleration)
-    np.testing.assert_allclose(after.covariance, before.covariance * np.outer(slower, slower), atol=1e-15)
-    assert after.agitation[TURN] == 0.0 and after.agitation[LINEAR] == 1.0
-    assert (after.agitation[FIRST_FINGER:] == 1.0).all()
-    twice = rested(TURN_HELD, 0.00625)[1]
-    rest(twice, 0.00625)
-    np.testing.assert_allclose(twice.covariance, after.covariance, atol=1e-15)
-
-
-def test_a_palm_that_is_held_is_not_shaken_and_other_hands_do_not_rest():
-    assert (rested(PALM_HELD)[1].agitation[[LINEAR, TURN]] == 0.0).all()
-    placed = rested(PLACED)[1].agitation
-    assert placed[LINEAR] == 1.0 and placed[TURN] == 0.0
-    for before, after in zip(*rested(FREE), strict=True):
-        np.testing.assert_array_equal(before, after)
-
-
-def test_a_size_is_held_where_it_is_in_doubt_and_beside_all_else():
-    for doubt, expected in ((0.0, 0), (0.01, 1)):
-        covariance, held = np.zeros((BIAS, BIAS)), empty_held(BIAS)
-        covariance[SCALE, SCALE], held.used[0] = doubt, MOST - 1
-        hold_size(covariance, held)
-        assert held.used[0] == MOST - 1 + expected
-        assert held.directions.sum() == expected == held.directions[-1, SCALE]
