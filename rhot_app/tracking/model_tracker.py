@@ -55,6 +55,9 @@ may have changed names."""
 _STRANGEST = 100.0
 """`HandFilter.strangeness` of a hand that is not as it is estimated to be; one that crosses its fingers has 70."""
 
+_AGAIN_NS = 1_000_000_000
+"""A hand that is as strange again this soon after it was begun anew for that is so."""
+
 _SOUND_MARKERS, _LEAST_CLEAR = 3, 2
 """With so many markers where all cameras see them a hand is sound; so many set it back. One may be something else."""
 
@@ -97,6 +100,7 @@ class ModelTracker:
             self._hand.resize(*self._size.known)
         self._tracking = self._ever = False
         self._believed_ns = self._plausible_ns = self._thumb_ns = self._behind = self._apart = self._strange = 0
+        self._anew_ns = -_AGAIN_NS
         self._sound: Sound | None = None
 
     def ingest(self, observations: CameraObservations) -> None:
@@ -190,7 +194,10 @@ class ModelTracker:
                                                               self._hand.estimate.angles.copy()))
         self._apart = self._apart + 1 if apart >= _APART_MARKERS else 0
         self._strange = self._strange + 1 if self._hand.strangeness > _STRANGEST else 0
-        if max(self._apart, self._strange) >= _APART_STATES:
+        is_strange = self._strange >= _APART_STATES and abs(self._timeline.t_ns - self._anew_ns) > _AGAIN_NS
+        if is_strange:
+            self._anew_ns = self._timeline.t_ns
+        if is_strange or self._apart >= _APART_STATES:
             self._begin(located)
 
     def _look_at_thumb(self) -> None:

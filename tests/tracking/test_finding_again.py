@@ -77,9 +77,9 @@ def test_a_hand_that_has_leapt_away_is_soon_set_back(seen, speed_m_s):
     assert deviations(after_s(states, 1.45), moving()).mm[:, fingers].max() < 10.0
 
 
-@pytest.mark.parametrize(("lasting", "begun"), [(4, 1), (8, 2)])
+@pytest.mark.parametrize(("lasting", "begun"), [(4, 1), (8, 2), (40, 2)])
 def test_a_hand_whose_fingers_stay_bent_as_nobodys_is_begun_anew(monkeypatch, lasting, begun):
-    """Its markers are where they are seen all the time."""
+    """Once: if it is bent so again, it is. Its markers are where they are seen all the time."""
     starts, left = [], [0]
     start = HandFilter.start
     monkeypatch.setattr(HandFilter, "start", lambda hand, *pose: (starts.append(pose), start(hand, *pose)))
