@@ -195,10 +195,8 @@ class ModelTracker:
         self._apart = self._apart + 1 if apart >= _APART_MARKERS else 0
         self._strange = self._strange + 1 if self._hand.strangeness > _STRANGEST else 0
         is_strange = self._strange >= _APART_STATES and abs(self._timeline.t_ns - self._anew_ns) > _AGAIN_NS
-        if is_strange:
+        if (is_strange or self._apart >= _APART_STATES) and self._begin(located) and is_strange:
             self._anew_ns = self._timeline.t_ns
-        if is_strange or self._apart >= _APART_STATES:
-            self._begin(located)
 
     def _look_at_thumb(self) -> None:
         """A thumb that bends backwards may be one that bends forwards."""
@@ -220,8 +218,9 @@ class ModelTracker:
         if located is not None:
             self._begin(located)
 
-    def _begin(self, located: Located) -> None:
-        """Start from what one instant shows, if it is enough, or enough for a hand that was sound a moment ago."""
+    def _begin(self, located: Located) -> bool:
+        """Start from what one instant shows, if it is enough, or enough for a hand that was sound a moment ago; returns
+        whether it is."""
         scale = 1.0 if self._size is None else self._size.scale
         pose = self._starter.pose_of(located.positions, scale)
         if pose is None and self._sound is not None and np.count_nonzero(located.clear) >= _LEAST_CLEAR:
@@ -231,6 +230,7 @@ class ModelTracker:
                 pose = self._starter.pose_near(clear, self._sound.pose, 1e-9 * since_ns, scale)
         if pose is not None:
             self._start(located, pose)
+        return pose is not None
 
     def _start(self, located: Located, pose: HandPose) -> None:
         """Start the filter at a pose and weigh again what was seen since."""

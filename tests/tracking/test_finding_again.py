@@ -95,6 +95,31 @@ def test_a_hand_whose_fingers_stay_bent_as_nobodys_is_begun_anew(monkeypatch, la
     assert deviations(after_s(states, 1.1), moving()).mm.max() < 5.0
 
 
+def test_a_strange_hand_that_cannot_be_begun_anew_just_now_is_so_as_soon_as_it_can(monkeypatch):
+    poses, fails, starts = Starter.pose_of, [], []
+    monkeypatch.setattr(HandFilter, "strangeness", property(lambda _: _STRANGEST + 1.0))
+    tracker = make_tracker(RIG)
+    frames = sights(RIG, moving(), 1.5)
+    for frame in frames[:len(frames) // 2]:
+        tracker.ingest(frame)
+        tracker.solve()
+
+    def pose_of(starter, markers, scale=1.0):
+        if len(fails) < 3:
+            fails.append(markers)
+            return None
+        starts.append(markers)
+        return poses(starter, markers, scale)
+
+    tracker._anew_ns = -10**18  # long ago
+    monkeypatch.setattr(Starter, "pose_of", pose_of)
+    monkeypatch.setattr(Starter, "pose_near", lambda *_: None)
+    for frame in frames[len(frames) // 2:]:
+        tracker.ingest(frame)
+        tracker.solve()
+    assert len(fails) == 3 and len(starts) == 1
+
+
 def test_how_strange_fingers_are_is_their_distance_from_habit():
     habits = WEARING.habits
     hand = HandFilter(WEARING.worn, WEARING.cameras, habits, WEARING.limits, WEARING.bias_variance)
