@@ -232,12 +232,12 @@ def _prepare(shared: Share, dt: float) -> None:
     estimate, rows, part = desk.estimate, desk.rows, desk.worn.part
     hold(estimate, rows, part, desk.worn.palmar, desk.cameras.pose, desk.habits, desk.held)
     rest(estimate, dt)
-    loosen(estimate, part, rows, desk.habits.usual)
+    back = loosen(estimate, part, rows, desk.habits.usual)
     if loosen_palm(estimate, desk.worn, desk.cameras.pose, rows, desk.habits.usual):
         estimate.held[0] = FREE
         let_go(desk.held)
     hold_size(estimate.covariance, desk.held)
-    appraise(rows, estimate, desk.habits.together, desk.believed, desk.widening)
+    appraise(rows, estimate, desk.habits.together, back, desk.believed, desk.widening)
     withhold(estimate.covariance, desk.held)
 
 

@@ -24,6 +24,7 @@ from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 AWAY_S = 0.08
 """What was unseen for this long may be anywhere."""
@@ -43,13 +44,13 @@ SPEED, HASTE = 3.0, 30.0
 
 
 @njit(cache=True)
-def loosen(estimate: Estimate, part: Indices, rows: Rows, usual: Array) -> None:
+def loosen(estimate: Estimate, part: Indices, rows: Rows, usual: Array) -> Mask:
     """Forget all of a finger that is seen again but what habit, `usual` (27, 27) as in `Habits`, says of its angles.
 
     How it was taken to go with the rest of the hand is forgotten too, so that the finger alone goes where it is seen.
-    `part` (M,) as in `Worn`.
+    `part` (M,) as in `Worn`. Returns (5,) which fingers were forgotten.
     """
-    away = fingers_away(estimate, part)
+    away, forgotten = fingers_away(estimate, part), np.zeros(FINGERS, np.bool_)
     for finger in range(FINGERS):
         back = False
         for observation in range(rows.used[1]):
@@ -57,6 +58,8 @@ def loosen(estimate: Estimate, part: Indices, rows: Rows, usual: Array) -> None:
         if not back or away[finger] < AWAY_S:
             continue
         forget_finger(estimate, finger, usual)
+        forgotten[finger] = True
+    return forgotten
 
 
 @njit(cache=True)

@@ -61,10 +61,11 @@ _STEP = 3.0
 
 
 @njit(cache=True)
-def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, widening: Array) -> None:
+def appraise(rows: Rows, estimate: Estimate, together: Array, back: Mask, believed: Mask, widening: Array) -> None:
     """Raise the agitation (and the covariance by what it did since its onset); fill `believed` and `widening` (L,).
 
-    `together` as in `Habits`.
+    `together` as in `Habits`. Fingers that are `back` (5,) from out of sight do not surprise, wherever they are: where
+    they are expected, and how sharply, is linearised about a pose that is far from theirs.
     """
     count, how, grown = rows.used[1], estimate.held[0], jerk_gains(ONSET_S)
     if count == 0:
@@ -72,7 +73,7 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
     noise, per_unit, surprise = np.empty((count, 3)), np.zeros((count, 3, 3)), np.empty(count)
     expected_noise(rows, estimate.covariance, noise)
     added = np.zeros(GROUPS)
-    if _as_expected(rows, estimate, noise, per_unit, added, believed, widening):
+    if _as_expected(rows, estimate, noise, per_unit, added, back, believed, widening):
         return
     for observation in range(count):
         for kind in range(3):
@@ -83,7 +84,8 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
         if how != TURN_HELD:
             _raise_palm(rows, estimate, noise, per_unit, TURN, added, surprise)
     for finger in range(GROUPS - FIRST_FINGER):
-        _raise_finger(rows, estimate, noise, per_unit, finger, added, surprise)
+        if not back[finger]:
+            _raise_finger(rows, estimate, noise, per_unit, finger, added, surprise)
     _follow_trends(estimate, added)
     if how in (PLACED, PALM_HELD):
         added[LINEAR] = 0.0
@@ -92,7 +94,7 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
     _wake(estimate, added)
     shake(estimate.covariance, added, together, ONSET_S)
     for observation in range(count):
-        value = _squared(rows, observation, noise, per_unit, added)
+        value = 0.0 if _is_of(back, rows, observation) else _squared(rows, observation, noise, per_unit, added)
         believed[observation] = value < GATE
         widening[observation] = max(1.0, value / ROBUST)
         if value > PLAUSIBLE:
@@ -100,18 +102,25 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, believed: Mask, wi
 
 
 @njit(cache=True)
-def _as_expected(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, added: Array, believed: Mask,
-                 widening: Array) -> bool:
+def _as_expected(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, added: Array, back: Mask,
+                 believed: Mask, widening: Array) -> bool:
     """Whether nothing surprises, as with most frames: then all is believed, and what acceleration would do need not be
     known."""
     if np.max(_trends(estimate)) > TREND:
         return False
     for observation in range(rows.used[1]):
-        value = _squared(rows, observation, noise, per_unit, added)
+        value = 0.0 if _is_of(back, rows, observation) else _squared(rows, observation, noise, per_unit, added)
         if not value <= PLAUSIBLE:
             return False
         believed[observation], widening[observation] = True, max(1.0, value / ROBUST)
     return True
+
+
+@njit(cache=True)
+def _is_of(fingers: Mask, rows: Rows, observation: int) -> bool:
+    """Whether an observation is attached to one of these `fingers` (5,)."""
+    part = rows.part[observation]
+    return bool(part != PALM_PART and fingers[part])
 
 
 @njit(cache=True)

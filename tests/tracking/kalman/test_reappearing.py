@@ -16,6 +16,7 @@ from rhot_app.tracking.kalman.reappearing import (
     loosen,
     loosen_palm,
 )
+from rhot_app.tracking.kalman.surprise import appraise
 
 PART, USUAL = WEARING.worn.part, WEARING.habits.usual
 WRIST = WEARING.roles.index("wrist")
@@ -49,6 +50,13 @@ def loosened(away, rows, part=PART):
     before = estimate.covariance.copy()
     loosen(estimate, part, rows, USUAL)
     return estimate, before
+
+
+def far_off(pixels):
+    """Two fingertips that one camera sees so far from where they are expected."""
+    rows = sighting((0, 1), (0, 2))
+    rows.jacobian[:4, 0], rows.noise[:4, 0], rows.residual[:4] = 1.0, 0.05**2, pixels
+    return rows
 
 
 @pytest.mark.parametrize("finger", [0, 2])
@@ -94,6 +102,23 @@ def test_what_a_finger_seemed_to_do_is_forgotten_too():
     for now, then in ((estimate.velocity, before.velocity), (estimate.acceleration, before.acceleration)):
         assert not now[finger].any()
         np.testing.assert_array_equal(np.delete(now, finger), np.delete(then, finger))
+
+
+@pytest.mark.parametrize("px", [0.3, 400.0], ids=["off", "far off"])
+def test_a_finger_that_is_back_is_believed_where_it_is_and_surprises_nobody(px):
+    estimate, rows = moving_estimate(), far_off(px)
+    estimate.unseen[:] = 0.0
+    estimate.unseen[:, 2] = 1.0
+    estimate.covariance[:] = 1e-8 * np.eye(SIZE)
+    estimate.agitation[:] = 1.0
+    back = loosen(estimate, PART, rows, USUAL)
+    np.testing.assert_array_equal(back, np.arange(5) == PART[2])
+    believed, widening = np.empty(2, np.bool_), np.empty(2)
+    appraise(rows, estimate, WEARING.habits.together, back, believed, widening)
+    assert believed[1] and widening[1] == 1.0
+    assert estimate.agitation[2 + PART[2]] == 1.0
+    assert widening[0] > 1.0 and believed[0] == (px < 1.0)
+    assert estimate.agitation[2 + PART[1]] > 1.0
 
 
 PX_PER_M = 900.0
