@@ -78,7 +78,7 @@ def tell_of_paint(estimate: Estimate, cameras: Cameras, paint: Array, out: Array
     for a in range(count):
         add_rows(rows[a], -factor[a, :a], rows, order[:a], 0)
         rows[a] /= factor[a, a]
-    add_squares(out, rows, count, -1.0)
+    add_squares(out, rows[:count], -1.0)
 
 
 @njit(cache=True)

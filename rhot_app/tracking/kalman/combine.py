@@ -42,16 +42,40 @@ def dot(a: Array, b: Array) -> float:
     return total
 
 
-@njit(cache=True)
-def add_squares(matrix: Array, rows: Array, count: int, sign: float) -> None:
-    """Add to a symmetric `matrix` (N, N) sign G^T G, G being the first `count` of `rows` (R, N); leaves it symmetric to
-    the last bit."""
-    size, chosen, weights = matrix.shape[0], np.arange(count), np.empty(count)
-    for i in range(size):
-        for k in range(count):
-            weights[k] = sign * rows[k, i]
-        add_rows(matrix[i, i:], weights, rows, chosen, i)
+@njit(cache=True, fastmath={"contract"})
+def add_products(matrix: Array, left: Array, right: Array) -> None:
+    """Add to a symmetric `matrix` (N, N) left^T right, of two (K, N) whose product is symmetric; leaves it symmetric to
+    the last bit.
+
+    From the eighth column on that the diagonal lies in: rows then begin where vectors do. Two rows of the matrix at
+    once: what is read of `right` serves both.
+    """
+    size, count = matrix.shape[0], left.shape[0]
+    for i in range(0, size, 2):
+        first, last = i - i % 8, min(i + 1, size - 1)
+        for k in range(0, count - 3, 4):
+            upper, lower = matrix[i, first:], matrix[last, first:]
+            row_a, row_b = right[k, first:], right[k + 1, first:]
+            row_c, row_d = right[k + 2, first:], right[k + 3, first:]
+            a, b, c, d = left[k, i], left[k + 1, i], left[k + 2, i], left[k + 3, i]
+            e, f, g, h = left[k, last], left[k + 1, last], left[k + 2, last], left[k + 3, last]
+            for j in range(size - first):
+                w, x, y, z = row_a[j], row_b[j], row_c[j], row_d[j]
+                upper[j] += a * w + b * x + c * y + d * z
+                if last > i:
+                    lower[j] += e * w + f * x + g * y + h * z
+        for k in range(count - count % 4, count):
+            for row in range(i, last + 1):
+                weight, target, source = left[k, row], matrix[row, first:], right[k, first:]
+                for j in range(size - first):
+                    target[j] += weight * source[j]
     mirror(matrix)
+
+
+@njit(cache=True)
+def add_squares(matrix: Array, rows: Array, sign: float) -> None:
+    """Add to a symmetric `matrix` (N, N) sign G^T G, G being the `rows` (K, N); leaves it symmetric to the last bit."""
+    add_products(matrix, sign * rows, rows)
 
 
 @njit(cache=True)

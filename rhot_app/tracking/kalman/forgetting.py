@@ -22,7 +22,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
-from rhot_app.tracking.kalman.combine import add_rows, add_squares, mirror
+from rhot_app.tracking.kalman.combine import mirror
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
@@ -38,7 +38,7 @@ from rhot_app.tracking.kalman.estimate import (
     TURN_HELD,
     Estimate,
 )
-from rhot_app.tracking.kalman.gain import Gain, project_rows, whiten
+from rhot_app.tracking.kalman.gain import Gain, add_step, contract, project_rows
 from rhot_app.tracking.kalman.holding import ENOUGH
 from rhot_app.tracking.kalman.motion import Habits
 from rhot_app.tracking.kalman.sighted import FRESH_S
@@ -266,7 +266,7 @@ def _return_to_habits(estimate: Estimate, dt: float, fading: Array, habits: Habi
         gain.jacobian[k, ANGLES:POSE] = habits.rows[k]
         for a in range(ANGLES, POSE):
             right[k] -= gain.jacobian[k, a] * (estimate.angles[a - ANGLES] + step[a])
-    project_rows(gain, count, estimate.covariance, noise)
-    whiten(gain, count, right)
-    add_rows(step, right, gain.rows, np.arange(count), 0)
-    add_squares(estimate.covariance, gain.rows, count, -1.0)
+    gain.used[0], gain.used[1] = 0, count
+    project_rows(gain, estimate.covariance, noise)
+    add_step(gain, right, step)
+    contract(estimate.covariance, gain)

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
-from rhot_app.tracking.kalman.combine import add_rows, add_squares, dot
+from rhot_app.tracking.kalman.combine import add_products, add_rows, add_squares, dot
 from rhot_app.tracking.kalman.rows import Rows
 
 Array = NDArray[np.float64]
@@ -62,9 +62,14 @@ def _at(vector: Array, chosen: Indices, weights: Array, count: int) -> float:
 
 
 class Gain(NamedTuple):
-    """How an update weighed its rows. `used` (1,): believed rows, the first ones of the others. `rows` (K, N): the
-    factor G of the posterior covariance P - G^T G, which is L^-1 H P; `jacobian` (K, N): H; `factor` (K, K): L, the
-    Cholesky factor of the innovations' covariance."""
+    """How an update weighed its rows.
+
+    `used` (2,): H directions are held (`withholding.py`), and with the K believed rows there are H + K. `rows` (H + K,
+    N): what the update takes from the covariance, P less their squares being what is left when the held directions
+    count as known: first what is not known of these, D; then the factor G = L^-1 H P of what is learnt, P less the
+    squares of D. `jacobian` (K, N): H. `factor` (H + K, H + K): in its last K rows H D^T, then L, the Cholesky factor
+    of the innovations' covariance.
+    """
 
     used: Indices
     rows: Array
@@ -73,58 +78,65 @@ class Gain(NamedTuple):
 
 
 def empty_gain(rows: int, size: int) -> Gain:
-    """Room for `rows` rows of a state with `size` numbers."""
-    return Gain(np.zeros(1, np.int64), np.zeros((rows, size)), np.zeros((rows, size)), np.zeros((rows, rows)))
+    """Room for `rows` rows, held directions among them, of a state with `size` numbers."""
+    return Gain(np.zeros(2, np.int64), np.zeros((rows, size)), np.zeros((rows, size)), np.zeros((rows, rows)))
 
 
 @njit(cache=True)
 def solve(rows: Rows, covariance: Array, believed: Mask, widening: Array, step: Array, gain: Gain) -> None:
-    """One Gauss-Newton step of the believed observations; fills `gain`.
+    """One Gauss-Newton step of the believed observations; fills `gain`, all but what is held.
 
     `step` (N,): where the rows were linearised, as a displacement of the prior mean; becomes where the mean should
     be. `widening` (L,): factor on each observation's noise.
     """
     noise, right = np.empty((rows.used[0], 2)), np.empty(rows.used[0])
-    count = _gather(rows, believed, widening, step, noise, right, gain)
-    project_rows(gain, count, covariance, noise)
-    whiten(gain, count, right)
+    _gather(rows, believed, widening, step, noise, right, gain)
+    project_rows(gain, covariance, noise)
     step[:] = 0.0
-    add_rows(step, right[:count], gain.rows, np.arange(count), 0)
+    add_step(gain, right, step)
 
 
 @njit(cache=True)
-def project_rows(gain: Gain, count: int, covariance: Array, noise: Array) -> None:
-    """Fill the first `count` of `gain.rows` with H P and of `gain.factor` with the Cholesky factor of H P H^T + R."""
-    size = covariance.shape[0]
-    chosen, weights = np.empty(size, np.int64), np.empty(size)
-    for k in range(count):
+def project_rows(gain: Gain, covariance: Array, noise: Array) -> None:
+    """Fill the rows after the held ones, by their `gain.jacobian` and `noise` (K, 2), all but the whitening."""
+    size, held, total = covariance.shape[0], gain.used[0], gain.used[1]
+    chosen, weights, order = np.empty(size, np.int64), np.empty(size), np.arange(held)
+    for row in range(held, total):
+        target, factor, k = gain.rows[row], gain.factor[row], row - held
         picked = _pick(gain.jacobian[k], chosen, weights)
-        gain.rows[k] = 0.0
-        add_rows(gain.rows[k], weights[:picked], covariance, chosen[:picked], 0)
-        for other in range(k + 1):
-            gain.factor[k, other] = _at(gain.rows[other], chosen, weights, picked)
-        gain.factor[k, k] += noise[k, 0]
+        target[:] = 0.0
+        add_rows(target, weights[:picked], covariance, chosen[:picked], 0)
+        for other in range(held):
+            factor[other] = _at(gain.rows[other], chosen, weights, picked)
+        add_rows(target, -factor[:held], gain.rows, order, 0)
+        for other in range(held, row + 1):
+            factor[other] = _at(gain.rows[other], chosen, weights, picked)
+        factor[row] += noise[k, 0]
         if k > 0:
-            gain.factor[k, k - 1] += noise[k, 1]
-    factorise(gain.factor[:count, :count])
+            factor[row - 1] += noise[k, 1]
+    factorise(gain.factor[held:total, held:total])
 
 
 @njit(cache=True)
-def whiten(gain: Gain, count: int, right: Array) -> None:
-    """H P becomes L^-1 H P, the innovation `right` (K,) L^-1 times itself."""
-    order = np.arange(count)
-    for k in range(count):
-        for other in range(k):
-            right[k] -= gain.factor[k, other] * right[other]
-        add_rows(gain.rows[k], -gain.factor[k, :k], gain.rows, order[:k], 0)
-        right[k] /= gain.factor[k, k]
-        gain.rows[k] /= gain.factor[k, k]
+def add_step(gain: Gain, right: Array, step: Array) -> None:
+    """Whiten the projected rows, H P becomes L^-1 H P; add to `step` (N,) what they make of the innovations `right`
+    (K,), which become L^-1 times themselves."""
+    held, total = gain.used
+    order = np.arange(total)
+    for row in range(held, total):
+        target, factor = gain.rows[row], gain.factor[row]
+        for other in range(held, row):
+            right[row - held] -= factor[other] * right[other - held]
+        add_rows(target, -factor[held:row], gain.rows, order[held:row], 0)
+        right[row - held] /= factor[row]
+        target *= 1.0 / factor[row]
+    add_rows(step, right[:total - held], gain.rows, order[held:], 0)
 
 
 @njit(cache=True)
-def _gather(rows: Rows, believed: Mask, widening: Array, step: Array, noise: Array, right: Array, gain: Gain) -> int:
-    """Fill the believed rows' Jacobians, `noise` (K, 2) of each and with the row before, and innovations from the prior
-    mean, `right` (K,); returns how many."""
+def _gather(rows: Rows, believed: Mask, widening: Array, step: Array, noise: Array, right: Array, gain: Gain) -> None:
+    """Count the believed rows, fill their Jacobians, `noise` (K, 2) of each and with the row before, and innovations
+    from the prior mean, `right` (K,)."""
     count = 0
     for observation in range(rows.used[1]):
         if believed[observation]:
@@ -135,8 +147,7 @@ def _gather(rows: Rows, believed: Mask, widening: Array, step: Array, noise: Arr
                 noise[count, 1] = widening[observation] * rows.noise[row, 1] if row > first else 0.0
                 right[count] = rows.residual[row] + dot(step, rows.jacobian[row])
                 count += 1
-    gain.used[0] = count
-    return count
+    gain.used[1] = gain.used[0] + count
 
 
 @njit(cache=True)
@@ -152,5 +163,31 @@ def misfit(rows: Rows, believed: Mask, widening: Array) -> float:
 
 @njit(cache=True)
 def contract(covariance: Array, gain: Gain) -> None:
-    """The posterior covariance P - G^T G in place of P."""
-    add_squares(covariance, gain.rows, gain.used[0], -1.0)
+    """The posterior covariance in place of P.
+
+    Of the held directions nothing is learnt, and what is not known of them goes on into the others by the gain that
+    leaves them alone: Joseph's form, which is true of any gain, also of one that is not the best. With
+    S = -L^-1 H D^T it is P - G^T G - D^T D + (D + S^T G)^T (D + S^T G), which is P + G^T Y + Y^T G with
+    Y = S D + (S S^T - 1) G / 2.
+    """
+    held, total = gain.used
+    learnt = gain.rows[held:total]
+    if held == 0:
+        add_squares(covariance, learnt, -1.0)
+        return
+    count, size = total - held, covariance.shape[0]
+    shares, square, order = np.empty((count, held)), np.empty(count), np.arange(total)
+    left, right = np.empty((2 * count, size)), np.zeros((2 * count, size))
+    for k in range(count):
+        factor = gain.factor[held + k]
+        shares[k] = -factor[:held]
+        add_rows(shares[k], -factor[held:held + k], shares, order[:k], 0)
+        shares[k] *= 1.0 / factor[held + k]
+    for k in range(count):
+        for other in range(count):
+            square[other] = 0.5 * dot(shares[k], shares[other])
+        square[k] -= 0.5
+        add_rows(right[k], shares[k], gain.rows, order[:held], 0)
+        add_rows(right[k], square, learnt, order[:count], 0)
+        left[k], left[count + k], right[count + k] = learnt[k], right[k], learnt[k]
+    add_products(covariance, left, right)

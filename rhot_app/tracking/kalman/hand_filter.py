@@ -35,7 +35,8 @@ from rhot_app.tracking.kalman.rows import Page, ResidualBlock, Rows, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown, note_sights
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
-from rhot_app.tracking.kalman.withholding import Held, empty_held, release, restore, withhold
+from rhot_app.tracking.kalman.withholding import MOST as MOST_HELD
+from rhot_app.tracking.kalman.withholding import Held, bound_biases, empty_held, withhold
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -118,9 +119,9 @@ class HandFilter:
         size = BIAS + 3 * len(worn.part)
         self.estimate = empty_estimate(*shape)
         self._desk = Desk(self.estimate, empty_estimate(*shape), empty_rows(ROWS_MAX, size),
-                          empty_gain(ROWS_MAX, size), empty_held(size), np.empty(size), np.empty(ROWS_MAX, np.bool_),
-                          np.empty(ROWS_MAX), worn, cameras, habits, limits, bias_variance,
-                          np.zeros(2))
+                          empty_gain(ROWS_MAX + MOST_HELD, size), empty_held(size), np.empty(size),
+                          np.empty(ROWS_MAX, np.bool_), np.empty(ROWS_MAX), worn, cameras, habits, limits,
+                          bias_variance, np.zeros(2))
         self._shared = Share(self._desk)
         self._now, self._tried = (Share(Page(mean, self._desk.rows)) for mean in (self.estimate, self._desk.trial))
 
@@ -238,17 +239,17 @@ def _prepare(shared: Share, dt: float) -> None:
         let_go(desk.held)
     hold_size(estimate.covariance, desk.held)
     appraise(rows, estimate, desk.habits.together, back, desk.believed, desk.widening)
-    withhold(estimate.covariance, desk.held)
+    withhold(estimate.covariance, desk.held, desk.gain)
 
 
 @njit(cache=True)
 def _hold_turn_alone(shared: Share) -> None:
     """Let go of all that is held but the palm's turn."""
     desk: Desk = shared.of
-    release(desk.estimate.covariance, desk.held)
+    let_go(desk.held)
     hold_turn(desk.held)
     hold_size(desk.estimate.covariance, desk.held)
-    withhold(desk.estimate.covariance, desk.held)
+    withhold(desk.estimate.covariance, desk.held, desk.gain)
 
 
 @njit(cache=True)
@@ -261,7 +262,7 @@ def _improve(shared: Share) -> float:
     turn = _turn(before, step)
     if turn > LONGEST_RAD:
         step[:] = before + LONGEST_RAD / turn * (step - before)
-    project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[0]], desk.limits, step)
+    project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[1]], desk.limits, step)
     displace(estimate, step, desk.trial)
     return _turn(before, step)
 
@@ -284,7 +285,8 @@ def _conclude(shared: Share, dt: float) -> None:
     note_trend(estimate, step, gain)
     contract(estimate.covariance, gain)
     displace(estimate, step, estimate)
-    restore(estimate.covariance, desk.held, gain, estimate.bias_variance)
+    if gain.used[0] > 0:
+        bound_biases(estimate.covariance, estimate.bias_variance)
     points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
     place_markers(worn, estimate, points, jacobian)
     keep_shown(estimate, worn.part, worn.palmar, desk.cameras.pose, points, jacobian)

@@ -25,9 +25,9 @@ def project(angles: Array, velocity: Array, covariance: Array, gains: Array, lim
     `velocity` (27,) + step, `FASTEST_RAD_S`.
 
     The most plausible state with the offending number on its limit (Simon and Chia 2002), one after the other, of the
-    angles the farthest first; plausible by `covariance` less what `gains` (K, N) will take from it, P - G^T G. The
-    covariance stays: to know that a joint is within its limits would make it smaller, so it is on the safe side. A
-    joint at its limit does not move on beyond it: its speed is stopped likewise.
+    angles the farthest first; plausible by `covariance` less what an update takes from it, the squares of `gains`
+    (K, N). The covariance stays: to know that a joint is within its limits would make it smaller, so it is on the safe
+    side. A joint at its limit does not move on beyond it: its speed is stopped likewise.
     """
     for i in range(angles.shape[0]):
         row = VELOCITY + ANGLES + i

@@ -253,12 +253,12 @@ def _raise(added: Array, group: int) -> bool:
 @njit(cache=True)
 def note_trend(estimate: Estimate, step: Array, gain: Gain) -> None:
     """Remember how an update corrects the velocities: `step` (N,), and the `gain` by which."""
-    count = gain.used[0]
-    if count == 0:
+    held, total = gain.used
+    if total == held:
         return
     for i in range(POSE):
         variance = 0.0
-        for k in range(count):
+        for k in range(held, total):
             variance += gain.rows[k, VELOCITY + i] ** 2
         if variance > 0.0:
             estimate.trend[i] += LEAK * (step[VELOCITY + i] / math.sqrt(variance) - estimate.trend[i])

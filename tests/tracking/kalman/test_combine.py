@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhot_app.tracking.kalman.combine import add_rows, add_squares, dot, mirror
+from rhot_app.tracking.kalman.combine import add_products, add_rows, add_squares, dot, mirror
 
 RNG = np.random.default_rng(4)
 
@@ -23,7 +23,19 @@ def test_squares_are_added_and_what_was_nearly_symmetric_is_symmetric(sign):
     rows, matrix = RNG.normal(size=(7, 23)), np.eye(23)
     matrix[3, 11] += 1e-15
     expected = matrix + sign * rows[:5].T @ rows[:5]
-    add_squares(matrix, rows, 5, sign)
+    add_squares(matrix, rows[:5], sign)
+    np.testing.assert_allclose(matrix, expected, atol=1e-13)
+    np.testing.assert_array_equal(matrix, matrix.T)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 16, 23])
+@pytest.mark.parametrize("count", [0, 1, 4, 6])
+def test_a_symmetric_product_is_added(size, count):
+    one, other = RNG.normal(size=(2, count, size))
+    left, right = np.concatenate([one, other]), np.concatenate([other, one])
+    matrix = np.diag(RNG.random(size))
+    expected = matrix + left.T @ right
+    add_products(matrix, left, right)
     np.testing.assert_allclose(matrix, expected, atol=1e-13)
     np.testing.assert_array_equal(matrix, matrix.T)
 

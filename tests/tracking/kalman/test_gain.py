@@ -51,7 +51,7 @@ def test_update_is_the_textbooks(believed):
     gain = empty_gain(32, SIZE)
     solve(rows, covariance, believed, widening, step, gain)
     contract(covariance, gain)
-    assert gain.used[0] == sum(np.array(SIZES)[believed])
+    assert gain.used[1] == sum(np.array(SIZES)[believed])
     np.testing.assert_allclose(step, mean, atol=1e-10)
     np.testing.assert_allclose(covariance, posterior, atol=1e-10)
 
@@ -61,7 +61,7 @@ def test_nothing_believed_changes_nothing():
     before, step, gain = covariance.copy(), np.zeros(SIZE), empty_gain(32, SIZE)
     solve(rows, covariance, np.zeros(len(SIZES), bool), np.ones(len(SIZES)), step, gain)
     contract(covariance, gain)
-    assert gain.used[0] == 0 and not step.any()
+    assert gain.used[1] == 0 and not step.any()
     np.testing.assert_array_equal(covariance, before)
 
 
