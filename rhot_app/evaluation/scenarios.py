@@ -34,7 +34,12 @@ from rhot_app.tracking.tracker import Tracker
 
 Array = NDArray[np.float64]
 
-BLIND_S = (3.0, 4.0)
+BLIND_S = 1.0
+"""A camera is covered for so long, from another moment on in every take: how a hand moves just then decides how well it
+is known without."""
+
+BLIND_FROM_S = 2.0
+WRIST_ALONE_S = 3.0
 SCALE_TOLERANCE = 0.02
 SCALE_TIMES_S = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)
 
@@ -42,15 +47,21 @@ SCALE_TIMES_S = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)
 def one_camera_blind(take: Take, rig: Rig, tracker: Tracker | None = None, *, says_so: bool) -> Figures:
     """Fingertips while the first camera is covered for a second; `says_so` False: while its node is silent."""
     node = rig.nodes[0].node_id
-    records = (alter.changed(take.records(), alter.blind(node, *BLIND_S)) if says_so
-               else alter.silent(take.records(), node, *BLIND_S))
+    begin = blind_from(take)
+    records = (alter.changed(take.records(), alter.blind(node, begin, begin + BLIND_S)) if says_so
+               else alter.silent(take.records(), node, begin, begin + BLIND_S))
     track = tracked(records, rig, tracker)
-    during = track.where((track.times_s >= BLIND_S[0]) & (track.times_s < BLIND_S[1]))
+    during = track.where((track.times_s >= begin) & (track.times_s < begin + BLIND_S))
     tips = distances(_off(during, take).tips)
-    span_s = BLIND_S[1] - BLIND_S[0]
     return {"tips_mm": _mm(rms(tips)), "tips_max_mm": _most_mm(tips),
             "known_share": float(np.isfinite(tips).mean()) if tips.size else 0.0,
-            "states_per_s": len(during.times_s) / span_s}
+            "states_per_s": len(during.times_s) / BLIND_S}
+
+
+def blind_from(take: Take) -> float:
+    """When `one_camera_blind` covers the camera, s of the take."""
+    last = max(take.seconds - BLIND_S - 0.5, BLIND_FROM_S)
+    return float(np.random.default_rng(_seed(take)).uniform(BLIND_FROM_S, last))
 
 
 def markers_hidden(take: Take, rig: Rig, tracker: Tracker | None = None, *, share: float,
@@ -77,11 +88,10 @@ def wrist_alone(take: Take, rig: Rig) -> Figures:
     """What is said of the palm's turn when only the wrist's marker is left, three seconds into the take, and what is
     true: rms over the states."""
     wrist = [marker.role for marker in rig.markers.markers].index(WRIST_ROLE)
-    late = BLIND_S[0]
-    records = alter.changed(take.records(), lambda t_s, _, seen: seen if t_s < late else [
+    records = alter.changed(take.records(), lambda t_s, _, seen: seen if t_s < WRIST_ALONE_S else [
         marker if marker.index == wrist else alter.lost(marker.index) for marker in seen])
     track = tracked(records, rig)
-    track = track.where(track.times_s >= late + SETTLE_S)
+    track = track.where(track.times_s >= WRIST_ALONE_S + SETTLE_S)
     turn = distances(_off(track, take).palm[:, 3:])
     stated = np.sqrt(np.trace(track.palm_covariance[:, 3:, 3:], axis1=1, axis2=2))
     return {"palm_turn_deg": _deg(rms(turn)), "stated_deg": _deg(rms(stated))}

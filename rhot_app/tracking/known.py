@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
 from rhot_app.tracking.kalman.combine import add_rows, add_squares
-from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, LOOK_VARIANCE, POSE, SCALE, Estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, LOOK_VARIANCE, PLACED, POSE, SCALE, Estimate
 from rhot_app.tracking.kalman.markers import NEAREST_M, Cameras
 
 Array = NDArray[np.float64]
@@ -37,7 +37,9 @@ def known_of(estimate: Estimate, cameras: Cameras, paint: Array, usual: Array) -
     """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as it is told.
 
     `paint` (M,) m^2: variances of the markers' seen middles about their places, without what light does to them,
-    infinite where nobody knows; `usual` (27,): variances of the pose by habit.
+    infinite where nobody knows; `usual` (27,): variances of the pose by habit. Of a palm that its own markers do not
+    place nothing is told of these: what is wrong with its place is wrong with markers and fingers too, all together,
+    and to know better of one of them would seem to be to know better of the place.
     """
     covariance, out = estimate.covariance, np.empty((POSE + 1, POSE + 1))
     for i in range(POSE):
@@ -45,12 +47,15 @@ def known_of(estimate: Estimate, cameras: Cameras, paint: Array, usual: Array) -
             out[i, j] = covariance[i, j]
         out[i, POSE], out[POSE, i] = covariance[i, SCALE], covariance[SCALE, i]
     out[POSE, POSE] = covariance[SCALE, SCALE]
-    tell_of_paint(estimate, cameras, paint, out)
+    placed = estimate.held[0] < PLACED
+    if placed:
+        tell_of_paint(estimate, cameras, paint, out)
     for i in range(POSE):
         for j in range(POSE):
             out[i, j] += DOUBTED * estimate.left_open[i, j]
-    for i in range(ANGLES, POSE):
-        tell_of_habit(out, i, usual[i])
+    if placed:
+        for i in range(ANGLES, POSE):
+            tell_of_habit(out, i, usual[i])
     return out
 
 

@@ -131,7 +131,7 @@ def describe(account: Share, t_ns: int, report: Report) -> bool:
         report.marker_knowledge[m] = _know(_worst(report.covariances[FIRST_MARKER + m]),
                                            seen_clearly(seen, t_ns, m), MEASURED_M, INFERRED_M)
         all_measured &= report.marker_knowledge[m] == _MEASURED
-    _conclude(covariance, subject.part, report)
+    _conclude(covariance, subject, report)
     return all_measured
 
 
@@ -185,15 +185,15 @@ def tell_of_lasting(velocity: Array, subject: Subject, jacobian: Array, located:
 
 
 @njit(cache=True)
-def _conclude(covariance: Array, part: Indices, report: Report) -> None:
+def _conclude(covariance: Array, subject: Subject, report: Report) -> None:
     """What is measured, the images alone determine; what they determine through habit is inferred, however well.
 
     A fingertip needs its marker, an inner joint two markers on its finger, a palm's rotation three on the palm, an
     angle two on its finger beside those.
     """
     shown = np.zeros(6, np.int64)  # markers measured on the palm, then on each finger
-    for m in range(part.shape[0]):
-        shown[part[m] + 1] += report.marker_knowledge[m] == _MEASURED
+    for m in range(subject.part.shape[0]):
+        shown[subject.part[m] + 1] += report.marker_knowledge[m] == _MEASURED
     turn = shown[0] >= 3
     for joint in range(21):
         finger = _FINGER_OF_JOINT[joint]
@@ -201,7 +201,8 @@ def _conclude(covariance: Array, part: Indices, report: Report) -> None:
         sd = _worst(report.covariances[joint])
         report.joint_knowledge[joint] = _know(sd, shown[finger + 1] >= needed, MEASURED_M, INFERRED_M)
     for angle in range(21):
-        sd = math.sqrt(max(covariance[ANGLES + angle, ANGLES + angle], 0.0))
+        variance = covariance[ANGLES + angle, ANGLES + angle]
+        sd = math.sqrt(max(min(variance, subject.usual[ANGLES + angle]), 0.0))  # no angle is known less than by habit
         report.angle_sd[angle] = sd
         report.angle_knowledge[angle] = _know(sd, turn and shown[_FINGER_OF_ANGLE[angle] + 1] >= 2, MEASURED_RAD,
                                               INFERRED_RAD)

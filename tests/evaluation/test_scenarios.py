@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -39,6 +40,13 @@ def test_a_camera_that_is_blind_makes_fingertips_worse(grasp: Take, rig: Rig) ->
         bad = scenarios.one_camera_blind(grasp, rig, says_so=says_so)
         assert bad["tips_mm"] is not None and bad["tips_max_mm"] is not None
         assert bad["tips_mm"] > 5.0 * good["tips_mm"] and bad["tips_max_mm"] > bad["tips_mm"]
+
+
+def test_a_camera_is_covered_at_another_moment_of_every_take(grasp: Take) -> None:
+    moments = [scenarios.blind_from(replace(grasp, folder=grasp.folder.with_name(name))) for name in "abcdef"]
+    assert len(set(moments)) == 6
+    assert min(moments) >= 2.0 and max(moments) + scenarios.BLIND_S <= grasp.seconds - 0.5
+    assert scenarios.blind_from(grasp) == scenarios.blind_from(grasp)
 
 
 def test_hidden_and_mixed_up_markers_make_fingertips_worse(grasp: Take, rig: Rig) -> None:

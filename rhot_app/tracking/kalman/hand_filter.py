@@ -232,7 +232,7 @@ def _prepare(shared: Share, dt: float) -> None:
     desk: Desk = shared.of
     estimate, rows, part = desk.estimate, desk.rows, desk.worn.part
     hold(estimate, rows, part, desk.worn.palmar, desk.cameras.pose, desk.habits, desk.held)
-    rest(estimate, dt)
+    rest(estimate, desk.held.sight, dt)
     back = loosen(estimate, part, rows, desk.habits.usual)
     if loosen_palm(estimate, desk.worn, desk.cameras.pose, rows, desk.habits.usual):
         estimate.held[0] = FREE

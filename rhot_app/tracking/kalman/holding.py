@@ -67,6 +67,9 @@ TURN_ALONE = 9
 REST_S = 0.1
 """A turn that is held comes to rest with this time constant."""
 
+ARRIVE_S = 0.2
+"""So does what is held of a palm's way to or from a camera, when it is not in a hurry: slow ways are short."""
+
 
 @njit(cache=True)
 def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: Array, habits: Habits,
@@ -125,6 +128,7 @@ def let_go(held: Held) -> None:
     """Hold nothing any more."""
     held.directions[:held.used[0]] = 0.0
     held.used[0] = 0
+    held.sight[:] = 0.0
 
 
 @njit(cache=True)
@@ -158,10 +162,9 @@ def _hold_place(estimate: Estimate, eyes: int, camera: Array, held: Held) -> Non
         for i in range(ROTATION):
             _hold_number(i, held)
         return
-    sight = np.empty(3)
-    line_of_sight(camera, estimate.world[:3, 3], sight)
+    line_of_sight(camera, estimate.world[:3, 3], held.sight)
     for base in (0, VELOCITY, ACCELERATION):
-        held.directions[held.used[0], base:base + 3] = sight
+        held.directions[held.used[0], base:base + 3] = held.sight
         held.used[0] += 1
 
 
@@ -180,8 +183,9 @@ def _hold_stiff(stiff: Array, eyes_of: Indices, held: Held) -> None:
 
 
 @njit(cache=True)
-def rest(estimate: Estimate, dt: float) -> None:
-    """What is held of the palm is not shaken, and its turn comes to rest."""
+def rest(estimate: Estimate, sight: Array, dt: float) -> None:
+    """What is held of the palm is not shaken, and comes to rest. `sight` (3,) as in `Held`."""
+    _arrive(estimate, sight, dt)
     if estimate.held[0] not in (TURN_HELD, PLACED, PALM_HELD):
         return
     share, covariance = math.exp(-dt / REST_S), estimate.covariance
@@ -194,3 +198,16 @@ def rest(estimate: Estimate, dt: float) -> None:
     estimate.agitation[TURN] = 0.0
     if estimate.held[0] == PALM_HELD:
         estimate.agitation[LINEAR] = 0.0
+
+
+@njit(cache=True)
+def _arrive(estimate: Estimate, sight: Array, dt: float) -> None:
+    """A way along `sight` (3,) that is not hurried ends. How fast it is is known no better for that: the covariance
+    stays."""
+    speed, pull = dot(sight, estimate.velocity[:3]), dot(sight, estimate.acceleration[:3])
+    if abs(speed) > HURRIES_M_S:
+        return
+    lost = 1.0 - math.exp(-dt / ARRIVE_S)
+    for i in range(ROTATION):
+        estimate.velocity[i] -= lost * speed * sight[i]
+        estimate.acceleration[i] -= lost * pull * sight[i]

@@ -25,15 +25,17 @@ MOST = 64
 
 class Held(NamedTuple):
     """`used` (1,): directions held. `directions` (64, N): each of them, a row that the state is multiplied with; zero
-    beyond the used ones."""
+    beyond the used ones. `sight` (3,): the unit vector, world, along which alone the palm's place is held; zero when it
+    is not, or is held whole."""
 
     used: NDArray[np.int64]
     directions: Array
+    sight: Array
 
 
 def empty_held(size: int) -> Held:
     """Room for what may be held of a state with `size` numbers."""
-    return Held(np.zeros(1, np.int64), np.zeros((MOST, size)))
+    return Held(np.zeros(1, np.int64), np.zeros((MOST, size)), np.zeros(3))
 
 
 @njit(cache=True)

@@ -51,10 +51,12 @@ def held_of(estimate, part, *seen, palmar=()):
     """(K, N) the directions that are held, when `seen` (camera, marker) is what the update sees; fingers may cover
     the markers `palmar`."""
     held = empty_held(BIAS + 3 * len(part))
-    held.used[0], held.directions[:7] = 7, 3.0  # of an earlier update
+    held.used[0], held.directions[:7], held.sight[:] = 7, 3.0, 2.0  # of an earlier update
     hold(estimate, sighting(*seen, part=part), part, np.isin(np.arange(len(part)), palmar), POSES, WEARING.habits, held)
     count = held.used[0]
     assert count <= MOST and not held.directions[count:].any()
+    placing = held.directions[:count, :3][held.directions[:count, :3].any(axis=1)]
+    np.testing.assert_array_equal(held.sight, placing[0] if len(placing) == 1 else np.zeros(3))
     return held.directions[:count]
 
 

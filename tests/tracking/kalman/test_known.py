@@ -7,7 +7,18 @@ from hypothesis import strategies as st
 from known_hand import MARKERS, RIG, WEARING, moving_estimate, next_frame, placed
 from msgspec.structs import replace
 
-from rhot_app.tracking.kalman.estimate import BIAS, LOOK_VARIANCE, POSE, SCALE, Estimate
+from rhot_app.tracking.kalman.estimate import (
+    BIAS,
+    FREE,
+    GOES_ON,
+    LOOK_VARIANCE,
+    PALM_HELD,
+    PLACED,
+    POSE,
+    SCALE,
+    TURN_HELD,
+    Estimate,
+)
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.known import COMMON, DOUBTED, known_of, tell_of_habit
 
@@ -84,6 +95,17 @@ def test_only_shapes_that_were_measured_have_paint_that_is_known():
         wearing = compile_wearing(replace(RIG, markers=replace(RIG.markers, markers=markers)))
         assert np.isfinite(wearing.paint_variance).tolist() == [known] * MARKERS
         assert (wearing.paint_variance < wearing.bias_variance).all() or not known
+
+
+@pytest.mark.parametrize(("how", "nothing_more"),
+                         [(FREE, False), (TURN_HELD, False), (PLACED, True), (PALM_HELD, True), (GOES_ON, True)])
+def test_of_a_palm_that_its_own_markers_do_not_place_nothing_is_told_but_what_the_filter_knows(how, nothing_more):
+    estimate = seen_sharply()
+    estimate.left_open[:] = 0.0
+    estimate.held[0] = how
+    usual = np.full(POSE, 1e-5)
+    assert (np.diag(estimate.covariance)[:POSE] > usual).all()
+    assert np.array_equal(told(estimate, usual=usual), worked_with(estimate)) == nothing_more
 
 
 def test_part_of_what_habit_leaves_open_of_a_palm_that_only_fingers_show_to_turn_is_told_beside():

@@ -1,6 +1,7 @@
 """What is held of a hand comes to rest, and its size is held beside all else."""
 
 import numpy as np
+import pytest
 from known_hand import moving_estimate, twin
 
 from rhot_app.tracking.kalman.estimate import (
@@ -16,15 +17,17 @@ from rhot_app.tracking.kalman.estimate import (
     TURN_HELD,
     VELOCITY,
 )
-from rhot_app.tracking.kalman.holding import REST_S, hold_size, rest
+from rhot_app.tracking.kalman.holding import ARRIVE_S, HURRIES_M_S, REST_S, hold_size, rest
 from rhot_app.tracking.kalman.withholding import MOST, empty_held
 
+NOWHERE = np.zeros(3)
 
-def rested(how, dt=0.0125):
+
+def rested(how, dt=0.0125, sight=NOWHERE):
     before = moving_estimate()
     before.held[0], before.agitation[:] = how, 1.0
     after = twin(before)
-    rest(after, dt)
+    rest(after, sight, dt)
     return before, after
 
 
@@ -39,7 +42,7 @@ def test_a_turn_that_is_held_comes_to_rest_and_its_covariance_with_it():
     assert after.agitation[TURN] == 0.0 and after.agitation[LINEAR] == 1.0
     assert (after.agitation[FIRST_FINGER:] == 1.0).all()
     twice = rested(TURN_HELD, 0.00625)[1]
-    rest(twice, 0.00625)
+    rest(twice, NOWHERE, 0.00625)
     np.testing.assert_allclose(twice.covariance, after.covariance, atol=1e-15)
 
 
@@ -49,6 +52,20 @@ def test_a_palm_that_is_held_is_not_shaken_and_other_hands_do_not_rest():
     assert placed[LINEAR] == 1.0 and placed[TURN] == 0.0
     for before, after in zip(*rested(FREE), strict=True):
         np.testing.assert_array_equal(before, after)
+
+
+@pytest.mark.parametrize(("part", "arrives"), [(0.9, True), (-0.9, True), (1.1, False), (-1.1, False)])
+def test_a_slow_way_along_the_line_of_sight_ends_and_is_known_no_better_for_it(part, arrives):
+    sight, before = np.array([0.6, 0.0, 0.8]), moving_estimate()
+    across = np.array([0.8, 0.3, -0.6])
+    before.held[0], before.velocity[:3], before.acceleration[:3] = PALM_HELD, part * HURRIES_M_S * sight + across, sight
+    after = twin(before)
+    rest(after, sight, 0.05)
+    share = np.exp(-0.05 / ARRIVE_S) if arrives else 1.0
+    np.testing.assert_allclose(after.velocity[:3], share * part * HURRIES_M_S * sight + across)
+    np.testing.assert_allclose(after.acceleration[:3], share * sight)
+    np.testing.assert_array_equal(after.covariance[VELOCITY:VELOCITY + 3, VELOCITY:VELOCITY + 3],
+                                  before.covariance[VELOCITY:VELOCITY + 3, VELOCITY:VELOCITY + 3])
 
 
 def test_a_size_is_held_where_it_is_in_doubt_and_beside_all_else():
