@@ -16,7 +16,7 @@ from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene import make_scene, twin_defaults
 
-CLASSIC = TrackerSettings(kind="classic")
+CLASSIC, MODEL = TrackerSettings(kind="classic"), TrackerSettings(kind="model")
 
 
 def sketch(folder: Path, motion: str, seconds: float) -> Take:
@@ -40,6 +40,13 @@ def test_a_camera_that_is_blind_makes_fingertips_worse(grasp: Take, rig: Rig) ->
         bad = scenarios.one_camera_blind(grasp, rig, says_so=says_so)
         assert bad["tips_mm"] is not None and bad["tips_max_mm"] is not None
         assert bad["tips_mm"] > 5.0 * good["tips_mm"] and bad["tips_max_mm"] > bad["tips_mm"]
+        assert bad["within_3_sd_share"] is None  # the classic tracker states nothing
+
+
+def test_the_model_tracker_knows_how_badly_it_knows_a_hand_before_one_camera(grasp: Take) -> None:
+    figures = scenarios.one_camera_blind(grasp, rig_with(grasp.rig, MODEL), says_so=True)
+    assert figures["tips_mm"] is not None and figures["tips_mm"] > 2.0
+    assert figures["within_3_sd_share"] is not None and figures["within_3_sd_share"] > 0.95
 
 
 def test_a_camera_is_covered_at_another_moment_of_every_take(grasp: Take) -> None:
