@@ -68,7 +68,8 @@ REST_S = 0.1
 """A turn that is held comes to rest with this time constant."""
 
 ARRIVE_S = 0.2
-"""So does what is held of a palm's way to or from a camera, when it is not in a hurry: slow ways are short."""
+"""So does the way of a palm to or from a camera that has seen it alone for as long, when it is not in a hurry: slow
+ways are short."""
 
 
 @njit(cache=True)
@@ -162,10 +163,22 @@ def _hold_place(estimate: Estimate, eyes: int, camera: Array, held: Held) -> Non
         for i in range(ROTATION):
             _hold_number(i, held)
         return
-    line_of_sight(camera, estimate.world[:3, 3], held.sight)
+    sight = np.empty(3)
+    line_of_sight(camera, estimate.world[:3, 3], sight)
     for base in (0, VELOCITY, ACCELERATION):
-        held.directions[held.used[0], base:base + 3] = held.sight
+        held.directions[held.used[0], base:base + 3] = sight
         held.used[0] += 1
+    if _alone(estimate.unseen):
+        held.sight[:] = sight
+
+
+@njit(cache=True)
+def _alone(unseen: Array) -> bool:
+    """Whether all cameras but one have seen nothing of the hand for a while; `unseen` (C, M) as in `Estimate`."""
+    seeing = 0
+    for camera in range(unseen.shape[0]):
+        seeing += unseen[camera].min() < ARRIVE_S
+    return seeing < 2
 
 
 @njit(cache=True)

@@ -25,8 +25,8 @@ MOST = 64
 
 class Held(NamedTuple):
     """`used` (1,): directions held. `directions` (64, N): each of them, a row that the state is multiplied with; zero
-    beyond the used ones. `sight` (3,): the unit vector, world, along which alone the palm's place is held; zero when it
-    is not, or is held whole."""
+    beyond the used ones. `sight` (3,): the unit vector, world, along which alone the palm's place is held before a
+    camera that has seen the hand alone for a while, else zero."""
 
     used: NDArray[np.int64]
     directions: Array

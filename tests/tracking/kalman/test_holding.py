@@ -20,6 +20,7 @@ from rhot_app.tracking.kalman.estimate import (
     empty_estimate,
 )
 from rhot_app.tracking.kalman.holding import (
+    ARRIVE_S,
     HURRIES_M_S,
     HURRIES_RAD_S,
     STRANGE,
@@ -56,7 +57,8 @@ def held_of(estimate, part, *seen, palmar=()):
     count = held.used[0]
     assert count <= MOST and not held.directions[count:].any()
     placing = held.directions[:count, :3][held.directions[:count, :3].any(axis=1)]
-    np.testing.assert_array_equal(held.sight, placing[0] if len(placing) == 1 else np.zeros(3))
+    alone = np.count_nonzero(estimate.unseen.min(axis=1) < ARRIVE_S) < 2
+    np.testing.assert_array_equal(held.sight, placing[0] if alone and len(placing) == 1 else np.zeros(3))
     return held.directions[:count]
 
 
