@@ -166,30 +166,39 @@ TRIALS: dict[str, Callable[[Bench], Results]] = {
 def main() -> int:
     """Run the trials, print a table of each as it is done, write JSON."""
     parser = argparse.ArgumentParser(description="The classic and the model tracker in trouble, on the same raw logs.")
-    parser.add_argument("--only", nargs="*", metavar="NAME", choices=tuple(TRIALS), default=tuple(TRIALS),
+    parser.add_argument("--only", nargs="+", metavar="NAME", choices=tuple(TRIALS), default=tuple(TRIALS),
                         help=f"trials: {', '.join(TRIALS)}")
-    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seeds", type=int, default=5, help="how many people, cameras and motions (default 5)")
     parser.add_argument("--seed", type=int, default=1, help="the first one")
     parser.add_argument("--seconds", type=float, default=8.0, help="length of a take (default 8)")
     parser.add_argument("--motion", default="grasp", help="of the trials that need none of their own (default grasp)")
-    parser.add_argument("--markers", "--marker-set", default="rhot6", metavar="SET")
+    parser.add_argument("--markers", "--marker-set", default="rhot6", metavar="SET",
+                        help="one of resources/markers, or a file (default rhot6)")
     parser.add_argument("--minutes", type=float, default=10.0, help="of crossing, and of computing (default 10)")
     parser.add_argument("--hidden-for", type=float, nargs=2, metavar=("MIN", "MAX"), default=EPISODE_S,
                         help=f"s, how long markers stay hidden at a time (default {EPISODE_S[0]} to {EPISODE_S[1]})")
     parser.add_argument("--sketched", action="store_true", help="logs without pictures (rhot_app/simulator/sights.py)")
-    parser.add_argument("--logs", type=Path, metavar="DIR", default=takes_folder())
+    parser.add_argument("--logs", type=Path, metavar="DIR", default=takes_folder(),
+                        help="where the logs are kept, and found again")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     if args.seeds < 1 or args.seed < 0:
-        parser.error("--seeds must be 1 or more, --seed 0 or more")
-    if not 2.0 <= args.seconds < float("inf") or not 0.0 < args.minutes < float("inf"):
-        parser.error("--seconds must be 2 or more, --minutes more than 0, and both must end")
+        parser.error(f"--seeds {args.seeds} --seed {args.seed}: the first must be 1 or more, the second 0 or more")
+    if not 2.0 <= args.seconds < float("inf"):
+        parser.error(f"--seconds {args.seconds}: must be 2 or more, and end")
+    if not 0.0 < args.minutes < float("inf"):
+        parser.error(f"--minutes {args.minutes}: must be more than 0, and end")
     if not 0.001 <= args.hidden_for[0] <= args.hidden_for[1] <= args.seconds:
         parser.error("--hidden-for must be 0.001 s or more, the shorter time first, and within --seconds")
     try:
         args.logs.mkdir(parents=True, exist_ok=True)
     except OSError as exc:
-        parser.error(f"--logs {args.logs}: logs cannot be kept there ({exc.strerror})")
+        parser.error(f"--logs {args.logs}: logs cannot be kept there ({exc.strerror}); choose another folder")
+    if args.json is not None:
+        try:
+            args.json.touch()
+        except OSError as exc:
+            parser.error(f"--json {args.json}: figures cannot be written there ({exc.strerror}); choose another file")
     bench = Bench(tuple(range(args.seed, args.seed + args.seeds)), args.seconds, args.markers, args.sketched, args.logs,
                   args.minutes, args.motion, tuple(args.hidden_for))
     done: dict[str, Results] = {}
@@ -202,7 +211,7 @@ def main() -> int:
         print(block(name, done[name]), flush=True)
         if args.json is not None:
             args.json.write_text(json.dumps(done, indent=1) + "\n")
-    return 0 if done else 2
+    return 0 if len(done) == len(args.only) else 2
 
 
 def block(name: str, results: Results) -> str:

@@ -92,7 +92,7 @@ def _motions_of(args: argparse.Namespace, usual: Sequence[str]) -> list[str]:
     if not all(motions):
         raise SimulatorError(f"--motions {args.motions!r}: put commas between names of motions only.")
     if args.recording is not None and not Path(args.recording).is_file():
-        raise SimulatorError(f"--recording {args.recording}: there is no such file.")
+        raise SimulatorError(f"--recording {args.recording}: there is no such file; name a recorded motion.")
     return motions if args.recording is None else [*motions, args.recording]
 
 
