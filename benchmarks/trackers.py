@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -194,11 +195,8 @@ def main() -> int:
         args.logs.mkdir(parents=True, exist_ok=True)
     except OSError as exc:
         parser.error(f"--logs {args.logs}: logs cannot be kept there ({exc.strerror}); choose another folder")
-    if args.json is not None:
-        try:
-            args.json.touch()
-        except OSError as exc:
-            parser.error(f"--json {args.json}: figures cannot be written there ({exc.strerror}); choose another file")
+    if args.json is not None and not _writable(args.json):
+        parser.error(f"--json {args.json}: figures cannot be written there; choose another file")
     bench = Bench(tuple(range(args.seed, args.seed + args.seeds)), args.seconds, args.markers, args.sketched, args.logs,
                   args.minutes, args.motion, tuple(args.hidden_for))
     done: dict[str, Results] = {}
@@ -212,6 +210,11 @@ def main() -> int:
         if args.json is not None:
             args.json.write_text(json.dumps(done, indent=1) + "\n")
     return 0 if len(done) == len(args.only) else 2
+
+
+def _writable(path: Path) -> bool:
+    """Whether a file can be written there; none is made yet."""
+    return os.access(path if path.exists() else path.parent, os.W_OK) and not path.is_dir()
 
 
 def block(name: str, results: Results) -> str:

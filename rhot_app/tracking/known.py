@@ -47,13 +47,13 @@ def known_of(estimate: Estimate, cameras: Cameras, paint: Array, usual: Array) -
             out[i, j] = covariance[i, j]
         out[i, POSE], out[POSE, i] = covariance[i, SCALE], covariance[SCALE, i]
     out[POSE, POSE] = covariance[SCALE, SCALE]
-    placed = estimate.held[0] < PLACED
-    if placed:
+    as_usual = estimate.held[0] < PLACED
+    if as_usual:
         tell_of_paint(estimate, cameras, paint, out)
     for i in range(POSE):
         for j in range(POSE):
             out[i, j] += DOUBTED * estimate.left_open[i, j]
-    if placed:
+    if as_usual:
         for i in range(ANGLES, POSE):
             tell_of_habit(out, i, usual[i])
     return out
@@ -81,7 +81,7 @@ def tell_of_paint(estimate: Estimate, cameras: Cameras, paint: Array, out: Array
         rows[a, POSE] = row[SCALE]
     factorise(factor)
     for a in range(count):
-        add_rows(rows[a], -factor[a, :a], rows, order[:a], 0)
+        add_rows(rows[a], -factor[a, :a], rows, order[:a])
         rows[a] /= factor[a, a]
     add_squares(out, rows[:count], -1.0)
 

@@ -11,23 +11,18 @@ Indices = NDArray[np.int64]
 
 
 @njit(cache=True, fastmath={"contract"})
-def add_rows(target: Array, weights: Array, rows: Array, chosen: Indices, first: int) -> None:
-    """Add to `target` (N - first,) the rows chosen (K,) of `rows` (R, N), from column `first` on, times their `weights`
-    (K,).
-
-    Four rows at once: the target is read and written once for them, and slices begin at zero, because a loop from
-    `first` on would be compiled with a test for negative indices, and so number by number.
-    """
+def add_rows(target: Array, weights: Array, rows: Array, chosen: Indices) -> None:
+    """Add to `target` (N,) the rows chosen (K,) of `rows` (R, N), times their `weights` (K,). Four rows at once: the
+    target is read and written once for them."""
     size, count, k = target.shape[0], chosen.shape[0], 0
     while k + 4 <= count:
         a, b, c, d = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
-        row_a, row_b = rows[chosen[k], first:], rows[chosen[k + 1], first:]
-        row_c, row_d = rows[chosen[k + 2], first:], rows[chosen[k + 3], first:]
+        row_a, row_b, row_c, row_d = rows[chosen[k]], rows[chosen[k + 1]], rows[chosen[k + 2]], rows[chosen[k + 3]]
         for j in range(size):
             target[j] += a * row_a[j] + b * row_b[j] + c * row_c[j] + d * row_d[j]
         k += 4
     while k < count:
-        a, row_a = weights[k], rows[chosen[k], first:]
+        a, row_a = weights[k], rows[chosen[k]]
         for j in range(size):
             target[j] += a * row_a[j]
         k += 1
@@ -47,8 +42,9 @@ def add_products(matrix: Array, left: Array, right: Array) -> None:
     """Add to a symmetric `matrix` (N, N) left^T right, of two (K, N) whose product is symmetric; leaves it symmetric to
     the last bit.
 
-    From the eighth column on that the diagonal lies in: rows then begin where vectors do. Two rows of the matrix at
-    once: what is read of `right` serves both.
+    From the eight columns on in which the diagonal lies, and by slices: a loop that does not begin at zero is compiled
+    with a test for negative indices, and so number by number. Two rows of the matrix at once: what is read of `right`
+    serves both.
     """
     size, count = matrix.shape[0], left.shape[0]
     for i in range(0, size, 2):

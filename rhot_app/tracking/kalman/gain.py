@@ -30,14 +30,14 @@ def expected_noise(rows: Rows, covariance: Array, out: Array) -> None:
         row, last = rows.first[observation], rows.first[observation + 1] - 1
         count = _pick(rows.jacobian[row], chosen, weights)
         product[:] = 0.0
-        add_rows(product, weights[:count], covariance, chosen[:count], 0)
+        add_rows(product, weights[:count], covariance, chosen[:count])
         out[observation, 0] = rows.noise[row, 0] + _at(product, chosen, weights, count)
         out[observation, 1], out[observation, 2] = 0.0, 1.0
         if last > row:
             count = _pick(rows.jacobian[last], chosen, weights)
             out[observation, 1] = rows.noise[last, 1] + _at(product, chosen, weights, count)
             product[:] = 0.0
-            add_rows(product, weights[:count], covariance, chosen[:count], 0)
+            add_rows(product, weights[:count], covariance, chosen[:count])
             out[observation, 2] = rows.noise[last, 0] + _at(product, chosen, weights, count)
 
 
@@ -64,11 +64,10 @@ def _at(vector: Array, chosen: Indices, weights: Array, count: int) -> float:
 class Gain(NamedTuple):
     """How an update weighed its rows.
 
-    `used` (2,): H directions are held (`withholding.py`), and with the K believed rows there are H + K. `rows` (H + K,
-    N): what the update takes from the covariance, P less their squares being what is left when the held directions
-    count as known: first what is not known of these, D; then the factor G = L^-1 H P of what is learnt, P less the
-    squares of D. `jacobian` (K, N): H. `factor` (H + K, H + K): in its last K rows H D^T, then L, the Cholesky factor
-    of the innovations' covariance.
+    `used` (2,): how many directions are held (`withholding.py`), and these and the K believed rows together, T. `rows`
+    (T, N): what the update takes from the covariance P, which less their squares is what would be left were the held
+    directions known: first D, what is not known of these; then G = L^-1 H (P - D^T D), what is learnt. `jacobian`
+    (K, N): H. `factor` (T, T): in its last K rows H D^T, and then L, the Cholesky factor of H (P - D^T D) H^T + R.
     """
 
     used: Indices
@@ -105,10 +104,10 @@ def project_rows(gain: Gain, covariance: Array, noise: Array) -> None:
         target, factor, k = gain.rows[row], gain.factor[row], row - held
         picked = _pick(gain.jacobian[k], chosen, weights)
         target[:] = 0.0
-        add_rows(target, weights[:picked], covariance, chosen[:picked], 0)
+        add_rows(target, weights[:picked], covariance, chosen[:picked])
         for other in range(held):
             factor[other] = _at(gain.rows[other], chosen, weights, picked)
-        add_rows(target, -factor[:held], gain.rows, order, 0)
+        add_rows(target, -factor[:held], gain.rows, order)
         for other in range(held, row + 1):
             factor[other] = _at(gain.rows[other], chosen, weights, picked)
         factor[row] += noise[k, 0]
@@ -127,10 +126,10 @@ def add_step(gain: Gain, right: Array, step: Array) -> None:
         target, factor = gain.rows[row], gain.factor[row]
         for other in range(held, row):
             right[row - held] -= factor[other] * right[other - held]
-        add_rows(target, -factor[held:row], gain.rows, order[held:row], 0)
+        add_rows(target, -factor[held:row], gain.rows, order[held:row])
         right[row - held] /= factor[row]
         target *= 1.0 / factor[row]
-    add_rows(step, right[:total - held], gain.rows, order[held:], 0)
+    add_rows(step, right[:total - held], gain.rows, order[held:])
 
 
 @njit(cache=True)
@@ -181,13 +180,13 @@ def contract(covariance: Array, gain: Gain) -> None:
     for k in range(count):
         factor = gain.factor[held + k]
         shares[k] = -factor[:held]
-        add_rows(shares[k], -factor[held:held + k], shares, order[:k], 0)
+        add_rows(shares[k], -factor[held:held + k], shares, order[:k])
         shares[k] *= 1.0 / factor[held + k]
     for k in range(count):
         for other in range(count):
             square[other] = 0.5 * dot(shares[k], shares[other])
         square[k] -= 0.5
-        add_rows(right[k], shares[k], gain.rows, order[:held], 0)
-        add_rows(right[k], square, learnt, order[:count], 0)
+        add_rows(right[k], shares[k], gain.rows, order[:held])
+        add_rows(right[k], square, learnt, order[:count])
         left[k], left[count + k], right[count + k] = learnt[k], right[k], learnt[k]
     add_products(covariance, left, right)

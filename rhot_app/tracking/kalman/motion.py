@@ -194,7 +194,7 @@ def _turn(covariance: Array, rotation: Array) -> None:
     block = covariance[ROTATION:ANGLES].copy()
     covariance[ROTATION:ANGLES] = 0.0
     for i in range(3):
-        add_rows(covariance[ROTATION + i], rotation[i], block, np.arange(3), 0)
+        add_rows(covariance[ROTATION + i], rotation[i], block, np.arange(3))
     for row in covariance:
         x, y, z = row[ROTATION], row[ROTATION + 1], row[ROTATION + 2]
         for i in range(3):

@@ -48,10 +48,10 @@ def withhold(covariance: Array, held: Held, gain: Gain) -> None:
         direction, load = held.directions[k], gain.rows[k]
         load[:] = 0.0
         picked = np.flatnonzero(direction)
-        add_rows(load, direction[picked], covariance, picked, 0)
+        add_rows(load, direction[picked], covariance, picked)
         for other in range(k):  # what goes with those before is theirs
             shares[other] = -dot(direction, gain.rows[other])
-        add_rows(load, shares[:k], gain.rows, order[:k], 0)
+        add_rows(load, shares[:k], gain.rows, order[:k])
         variance = dot(direction, load)
         load *= 1.0 / math.sqrt(variance) if variance > 1e-14 else 0.0
     gain.used[:] = count
