@@ -132,7 +132,9 @@ def _ask(questions: Sequence[tuple[NodeAddress, dict[str, Any]]], timeout_s: flo
             socket.maxmsgsize = _ANSWER_MAX
             try:
                 socket.connect(f"tcp://{address}")
-                socket.send(msgspec.json.encode(question))
+                socket.send(msgspec.json.encode(question), zmq.DONTWAIT)
+            except zmq.Again:
+                continue  # what listens there has hung up already; waiting to send would be for ever
             except zmq.ZMQError as exc:
                 answers[place] = f"{str(address)!r} is not an address that can be asked ({exc})."
                 continue

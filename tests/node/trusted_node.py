@@ -76,7 +76,10 @@ class TrustedNode:
 
     def ask(self, sock: zmq.Socket[bytes], timeout_s: float = PATIENCE_S, **request: Any) -> dict[str, Any] | None:
         """The answer to one request; None when none comes in time."""
-        sock.send(json.dumps(request).encode())
+        try:
+            sock.send(json.dumps(request).encode(), zmq.DONTWAIT)
+        except zmq.Again:  # refused already when it connected: nowhere to send to
+            return None
         if not sock.poll(round(1e3 * timeout_s)):
             return None
         answer: dict[str, Any] = json.loads(sock.recv_multipart()[0])
