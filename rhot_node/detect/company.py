@@ -83,19 +83,26 @@ class Company:
             if not mark.found:
                 self._known[index] = self._vouched[index] = False
             elif not self._known[index] or mark.flags & MarkerFlag.ACQUIRED:
-                self._known[index] = True
-                self._moved[index] = self._afar[index] = self._vouched[index] = False
-                middle = (hand.x, hand.y) if hand else (math.nan, math.nan)
-                self._origin[index] = (mark.x, mark.y, *middle, mark.diameter)
-                self._frames[index] = 0.0
+                self._known[index], self._vouched[index] = True, False
+                self._set_out(mark, hand)
             elif not mark.flags & DOUBTFUL:
-                self._note_way(mark)
+                self._note_way(mark, hand)
 
-    def _note_way(self, mark: MarkerObservation) -> None:
+    def _set_out(self, mark: MarkerObservation, hand: Whereabouts | None) -> None:
+        """Note how far a marker comes from here on."""
+        self._moved[mark.index] = self._afar[mark.index] = False
+        middle = (hand.x, hand.y) if hand else (math.nan, math.nan)
+        self._origin[mark.index] = (mark.x, mark.y, *middle, mark.diameter)
+        self._frames[mark.index] = 0.0
+
+    def _note_way(self, mark: MarkerObservation, hand: Whereabouts | None) -> None:
         """Note how far a marker in plain view has come."""
         x, y, _, _, diameter = self._origin[mark.index]
         self._frames[mark.index] += 1.0
-        if abs(math.log(mark.diameter / diameter)) > SAME_SIZE:
+        grown = math.log(mark.diameter / diameter)
+        if grown > SAME_SIZE:  # only a part of it showed when it was found, and uncovering it has moved its middle
+            self._set_out(mark, hand)
+        if abs(grown) > SAME_SIZE:
             return
         way = math.hypot(mark.x - x, mark.y - y)
         self._moved[mark.index] |= way > MOVED

@@ -90,6 +90,33 @@ def test_what_stays_behind_when_the_hand_moves_is_doubted() -> None:
     assert doubted(seen) == {4}
 
 
+def test_what_comes_out_from_behind_a_finger_is_of_the_hand_once_it_moves_with_it() -> None:
+    company = Company(RHOT6.markers)
+    for shift in (0.0, 2.0, 4.0):
+        company.judge(frame(0, 1, 2, 3, 4, shift=shift))
+    company.judge(frame(0, 1, 3, 4, shift=6.0))
+    x, y = HAND[2]
+    for step, diameter in enumerate((8.0, 10.5, 13.0, 16.0)):
+        flags = NO_FLAGS if step else MarkerFlag.ACQUIRED
+        company.judge(frame(0, 1, 3, 4, shift=8.0, others=(mark(2, x + 4.0 + step, y, diameter, flags),)))
+    for shift in np.arange(8.0, 30.0, 2.0):
+        seen = company.judge(frame(0, 1, 2, 3, 4, shift=float(shift)))
+    assert doubted(seen) == set()
+
+
+def test_a_thing_that_a_passing_hand_uncovers_is_left_behind() -> None:
+    company = Company(RHOT6.markers)
+    for shift in (0.0, 2.0, 4.0):
+        company.judge(frame(0, 1, 2, 3, shift=shift))
+    x, y = HAND[4]
+    for step, diameter in enumerate((8.0, 10.0, 12.0, 14.0, 16.0)):  # its middle moves until it shows whole
+        flags = MarkerFlag.ACQUIRED if step == 0 else NO_FLAGS
+        company.judge(frame(0, 1, 2, 3, shift=4.0 + 2.0 * step, others=(mark(4, x - 8.0 + 2.0 * step, y, diameter, flags),)))
+    for shift in np.arange(14.0, 40.0, 2.0):
+        seen = company.judge(frame(0, 1, 2, 3, shift=float(shift), others=(mark(4, x, y),)))
+    assert doubted(seen) == {4}
+
+
 @pytest.mark.parametrize("flags", [MarkerFlag.ACQUIRED, MarkerFlag.PARTIAL, MarkerFlag.ACQUIRED | MarkerFlag.PARTIAL])
 def test_what_a_known_hand_passes_joins_it_only_when_followed_in_plain_view(flags: MarkerFlag) -> None:
     company = Company(RHOT6.markers)
