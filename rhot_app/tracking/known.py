@@ -33,13 +33,14 @@ COMMON = 0.8
 
 
 @njit(cache=True)
-def known_of(estimate: Estimate, cameras: Cameras, paint: Array, usual: Array) -> Array:
+def known_of(estimate: Estimate, cameras: Cameras, paint: Array, made: Array, usual: Array) -> Array:
     """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as it is told.
 
     `paint` (M,) m^2: variances of the markers' seen middles about their places, without what light does to them,
-    infinite where nobody knows; `usual` (27,): variances of the pose by habit. Of a palm that its own markers do not
-    place nothing is told of these: what is wrong with its place is wrong with markers and fingers too, all together,
-    and to know better of one of them would seem to be to know better of the place.
+    infinite where nobody knows; `made` (M,) m^2: the same as the filter takes them to be in plain view; `usual` (27,):
+    variances of the pose by habit. Of a palm that its own markers do not place nothing is told of these: what is wrong
+    with its place is wrong with markers and fingers too, all together, and to know better of one of them would seem to
+    be to know better of the place.
     """
     covariance, out = estimate.covariance, np.empty((POSE + 1, POSE + 1))
     for i in range(POSE):
@@ -49,7 +50,7 @@ def known_of(estimate: Estimate, cameras: Cameras, paint: Array, usual: Array) -
     out[POSE, POSE] = covariance[SCALE, SCALE]
     as_usual = estimate.held[0] < PLACED
     if as_usual:
-        tell_of_paint(estimate, cameras, paint, out)
+        tell_of_paint(estimate, cameras, paint, made, out)
     for i in range(POSE):
         for j in range(POSE):
             out[i, j] += DOUBTED * estimate.left_open[i, j]
@@ -60,13 +61,14 @@ def known_of(estimate: Estimate, cameras: Cameras, paint: Array, usual: Array) -
 
 
 @njit(cache=True)
-def tell_of_paint(estimate: Estimate, cameras: Cameras, paint: Array, out: Array) -> None:
+def tell_of_paint(estimate: Estimate, cameras: Cameras, paint: Array, made: Array, out: Array) -> None:
     """Weigh in `out` (28, 28), the covariance of pose and size, that markers are nearer to their places than the filter
     takes them to be: a measurement of each bias, of no other value than it has."""
     covariance, count = estimate.covariance, 0
     numbers, noise = np.empty(3 * paint.shape[0], np.int64), np.empty(3 * paint.shape[0])
     for m in range(paint.shape[0]):
-        worked, told = estimate.bias_variance[m], paint[m] + _lit(estimate, cameras, m)
+        worked = estimate.bias_variance[m]
+        told = paint[m] + _lit(estimate, cameras, m) + max(worked - made[m], 0.0)  # the last is what hides it
         if told < worked:
             for k in range(3):
                 numbers[count], noise[count] = BIAS + 3 * m + k, 1.0 / (1.0 / told - 1.0 / worked)

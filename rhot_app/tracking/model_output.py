@@ -54,8 +54,8 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 class Subject(NamedTuple):
     """What states tell of, unchanging: `dh`, the hand's table with P = 26 + M points: joints, fingertips, M markers;
     `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in
-    `RigArrays`; `paint` (M,) m^2 and `usual` (27,) as in `known_of`. `tips` (5,) and `wrist`: the markers on the
-    fingertips and on the wrist, -1 where there is none."""
+    `RigArrays`; `paint` and `made` (M,) m^2 and `usual` (27,) as in `known_of`. `tips` (5,) and `wrist`: the markers
+    on the fingertips and on the wrist, -1 where there is none."""
 
     dh: DhArrays
     part: Indices
@@ -64,6 +64,7 @@ class Subject(NamedTuple):
     focal: Array
     shapes: Array
     paint: Array
+    made: Array
     usual: Array
     tips: Indices
     wrist: int
@@ -90,7 +91,7 @@ def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
     dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
                       point_offset=np.concatenate([one.point_offset, other.point_offset]))
     return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes,
-                   wearing.paint_variance, np.diag(wearing.habits.usual).copy(),
+                   wearing.paint_variance, wearing.bias_variance, np.diag(wearing.habits.usual).copy(),
                    np.array([wearing.marker_of(role) for role in TIP_ROLES]), wearing.marker_of(WRIST_ROLE))
 
 
@@ -117,7 +118,7 @@ def describe(account: Share, t_ns: int, report: Report) -> bool:
     told: Account = account.of
     estimate, subject, seen = told.estimate, told.subject, told.seen
     world, count = estimate.world, report.points.shape[0]
-    covariance = known_of(estimate, subject.cameras, subject.paint, subject.usual)
+    covariance = known_of(estimate, subject.cameras, subject.paint, subject.made, subject.usual)
     report.palm_covariance[:] = covariance[:ANGLES, :ANGLES]
     jacobian = np.empty((count, 3, POSE))
     _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)

@@ -111,7 +111,8 @@ def test_a_thing_that_a_passing_hand_uncovers_is_left_behind() -> None:
     x, y = HAND[4]
     for step, diameter in enumerate((8.0, 10.0, 12.0, 14.0, 16.0)):  # its middle moves until it shows whole
         flags = MarkerFlag.ACQUIRED if step == 0 else NO_FLAGS
-        company.judge(frame(0, 1, 2, 3, shift=4.0 + 2.0 * step, others=(mark(4, x - 8.0 + 2.0 * step, y, diameter, flags),)))
+        thing = mark(4, x - 8.0 + 2.0 * step, y, diameter, flags)
+        company.judge(frame(0, 1, 2, 3, shift=4.0 + 2.0 * step, others=(thing,)))
     for shift in np.arange(14.0, 40.0, 2.0):
         seen = company.judge(frame(0, 1, 2, 3, shift=float(shift), others=(mark(4, x, y),)))
     assert doubted(seen) == {4}

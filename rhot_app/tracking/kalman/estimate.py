@@ -52,7 +52,7 @@ ORDINARY_S = 1.0 / 30.0
 slowly."""
 
 
-LOOK_WIDTH, LOOK_X, LOOK_Y, LOOK_VARIANCE, LOOK_AGE = 0, 1, 2, 3, 4
+LOOK_WIDTH, LOOK_X, LOOK_Y, LOOK_VARIANCE, LOOK_AGE, LOOK_HIDDEN = 0, 1, 2, 3, 4, 5
 """Columns of `Estimate.looks`."""
 
 
@@ -65,10 +65,11 @@ class Estimate(NamedTuple):
     corrections of each velocity. `unfaded` (2,): s since open directions last went back to habit, and since
     knowledge last faded (`forgetting.py`). `unseen` (C, M): s since each camera was
     last believed to see each marker. `held` (1,): how the last update held the hand
-    (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s. `width` (M,) m: how wide paint on the inner
-    side of the palm is known to be, 0 where nobody knows; `bias_variance` (M,) m^2: what the biases' variances tend to
-    now (both: `covering.py`). `looks` (C, M, 5): what each camera saw of each marker last, its width m (0 where it says
-    little), place px (2), variance px^2, and s since then (`partial.py`). `left_open` (27, 27): what habit leaves to
+    (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s. `width` (M,) m: how wide fingertips, and
+    paint on the inner side of the palm, are known to be, 0 where nobody knows; `bias_variance` (M,) m^2: what the
+    biases' variances tend to now (both: `covering.py`, `hiding.py`). `looks` (C, M, 6): what each camera saw of each
+    marker last, its width m (0 where it says little), place px (2), variance px^2, s since then (`partial.py`), and the
+    part of it that was hidden (`hiding.py`). `left_open` (27, 27): what habit leaves to
     the pose of a hand whose palm's turn only its fingers show, else zero (`forgetting.py`). `untroubled` (1,): s since
     a sight was renamed, or not believed as it was. `pace` (C,): how fast the time since a sight runs, less than
     1 for slow cameras. `memory`: all of these again, one after the other.
@@ -102,7 +103,7 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     shapes = {"world": (4, 4), "angles": (21,), "velocity": (POSE,), "acceleration": (POSE,), "log_scale": (1,),
               "bias": (markers, 3), "covariance": (size, size), "agitation": (GROUPS,), "trend": (POSE,),
               "unfaded": (2,), "unseen": (cameras, markers), "held": (1,), "turning": (1,), "width": (markers,),
-              "bias_variance": (markers,), "looks": (cameras, markers, 5), "left_open": (POSE, POSE),
+              "bias_variance": (markers,), "looks": (cameras, markers, 6), "left_open": (POSE, POSE),
               "untroubled": (1,), "pace": (cameras,)}
     memory, end = np.zeros(sum(map(math.prod, shapes.values()))), 0
     arrays: dict[str, Any] = {}

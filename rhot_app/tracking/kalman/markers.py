@@ -54,13 +54,16 @@ class Worn(NamedTuple):
 
     `dh`: the hand's table with one point per marker. `part` (M,): the finger, PALM_PART on the palm. `half_axes`
     (M, 3) m: their bodies' along the palm's axes (a ball has three equal ones), zero for flat ones. `palmar` (M,):
-    paint of no known shape on the inner side of the palm, which closing fingers cover (`covering.py`).
+    paint of no known shape on the inner side of the palm, which closing fingers cover (`covering.py`). `slender` (M,):
+    how much more of a fingertip is seen from its side than from its end, as a part of the latter; 0 for balls on
+    fingertips, negative for other markers (`hiding.py`).
     """
 
     dh: DhArrays
     part: Indices
     half_axes: Array
     palmar: NDArray[np.bool_]
+    slender: Array
 
 
 class Outfit(NamedTuple):

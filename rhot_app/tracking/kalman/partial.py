@@ -97,7 +97,7 @@ def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate
 
 @njit(cache=True)
 def _remember(look: Array, frame: Frame, sight: int, width: float) -> None:
-    """Fill `look` (5,) with what a frame shows of a marker."""
+    """Fill `look` (6,) with what a frame shows of a marker."""
     look[LOOK_WIDTH] = width if frame.plain[sight] else 0.0
     look[LOOK_X], look[LOOK_Y] = frame.pixels[sight]
     look[LOOK_VARIANCE] = max(_variance(frame, sight), EXACT_PX2)  # zero is for what was never seen

@@ -14,7 +14,7 @@ from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import NaturalPose
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import KNUCKLE_ROLES, Place, place_of
-from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS
+from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, TIP_ROLES
 from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
@@ -78,7 +78,8 @@ def compile_wearing(rig: Rig) -> Wearing:
     models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     worn = Worn(points_on(model.dh, places), np.array([place.finger for place in places], dtype=np.int64),
                 half_axes_of(rig.markers, model),
-                np.array([marker.role in KNUCKLE_ROLES and marker.shape == "blob" for marker in rig.markers.markers]))
+                np.array([marker.role in KNUCKLE_ROLES and marker.shape == "blob" for marker in rig.markers.markers]),
+                np.array([_slenderness(marker, model) for marker in rig.markers.markers]))
     return Wearing(
         model, worn,
         Cameras(np.array([camera.camera_from_world[:3] for camera in models]),
@@ -105,6 +106,18 @@ def _half_axes(marker: Marker, model: HandModel) -> Array:
         return band_axes(marker, model.anatomy)
     radius = 1e-3 * marker.radius_mm if marker.radius_mm and marker.shape in ("sphere", "capsule") else 0.0
     return np.full(3, radius)
+
+
+def _slenderness(marker: Marker, model: HandModel) -> float:
+    """As `Worn.slender`. The area of a capsule with ends of radius r, l apart, is pi r^2 + 2 r l sin(angle of view)."""
+    if marker.role not in TIP_ROLES or marker.shape not in ("capsule", "sphere"):
+        return -1.0
+    if marker.shape == "sphere":
+        return 0.0
+    finger = TIP_ROLES.index(marker.role)
+    radius = float(model.radii[finger, 2])
+    apart = 2.0 * max(float(model.bones[finger, 2] - model.marker[finger]) - radius, 0.0)
+    return 2.0 * apart / (math.pi * radius)
 
 
 def natural_of(model: HandModel, variant: VariantName) -> NaturalPose:

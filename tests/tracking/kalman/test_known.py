@@ -29,7 +29,7 @@ LOST_FOCUS_PX = 100.0
 
 
 def told(estimate: Estimate, paint: np.ndarray = PAINT, usual: np.ndarray = ANY_HABIT) -> np.ndarray:
-    return known_of(estimate, WEARING.cameras, paint, usual)
+    return known_of(estimate, WEARING.cameras, paint, WEARING.bias_variance, usual)
 
 
 def worked_with(estimate: Estimate) -> np.ndarray:

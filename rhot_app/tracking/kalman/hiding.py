@@ -1,0 +1,132 @@
+"""Fingertips that other fingers hide: how much less of its paint a camera sees than there is.
+
+What is left of a half-hidden fingertip has its middle elsewhere, by up to its radius, much alike in all pictures and
+for as long as it is hidden. A node notices when an area changes from one frame to the next, not when one finger slides
+behind another, and two cameras that see equally little of it agree. The master knows how far away the fingertip is, how
+it points and how large it was in plain view, hence how much of it is missing. Its middle is then believed to lie off
+its place by as much as that may have moved it: a bias of the marker, the same for all cameras.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.kinematics import forward_arrays
+from rhot_app.tracking.kalman.covering import LEARNT, set_bias_variance
+from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_HIDDEN, POSE, Estimate
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
+from rhot_app.tracking.kalman.partial import metres_per_px
+from rhot_app.tracking.kalman.sighted import FRESH_S, line_of_sight
+
+Array = NDArray[np.float64]
+
+VARIES, VARIES_PER_M_S, FASTEST_M_S = 0.07, 0.08, 3.0
+"""Areas of fingertips in plain view are less than they should be by up to this part, and by so much more per speed,
+because motion smears their edges."""
+
+SHIFT = 1.6
+"""A part h of its area that is hidden moves the middle of a fingertip by SHIFT h^1.5 of its radius, one standard
+deviation per axis. (Measured of crossing and pinching fingers: 1.25; but it lasts.)"""
+
+PLACED_BY = 3
+"""A hand of which another camera sees so many markers is where it is taken to be."""
+
+SHRINKS = 0.01
+"""Of what a fingertip in plain view is smaller than it was known to be, a sight teaches this part: slower than of what
+it is larger (`covering.LEARNT`), because what is smaller may be hidden."""
+
+LIKE = 0.1
+"""A part of its area that a fingertip in plain view may be smaller."""
+
+
+@njit(cache=True)
+def open_hidden(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array,
+                made: Array) -> None:
+    """Set the biases' variances of fingertips that are hidden in part, and back; learn their sizes (`estimate.width`).
+
+    To be called when `frame.label` is known. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them;
+    `made` (M,) m^2: variance of the markers' places by their making.
+    """
+    camera, count = frame.camera[0], worn.part.shape[0]
+    if not _is_placed(estimate, camera):
+        return
+    parts = np.empty(count)
+    shown_parts(worn, estimate, cameras.pose[camera], points, parts)
+    for sight in range(count):
+        m = frame.label[sight]
+        if not frame.seen[sight] or worn.slender[m] < 0.0 or not frame.widths[sight] > 0.0:
+            continue
+        width = frame.widths[sight] * metres_per_px(worn, cameras, estimate, m, camera, points[m])
+        estimate.looks[camera, m, LOOK_HIDDEN] = _hidden(estimate, m, width / math.sqrt(parts[m]), frame.plain[sight])
+        varies = VARIES + VARIES_PER_M_S * min(_speed(jacobian[m], estimate.velocity), FASTEST_M_S)
+        shift = SHIFT * 0.5 * width * math.sqrt(max(_most_hidden(estimate, camera, m) ** 3 - varies**3, 0.0))
+        set_bias_variance(estimate, m, made[m] + shift * shift)
+
+
+@njit(cache=True)
+def shown_parts(worn: Worn, estimate: Estimate, camera: Array, points: Array, out: Array) -> None:
+    """Fill `out` (M,) with the part of a fingertip's largest area that a camera (3, 4) sees of it when nothing hides
+    it, 1 for other markers; they are at `points` (M, 3) m.
+
+    A painted fingertip is a capsule: from its end it shows a disc, from its side also what is between its ends.
+    """
+    dh = worn.dh
+    frames, ignored, sight = np.empty((dh.parent.shape[0], 3, 4)), np.empty(points.shape), np.empty(3)
+    forward_arrays(dh, estimate.world, estimate.angles, frames, ignored)
+    for m in range(points.shape[0]):
+        out[m] = 1.0
+        if worn.slender[m] > 0.0:
+            line_of_sight(camera, points[m], sight)
+            bone = frames[dh.point_row[m]]
+            along = bone[0, 0] * sight[0] + bone[1, 0] * sight[1] + bone[2, 0] * sight[2]
+            side = math.sqrt(max(1.0 - along * along, 0.0))
+            out[m] = (1.0 + worn.slender[m] * side) / (1.0 + worn.slender[m])
+
+
+@njit(cache=True)
+def _is_placed(estimate: Estimate, camera: int) -> bool:
+    """Whether it is known how far away the hand is: cameras other than this one see it too."""
+    for other in range(estimate.unseen.shape[0]):
+        if other != camera and np.sum(estimate.unseen[other] < FRESH_S) >= PLACED_BY:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _hidden(estimate: Estimate, m: int, size: float, plain: bool) -> float:
+    """The part of fingertip `m` that is missing in a sight of `size`, m: the diameter of a disc as large as it is, seen
+    from its side. Learns from sights in plain view."""
+    known = estimate.width[m]
+    if known == 0.0:
+        estimate.width[m] = size
+        return 0.0
+    hidden = 1.0 - (size / known) ** 2
+    if plain and hidden < LIKE:
+        estimate.width[m] += (LEARNT if size > known else SHRINKS) * (size - known)
+    return hidden
+
+
+@njit(cache=True)
+def _most_hidden(estimate: Estimate, camera: int, m: int) -> float:
+    """The largest part of a fingertip that is hidden from `camera` or another one that saw it just now."""
+    most = max(estimate.looks[camera, m, LOOK_HIDDEN], 0.0)
+    for other in range(estimate.looks.shape[0]):
+        if estimate.looks[other, m, LOOK_AGE] < FRESH_S:
+            most = max(most, estimate.looks[other, m, LOOK_HIDDEN])
+    return most
+
+
+@njit(cache=True)
+def _speed(jacobian: Array, velocity: Array) -> float:
+    """m/s, of what has `jacobian` (3, 27)."""
+    square = 0.0
+    for i in range(3):
+        speed = 0.0
+        for j in range(POSE):
+            speed += jacobian[i, j] * velocity[j]
+        square += speed * speed
+    return math.sqrt(square)

@@ -1,0 +1,193 @@
+"""Fingertips that others hide in part: how much of them is missing, and what that says of where their middles are."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from modelled_hand import model_rig, moving, sights
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.model import HandPose, neutral_pose
+from rhot_app.hand.shape import segments
+from rhot_app.hand.skeleton import FINGERS
+from rhot_app.simulator.motion import FACING
+from rhot_app.tracking.kalman.estimate import BIAS, LOOK_AGE, LOOK_VARIANCE, POSE, empty_estimate
+from rhot_app.tracking.kalman.hiding import (
+    FASTEST_M_S,
+    PLACED_BY,
+    SHIFT,
+    VARIES,
+    VARIES_PER_M_S,
+    open_hidden,
+    shown_parts,
+)
+from rhot_app.tracking.kalman.marker_block import MarkerBlock
+from rhot_app.tracking.kalman.markers import place_markers, project_marker
+from rhot_app.tracking.kalman.sighted import FRESH_S
+from rhot_app.tracking.kalman.wearing import compile_wearing
+from rhot_app.tracking.known import known_of
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+from rhot_node.wire.messages import MarkerFlag
+
+FLAT = model_rig()
+RIG = msgspec.structs.replace(FLAT, markers=load_markers(resource_path("markers", "rhot6.json")))
+WEARING = compile_wearing(RIG)
+COUNT, INDEX, WRIST = 6, 1, 5
+DISTANCE_M = 0.6
+
+
+def hand(bent=0.0):
+    estimate = empty_estimate(2, COUNT)
+    estimate.world[:3, :3], estimate.world[:3, 3] = FACING, (0.03, 0.08, DISTANCE_M)
+    estimate.angles[:] = neutral_pose().angles
+    estimate.angles[5:] += bent
+    estimate.unseen[:] = 0.0
+    return estimate
+
+
+def placed(estimate):
+    points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
+    place_markers(WEARING.worn, estimate, points, jacobian)
+    return points, jacobian
+
+
+def silhouette_m2(estimate, finger, eye):
+    """The area that the capsule of a fingertip covers across the line of sight from `eye` (3,)."""
+    pose = HandPose(estimate.world, estimate.angles)
+    capsules = segments(WEARING.model, pose, forward(WEARING.model, pose))
+    part = capsules.names.index(f"{FINGERS[finger]}_distal")
+    start, end, radius = capsules.start[part], capsules.end[part], capsules.radius[part]
+    sight = 0.5 * (start + end) - eye
+    across = np.linalg.svd(sight[None])[2][1:]
+    turns = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
+    rim = radius * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    return ConvexHull(np.concatenate([across @ start + rim, across @ end + rim])).volume
+
+
+def seen(estimate, camera, shares=(), flag=0):
+    """What a camera sees of the hand: of some fingertips only these `shares` of their areas, flagged so."""
+    points, _ = placed(estimate)
+    eye = -WEARING.cameras.pose[camera, :, :3].T @ WEARING.cameras.pose[camera, :, 3]
+    pixels, slope, flags = np.empty((COUNT, 2)), np.empty((2, 3)), np.zeros(COUNT, np.uint16)
+    diameters = np.full(COUNT, 50.0)
+    for m in range(COUNT):
+        project_marker(points[m], estimate.world, WEARING.worn.half_axes[m], WEARING.cameras.pose[camera],
+                       WEARING.cameras.intrinsics[camera], pixels[m], slope)
+        if m != WRIST:
+            share = dict(shares).get(m, 1.0)
+            area_px2 = share * silhouette_m2(estimate, m, eye) * np.linalg.norm(np.cross(*slope))
+            diameters[m], flags[m] = np.sqrt(4.0 / np.pi * area_px2), flag if share < 1.0 else 0
+    frame = sights(FLAT, moving(), 0.1)[camera]
+    return MarkerBlock(WEARING, replace(frame, camera=camera, pixels=pixels, row_time_ns=0, flags=flags,
+                                        covariances=np.tile(0.05**2 * np.eye(2), (COUNT, 1, 1)), diameters=diameters))
+
+
+def opened(block, estimate):
+    """(M,) m: standard deviations that the frame's biases tend to beyond those of plain view."""
+    points, jacobian = placed(estimate)
+    for sight in range(COUNT):
+        block.frame.label[sight] = sight
+    open_hidden(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian, WEARING.bias_variance)
+    return np.sqrt(np.maximum(estimate.bias_variance - WEARING.bias_variance, 0.0))
+
+
+def looked_at(bent=0.0):
+    """A hand whose fingertips both cameras have seen in plain view."""
+    estimate = hand(bent)
+    for camera in (0, 1, 0, 1):
+        assert opened(seen(estimate, camera), estimate).max() == 0.0
+    return estimate
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), st.floats(0.0, 1.2))
+def test_a_fingertip_shows_as_much_as_its_silhouette(turn, bent):
+    estimate = hand(bent)
+    estimate.world[:3, :3] = Rotation.from_rotvec(turn).as_matrix() @ FACING
+    points, _ = placed(estimate)
+    camera, parts = WEARING.cameras.pose[0], np.empty(COUNT)
+    shown_parts(WEARING.worn, estimate, camera, points, parts)
+    eye = -camera[:, :3].T @ camera[:, 3]
+    for finger in range(5):
+        radius = WEARING.model.radii[finger, 2]
+        largest = np.pi * radius**2 * (1.0 + WEARING.worn.slender[finger])
+        assert parts[finger] * largest == pytest.approx(silhouette_m2(estimate, finger, eye), rel=2e-3)
+    assert parts[WRIST] == 1.0 and WEARING.worn.slender[WRIST] < 0.0
+
+
+@pytest.mark.parametrize("bent", [0.0, 0.9])
+def test_what_is_missing_moves_the_middle_for_all_cameras(bent):
+    estimate = looked_at(bent)
+    width_m = estimate.width[INDEX]
+    off = opened(seen(estimate, 0, {INDEX: 0.5}), estimate)
+    eye = -WEARING.cameras.pose[0, :, :3].T @ WEARING.cameras.pose[0, :, 3]
+    radius = np.sqrt(0.5 * silhouette_m2(estimate, INDEX, eye) / np.pi)
+    assert off[INDEX] == pytest.approx(SHIFT * radius * np.sqrt(0.5**3 - VARIES**3), rel=0.03)
+    assert off[[0, 2, 3, 4, WRIST]].max() == 0.0
+    assert opened(seen(estimate, 1, {INDEX: 0.8}), estimate)[INDEX] > 0.9 * off[INDEX]  # the worst of both counts
+    assert estimate.width[INDEX] == pytest.approx(width_m)  # what is hidden teaches no size
+    opened(seen(estimate, 0), estimate)
+    assert opened(seen(estimate, 1), estimate).max() == 0.0
+
+
+def test_what_another_camera_saw_long_ago_no_longer_counts():
+    estimate = looked_at()
+    opened(seen(estimate, 1, {INDEX: 0.5}), estimate)
+    estimate.looks[1, :, LOOK_AGE] = 1.1 * FRESH_S
+    assert opened(seen(estimate, 0), estimate).max() == 0.0
+
+
+def test_areas_vary_more_of_a_hand_that_hurries():
+    for speed, share in ((0.0, 1.0 - 0.8 * VARIES), (1.0, 1.0 - VARIES - 0.8 * VARIES_PER_M_S),
+                         (10.0, 1.0 - VARIES - 0.8 * VARIES_PER_M_S * FASTEST_M_S)):
+        estimate = looked_at()
+        estimate.velocity[0] = speed
+        assert opened(seen(estimate, 0, {INDEX: share}), estimate).max() == 0.0
+        estimate.velocity[0] = 0.0
+        hidden = opened(seen(estimate, 0, {INDEX: share}), estimate)[INDEX]
+        assert (hidden > 0.0) == (share < 1.0 - VARIES)
+
+
+def test_one_camera_alone_does_not_know_how_much_there_is():
+    estimate = looked_at()
+    estimate.unseen[1, PLACED_BY - 1:] = 1.0
+    assert opened(seen(estimate, 0, {INDEX: 0.5}), estimate).max() == 0.0
+    estimate.unseen[1, PLACED_BY - 1] = 0.0
+    assert opened(seen(estimate, 0, {INDEX: 0.5}), estimate)[INDEX] > 1e-3
+
+
+def test_sizes_are_learnt_of_plain_view_and_of_growth_faster():
+    estimate = looked_at()
+    true = estimate.width.copy()
+    for factor in (0.8, 1.04):
+        estimate.width[:] = factor * true
+        for _ in range(30):
+            opened(seen(estimate, 0), estimate)
+        left = abs(estimate.width[INDEX] / true[INDEX] - 1.0) / abs(factor - 1.0)
+        assert left < 0.1 if factor < 1.0 else 0.5 < left < 0.9
+    estimate.width[INDEX] = 1.04 * true[INDEX]
+    opened(seen(estimate, 0, {INDEX: 0.95}, MarkerFlag.PARTIAL), estimate)
+    assert estimate.width[INDEX] == 1.04 * true[INDEX]
+
+
+def test_what_hides_a_fingertip_is_told_of_it():
+    """Beside what paint and light do, which is told to be less than the filter works with."""
+    told, column = [], BIAS + 3 * INDEX
+    for hiding_m in (0.0, 2e-3):
+        estimate = looked_at()
+        estimate.looks[:, :, LOOK_VARIANCE] = 0.04**2
+        bias = WEARING.bias_variance[INDEX] + hiding_m**2
+        estimate.bias_variance[INDEX] = bias
+        np.fill_diagonal(estimate.covariance, 1e-6)
+        estimate.covariance[0, 0] = estimate.covariance[column, column] = bias
+        estimate.covariance[0, column] = estimate.covariance[column, 0] = -0.999 * bias  # a place as good as its marker
+        told.append(known_of(estimate, WEARING.cameras, WEARING.paint_variance, WEARING.bias_variance,
+                             np.full(POSE, 1e9))[0, 0])
+    assert told[0] < 0.5 * WEARING.bias_variance[INDEX]
+    assert told[1] == pytest.approx(2e-3**2, rel=0.05)
