@@ -4,7 +4,8 @@ What is left of a half-hidden fingertip has its middle elsewhere, by up to its r
 for as long as it is hidden. A node notices when an area changes from one frame to the next, not when one finger slides
 behind another, and two cameras that see equally little of it agree. The master knows how far away the fingertip is, how
 it points and how large it was in plain view, hence how much of it is missing. Its middle is then believed to lie off
-its place by as much as that may have moved it: a bias of the marker, the same for all cameras.
+its place by as much as that may have moved it: a bias of the marker, the same for all cameras. Of a fingertip that
+shows all of its paint a node's caution, who has seen its area change, is not needed.
 """
 
 from __future__ import annotations
@@ -32,6 +33,10 @@ SHIFT = 1.6
 """A part h of its area that is hidden moves the middle of a fingertip by SHIFT h^1.5 of its radius, one standard
 deviation per axis. (Measured of crossing and pinching fingers: 1.25; but it lasts.)"""
 
+PLAIN_PX = 0.1
+"""A fingertip in plain view is seen to this, one standard deviation per axis, if its node does not even claim more:
+what has just come out from behind another, or hurries, is stated with up to 1 px. (Measured: 0.06 to 0.08.)"""
+
 PLACED_BY = 3
 """A hand of which another camera sees so many markers is where it is taken to be."""
 
@@ -44,11 +49,12 @@ LIKE = 0.1
 
 
 @njit(cache=True)
-def open_hidden(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array,
-                made: Array) -> None:
-    """Set the biases' variances of fingertips that are hidden in part, and back; learn their sizes (`estimate.width`).
+def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array,
+                     made: Array) -> None:
+    """Set the biases' variances of fingertips that are hidden in part, and back, and `frame.own` of those in plain
+    view; learn their sizes (`estimate.width`).
 
-    To be called when `frame.label` is known. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them;
+    To be called after `doubt_partial`. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them;
     `made` (M,) m^2: variance of the markers' places by their making.
     """
     camera, count = frame.camera[0], worn.part.shape[0]
@@ -61,10 +67,15 @@ def open_hidden(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, 
         if not frame.seen[sight] or worn.slender[m] < 0.0 or not frame.widths[sight] > 0.0:
             continue
         width = frame.widths[sight] * metres_per_px(worn, cameras, estimate, m, camera, points[m])
-        estimate.looks[camera, m, LOOK_HIDDEN] = _hidden(estimate, m, width / math.sqrt(parts[m]), frame.plain[sight])
+        hidden = _hidden(estimate, m, width / math.sqrt(parts[m]), frame.plain[sight])
+        estimate.looks[camera, m, LOOK_HIDDEN] = hidden
         varies = VARIES + VARIES_PER_M_S * min(_speed(jacobian[m], estimate.velocity), FASTEST_M_S)
-        shift = SHIFT * 0.5 * width * math.sqrt(max(_most_hidden(estimate, camera, m) ** 3 - varies**3, 0.0))
+        most = _most_hidden(estimate, camera, m)
+        shift = SHIFT * 0.5 * width * math.sqrt(max(most**3 - varies**3, 0.0))
         set_bias_variance(estimate, m, made[m] + shift * shift)
+        if frame.plain[sight] and -varies < hidden and most < varies:
+            stated = 0.5 * (frame.covariances[sight, 0, 0] + frame.covariances[sight, 1, 1])
+            frame.own[sight] = min(frame.own[sight], PLAIN_PX**2 / max(stated, PLAIN_PX**2))
 
 
 @njit(cache=True)

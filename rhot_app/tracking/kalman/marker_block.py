@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rhot_app.tracking.kalman.association import relabel
 from rhot_app.tracking.kalman.covering import leave_out_covered
 from rhot_app.tracking.kalman.estimate import POSE
-from rhot_app.tracking.kalman.hiding import open_hidden
+from rhot_app.tracking.kalman.hiding import judge_fingertips
 from rhot_app.tracking.kalman.markers import Frame, Outfit, append_markers, place_markers
 from rhot_app.tracking.kalman.partial import doubt_partial
 from rhot_app.tracking.kalman.rows import Page
@@ -69,7 +69,7 @@ def _associate(outfit: Share, shared: Share, page: Share) -> int:
     if changed > 0:
         estimate.untroubled[0] = 0.0
     doubt_partial(worn, cameras, frame, estimate, points, jacobian)
-    open_hidden(worn, cameras, frame, estimate, points, jacobian, worn_by.made)
+    judge_fingertips(worn, cameras, frame, estimate, points, jacobian, worn_by.made)
     leave_out_covered(worn, cameras, frame, estimate, worn_by.made)
     return changed
 

@@ -80,7 +80,7 @@ class Frame(NamedTuple):
     `label` (M,): which of the hand's markers the m-th sight is of. `widths` (M,) px: diameters of discs of their areas,
     0 where unknown; `plain` (M,): without any flag; `covered` (M,): shows too little of its marker to be weighed;
     `doubt` (M,) px^2: how far off, per axis, what is covered of it may have brought it; `own` (M,): the part of its
-    stated variance that is this camera's alone."""
+    stated variance that counts: what is this camera's alone, or what is left of a node's caution."""
 
     camera: Indices
     seen: NDArray[np.bool_]

@@ -20,10 +20,11 @@ from rhot_app.tracking.kalman.estimate import BIAS, LOOK_AGE, LOOK_VARIANCE, POS
 from rhot_app.tracking.kalman.hiding import (
     FASTEST_M_S,
     PLACED_BY,
+    PLAIN_PX,
     SHIFT,
     VARIES,
     VARIES_PER_M_S,
-    open_hidden,
+    judge_fingertips,
     shown_parts,
 )
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
@@ -93,7 +94,7 @@ def opened(block, estimate):
     points, jacobian = placed(estimate)
     for sight in range(COUNT):
         block.frame.label[sight] = sight
-    open_hidden(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian, WEARING.bias_variance)
+    judge_fingertips(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian, WEARING.bias_variance)
     return np.sqrt(np.maximum(estimate.bias_variance - WEARING.bias_variance, 0.0))
 
 
@@ -174,6 +175,19 @@ def test_sizes_are_learnt_of_plain_view_and_of_growth_faster():
     estimate.width[INDEX] = 1.04 * true[INDEX]
     opened(seen(estimate, 0, {INDEX: 0.95}, MarkerFlag.PARTIAL), estimate)
     assert estimate.width[INDEX] == 1.04 * true[INDEX]
+
+
+@pytest.mark.parametrize(("share", "flag", "cautious"), [(1.0, 0, False), (0.5, 0, True), (1.3, 0, True),
+                                                        (0.99, MarkerFlag.AMBIGUOUS, True)])
+def test_a_node_may_be_less_cautious_about_what_is_in_plain_view(share, flag, cautious):
+    for stated_px in (0.05, 0.8):
+        estimate = looked_at()
+        block = seen(estimate, 0, {INDEX: share}, flag)
+        block.frame.covariances[:] = stated_px**2 * np.eye(2)
+        opened(block, estimate)
+        counts = 1.0 if cautious else min(1.0, (PLAIN_PX / stated_px) ** 2)
+        assert block.frame.own[INDEX] == pytest.approx(counts)
+        assert block.frame.own[WRIST] == 1.0
 
 
 def test_what_hides_a_fingertip_is_told_of_it():
