@@ -38,10 +38,12 @@ LOG_NAME: Final = "take.rhotlog"
 Told = Callable[[str], Progress | None]
 """Says how the filming of a take goes: given what is filmed, who is told of its frames."""
 
-_SOURCES = ("rhot_node/detect/*.py", *(f"rhot_app/simulator/{name}.py" for name in (
-    "background", "body", "controls", "edges", "lamp", "moments", "motion", "node_log", "raycast", "rays", "recorded",
-    "render", "scene", "sensor", "solids_painter", "spans", "trace")))
-"""What a take depends on besides its order: what makes pictures, finds markers in them and sends them."""
+_SHOWN = "body", "motion", "node_log", "raycast", "recorded", "scene"
+_SEEN = (*_SHOWN, "background", "controls", "edges", "lamp", "moments", "rays", "render", "sensor", "solids_painter",
+         "spans", "trace")
+_SKETCHED = (*_SHOWN, "hidden_parts", "marker_rows", "sights")
+"""Modules of the twin that a take depends on besides its order: what moves, makes pictures or does without, and sends
+what was found in them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,7 @@ def take(order: Order, folder: Path, told: Told = lambda title: None) -> Take:
     reader = LogReader(place / LOG_NAME)
     reader.close()
     return Take(place, reader.rig, load_truth(place / TRUTH_NAME), order.seconds,
-                reader.about.get("sources") != _source_digest())
+                reader.about.get("sources") != _source_digest(order.sketched))
 
 
 def _film(order: Order, place: Path, progress: Progress | None) -> None:
@@ -122,7 +124,7 @@ def _film(order: Order, place: Path, progress: Progress | None) -> None:
             streams = tuple(_sketch(rig, order.network, shot, index) for index in range(len(rig.nodes)))
         else:
             streams = for_each_camera(shot, functools.partial(_watch, rig, order.network), progress)
-        write_node_log(work / LOG_NAME, rig, {"simulated": shot.act.name, "sources": _source_digest()},
+        write_node_log(work / LOG_NAME, rig, {"simulated": shot.act.name, "sources": _source_digest(order.sketched)},
                        [record for records, _ in streams for record in records])
         save_truth(work / TRUTH_NAME, true_act(shot.act, shot.seconds, tuple(truth for _, truth in streams)))
 
@@ -172,9 +174,12 @@ def _motion_digest(motion: str) -> str:
 
 
 @functools.cache
-def _source_digest() -> str:
+def _source_digest(sketched: bool) -> str:
     root = Path(__file__).parents[2]
     digest = hashlib.sha256()
-    for path in sorted(path for pattern in _SOURCES for path in root.glob(pattern)):
+    paths = [root / "rhot_app" / "simulator" / f"{name}.py" for name in (_SKETCHED if sketched else _SEEN)]
+    if not sketched:
+        paths += (root / "rhot_node" / "detect").glob("*.py")
+    for path in sorted(paths):
         digest.update(path.read_bytes())
     return digest.hexdigest()

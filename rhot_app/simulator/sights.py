@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import project_normalised
 from rhot_app.hand.skeleton import WRIST_ROLE
-from rhot_app.simulator.body import HandBody
+from rhot_app.simulator.body import CAPSULE, HandBody
 from rhot_app.simulator.hidden_parts import spots, visible_parts
 from rhot_app.simulator.marker_rows import at_own_rows
 from rhot_app.simulator.shot import Shot, camera_seed
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _GRID_HZ = 250.0  # of the splines through the markers' ways
 _WHOLE, _ENOUGH = 0.9, 0.4  # visible parts: above the first a marker is in plain view, below the second it is lost
 _BIAS_GRID_S = 0.05
+_STEP = 1e-4  # normalised, of derivatives
 _RADIUS_M = 8e-3  # where the marker set gives none
 
 
@@ -75,12 +76,12 @@ class _Eye:
         local = self._camera.camera_from_world @ transforms
         self._shapes = [self._shape(body, marker, role, local) for marker, role in
                         enumerate(marker.role for marker in scene.markers.markers)]
-        discs = self._discs(shot, body, row_time_s)
+        placed = body.place(local, angles)
+        discs = self._discs(shot, body, placed, row_time_s)
         self.seen = np.empty((len(discs), body.marker_count, 3))
         groups = np.array([body.group[list(body.marker).index(marker)] for marker in range(body.marker_count)])
-        visible_parts(np.stack([body.kind, body.group], axis=1), body.size, body.place(local, angles), groups, discs,
-                      spots(), self.seen)
-        self._diameters = 2.0 * discs[:, :, 2] * self._camera.intrinsics[0]
+        visible_parts(np.stack([body.kind, body.group], axis=1), body.size, placed, groups, discs, spots(), self.seen)
+        self._diameters = self._sizes(discs)
         self._places = self._middles(discs) + self._biases(shot, camera_seed(scene, index))
 
     def observation(self, number: int, marker: int) -> MarkerObservation:
@@ -104,12 +105,12 @@ class _Eye:
         turned = local[:, :3, :3] * half_axes
         return np.asarray(turned @ turned.transpose(0, 2, 1))
 
-    def _discs(self, shot: Shot, body: HandBody, row_time_s: float) -> Array:
-        """(F, M, 4) as `visible_parts` wants them; NaN for what is not in the picture."""
+    def _discs(self, shot: Shot, body: HandBody, placed: Array, row_time_s: float) -> Array:
+        """(F, M, 6) as `visible_parts` wants them; NaN for what is not in the picture. `placed` as `HandBody.place`."""
         grid = np.arange(-0.1, shot.seconds + 0.2, 1.0 / _GRID_HZ)
         ways = body.marker_positions(*shot.act.source.sample(grid))
         size = self._camera.width, self._camera.height
-        discs = np.full((len(self.times_s), body.marker_count, 4), np.nan)
+        discs = np.full((len(self.times_s), body.marker_count, 6), np.nan)
         for marker in range(body.marker_count):
             places, pixels = at_own_rows(CubicSpline(grid, ways[:, marker]),
                                          functools.partial(self._project, marker=marker), self.times_s, row_time_s,
@@ -117,6 +118,7 @@ class _Eye:
             discs[:, marker, :2] = np.where(np.isfinite(pixels), self._silhouette(places, marker), np.nan)
             depth = self._local(places)[:, 2]
             discs[:, marker, 2], discs[:, marker, 3] = self._radii[marker] / depth, depth
+            discs[:, marker, 4:] = _drawn_out(body, placed, marker)
         return discs
 
     def _local(self, places: Array) -> Array:
@@ -129,6 +131,17 @@ class _Eye:
         shape = self._shapes[marker]
         below = z**2 - shape[..., 2, 2]
         return np.stack([(x * z - shape[..., 0, 2]) / below, (y * z - shape[..., 1, 2]) / below], axis=1)
+
+    def _sizes(self, discs: Array) -> Array:
+        """(F, M) px: diameters of discs that are as large as the outlines, drawn out, and stretched off the axis."""
+        flat, step = discs[:, :, :2].reshape(-1, 2), _STEP * np.eye(2)
+        rows = [(project_normalised(flat + by, self._camera.intrinsics)
+                 - project_normalised(flat - by, self._camera.intrinsics)) / (2.0 * _STEP) for by in step]
+        stretch = np.abs(rows[0][:, 0] * rows[1][:, 1] - rows[0][:, 1] * rows[1][:, 0])
+        stretch *= np.sqrt(1.0 + np.square(flat).sum(axis=1))
+        radius, out = discs[:, :, 2], np.linalg.norm(discs[:, :, 4:], axis=2)
+        area = (math.pi * radius**2 + 4.0 * radius * out) * stretch.reshape(radius.shape)
+        return np.asarray(2.0 * np.sqrt(area / math.pi))
 
     def _project(self, places: Array, marker: int) -> Array:
         return np.asarray(project_normalised(self._silhouette(places, marker), self._camera.intrinsics))
@@ -147,6 +160,17 @@ class _Eye:
         count, noise = len(self._radii), self._noise
         return (noise.common * _slow(shot, count, shot.scene.seed, noise.slow_s, self.times_s)
                 + noise.own * _slow(shot, count, own_seed + 0x1000000, noise.slow_s, self.times_s))
+
+
+def _drawn_out(body: HandBody, placed: Array, marker: int) -> Array:
+    """(F, 2) normalised: by how much the outline of a marker on the hand (`placed` as `HandBody.place`) is drawn out
+    to either side of a disc: half of what lies between the ends of a capsule, as it is seen."""
+    solid = list(body.marker).index(marker)
+    if body.kind[solid] != CAPSULE:
+        return np.zeros((len(placed), 2))
+    start, end = placed[:, solid, :3], placed[:, solid, 3:6]
+    middle = 0.5 * (start + end)
+    return np.asarray(0.5 * (end - start - middle * ((end - start)[:, 2] / middle[:, 2])[:, None])[:, :2] / middle[:, 2:])
 
 
 def _slow(shot: Shot, count: int, seed: int, slow_s: float, times_s: Array) -> Array:

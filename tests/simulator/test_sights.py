@@ -10,11 +10,13 @@ import pytest
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.silhouette import point_rays
 from rhot_app.simulator.hidden_parts import spots
-from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
+from rhot_app.simulator.scene import Scene, make_scene, node_settings, twin_defaults
 from rhot_app.simulator.shot import Shot, make_renderer, make_shot
 from rhot_app.simulator.shows import BoardShow
 from rhot_app.simulator.sights import SightNoise, sights
 from rhot_app.simulator.truth import true_act
+from rhot_node.__main__ import make_detector
+from rhot_node.detect.image import from_i420
 from rhot_node.wire.messages import MarkerFlag
 
 EXACT = SightNoise(white=0.0, common=0.0, own=0.0)
@@ -56,6 +58,22 @@ def test_hidden_parts_are_those_of_the_pictures() -> None:
     assert (painted < 0.8).sum() > 5, "something is hidden now and then"
     assert np.abs(painted - sketched).mean() < 0.04
     assert np.corrcoef(painted.ravel(), sketched.ravel())[0, 1] > 0.8
+
+
+def test_fingertips_are_as_large_as_in_pictures_wherever_they_are_and_however_they_point() -> None:
+    taken = shot("fast", 1.0)
+    frames, truth = sights(taken, 0)
+    renderer, detector = make_renderer(taken, 0), make_detector(node_settings(taken.scene, 0))
+    width, height = taken.scene.preset.width, taken.scene.preset.height
+    ratios = []
+    for number, t_s in enumerate(truth.times_s):
+        frame, _ = renderer.render(taken.act.source, t_s, number)
+        found = detector.detect(from_i420(frame, width, height))
+        ratios += [one.diameter / other.diameter for one, other in zip(found[:5], frames[number], strict=False)
+                   if one.flags == other.flags == 0]
+    assert len(ratios) > 150
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.01)
+    assert np.std(ratios) < 0.025, "motion smears the pictures' edges"
 
 
 def test_what_is_half_hidden_is_said_to_be_and_what_is_hidden_is_lost() -> None:
