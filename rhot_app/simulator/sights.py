@@ -169,8 +169,9 @@ def _drawn_out(body: HandBody, placed: Array, marker: int) -> Array:
     if body.kind[solid] != CAPSULE:
         return np.zeros((len(placed), 2))
     start, end = placed[:, solid, :3], placed[:, solid, 3:6]
-    middle = 0.5 * (start + end)
-    return np.asarray(0.5 * (end - start - middle * ((end - start)[:, 2] / middle[:, 2])[:, None])[:, :2] / middle[:, 2:])
+    middle, half = 0.5 * (start + end), 0.5 * (end - start)
+    across = half - middle * (half[:, 2:] / middle[:, 2:])
+    return np.asarray(across[:, :2] / middle[:, 2:])
 
 
 def _slow(shot: Shot, count: int, seed: int, slow_s: float, times_s: Array) -> Array:
