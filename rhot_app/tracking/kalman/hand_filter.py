@@ -97,9 +97,8 @@ class Desk(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of an update's L observations, in the order of the blocks: `believed` (L,), `widening` (L,) the
-    factor on their noise, above 1 for what was unlikely, `source` (L, 3) as in `Rows`. Views that the next update
-    overwrites."""
+    """What became of a block's L observations: `believed` (L,), `widening` (L,) the factor on their noise, above 1 for
+    what was unlikely, `source` (L, 3) as in `Rows`. Views that the next update overwrites."""
 
     believed: Mask
     widening: Array
@@ -108,7 +107,7 @@ class Outcome:
 
 class HandFilter:
     """An iterated extended Kalman filter on the hand's pose, velocity and markers' biases, for a hand whose size it is
-    told.
+    told. `turned`: by how much the last update changed how the palm is turned, or any joint is bent, rad.
 
     `worn`: the markers; `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance`
     (M,) m^2.
@@ -122,7 +121,7 @@ class HandFilter:
                           empty_gain(ROWS_MAX + MOST_HELD, size), empty_held(size), np.empty(size),
                           np.empty(ROWS_MAX, np.bool_), np.empty(ROWS_MAX), worn, cameras, habits, limits,
                           bias_variance, np.zeros(2))
-        self._shared = Share(self._desk)
+        self._shared, self._last, self.turned = Share(self._desk), 0, 0.0
         self._now, self._tried = (Share(Page(mean, self._desk.rows)) for mean in (self.estimate, self._desk.trial))
 
     def resize(self, log_scale: float, variance: float) -> None:
@@ -162,7 +161,8 @@ class HandFilter:
         return float(strangeness.py_func(self.estimate.angles, self._desk.habits))
 
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
-        """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there."""
+        """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there; returns what became of the last
+        one."""
         rows = self._desk.rows
         _carry_on(self._shared, dt)
         for block in blocks:
@@ -174,13 +174,15 @@ class HandFilter:
             _hold_turn_alone(self._shared)
             self._linearise(blocks, self._now)
             self._settle(blocks)
-        _conclude(self._shared, dt)
-        count = int(rows.used[1])
-        return Outcome(self._desk.believed[:count], self._desk.widening[:count], rows.source[:count])
+        self.turned = _conclude(self._shared, dt)
+        of_last = slice(self._last, int(rows.used[1]))
+        return Outcome(self._desk.believed[of_last], self._desk.widening[of_last], rows.source[of_last])
 
     def _linearise(self, blocks: Sequence[ResidualBlock], page: Share) -> None:
-        self._desk.rows.used[:] = 0
+        used = self._desk.rows.used
+        used[:] = 0
         for block in blocks:
+            self._last = int(used[1])
             block.linearise(page)
 
     def _settle(self, blocks: Sequence[ResidualBlock]) -> None:
@@ -277,10 +279,12 @@ def _turn(one: Array, other: Array) -> float:
 
 
 @njit(cache=True)
-def _conclude(shared: Share, dt: float) -> None:
-    """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits; the size stays."""
+def _conclude(shared: Share, dt: float) -> float:
+    """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits; the size stays. Returns how
+    much was learnt of any turn, rad."""
     desk: Desk = shared.of
     estimate, worn, gain, step = desk.estimate, desk.worn, desk.gain, desk.step
+    turned = float(np.abs(step[ROTATION:POSE]).max())
     note_sights(estimate, worn.part, desk.rows, desk.believed)
     note_trend(estimate, step, gain)
     contract(estimate.covariance, gain)
@@ -296,3 +300,4 @@ def _conclude(shared: Share, dt: float) -> None:
     displace(estimate, step, estimate)
     if desk.size[1] > 0.0:
         estimate.log_scale[0], estimate.covariance[SCALE, SCALE] = desk.size[0], desk.size[1]
+    return turned

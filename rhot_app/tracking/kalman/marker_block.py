@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import NamedTuple
 
@@ -33,11 +34,11 @@ class Sighting(NamedTuple):
 
 class MarkerBlock:
     """The markers that one camera saw in one frame. `t_ns`: the mean time of its sights, or of its middle row;
-    `sights`: how many markers it shows; `shared`: its `Sighting`, for compiled functions."""
+    `camera`: which; `sights`: how many markers it shows; `shared`: its `Sighting`, for compiled functions."""
 
     def __init__(self, wearing: Wearing, observations: CameraObservations) -> None:
         count = len(observations.pixels)
-        self.observations = observations
+        self.observations, self.camera = observations, observations.camera
         sized = not math.isnan(observations.detect_s)  # text datagrams tell no sizes
         self.frame = Frame(np.array([observations.camera]), np.empty(count, np.bool_), observations.pixels,
                            observations.covariances, np.empty(count), np.empty(count, np.int64),
@@ -46,6 +47,13 @@ class MarkerBlock:
         self.shared, self._outfit = Share(Sighting(self.frame, observations.flags)), wearing.outfit
         after_ns, self.sights = _read(self._outfit, self.shared, 1e-9 * observations.row_time_ns)
         self.t_ns = observations.t_row0_master_ns + int(after_ns)
+
+    def as_of(self, t_ns: int) -> MarkerBlock:
+        """The same frame, told of as of another instant, master ns."""
+        other = copy.copy(self)
+        other.t_ns, other.frame = t_ns, self.frame._replace(late_s=self.frame.late_s - 1e-9 * (t_ns - self.t_ns))
+        other.shared = Share(Sighting(other.frame, self.observations.flags))
+        return other
 
     def associate(self, page: Share) -> int:
         """Ask the hand, carried to this frame's instant, which marker each sight is of, and how much of it it shows;

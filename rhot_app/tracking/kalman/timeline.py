@@ -1,4 +1,10 @@
-"""The filter's recent past: so that a frame that arrives late is weighed where it belongs, not where it arrived."""
+"""The filter's recent past: so that a frame that arrives late is weighed where it belongs, not where it arrived, and
+one that turns the hand is weighed together with the one before.
+
+What a camera saw is kept as a covariance, linearised where the hand was then. A frame of another camera that turns the
+palm, and bends its fingers to match, keeps to that along straight lines where fingertips go along arcs: 10 degrees
+move them by 3 mm towards the cameras or away. Weighed together, both are linearised where the hand comes to be.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +14,9 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Protocol
 
-from rhot_app.tracking.kalman.estimate import Estimate, copy_estimate, empty_estimate
+import numpy as np
+
+from rhot_app.tracking.kalman.estimate import ROTATION, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
 from rhot_app.tracking.kalman.rows import ResidualBlock
 
@@ -16,12 +24,31 @@ LENGTH = 12
 """Updates remembered: 150 ms of two cameras at 40 fps. What is older came too late."""
 
 
+TURNS_RAD = 0.05
+"""A frame that turns anything by more is weighed together with the one before."""
+
+BESIDE_NS = 15_000_000
+"""This is of another camera, and not older than that,"""
+
+WAY_M = 0.006
+"""and the palm has moved on by less since then: ways are straightened when they are told of as of another instant."""
+
+
 class TimedBlock(ResidualBlock, Protocol):
-    """A residual block that knows when it was observed."""
+    """A residual block that knows when and by whom it was observed."""
 
     @property
     def t_ns(self) -> int:
         """The instant of the observation, master ns."""
+        ...
+
+    @property
+    def camera(self) -> int:
+        """Which camera saw it, -1 for none."""
+        ...
+
+    def as_of(self, t_ns: int) -> ResidualBlock:
+        """The same observations, told of as of another instant, master ns."""
         ...
 
 
@@ -78,6 +105,19 @@ class Timeline:
         self._moments.append(_Moment(block.t_ns, self.t_ns, before, block))
         if len(self._moments) > LENGTH:
             self._spare.append(self._moments.pop(0).before)
-        dt = 1e-9 * (block.t_ns - self.t_ns)
+        outcome = self._hand.update(1e-9 * (block.t_ns - self.t_ns), [block])
         self.t_ns = block.t_ns
-        return self._hand.update(dt, [block])
+        beside = self._beside() if self._hand.turned > TURNS_RAD else None
+        if beside is None:
+            return outcome
+        copy_estimate(beside.before, estimate)
+        return self._hand.update(1e-9 * (block.t_ns - beside.before_ns), [beside.block.as_of(block.t_ns), block])
+
+    def _beside(self) -> _Moment | None:
+        """The moment before the last one, if it can be told of as of that."""
+        if len(self._moments) < 2:
+            return None
+        beside, last = self._moments[-2:]
+        since_ns = last.t_ns - beside.t_ns
+        way_m = 1e-9 * since_ns * float(np.linalg.norm(self._hand.estimate.velocity[:ROTATION]))
+        return beside if beside.block.camera != last.block.camera and since_ns < BESIDE_NS and way_m < WAY_M else None

@@ -61,6 +61,22 @@ def test_a_lost_marker_has_no_rows():
     assert 2 not in rows.source[:rows.used[1], 1]
 
 
+def test_a_frame_told_of_as_of_another_instant_expects_a_hand_that_has_moved_on_to_look_the_same():
+    block, estimate, later_s = blocks()[1], moving_estimate(), 5e-3
+    estimate.acceleration[:] = 0.0
+    late_s, t_ns, step = block.frame.late_s.copy(), block.t_ns, np.zeros(SIZE)
+    step[:POSE] = later_s * estimate.velocity
+    other = block.as_of(t_ns + round(1e9 * later_s))
+    assert other.t_ns - t_ns == 5_000_000 and other.camera == block.camera
+    rows, expected = residuals(other, moved(estimate, step)), residuals(block, estimate)
+    np.testing.assert_allclose(rows.residual[:12], expected.residual[:12], atol=0.05)
+    assert np.abs(residuals(block, moved(estimate, step)).residual[:12] - expected.residual[:12]).max() > 1.0
+    other.frame.label[:2] = 1, 0
+    assert block.frame.label[0] == 1  # what is decided about one is decided about both
+    np.testing.assert_array_equal(block.frame.late_s, late_s)
+    assert block.t_ns == t_ns
+
+
 def test_a_frame_without_sights_is_of_its_middle_row():
     frame = blocks()[0].observations
     frame.pixels[:] = np.nan

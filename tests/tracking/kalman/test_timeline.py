@@ -1,10 +1,16 @@
 """Frames that arrive in another order than they were taken."""
 
-import numpy as np
-from known_hand import blocks, difference, empty, filter_of_hand, moving_estimate, settled, twin
+from dataclasses import dataclass, replace
 
+import numpy as np
+import pytest
+from known_hand import WEARING, blocks, difference, empty, filter_of_hand, moving_estimate, settled, twin
+from modelled_hand import after_s, deviations, model_rig, moving, sights, states_of
+
+from rhot_app.hand.skeleton import WRIST_ROLE
+from rhot_app.tracking.kalman import timeline as timeline_module
 from rhot_app.tracking.kalman.estimate import copy_estimate
-from rhot_app.tracking.kalman.timeline import LENGTH, Timeline
+from rhot_app.tracking.kalman.timeline import BESIDE_NS, LENGTH, TURNS_RAD, WAY_M, Timeline
 
 
 def follow(frames):
@@ -67,3 +73,64 @@ def test_what_is_remembered_is_whole_and_its_own():
     for field, source, target in zip(estimate._fields, estimate, other, strict=True):
         np.testing.assert_array_equal(source, target, err_msg=field)
         assert not np.shares_memory(source, target)
+
+
+@dataclass(frozen=True)
+class Glimpse:
+    """A block that says nothing."""
+
+    t_ns: int
+    camera: int
+
+    def as_of(self, t_ns):
+        return replace(self, t_ns=t_ns)
+
+
+class Recorder:
+    """Stands for a filter: notes what it is told, and by how much."""
+
+    def __init__(self, turned, speed):
+        self.estimate, self.turned, self.told = empty(), turned, []
+        self.estimate.velocity[0] = speed
+
+    def update(self, dt, seen):
+        self.told.append((round(1e9 * dt), *seen))
+        self.estimate.world[0, 3] += dt
+        return len(self.told)
+
+
+@pytest.mark.parametrize(("turned", "speed", "since_ns", "camera", "together"), [
+    (1.1 * TURNS_RAD, 0.0, 2_000_000, 1, True), (0.9 * TURNS_RAD, 0.0, 2_000_000, 1, False),
+    (1.1 * TURNS_RAD, 0.0, 2_000_000, 0, False), (1.1 * TURNS_RAD, 0.0, BESIDE_NS, 1, False),
+    (1.1 * TURNS_RAD, 0.9 * WAY_M / 0.002, 2_000_000, 1, True),
+    (1.1 * TURNS_RAD, 1.1 * WAY_M / 0.002, 2_000_000, 1, False)])
+def test_a_frame_that_turns_the_hand_is_weighed_with_the_one_before(turned, speed, since_ns, camera, together):
+    hand = Recorder(turned, speed)
+    timeline = Timeline(hand)
+    timeline.begin(0)
+    one, other = Glimpse(10_000_000, 0), Glimpse(10_000_000 + since_ns, camera)
+    timeline.add(one)
+    (weighed, outcome), = timeline.add(other)
+    told = [(10_000_000, one), (since_ns, other)]
+    if together:
+        told.append((other.t_ns, replace(one, t_ns=other.t_ns), other))
+    assert hand.told == told and weighed is other and outcome == len(told)
+    assert hand.estimate.world[0, 3] == pytest.approx(1e-9 * other.t_ns)  # from before both of them
+    assert timeline.t_ns == other.t_ns
+
+
+def test_fingertips_stay_where_both_cameras_see_them_when_a_palm_comes_back(monkeypatch):
+    rig, truth, wrist = model_rig(), moving("wave"), WEARING.marker_of(WRIST_ROLE)
+    off_mm = {TURNS_RAD: [], np.inf: []}
+    for begin in (0.6, 1.0, 1.4, 1.8):
+        frames = [replace(frame, pixels=frame.pixels.copy()) for frame in sights(rig, truth, 3.0)]
+        start_ns = min(frame.t_row0_master_ns for frame in frames)
+        for frame in frames:
+            if begin < 1e-9 * (frame.t_row0_master_ns - start_ns) < begin + 0.6:
+                frame.pixels[wrist] = np.nan
+        for turns, found in off_mm.items():
+            monkeypatch.setattr(timeline_module, "TURNS_RAD", turns)
+            states = after_s(states_of(rig, frames), begin + 0.5, begin + 0.85)
+            found.append(deviations(states, truth).rms_mm)
+    together, apart = (np.sqrt(np.mean(np.square(found))) for found in off_mm.values())
+    assert together < 0.9 * apart
