@@ -19,9 +19,10 @@ from rhot_app.project import Rig
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
 from rhot_app.tracking.kalman.estimate import ORDINARY_S, copy_estimate, empty_estimate
-from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
+from rhot_app.tracking.kalman.hand_filter import HandFilter
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.motion import predict
+from rhot_app.tracking.kalman.rows import Outcome
 from rhot_app.tracking.kalman.timeline import TimedBlock, Timeline
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.model_output import subject_of

@@ -9,9 +9,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import POSE
-from rhot_app.tracking.kalman.hand_filter import Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock, Sighting
 from rhot_app.tracking.kalman.markers import Cameras, project_marker
+from rhot_app.tracking.kalman.rows import Outcome
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.surprise import PLAUSIBLE, ROBUST
 from rhot_app.tracking.tracker import CameraObservations

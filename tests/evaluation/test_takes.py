@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rhot_app.evaluation import alterations as alter
+from rhot_app.evaluation import takes
 from rhot_app.evaluation.compare import judge, orders
 from rhot_app.evaluation.takes import LOG_NAME, Order, Stream, Take, take
 from rhot_app.evaluation.track import tracked
@@ -73,6 +74,19 @@ def test_one_order_is_filmed_once_and_the_same_anywhere(tmp_path: Path) -> None:
         assert not one.outdated
     assert told == ["pinch, 0.3 s, seed 3"] * 2
     assert logs[0] == logs[1] == logs[2]
+
+
+@pytest.mark.parametrize(("changed", "outdated"), [("_SKETCHED", True), ("_SEEN", False)])
+def test_a_sketch_that_other_sources_made_is_outdated(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str, outdated: bool) -> None:
+    order = Order(scene(3), "pinch", 0.3, sketched=True)
+    assert not take(order, tmp_path).outdated
+    monkeypatch.setattr(takes, changed, (*getattr(takes, changed), "rays"))  # as good as another text of one of them
+    takes._source_digest.cache_clear()
+    try:
+        assert take(order, tmp_path).outdated is outdated
+    finally:
+        takes._source_digest.cache_clear()
 
 
 def test_orders_that_differ_have_names_that_differ() -> None:

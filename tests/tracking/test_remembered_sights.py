@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from modelled_hand import model_rig, moving, sights
 
-from rhot_app.tracking.kalman.hand_filter import Outcome
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
 from rhot_app.tracking.kalman.markers import place_markers, project_marker
+from rhot_app.tracking.kalman.rows import Outcome
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.model_start import count_apart

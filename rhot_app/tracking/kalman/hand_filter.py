@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +30,7 @@ from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
 from rhot_app.tracking.kalman.reappearing import loosen, loosen_palm
-from rhot_app.tracking.kalman.rows import Page, ResidualBlock, Rows, empty_rows
+from rhot_app.tracking.kalman.rows import Outcome, Page, ResidualBlock, Rows, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown, note_sights
 from rhot_app.tracking.kalman.surprise import appraise, note_trend
@@ -93,16 +92,6 @@ class Desk(NamedTuple):
     limits: Array
     bias_variance: Array
     size: Array  # (2,): the logarithm of the hand's scale, and the variance of it, 0 for a size that is certain
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of a block's L observations: `believed` (L,), `widening` (L,) the factor on their noise, above 1 for
-    what was unlikely, `source` (L, 3) as in `Rows`. Views that the next update overwrites."""
-
-    believed: Mask
-    widening: Array
-    source: NDArray[np.int64]
 
 
 class HandFilter:

@@ -6,6 +6,7 @@ that are believed or not believed as a whole.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -16,6 +17,7 @@ from rhot_app.tracking.kalman.share import Share
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 PALM_PART = -1
 """The part of the hand that an observation is attached to: the palm, or the index of a finger."""
@@ -61,6 +63,16 @@ class ResidualBlock(Protocol):
         Called once or more per update; every time it must append the same observations in the same order.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a block's L observations: `believed` (L,), `widening` (L,) the factor on their noise, above 1 for
+    what was unlikely, `source` (L, 3) as in `Rows`. Views that the next update overwrites."""
+
+    believed: Mask
+    widening: Array
+    source: NDArray[np.int64]
 
 
 def empty_rows(rows: int, size: int) -> Rows:

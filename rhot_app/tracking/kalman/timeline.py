@@ -17,12 +17,11 @@ from typing import Protocol
 import numpy as np
 
 from rhot_app.tracking.kalman.estimate import ROTATION, Estimate, copy_estimate, empty_estimate
-from rhot_app.tracking.kalman.hand_filter import HandFilter, Outcome
-from rhot_app.tracking.kalman.rows import ResidualBlock
+from rhot_app.tracking.kalman.hand_filter import HandFilter
+from rhot_app.tracking.kalman.rows import Outcome, ResidualBlock
 
 LENGTH = 12
 """Updates remembered: 150 ms of two cameras at 40 fps. What is older came too late."""
-
 
 TURNS_RAD = 0.05
 """A frame that turns anything by more is weighed together with the one before."""
