@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
+from rhot_app.tracking import schedule
 from rhot_app.tracking.kalman.estimate import ROTATION
 from rhot_app.tracking.kalman.rows import PALM_PART
 from rhot_app.tracking.kalman.wearing import Wearing
@@ -39,6 +41,7 @@ _STRAY, _REACH_M = 0.25, 0.1
 """A marker's way since differs by this part from the palm's, and by so much per radian that the palm turns."""
 
 _TARGET_SD_M = 1e-3
+_WAITING = schedule.FRAMES  # frames of each camera; those before would tell nothing more of an instant
 
 
 class Located(NamedTuple):
@@ -52,25 +55,30 @@ class Located(NamedTuple):
 
 
 class Starter:
-    """Collects frames until one instant shows enough of the hand."""
+    """Collects frames until one instant shows enough of the hand; they are paired when that is asked for."""
 
     def __init__(self, rig: RigArrays, wearing: Wearing) -> None:
         self._rig, self._wearing = rig, wearing
         self._pairing = Pairing(len(rig.cameras), len(rig.marker_ids))
+        self._waiting: deque[CameraObservations] = deque(maxlen=_WAITING * len(rig.cameras))
         self._tips = [wearing.marker_of(role) for role in TIP_ROLES]
         self._wrist = wearing.marker_of(WRIST_ROLE)
         self._on_palm = np.flatnonzero(wearing.worn.part == PALM_PART)
 
     def reset(self) -> None:
         """Forget the frames."""
+        self._waiting.clear()
         self._pairing.reset()
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in."""
-        self._pairing.ingest(observations)
+        self._waiting.append(observations)
 
     def locate(self) -> Located | None:
         """Where the markers were at the newest instant; None: none is due."""
+        for observations in self._waiting:
+            self._pairing.ingest(observations)
+        self._waiting.clear()
         paired = self._pairing.due()
         return None if paired is None else self._locate(paired)
 

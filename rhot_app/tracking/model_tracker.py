@@ -30,7 +30,7 @@ from rhot_app.tracking.model_start import Located, Starter, count_elsewhere
 from rhot_app.tracking.model_states import Teller, tell_of_none
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.sights import Sights
-from rhot_app.tracking.state import Condition, HandState
+from rhot_app.tracking.state import Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
@@ -61,6 +61,9 @@ _AGAIN_NS = 1_000_000_000
 
 _SOUND_MARKERS, _LEAST_CLEAR = 3, 2
 """With so many markers where all cameras see them a hand is sound; so many set it back. One may be something else."""
+
+_SOUND_NS = 50_000_000
+"""A sound hand all of whose markers are measured is not compared again for so long."""
 
 _THUMB_NS = 200_000_000
 """How often a thumb that bends backwards is looked at."""
@@ -180,24 +183,37 @@ class ModelTracker:
         self._hand.estimate.pace[camera] = min(ORDINARY_S / periods_s[camera], 1.0)
         return min(period_s for period_s, frame in zip(periods_s, newest, strict=True) if frame is not None)
 
-    def _compare(self, estimated: Array) -> None:
-        """Begin anew when the estimate's markers, (M, 3) m, stay away from where all cameras together see them, or its
-        fingers stay bent as nobody's are."""
+    def _compare(self, state: HandState) -> None:
+        """Begin anew when the estimate's markers stay away from where all cameras together see them, or its fingers
+        stay bent as nobody's are."""
+        is_strange = self._hand.strangeness > _STRANGEST
+        if (state.condition is Condition.TRACKING and not is_strange and self._sound is not None
+                and 0 <= self._timeline.t_ns - self._sound.t_ns < _SOUND_NS):
+            return
+        measured = np.count_nonzero(state.marker_knowledge == Knowledge.MEASURED)
+        if self._size is None and not is_strange and measured > len(state.marker_ids) - _APART_MARKERS:
+            self._apart = self._strange = 0  # what is measured is where cameras see it: nothing is left to compare
+            if measured >= _SOUND_MARKERS:
+                self._note_sound()
+            return
         located = self._starter.locate()
         if located is None:
             return
-        apart = count_elsewhere(located.positions, estimated, self._hand.estimate.velocity,
+        apart = count_elsewhere(located.positions, state.marker_positions, self._hand.estimate.velocity,
                                 1e-9 * (self._timeline.t_ns - located.t_ns))
         if self._size is not None and apart == 0:
             self._size.look(located, self._hand.estimate.world, self._hand.estimate.angles)
         if apart == 0 and np.count_nonzero(located.clear) >= _SOUND_MARKERS:
-            self._sound = Sound(self._timeline.t_ns, HandPose(self._hand.estimate.world.copy(),
-                                                              self._hand.estimate.angles.copy()))
+            self._note_sound()
         self._apart = self._apart + 1 if apart >= _APART_MARKERS else 0
-        self._strange = self._strange + 1 if self._hand.strangeness > _STRANGEST else 0
+        self._strange = self._strange + 1 if is_strange else 0
         is_strange = self._strange >= _APART_STATES and abs(self._timeline.t_ns - self._anew_ns) > _AGAIN_NS
         if (is_strange or self._apart >= _APART_STATES) and self._begin(located) and is_strange:
             self._anew_ns = self._timeline.t_ns
+
+    def _note_sound(self) -> None:
+        self._sound = Sound(self._timeline.t_ns, HandPose(self._hand.estimate.world.copy(),
+                                                          self._hand.estimate.angles.copy()))
 
     def _look_at_thumb(self) -> None:
         """A thumb that bends backwards may be one that bends forwards."""
@@ -266,5 +282,5 @@ class ModelTracker:
                                 Condition.LOST if self._ever else Condition.SEARCHING,
                                 None if self._size is None else self._size.known, newest, begun)
         state = self._told.tell(self._timeline.t_ns, newest, begun)
-        self._compare(state.marker_positions)
+        self._compare(state)
         return state

@@ -136,6 +136,20 @@ def displace(source: Estimate, step: Array, target: Estimate) -> None:
 
 
 @njit(cache=True)
+def take_size(estimate: Estimate, size: Array) -> None:
+    """Make the hand as large as `size` (2,) says, as well known as that. What goes with the size is known better as it
+    is, but not worse all at once: the covariance must stay one."""
+    covariance = estimate.covariance
+    before = covariance[SCALE, SCALE]
+    if before > size[1]:
+        share = math.sqrt(size[1] / before)
+        covariance[SCALE] *= share
+        covariance[:, SCALE] *= share
+    covariance[SCALE, SCALE] = size[1]
+    estimate.log_scale[0] = size[0]
+
+
+@njit(cache=True)
 def scale_of(estimate: Estimate) -> float:
     """Factor on every length of the hand."""
     return math.exp(estimate.log_scale[0])

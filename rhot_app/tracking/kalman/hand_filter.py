@@ -22,6 +22,7 @@ from rhot_app.tracking.kalman.estimate import (
     Estimate,
     displace,
     empty_estimate,
+    take_size,
 )
 from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import Gain, contract, empty_gain, misfit, solve
@@ -92,11 +93,12 @@ class Desk(NamedTuple):
     limits: Array
     bias_variance: Array
     size: Array  # (2,): the logarithm of the hand's scale, and the variance of it, 0 for a size that is certain
+    strange: Array  # (1,): `holding.strangeness` of the estimate
 
 
 class HandFilter:
     """An iterated extended Kalman filter on the hand's pose, velocity and markers' biases, for a hand whose size it is
-    told. `turned`: by how much the last update changed how the palm is turned, or any joint is bent, rad.
+    told.
 
     `worn`: the markers; `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance`
     (M,) m^2.
@@ -109,8 +111,8 @@ class HandFilter:
         self._desk = Desk(self.estimate, empty_estimate(*shape), empty_rows(ROWS_MAX, size),
                           empty_gain(ROWS_MAX + MOST_HELD, size), empty_held(size), np.empty(size),
                           np.empty(ROWS_MAX, np.bool_), np.empty(ROWS_MAX), worn, cameras, habits, limits,
-                          bias_variance, np.zeros(2))
-        self._shared, self._last, self.turned = Share(self._desk), 0, 0.0
+                          bias_variance, np.zeros(2), np.zeros(1))
+        self._shared, self._last = Share(self._desk), 0
         self._now, self._tried = (Share(Page(mean, self._desk.rows)) for mean in (self.estimate, self._desk.trial))
 
     def resize(self, log_scale: float, variance: float) -> None:
@@ -146,26 +148,38 @@ class HandFilter:
 
     @property
     def strangeness(self) -> float:
-        """How far from habit the fingers are bent, as `holding.strangeness` has it."""
-        return float(strangeness.py_func(self.estimate.angles, self._desk.habits))
+        """How far from habit the last update left the fingers bent, as `holding.strangeness` has it."""
+        return float(self._desk.strange[0])
 
     def update(self, dt: float, blocks: Sequence[ResidualBlock]) -> Outcome:
         """Carry the estimate on by `dt` >= 0 s and weigh what `blocks` observed there; returns what became of the last
         one."""
-        rows = self._desk.rows
+        self._weigh(dt, blocks)
+        return self._conclude(dt)
+
+    def update_gently(self, dt: float, blocks: Sequence[ResidualBlock], most_rad: float) -> Outcome | None:
+        """The same, unless the palm is turned, or any joint bent, by more than `most_rad` for it: then None, and the
+        estimate is of no use before it is brought back to what it was."""
+        return self._conclude(dt) if self._weigh(dt, blocks) <= most_rad else None
+
+    def _weigh(self, dt: float, blocks: Sequence[ResidualBlock]) -> float:
+        """All of an update but its conclusion; returns by how much it is to turn anything, rad."""
         _carry_on(self._shared, dt)
         for block in blocks:
             block.associate(self._now)
         self._linearise(blocks, self._now)
         _prepare(self._shared, dt)
-        self._settle(blocks)
+        turned = self._settle(blocks)
         if self._misfits(blocks):
             _hold_turn_alone(self._shared)
             self._linearise(blocks, self._now)
-            self._settle(blocks)
-        self.turned = _conclude(self._shared, dt)
-        of_last = slice(self._last, int(rows.used[1]))
-        return Outcome(self._desk.believed[of_last], self._desk.widening[of_last], rows.source[of_last])
+            turned = self._settle(blocks)
+        return turned
+
+    def _conclude(self, dt: float) -> Outcome:
+        _conclude(self._shared, dt)
+        of_last = slice(self._last, int(self._desk.rows.used[1]))
+        return Outcome(self._desk.believed[of_last], self._desk.widening[of_last], self._desk.rows.source[of_last])
 
     def _linearise(self, blocks: Sequence[ResidualBlock], page: Share) -> None:
         used = self._desk.rows.used
@@ -174,17 +188,18 @@ class HandFilter:
             self._last = int(used[1])
             block.linearise(page)
 
-    def _settle(self, blocks: Sequence[ResidualBlock]) -> None:
-        """Iterate to the new mean, a step from the old one."""
+    def _settle(self, blocks: Sequence[ResidualBlock]) -> float:
+        """Iterate to the new mean, a step from the old one; returns by how much that turns anything, rad."""
         self._desk.step[:] = 0.0
-        whole = 0
+        whole, turned = 0, 0.0
         for count in range(MOST_STEPS):
             if count > 0:
                 self._linearise(blocks, self._tried)
-            turn = _improve(self._shared)
+            turn, turned = _improve(self._shared)
             whole += turn < 0.99 * LONGEST_RAD
             if turn < NEAR_RAD or whole == ITERATIONS:
-                return
+                break
+        return turned
 
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
         """Whether fingers that are held to bend in all joints at once cannot be where they are seen."""
@@ -201,20 +216,6 @@ def _carry_on(shared: Share, dt: float) -> None:
     predict(desk.estimate, dt, desk.worn.part, desk.habits, desk.estimate.bias_variance)
     if desk.size[1] > 0.0:
         take_size(desk.estimate, desk.size)
-
-
-@njit(cache=True)
-def take_size(estimate: Estimate, size: Array) -> None:
-    """Make the hand as large as `size` (2,) says, as well known as that. What goes with the size is known better as it
-    is, but not worse all at once: the covariance must stay one."""
-    covariance = estimate.covariance
-    before = covariance[SCALE, SCALE]
-    if before > size[1]:
-        share = math.sqrt(size[1] / before)
-        covariance[SCALE] *= share
-        covariance[:, SCALE] *= share
-    covariance[SCALE, SCALE] = size[1]
-    estimate.log_scale[0] = size[0]
 
 
 @njit(cache=True)
@@ -244,8 +245,9 @@ def _hold_turn_alone(shared: Share) -> None:
 
 
 @njit(cache=True)
-def _improve(shared: Share) -> float:
-    """One iteration, no longer than `LONGEST_RAD`; the trial becomes the new mean. Returns its largest turn, rad."""
+def _improve(shared: Share) -> tuple[float, float]:
+    """One iteration, no longer than `LONGEST_RAD`; the trial becomes the new mean. Returns its largest turn and that of
+    the whole step, rad."""
     desk: Desk = shared.of
     estimate, gain, step = desk.estimate, desk.gain, desk.step
     before = step.copy()
@@ -255,7 +257,7 @@ def _improve(shared: Share) -> float:
         step[:] = before + LONGEST_RAD / turn * (step - before)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[1]], desk.limits, step)
     displace(estimate, step, desk.trial)
-    return _turn(before, step)
+    return _turn(before, step), _turn(np.zeros_like(step), step)
 
 
 @njit(cache=True)
@@ -268,12 +270,10 @@ def _turn(one: Array, other: Array) -> float:
 
 
 @njit(cache=True)
-def _conclude(shared: Share, dt: float) -> float:
-    """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits; the size stays. Returns how
-    much was learnt of any turn, rad."""
+def _conclude(shared: Share, dt: float) -> None:
+    """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits; the size stays."""
     desk: Desk = shared.of
     estimate, worn, gain, step = desk.estimate, desk.worn, desk.gain, desk.step
-    turned = float(np.abs(step[ROTATION:POSE]).max())
     note_sights(estimate, worn.part, desk.rows, desk.believed)
     note_trend(estimate, step, gain)
     contract(estimate.covariance, gain)
@@ -287,6 +287,6 @@ def _conclude(shared: Share, dt: float) -> float:
     forget(estimate, dt, desk.habits, estimate.bias_variance, jacobian, gain, step, away)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], desk.limits, step)
     displace(estimate, step, estimate)
+    desk.strange[0] = strangeness(estimate.angles, desk.habits)
     if desk.size[1] > 0.0:
         estimate.log_scale[0], estimate.covariance[SCALE, SCALE] = desk.size[0], desk.size[1]
-    return turned

@@ -98,25 +98,26 @@ class Timeline:
         return outcomes
 
     def _weigh(self, block: TimedBlock) -> Outcome:
-        estimate = self._hand.estimate
+        estimate, beside = self._hand.estimate, self._beside(block)
         before = self._spare.pop() if self._spare else empty_estimate(*estimate.unseen.shape)
         copy_estimate(estimate, before)
         self._moments.append(_Moment(block.t_ns, self.t_ns, before, block))
         if len(self._moments) > LENGTH:
             self._spare.append(self._moments.pop(0).before)
-        outcome = self._hand.update(1e-9 * (block.t_ns - self.t_ns), [block])
-        self.t_ns = block.t_ns
-        beside = self._beside() if self._hand.turned > TURNS_RAD else None
+        since_s, self.t_ns = 1e-9 * (block.t_ns - self.t_ns), block.t_ns
         if beside is None:
+            return self._hand.update(since_s, [block])
+        outcome = self._hand.update_gently(since_s, [block], TURNS_RAD)
+        if outcome is not None:
             return outcome
         copy_estimate(beside.before, estimate)
         return self._hand.update(1e-9 * (block.t_ns - beside.before_ns), [beside.block.as_of(block.t_ns), block])
 
-    def _beside(self) -> _Moment | None:
-        """The moment before the last one, if it can be told of as of that."""
-        if len(self._moments) < 2:
+    def _beside(self, block: TimedBlock) -> _Moment | None:
+        """The last moment, if it can be told of as of this block's instant."""
+        if not self._moments:
             return None
-        beside, last = self._moments[-2:]
-        since_ns = last.t_ns - beside.t_ns
+        beside = self._moments[-1]
+        since_ns = block.t_ns - beside.t_ns
         way_m = 1e-9 * since_ns * float(np.linalg.norm(self._hand.estimate.velocity[:ROTATION]))
-        return beside if beside.block.camera != last.block.camera and since_ns < BESIDE_NS and way_m < WAY_M else None
+        return beside if beside.block.camera != block.camera and since_ns < BESIDE_NS and way_m < WAY_M else None
