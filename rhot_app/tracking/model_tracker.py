@@ -65,8 +65,8 @@ _SOUND_MARKERS, _LEAST_CLEAR = 3, 2
 _SOUND_NS = 50_000_000
 """A sound hand all of whose markers are measured is not compared again for so long."""
 
-_THUMB_NS = 200_000_000
-"""How often a thumb that bends backwards is looked at."""
+_THUMB_NS = 40_000_000
+"""How often a thumb that bends backwards is looked at: before it has gone far the wrong way."""
 
 
 class Sound(NamedTuple):
@@ -219,7 +219,8 @@ class ModelTracker:
         """A thumb that bends backwards may be one that bends forwards."""
         if self._timeline.t_ns - self._thumb_ns > _THUMB_NS and bent_backwards(self._hand.estimate):
             self._thumb_ns = self._timeline.t_ns
-            unbend(self._hand.estimate, self._wearing.model, self._wearing.habits.usual)
+            if unbend(self._hand.estimate, self._wearing.model, self._wearing.habits.usual):
+                self._timeline.begin(self._timeline.t_ns)
 
     def _other_time(self, t_ns: int) -> bool:
         """Whether frames are of another timeline now: one far ahead, or several far behind; a single one is only late.

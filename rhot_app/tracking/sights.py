@@ -13,7 +13,7 @@ from rhot_app.tracking.kalman.marker_block import MarkerBlock, Sighting
 from rhot_app.tracking.kalman.markers import Cameras, project_marker
 from rhot_app.tracking.kalman.rows import Outcome
 from rhot_app.tracking.kalman.share import Share
-from rhot_app.tracking.kalman.surprise import PLAUSIBLE, ROBUST
+from rhot_app.tracking.kalman.surprise import UNLIKELY
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
@@ -22,9 +22,6 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.uint16]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-
-UNLIKELY = PLAUSIBLE / ROBUST
-"""A sight whose noise was widened by more to fit is not beyond doubt: 5 in 100,000 are so by chance."""
 
 SLOWEST_CLEAR_NS = 150_000_000
 """Sights that stay fresh for longer, those of a camera of fewer than 10 frames/s, measure nothing: where a hand went

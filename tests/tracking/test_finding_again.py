@@ -10,6 +10,7 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.simulator.motion import FACING
+from rhot_app.tracking import model_tracker
 from rhot_app.tracking.kalman.hand_filter import HandFilter
 from rhot_app.tracking.kalman.holding import strangeness
 from rhot_app.tracking.kalman.wearing import compile_wearing
@@ -135,3 +136,20 @@ def test_a_tracked_hand_is_as_strange_as_it_is_estimated_to_be():
         state = tracker.solve()
     assert tracker._hand.strangeness == pytest.approx(strangeness(state.angles, WEARING.habits), rel=1e-6)
     assert tracker._hand.strangeness > 0.1
+
+
+def test_a_thumb_that_was_bent_forwards_stays_so_when_a_frame_comes_late(monkeypatch):
+    tracker, frames = make_tracker(RIG), sights(RIG, moving(), 1.3)
+    late = frames.pop(-2)
+    for frame in frames[:-1]:
+        tracker.ingest(frame)
+        tracker.solve()
+    monkeypatch.setattr(model_tracker, "bent_backwards", lambda _: True)
+    monkeypatch.setattr(model_tracker, "unbend", lambda estimate, *_: True)
+    tracker.ingest(frames[-1])
+    tracker.solve()
+    dropped, angles = tracker._timeline.dropped, tracker._hand.estimate.angles.copy()
+    tracker.ingest(late)
+    tracker.solve()
+    assert tracker._timeline.dropped == dropped + 1
+    np.testing.assert_array_equal(tracker._hand.estimate.angles, angles)

@@ -2,7 +2,8 @@
 
 A nearly straight thumb has its tip in the same place whether its joints bend a little forwards or a little backwards.
 The way from one to the other leads through the straight thumb, whose tip is elsewhere, so a filter that has once taken
-the wrong one stays there. Thumbs seldom bend backwards.
+the wrong one stays there, and when the thumb goes on to bend forwards is led away from what both cameras see. Thumbs
+seldom bend backwards.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 BACKWARDS_RAD = np.radians(5.0)
 """Sum of the outer two joints' angles beyond which a thumb counts as bent backwards."""
 
+_AT_END_RAD, _CLIPPED = np.radians(1.0), 2.0
+"""Outer joints this near to the end of their way back would go on if they could: that counts as so much strain."""
+
 _THUMB = ANGLE_SLICES[0]
 _ROOT, _OUTER = 1, slice(3, 5)
 _LEVERS = np.array([1.2, 0.6])  # what the root turns for a tip that stays, per angle of the outer joints mirrored
@@ -33,7 +37,8 @@ def bent_backwards(estimate: Estimate) -> bool:
 
 
 def unbend(estimate: Estimate, model: HandModel, usual: Array) -> bool:
-    """Bend the thumb forwards if that is more natural and leaves its tip in place; returns whether it was.
+    """Bend the thumb forwards if that is more natural and leaves its tip in place; returns whether it was. One that
+    is about as natural is preferred to a thumb at the end of its way back.
 
     `usual` (27, 27) as in `Habits`: what is known of the thumb's angles afterwards.
     """
@@ -43,7 +48,10 @@ def unbend(estimate: Estimate, model: HandModel, usual: Array) -> bool:
     mirrored[_OUTER] *= -1.0
     mirrored[_ROOT] += _LEVERS @ angles[_OUTER]
     found = solve_finger(model, 0, world, mirrored, target)
-    if not found.reached or found.angles[_OUTER].sum() < 0.0 or _strain(model, found.angles) >= _strain(model, angles):
+    strain, ends = _strain(model, angles), model.limits[_THUMB][_OUTER, 0]
+    if np.all(angles[_OUTER] < ends + _AT_END_RAD):
+        strain += _CLIPPED
+    if not found.reached or found.angles[_OUTER].sum() < 0.0 or _strain(model, found.angles) >= strain:
         return False
     estimate.angles[_THUMB] = found.angles
     forget_finger(estimate, 0, usual)

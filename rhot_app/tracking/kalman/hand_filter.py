@@ -34,7 +34,7 @@ from rhot_app.tracking.kalman.reappearing import loosen, loosen_palm
 from rhot_app.tracking.kalman.rows import Outcome, Page, ResidualBlock, Rows, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown, note_sights
-from rhot_app.tracking.kalman.surprise import appraise, note_trend
+from rhot_app.tracking.kalman.surprise import UNLIKELY, appraise, note_trend
 from rhot_app.tracking.kalman.withholding import MOST as MOST_HELD
 from rhot_app.tracking.kalman.withholding import Held, bound_biases, empty_held, withhold
 
@@ -42,7 +42,12 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 ITERATIONS = 2
-"""Whole steps; more of them go to and fro where an angle is open: what is left is there again with the next frame."""
+"""Whole steps; more of them go to and fro where an angle is open."""
+
+FITS, CAUTIOUS, CAUTIOUS_STEPS = 25.0, 0.3, 8
+"""A finger that is nearly straight is shown as well bent the one way as the other. Where any row is left with a squared
+normalised residual beyond the first of these, up to so many more steps go this part of their way; what smaller ones
+leave is there again with the next frame."""
 
 LONGEST_RAD = 0.35
 """A step that turns anything by more is shortened to this and the rows are linearised again: what moves along an arc
@@ -158,23 +163,25 @@ class HandFilter:
         return self._conclude(dt)
 
     def update_gently(self, dt: float, blocks: Sequence[ResidualBlock], most_rad: float) -> Outcome | None:
-        """The same, unless the palm is turned, or any joint bent, by more than `most_rad` for it: then None, and the
-        estimate is of no use before it is brought back to what it was."""
-        return self._conclude(dt) if self._weigh(dt, blocks) <= most_rad else None
+        """The same, unless anything that is seen is unlikely, or the palm is turned, or any joint bent, by more than
+        `most_rad` for it: then None, and the estimate is of no use before it is brought back to what it was."""
+        turned, likely = self._weigh(dt, blocks)
+        return self._conclude(dt) if likely and turned <= most_rad else None
 
-    def _weigh(self, dt: float, blocks: Sequence[ResidualBlock]) -> float:
-        """All of an update but its conclusion; returns by how much it is to turn anything, rad."""
+    def _weigh(self, dt: float, blocks: Sequence[ResidualBlock]) -> tuple[float, bool]:
+        """All of an update but its conclusion; returns by how much it is to turn anything, rad, and whether all that is
+        seen was likely."""
         _carry_on(self._shared, dt)
         for block in blocks:
             block.associate(self._now)
         self._linearise(blocks, self._now)
-        _prepare(self._shared, dt)
+        likely = _prepare(self._shared, dt)
         turned = self._settle(blocks)
         if self._misfits(blocks):
             _hold_turn_alone(self._shared)
             self._linearise(blocks, self._now)
             turned = self._settle(blocks)
-        return turned
+        return turned, likely
 
     def _conclude(self, dt: float) -> Outcome:
         _conclude(self._shared, dt)
@@ -195,19 +202,29 @@ class HandFilter:
         for count in range(MOST_STEPS):
             if count > 0:
                 self._linearise(blocks, self._tried)
-            turn, turned = _improve(self._shared)
+            if whole >= ITERATIONS and (self._holds or self._misfit <= FITS):
+                break
+            turn, turned = _improve(self._shared, 1.0 if whole < ITERATIONS else CAUTIOUS)
             whole += turn < 0.99 * LONGEST_RAD
-            if turn < NEAR_RAD or whole == ITERATIONS:
+            if turn < NEAR_RAD or whole == ITERATIONS + CAUTIOUS_STEPS:
                 break
         return turned
 
     def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
         """Whether fingers that are held to bend in all joints at once cannot be where they are seen."""
-        stiff = self._desk.held.used[0] > TURN_ALONE + (self._desk.size[1] > 0.0)
-        if self.estimate.held[0] != TURN_HELD or not stiff:
+        if self.estimate.held[0] != TURN_HELD or not self._holds:
             return False
         self._linearise(blocks, self._tried)
-        return bool(misfit(self._desk.rows, self._desk.believed, self._desk.widening) > MISFIT)
+        return self._misfit > MISFIT
+
+    @property
+    def _holds(self) -> bool:
+        """Whether more is held than how the palm is turned, and the hand's size."""
+        return bool(self._desk.held.used[0] > TURN_ALONE + (self._desk.size[1] > 0.0))
+
+    @property
+    def _misfit(self) -> float:
+        return float(misfit(self._desk.rows, self._desk.believed, self._desk.widening))
 
 
 @njit(cache=True)
@@ -219,8 +236,8 @@ def _carry_on(shared: Share, dt: float) -> None:
 
 
 @njit(cache=True)
-def _prepare(shared: Share, dt: float) -> None:
-    """Decide what is held of the hand and which observations are believed."""
+def _prepare(shared: Share, dt: float) -> bool:
+    """Decide what is held of the hand and which observations are believed; returns whether they are all likely."""
     desk: Desk = shared.of
     estimate, rows, part = desk.estimate, desk.rows, desk.worn.part
     hold(estimate, rows, part, desk.worn.palmar, desk.cameras.pose, desk.habits, desk.held)
@@ -232,6 +249,7 @@ def _prepare(shared: Share, dt: float) -> None:
     hold_size(estimate.covariance, desk.held)
     appraise(rows, estimate, desk.habits.together, back, desk.believed, desk.widening)
     withhold(estimate.covariance, desk.held, desk.gain)
+    return not np.any(desk.widening[:rows.used[1]] > UNLIKELY)
 
 
 @njit(cache=True)
@@ -245,16 +263,16 @@ def _hold_turn_alone(shared: Share) -> None:
 
 
 @njit(cache=True)
-def _improve(shared: Share) -> tuple[float, float]:
-    """One iteration, no longer than `LONGEST_RAD`; the trial becomes the new mean. Returns its largest turn and that of
-    the whole step, rad."""
+def _improve(shared: Share, share: float) -> tuple[float, float]:
+    """One iteration, a `share` of what it wants to be and no longer than `LONGEST_RAD`; the trial becomes the new mean.
+    Returns its largest turn and that of the whole step, rad."""
     desk: Desk = shared.of
     estimate, gain, step = desk.estimate, desk.gain, desk.step
     before = step.copy()
     solve(desk.rows, estimate.covariance, desk.believed, desk.widening, step, gain)
-    turn = _turn(before, step)
-    if turn > LONGEST_RAD:
-        step[:] = before + LONGEST_RAD / turn * (step - before)
+    share *= LONGEST_RAD / max(_turn(before, step), LONGEST_RAD)
+    if share < 1.0:
+        step[:] = before + share * (step - before)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[1]], desk.limits, step)
     displace(estimate, step, desk.trial)
     return _turn(before, step), _turn(np.zeros_like(step), step)

@@ -42,6 +42,9 @@ PLAUSIBLE = 20.0
 ROBUST = 8.0
 """Beyond this an observation's weight falls: its noise is widened until it is no farther off."""
 
+UNLIKELY = PLAUSIBLE / ROBUST
+"""A sight whose noise was widened by more to fit is not beyond doubt: 5 in 100,000 are so by chance."""
+
 GATE = 100.0
 """Beyond this, with all acceleration that a hand is capable of, it is something else."""
 
@@ -91,7 +94,7 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, back: Mask, believ
         added[LINEAR] = 0.0
     if how in (TURN_HELD, PLACED, PALM_HELD):
         added[TURN] = 0.0
-    _wake(estimate, added)
+    _wake(estimate, added, _of_one_camera(rows))
     shake(estimate.covariance, added, together, ONSET_S)
     for observation in range(count):
         value = 0.0 if _is_of(back, rows, observation) else _squared(rows, observation, noise, per_unit, added)
@@ -145,18 +148,24 @@ def _follow_trends(estimate: Estimate, added: Array) -> None:
 
 
 @njit(cache=True)
-def _wake(estimate: Estimate, added: Array) -> None:
+def _of_one_camera(rows: Rows) -> bool:
+    """Whether all observations are of the same camera."""
+    return not np.any(rows.source[:rows.used[1], 0] != rows.source[0, 0])
+
+
+@njit(cache=True)
+def _wake(estimate: Estimate, added: Array, alone: bool) -> None:
     """Wake what surprised; leave in `added` (7,) what the covariance must learn of it.
 
-    An onset is told to the covariance once. Told with every frame, it would let each camera in turn shift the hand
-    sideways where the hand's distance is wrong.
+    Of one camera `alone` an onset is told to the covariance once. Told with every frame, it would let each camera in
+    turn shift the hand sideways where the hand's distance is wrong. Cameras that are weighed together do not.
     """
     for group in range(GROUPS):
         if added[group] > 0.0:
             awake = AWAKE[group] ** 2
             asleep = estimate.agitation[group] < ASLEEP * awake
             estimate.agitation[group] = min(max(2.0 * estimate.agitation[group], awake), MOST[group])
-            added[group] = max(added[group], awake) if asleep else 0.0
+            added[group] = max(added[group], awake) if asleep or not alone else 0.0
 
 
 @njit(cache=True)

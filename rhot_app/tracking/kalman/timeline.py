@@ -1,9 +1,10 @@
 """The filter's recent past: so that a frame that arrives late is weighed where it belongs, not where it arrived, and
-one that turns the hand is weighed together with the one before.
+one that turns the hand, or shows what is unlikely, is weighed together with the one before.
 
 What a camera saw is kept as a covariance, linearised where the hand was then. A frame of another camera that turns the
 palm, and bends its fingers to match, keeps to that along straight lines where fingertips go along arcs: 10 degrees
-move them by 3 mm towards the cameras or away. Weighed together, both are linearised where the hand comes to be.
+move them by 3 mm towards the cameras or away. Weighed together, both are linearised where the hand comes to be, and
+what neither expected is put where both see it, not along one's line of sight.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ LENGTH = 12
 """Updates remembered: 150 ms of two cameras at 40 fps. What is older came too late."""
 
 TURNS_RAD = 0.05
-"""A frame that turns anything by more is weighed together with the one before."""
+"""A frame that turns anything by more, or shows what is unlikely, is weighed together with the one before."""
 
 BESIDE_NS = 15_000_000
 """This is of another camera, and not older than that,"""
@@ -75,7 +76,7 @@ class Timeline:
         self.dropped = 0  # blocks that came too late to be of use
 
     def begin(self, t_ns: int) -> None:
-        """The filter has been started at `t_ns`: what was before does not count."""
+        """The filter has been started at `t_ns`, or changed from outside: what was before does not count."""
         self._spare += [moment.before for moment in self._moments]
         self._moments.clear()
         self.t_ns = t_ns

@@ -58,3 +58,14 @@ def test_a_thumb_that_has_no_better_way_to_bend_is_left_alone(thumb):
     assert not unbend(estimate, MODEL, USUAL)
     np.testing.assert_array_equal(estimate.angles, angles)
     np.testing.assert_array_equal(estimate.covariance, covariance)
+
+
+@pytest.mark.parametrize(("short_of_end_deg", "bends"), [(0.0, True), (1.5, False)])
+def test_a_thumb_at_the_end_of_its_way_back_rather_bends_forwards(short_of_end_deg, bends):
+    """Either way it would be about as natural; but at the end it is not where it would go."""
+    mcp, ip = LIMITS[THUMB][3:, 0] + np.radians(short_of_end_deg)
+    estimate = with_thumb(-0.1, mcp, ip)
+    before = joints(estimate)
+    assert bent_backwards(estimate) and unbend(estimate, MODEL, USUAL) == bends
+    assert bent_backwards(estimate) != bends
+    np.testing.assert_allclose(joints(estimate), before, atol=1e-4)
