@@ -31,7 +31,8 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One take through every tracker: what came of it by the tracker's name."""
+    """One take through every tracker: what came of it by the tracker's name. `motion`: the twin's own by its name, a
+    recording by its file's, suffix and all, so that `pinch` and `pinch.csv` are two."""
 
     motion: str
     seed: int
@@ -87,7 +88,7 @@ def compare(wanted: Sequence[Order], folder: Path, trackers: dict[str, TrackerSe
         for place, (name, settings) in enumerate(trackers.items()):
             progress(f"{name} tracker, {order.title}", (number + place / len(trackers)) / len(wanted))
             judged[name] = judge(recorded, settings)
-        runs.append(Run(Path(order.motion).stem, order.scene.seed, judged))
+        runs.append(Run(Path(order.motion).name, order.scene.seed, judged))
     return Comparison(tuple(runs), outdated)
 
 

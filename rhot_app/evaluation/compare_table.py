@@ -60,15 +60,16 @@ def honesty_table(comparison: Comparison) -> str:
     seeds = len(comparison.of(comparison.motions()[0]))
     heads = "".join(f"{quantity + ' ' + _span(seeds, degrees):>22}" for quantity, degrees in DEGREES.items())
     words = f"{'NEES':>8}{'inside':>7}{'3 sg':>7}"
+    margin = max(len(motion) for motion in comparison.motions()) + 1
     lines = [f"NEES by its degrees of freedom, with the 95 % band of the mean of {seeds} seeds; part of the instants "
              "inside it; part of what is called measured within 3 sigma",
-             " " * 20 + heads, " " * 20 + words * len(DEGREES)]
+             " " * (margin + 8) + heads, " " * (margin + 8) + words * len(DEGREES)]
     for motion in comparison.motions():
         for tracker in comparison.trackers():
             found = comparison.honesty(motion, tracker)
             cells = "".join(f"{cell(one.average, '.2f'):>8}{cell(one.inside, '.2f'):>7}{cell(one.within, '.3f'):>7}"
                             for one in found.values())
-            lines.append(f"{motion[:11]:<11} {tracker[:7]:<8}{cells}")
+            lines.append(f"{motion:<{margin}}{tracker[:7]:<8}{cells}")
     return "\n".join(lines)
 
 

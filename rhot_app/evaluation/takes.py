@@ -60,7 +60,7 @@ class Order:
     @property
     def title(self) -> str:
         """What it is, for people."""
-        return f"{Path(self.motion).stem}, {self.seconds:g} s, seed {self.scene.seed}"
+        return f"{Path(self.motion).name}, {self.seconds:g} s, seed {self.scene.seed}"
 
     def name(self) -> str:
         """A folder name that differs with the order."""

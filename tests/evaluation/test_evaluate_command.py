@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 
 from rhot_app.__main__ import main
+from rhot_app.evaluation.compare import TRACKERS, compare
+from rhot_app.evaluation.compare_table import honesty_table, table
+from rhot_app.evaluation.takes import Order
+from rhot_app.simulator.scene import make_scene, twin_defaults
 
+RAMP = Path(__file__).resolve().parents[2] / "benchmarks" / "motions" / "ramp.json"
 QUICK = ("evaluate", "--compare", "--sketched", "--trackers", "classic", "--motions", "rest,pinch", "--seeds", "2",
          "--seconds", "1.6")
 
@@ -25,6 +31,16 @@ def test_a_comparison_prints_tables_and_json(tmp_path: Path, capsys: pytest.Capt
     assert found["outdated"] == 0 and len(found["runs"]) == 4
     assert 0.0 < found["motions"]["rest"]["classic"]["tip_visible_mm"] < 2.0
     assert found["honesty"]["rest"]["classic"]["tips"]["average"] is None
+
+
+def test_a_recording_of_a_motions_name_is_another_motion(tmp_path: Path) -> None:
+    recording = shutil.copy(RAMP, tmp_path / "pinch.json")
+    wanted = [Order(make_scene(twin_defaults(), 1), motion, 1.6, sketched=True) for motion in ("pinch", str(recording))]
+    found = compare(wanted, tmp_path / "logs", {"classic": TRACKERS["classic"]})
+    assert found.motions() == ["pinch", "pinch.json"]
+    assert [len(found.of(motion)) for motion in found.motions()] == [1, 1]
+    for printed in (table(found), honesty_table(found)):
+        assert [line.split()[0] for line in printed.splitlines()[-2:]] == ["pinch", "pinch.json"]
 
 
 @pytest.mark.parametrize("wrong", [("--trackers", "magic"), ("--seconds", "0.5"), ("--seeds", "0"), ("--loss", "1"),
