@@ -3,8 +3,8 @@
 Three things differ. The filter takes markers' seen middles to lie farther from their places than they turn out to: a
 hand that trusts its fingertips too far follows them where its palm does not go. What is told takes them to lie as near
 as they do.
-Of a palm that turns, and of which only fingers show how, more is believed to be known than is. And no angle is known
-less than by habit.
+How a palm is turned that only fingers show is believed to be known better than habit leaves it: it is told as no better
+known. And no angle is known less than by habit.
 """
 
 from __future__ import annotations
@@ -17,14 +17,10 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
 from rhot_app.tracking.kalman.combine import add_rows, add_squares
-from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, LOOK_VARIANCE, PLACED, POSE, SCALE, Estimate
+from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, LOOK_VARIANCE, PLACED, POSE, ROTATION, SCALE, Estimate
 from rhot_app.tracking.kalman.markers import NEAREST_M, Cameras
 
 Array = NDArray[np.float64]
-
-DOUBTED = 0.25
-"""Of a palm that turns, and of which only fingers show how, more is believed to be known than is: linearised anew with
-every frame, fingers that bend pass for a palm that turns. This part of what habit leaves open is told beside."""
 
 COMMON = 0.8
 """Light and paint move a marker's middle in all pictures alike by so many of the standard deviations that nodes state
@@ -51,13 +47,30 @@ def known_of(estimate: Estimate, cameras: Cameras, paint: Array, made: Array, us
     as_usual = estimate.held[0] < PLACED
     if as_usual:
         tell_of_paint(estimate, cameras, paint, made, out)
-    for i in range(POSE):
-        for j in range(POSE):
-            out[i, j] += DOUBTED * estimate.left_open[i, j]
+    _tell_of_open(estimate.left_open, out)
     if as_usual:
         for i in range(ANGLES, POSE):
             tell_of_habit(out, i, usual[i])
     return out
+
+
+@njit(cache=True)
+def _tell_of_open(left_open: Array, out: Array) -> None:
+    """Add to `out` (28, 28) so much of `left_open` (27, 27), as in `Estimate`, that how the palm is turned is not told
+    to be known better than habit leaves it to a hand with its markers in their places.
+
+    A filter that linearises anew with every frame takes the sum of what it saw for more: fingers that sweep about their
+    knuckles seem to show where these are, fingers that bend pass for a palm that turns.
+    """
+    left = known = 0.0
+    for i in range(ROTATION, ANGLES):
+        left += left_open[i, i]
+        known += out[i, i]
+    if left > known:
+        share = 1.0 - known / left
+        for i in range(POSE):
+            for j in range(POSE):
+                out[i, j] += share * left_open[i, j]
 
 
 @njit(cache=True)

@@ -189,6 +189,7 @@ class ModelTracker:
         is_strange = self._hand.strangeness > _STRANGEST
         if (state.condition is Condition.TRACKING and not is_strange and self._sound is not None
                 and 0 <= self._timeline.t_ns - self._sound.t_ns < _SOUND_NS):
+            self._apart = self._strange = 0
             return
         measured = np.count_nonzero(state.marker_knowledge == Knowledge.MEASURED)
         if self._size is None and not is_strange and measured > len(state.marker_ids) - _APART_MARKERS:

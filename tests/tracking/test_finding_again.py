@@ -79,13 +79,14 @@ def test_a_hand_that_has_leapt_away_is_soon_set_back(seen, speed_m_s):
     assert deviations(after_s(states, 1.45), moving()).mm[:, fingers].max() < 10.0
 
 
-@pytest.mark.parametrize(("lasting", "begun"), [(3, 1), (8, 2), (40, 2)])
-def test_a_hand_whose_fingers_stay_bent_as_nobodys_is_begun_anew(monkeypatch, lasting, begun):
+@pytest.mark.parametrize(("lasting", "every", "begun"), [(3, 1, 1), (8, 1, 2), (40, 1, 2), (40, 2, 1)])
+def test_a_hand_whose_fingers_stay_bent_as_nobodys_is_begun_anew(monkeypatch, lasting, every, begun):
     """Once: if it is bent so again, it is. Its markers are where they are seen all the time."""
     starts, left = [], [0]
     start = HandFilter.start
     monkeypatch.setattr(HandFilter, "start", lambda hand, *pose: (starts.append(pose), start(hand, *pose)))
-    monkeypatch.setattr(HandFilter, "strangeness", property(lambda _: _STRANGEST + 1.0 if left[0] > 0 else _STRANGEST))
+    monkeypatch.setattr(HandFilter, "strangeness", property(
+        lambda _: _STRANGEST + (1.0 if left[0] > 0 and left[0] % every == 0 else 0.0)))
     tracker, states = make_tracker(RIG), []
     for frame in sights(RIG, moving(), 1.3):
         tracker.ingest(frame)

@@ -28,7 +28,6 @@ from rhot_app.tracking.kalman.estimate import (
     BIAS,
     FADING,
     FIRST_FINGER,
-    FREE,
     GOES_ON,
     GROUP_OF,
     OPENING,
@@ -139,7 +138,7 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
             _open_up(estimate, -math.expm1(-passed / constant), habits, bias_variance, jacobian, step)
         mirror(estimate.covariance)  # rounding must not make it unsymmetric: what fades would let it grow
         estimate.unfaded[what] = 0.0
-    if how != FREE or _palm_shown(jacobian) >= ENOUGH:
+    if how > TURN_HELD or _palm_shown(jacobian) >= ENOUGH:
         estimate.left_open[:] = 0.0
 
 

@@ -155,7 +155,8 @@ def _of_one_camera(rows: Rows) -> bool:
 
 @njit(cache=True)
 def _wake(estimate: Estimate, added: Array, alone: bool) -> None:
-    """Wake what surprised; leave in `added` (7,) what the covariance must learn of it.
+    """Wake what surprised, to be as lively as makes it plausible; leave in `added` (7,) what the covariance must learn
+    of it.
 
     Of one camera `alone` an onset is told to the covariance once. Told with every frame, it would let each camera in
     turn shift the hand sideways where the hand's distance is wrong. Cameras that are weighed together do not.
@@ -164,7 +165,7 @@ def _wake(estimate: Estimate, added: Array, alone: bool) -> None:
         if added[group] > 0.0:
             awake = AWAKE[group] ** 2
             asleep = estimate.agitation[group] < ASLEEP * awake
-            estimate.agitation[group] = min(max(2.0 * estimate.agitation[group], awake), MOST[group])
+            estimate.agitation[group] = min(max(2.0 * estimate.agitation[group], awake, added[group]), MOST[group])
             added[group] = max(added[group], awake) if asleep or not alone else 0.0
 
 

@@ -216,7 +216,8 @@ def test_a_palm_that_habit_turns_is_taken_to_turn_once_it_has_been_found(how, do
     assert (estimate.turning[0] > 0.01) == turns
 
 
-@pytest.mark.parametrize(("how", "knuckles", "told"), [(FREE, 0, True), (FREE, 2, False), (TURN_HELD, 0, False)])
+@pytest.mark.parametrize(("how", "knuckles", "told"), [(FREE, 0, True), (FREE, 2, False), (TURN_HELD, 0, True),
+                                                       (PLACED, 0, False), (GOES_ON, 0, False)])
 def test_what_is_open_of_a_palm_that_only_fingers_show_to_turn_is_told(how, knuckles, told):
     estimate, step = moving_estimate(), np.zeros(SIZE)
     estimate.held[0], estimate.left_open[:] = how, 7.0

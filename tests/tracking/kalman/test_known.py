@@ -8,6 +8,7 @@ from known_hand import MARKERS, RIG, WEARING, moving_estimate, next_frame, place
 from msgspec.structs import replace
 
 from rhot_app.tracking.kalman.estimate import (
+    ANGLES,
     BIAS,
     FREE,
     GOES_ON,
@@ -15,12 +16,13 @@ from rhot_app.tracking.kalman.estimate import (
     PALM_HELD,
     PLACED,
     POSE,
+    ROTATION,
     SCALE,
     TURN_HELD,
     Estimate,
 )
 from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.known import COMMON, DOUBTED, known_of, tell_of_habit
+from rhot_app.tracking.known import COMMON, known_of, tell_of_habit
 
 ANY_HABIT = np.full(POSE, 1e9)
 PAINT = WEARING.bias_variance / 16.0
@@ -108,11 +110,29 @@ def test_of_a_palm_that_its_own_markers_do_not_place_nothing_is_told_but_what_th
     assert np.array_equal(told(estimate, usual=usual), worked_with(estimate)) == nothing_more
 
 
-def test_part_of_what_habit_leaves_open_of_a_palm_that_only_fingers_show_to_turn_is_told_beside():
+@pytest.mark.parametrize("how", [FREE, TURN_HELD])
+def test_a_palm_that_only_fingers_show_is_told_to_be_turned_no_better_known_than_habit_leaves_it(how):
+    estimate = moving_estimate()
+    estimate.held[0] = how
+    before = told(estimate)
+    estimate.left_open[:] = np.diag(np.linspace(1.0, 2.0, POSE))
+    estimate.left_open[ROTATION:ANGLES, ROTATION:ANGLES] = np.diag(np.linspace(2.0, 4.0, 3)) * turn(before)
+    added = told(estimate) - before
+    assert turn(before + added) == pytest.approx(turn(estimate.left_open), rel=1e-9)
+    np.testing.assert_allclose(added[:POSE, :POSE], added[0, 0] * estimate.left_open, rtol=1e-9, atol=1e-15)
+    assert not added[POSE].any()
+
+
+def test_a_palm_that_is_known_no_better_than_habit_leaves_it_is_told_as_it_is():
     estimate = moving_estimate()
     before = told(estimate)
-    estimate.left_open[3:6, 3:6] = 1e-2 * np.eye(3)
-    np.testing.assert_allclose((told(estimate) - before)[3:6, 3:6], DOUBTED * 1e-2 * np.eye(3), atol=1e-12)
+    estimate.left_open[:] = 0.99 * turn(before) / 3.0 * np.eye(POSE)
+    np.testing.assert_array_equal(told(estimate), before)
+
+
+def turn(known: np.ndarray) -> float:
+    """How little is known of the palm's turn, rad^2: its variances together."""
+    return float(np.trace(known[ROTATION:ANGLES, ROTATION:ANGLES]))
 
 
 @given(seed=st.integers(0, 2**32 - 1), column=st.integers(0, 5), usual=st.floats(1e-3, 10.0))

@@ -4,11 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from known_hand import WEARING, blocks, difference, empty, filter_of_hand, moving_estimate, settled, twin
-from modelled_hand import after_s, deviations, model_rig, moving, sights, states_of
+from known_hand import blocks, difference, empty, filter_of_hand, moving_estimate, settled, twin
 
-from rhot_app.hand.skeleton import WRIST_ROLE
-from rhot_app.tracking.kalman import timeline as timeline_module
 from rhot_app.tracking.kalman.estimate import copy_estimate
 from rhot_app.tracking.kalman.timeline import BESIDE_NS, LENGTH, TURNS_RAD, WAY_M, Timeline
 
@@ -121,20 +118,3 @@ def test_a_frame_that_turns_the_hand_is_weighed_with_the_one_before(turns, speed
     assert hand.told == told and weighed is other and outcome == len(told)
     assert hand.estimate.world[0, 3] == pytest.approx(1e-9 * other.t_ns)  # from before both of them
     assert timeline.t_ns == other.t_ns
-
-
-def test_fingertips_stay_where_both_cameras_see_them_when_a_palm_comes_back(monkeypatch):
-    rig, truth, wrist = model_rig(), moving("wave"), WEARING.marker_of(WRIST_ROLE)
-    off_mm = {BESIDE_NS: [], 0: []}
-    for begin in (0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8):
-        frames = [replace(frame, pixels=frame.pixels.copy()) for frame in sights(rig, truth, 3.0)]
-        start_ns = min(frame.t_row0_master_ns for frame in frames)
-        for frame in frames:
-            if begin < 1e-9 * (frame.t_row0_master_ns - start_ns) < begin + 0.6:
-                frame.pixels[wrist] = np.nan
-        for beside_ns, found in off_mm.items():
-            monkeypatch.setattr(timeline_module, "BESIDE_NS", beside_ns)
-            states = after_s(states_of(rig, frames), begin + 0.5, begin + 0.85)
-            found.append(deviations(states, truth).rms_mm)
-    together, apart = (np.sqrt(np.mean(np.square(found))) for found in off_mm.values())
-    assert together < 0.9 * apart
