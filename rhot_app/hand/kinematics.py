@@ -113,6 +113,26 @@ def add_angle_columns(dh: DhArrays, world_from_root: Array, frames: Array, point
 
 
 @njit(cache=True)
+def direction_jacobian(dh: DhArrays, world_from_root: Array, frames: Array, point: int, direction: Array,
+                       out: Array) -> None:
+    """Fill `out` (3, 6 + angles): how a unit vector (3,), world, follows that is fixed to a point's body. Columns as
+    `jacobian` says."""
+    out[:] = 0.0
+    x, y, z = direction
+    add_turn(out, 3, 1.0, 0.0, 0.0, x, y, z)
+    add_turn(out, 4, 0.0, 1.0, 0.0, x, y, z)
+    add_turn(out, 5, 0.0, 0.0, 1.0, x, y, z)
+    row = dh.point_row[point]
+    while row >= 0:
+        parent = dh.parent[row]
+        if dh.angle[row] >= 0:
+            base = world_from_root if parent < 0 else frames[parent]
+            sign = dh.sign[row]
+            add_turn(out, TWIST + dh.angle[row], sign * base[0, 2], sign * base[1, 2], sign * base[2, 2], x, y, z)
+        row = parent
+
+
+@njit(cache=True)
 def add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float, ry: float, rz: float) -> None:
     """Add axis x lever to a column: the velocity of a point at `lever` from an axis of unit angular speed."""
     out[0, column] += ay * rz - az * ry

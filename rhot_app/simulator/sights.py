@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +31,7 @@ Array = NDArray[np.float64]
 _GRID_HZ = 250.0  # of the splines through the markers' ways
 _WHOLE, _ENOUGH = 0.9, 0.4  # visible parts: above the first a marker is in plain view, below the second it is lost
 _BIAS_GRID_S = 0.05
-_STEP = 1e-4  # normalised, of derivatives
+_STEP, _TICK_S = 1e-4, 1e-4  # normalised, and s, of derivatives
 _RADIUS_M = 8e-3  # where the marker set gives none
 
 
@@ -77,6 +78,7 @@ class _Eye:
         self._shapes = [self._shape(body, marker, role, local) for marker, role in
                         enumerate(marker.role for marker in scene.markers.markers)]
         placed = body.place(local, angles)
+        self._rolled = np.ones((len(self.times_s), body.marker_count))
         discs = self._discs(shot, body, placed, row_time_s)
         self.seen = np.empty((len(discs), body.marker_count, 3))
         groups = np.array([body.group[list(body.marker).index(marker)] for marker in range(body.marker_count)])
@@ -112,9 +114,9 @@ class _Eye:
         size = self._camera.width, self._camera.height
         discs = np.full((len(self.times_s), body.marker_count, 6), np.nan)
         for marker in range(body.marker_count):
-            places, pixels = at_own_rows(CubicSpline(grid, ways[:, marker]),
-                                         functools.partial(self._project, marker=marker), self.times_s, row_time_s,
-                                         size)
+            way, see = CubicSpline(grid, ways[:, marker]), functools.partial(self._project, marker=marker)
+            places, pixels = at_own_rows(way, see, self.times_s, row_time_s, size)
+            self._rolled[:, marker] = _rolled(way, see, self.times_s + row_time_s * pixels[:, 1], row_time_s)
             discs[:, marker, :2] = np.where(np.isfinite(pixels), self._silhouette(places, marker), np.nan)
             depth = self._local(places)[:, 2]
             discs[:, marker, 2], discs[:, marker, 3] = self._radii[marker] / depth, depth
@@ -133,14 +135,15 @@ class _Eye:
         return np.stack([(x * z - shape[..., 0, 2]) / below, (y * z - shape[..., 1, 2]) / below], axis=1)
 
     def _sizes(self, discs: Array) -> Array:
-        """(F, M) px: diameters of discs that are as large as the outlines, drawn out, and stretched off the axis."""
+        """(F, M) px: diameters of discs that are as large as the outlines, drawn out, and stretched off the axis and
+        by rows that are exposed one after the other."""
         flat, step = discs[:, :, :2].reshape(-1, 2), _STEP * np.eye(2)
         rows = [(project_normalised(flat + by, self._camera.intrinsics)
                  - project_normalised(flat - by, self._camera.intrinsics)) / (2.0 * _STEP) for by in step]
         stretch = np.abs(rows[0][:, 0] * rows[1][:, 1] - rows[0][:, 1] * rows[1][:, 0])
         stretch *= np.sqrt(1.0 + np.square(flat).sum(axis=1))
         radius, out = discs[:, :, 2], np.linalg.norm(discs[:, :, 4:], axis=2)
-        area = (math.pi * radius**2 + 4.0 * radius * out) * stretch.reshape(radius.shape)
+        area = (math.pi * radius**2 + 4.0 * radius * out) * stretch.reshape(radius.shape) * self._rolled
         return np.asarray(2.0 * np.sqrt(area / math.pi))
 
     def _project(self, places: Array, marker: int) -> Array:
@@ -160,6 +163,13 @@ class _Eye:
         count, noise = len(self._radii), self._noise
         return (noise.common * _slow(shot, count, shot.scene.seed, noise.slow_s, self.times_s)
                 + noise.own * _slow(shot, count, own_seed + 0x1000000, noise.slow_s, self.times_s))
+
+
+def _rolled(way: Callable[[Array], Array], see: Callable[[Array], Array], times_s: Array, row_time_s: float) -> Array:
+    """(F,) how much higher than it is what moves down the picture looks, at its own rows' `times_s` (F,): the rows go
+    with it. `way` and `see` as in `at_own_rows`."""
+    rows = see(way(times_s + _TICK_S))[:, 1] - see(way(times_s - _TICK_S))[:, 1]
+    return np.asarray(1.0 / (1.0 - rows * row_time_s / (2.0 * _TICK_S)))
 
 
 def _drawn_out(body: HandBody, placed: Array, marker: int) -> Array:

@@ -49,6 +49,15 @@ def test_the_model_tracker_knows_how_badly_it_knows_a_hand_before_one_camera(gra
     assert figures["within_3_sd_share"] is not None and figures["within_3_sd_share"] > 0.95
 
 
+def test_a_waving_hand_before_one_camera_is_where_its_fingertips_look_as_large(tmp_path: Path) -> None:
+    """By its course alone it is 6 mm off."""
+    wave = sketch(tmp_path, "wave", 5.0)
+    for says_so in (True, False):
+        figures = scenarios.one_camera_blind(wave, rig_with(wave.rig, MODEL), says_so=says_so)
+        assert figures["tips_mm"] is not None and figures["tips_mm"] < 3.0
+        assert figures["within_3_sd_share"] is not None and figures["within_3_sd_share"] > 0.95
+
+
 def test_a_camera_is_covered_at_another_moment_of_every_take(grasp: Take) -> None:
     moments = [scenarios.blind_from(replace(grasp, folder=grasp.folder.with_name(name))) for name in "abcdef"]
     assert len(set(moments)) == 6

@@ -7,7 +7,7 @@ import pytest
 from hand_samples import random_pose, rotation_about
 
 from rhot_app.hand.dh import ROOT, DhRow, compile_table, rigid_rows
-from rhot_app.hand.kinematics import empty_frames, forward, forward_arrays, jacobian
+from rhot_app.hand.kinematics import direction_jacobian, empty_frames, forward, forward_arrays, jacobian
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, HandPose
 
@@ -46,27 +46,57 @@ def test_joints_match_a_plain_numpy_hand(right_hand):
         np.testing.assert_allclose(points.marker_centres, markers, atol=1e-12)
 
 
+def numeric_jacobian(look, pose):
+    """(..., 27): how what `look` says of a pose follows each of its numbers, by differences."""
+    def moved(column, by):
+        world, angles = pose.world_from_palm.copy(), pose.angles.copy()
+        if column < 3:
+            world[column, 3] += by
+        elif column < 6:
+            world[:3, :3] = rotation_about(by * np.eye(3)[column - 3]) @ world[:3, :3]
+        else:
+            angles[column - 6] += by
+        return look(HandPose(world, angles))
+
+    step = 1e-6
+    return np.stack([(moved(c, step) - moved(c, -step)) / (2 * step) for c in range(6 + len(ANGLES))], axis=-1)
+
+
 @pytest.mark.parametrize("side", ["right_hand", "left_hand"])
 def test_jacobian_matches_finite_differences(side, request):
     model = request.getfixturevalue(side)
     rng = np.random.default_rng(2)
-    step = 1e-6
+
+    def points(pose):
+        found = forward(model, pose)
+        return np.vstack([found.joints, found.marker_centres])
+
     for _ in range(5):
         pose = random_pose(model, rng)
+        np.testing.assert_allclose(jacobian(model, pose), numeric_jacobian(points, pose), atol=1e-8)
 
-        def moved(column, by, pose=pose):
-            world, angles = pose.world_from_palm.copy(), pose.angles.copy()
-            if column < 3:
-                world[column, 3] += by
-            elif column < 6:
-                world[:3, :3] = rotation_about(by * np.eye(3)[column - 3]) @ world[:3, :3]
-            else:
-                angles[column - 6] += by
-            points = forward(model, HandPose(world, angles))
-            return np.vstack([points.joints, points.marker_centres])
 
-        numeric = np.stack([(moved(c, step) - moved(c, -step)) / (2 * step) for c in range(6 + len(ANGLES))], axis=-1)
-        np.testing.assert_allclose(jacobian(model, pose), numeric, atol=1e-8)
+@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
+def test_directions_follow_the_pose_as_finite_differences_say(side, request):
+    model = request.getfixturevalue(side)
+    rng, dh = np.random.default_rng(3), model.dh
+    count = len(dh.point_row)
+
+    def frames_of(pose):
+        frames = np.empty((len(dh.parent), 3, 4))
+        forward_arrays(dh, pose.world_from_palm, pose.angles, frames, np.empty((count, 3)))
+        return frames
+
+    for _ in range(3):
+        pose, out = random_pose(model, rng), np.empty((3, 6 + len(ANGLES)))
+        frames = frames_of(pose)
+        for point in range(count):
+            row = dh.point_row[point]
+            if row == ROOT:
+                continue
+            direction_jacobian(dh, pose.world_from_palm, frames, point, frames[row, :, 0].copy(), out)
+            numeric = numeric_jacobian(lambda other, row=row: frames_of(other)[row, :, 0], pose)
+            np.testing.assert_allclose(out, numeric, atol=1e-8)
 
 
 def test_left_hand_is_the_mirror_image(right_hand, left_hand):

@@ -73,7 +73,7 @@ def test_fingertips_are_as_large_as_in_pictures_wherever_they_are_and_however_th
                    if one.flags == other.flags == 0]
     assert len(ratios) > 150
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.01)
-    assert np.std(ratios) < 0.025, "motion smears the pictures' edges"
+    assert np.std(ratios) < 0.012, "motion smears the pictures' edges"
 
 
 def test_what_is_half_hidden_is_said_to_be_and_what_is_hidden_is_lost() -> None:

@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.estimate import BIAS, Estimate, scale_of
-from rhot_app.tracking.kalman.markers import NEAREST_M, Cameras, Frame, Worn
-from rhot_app.tracking.kalman.sighted import FRESH_S, KEPT_S
+from rhot_app.tracking.kalman.estimate import BIAS, Estimate
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
+from rhot_app.tracking.kalman.sighted import FRESH_S, KEPT_S, line_of_sight
 
 Array = NDArray[np.float64]
 
@@ -30,16 +30,18 @@ STRAYS_M_S = 0.007
 
 
 @njit(cache=True)
-def leave_out_covered(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, made: Array) -> None:
+def leave_out_covered(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array,
+                      made: Array) -> None:
     """Set more of `frame.covered`, learn sizes (`estimate.width`), and set the biases' variances of paint that was
     away.
 
-    To be called when `frame.label` is known. `made` (M,) m^2: variance of the markers' places by their making.
+    To be called after `measure_sizes`. `points` (M, 3) m as `place_markers` has them; `made` (M,) m^2: variance of the
+    markers' places by their making.
     """
     for sight in range(worn.part.shape[0]):
         m = frame.label[sight]
-        if frame.seen[sight] and worn.palmar[m] and frame.widths[sight] > 0.0:
-            frame.covered[sight] |= _is_covered(worn, cameras, frame, estimate, sight, m)
+        if frame.seen[sight] and worn.palmar[m] and frame.sizes[sight] > 0.0:
+            frame.covered[sight] |= _is_covered(cameras, frame, estimate, sight, m, points[m])
             if not frame.covered[sight]:
                 set_bias_variance(estimate, m, made[m])
     for m in range(worn.part.shape[0]):
@@ -61,32 +63,20 @@ def _shows(frame: Frame, m: int) -> bool:
 
 
 @njit(cache=True)
-def _is_covered(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, sight: int, m: int) -> bool:
-    """Whether a sight shows too little of paint `m`; learns its size from a sight in plain view.
+def _is_covered(cameras: Cameras, frame: Frame, estimate: Estimate, sight: int, m: int, point: Array) -> bool:
+    """Whether a sight shows too little of paint `m`, at `point` (3,) m; learns its size from a sight in plain view.
 
     Flat paint shows less of itself when the palm is turned away, round paint does not; which of the two it is nobody
     knows, so as much as flat paint would show is enough.
     """
-    camera, offset, world = frame.camera[0], worn.dh.point_offset[m], estimate.world
-    pose, intrinsics, scale = cameras.pose[camera], cameras.intrinsics[camera], scale_of(estimate)
-    local, normal = np.empty(3), np.empty(3)
-    for i in range(3):
-        local[i], normal[i] = pose[i, 3], 0.0
-        for k in range(3):
-            place = world[k, 3]
-            for j in range(3):
-                place += scale * world[k, j] * offset[j]
-            local[i] += pose[i, k] * place
-            normal[i] += pose[i, k] * world[k, 2]
-    if local[2] < NEAREST_M:
-        return False
-    distance = math.sqrt(local[0] ** 2 + local[1] ** 2 + local[2] ** 2)
-    facing = abs(normal[0] * local[0] + normal[1] * local[1] + normal[2] * local[2]) / distance
-    width = frame.widths[sight] * local[2] / math.sqrt(intrinsics[0] * intrinsics[1])
-    known = estimate.width[m]
+    line, facing = np.empty(3), 0.0
+    line_of_sight(cameras.pose[frame.camera[0]], point, line)
+    for k in range(3):
+        facing += line[k] * estimate.world[k, 2]
+    width, known = frame.sizes[sight], estimate.width[m]
     if frame.plain[sight] and width > known:
         estimate.width[m] = known + LEARNT * (width - known) if known > 0.0 else width
-    return width * width < COVERED * facing * known * known
+    return width * width < COVERED * abs(facing) * known * known
 
 
 @njit(cache=True)

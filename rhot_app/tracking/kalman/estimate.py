@@ -66,7 +66,8 @@ class Estimate(NamedTuple):
     knowledge last faded (`forgetting.py`). `unseen` (C, M): s since each camera was
     last believed to see each marker. `held` (1,): how the last update held the hand
     (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s. `width` (M,) m: how wide fingertips, and
-    paint on the inner side of the palm, are known to be, 0 where nobody knows; `bias_variance` (M,) m^2: what the
+    paint on the inner side of the palm, are known to be, 0 where nobody knows; `width_varies` (M,): variance of its
+    logarithm in plain view; `bias_variance` (M,) m^2: what the
     biases' variances tend to now (both: `covering.py`, `hiding.py`). `looks` (C, M, 6): what each camera saw of each
     marker last, its width m (0 where it says little), place px (2), variance px^2, s since then (`partial.py`), and the
     part of it that was hidden (`hiding.py`). `left_open` (27, 27): what habit leaves to
@@ -89,6 +90,7 @@ class Estimate(NamedTuple):
     held: NDArray[np.int64]
     turning: Array
     width: Array
+    width_varies: Array
     bias_variance: Array
     looks: Array
     left_open: Array
@@ -103,6 +105,7 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     shapes = {"world": (4, 4), "angles": (21,), "velocity": (POSE,), "acceleration": (POSE,), "log_scale": (1,),
               "bias": (markers, 3), "covariance": (size, size), "agitation": (GROUPS,), "trend": (POSE,),
               "unfaded": (2,), "unseen": (cameras, markers), "held": (1,), "turning": (1,), "width": (markers,),
+              "width_varies": (markers,),
               "bias_variance": (markers,), "looks": (cameras, markers, 6), "left_open": (POSE, POSE),
               "untroubled": (1,), "pace": (cameras,)}
     memory, end = np.zeros(sum(map(math.prod, shapes.values()))), 0

@@ -20,7 +20,6 @@ from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.tracking.kalman.covering import LEARNT, set_bias_variance
 from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_HIDDEN, POSE, Estimate
 from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
-from rhot_app.tracking.kalman.partial import metres_per_px
 from rhot_app.tracking.kalman.sighted import FRESH_S, line_of_sight
 
 Array = NDArray[np.float64]
@@ -44,6 +43,10 @@ SHRINKS = 0.01
 """Of what a fingertip in plain view is smaller than it was known to be, a sight teaches this part: slower than of what
 it is larger (`covering.LEARNT`), because what is smaller may be hidden."""
 
+VARIED, VARIES_LEARNT = 0.02, 0.02
+"""One standard deviation of a width's logarithm before anything is known of it, and which part of its variance a sight
+teaches."""
+
 LIKE = 0.1
 """A part of its area that a fingertip in plain view may be smaller."""
 
@@ -58,18 +61,18 @@ def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estim
     `made` (M,) m^2: variance of the markers' places by their making.
     """
     camera, count = frame.camera[0], worn.part.shape[0]
-    if not _is_placed(estimate, camera):
+    if not is_placed(estimate, camera):
         return
     parts = np.empty(count)
     shown_parts(worn, estimate, cameras.pose[camera], points, parts)
     for sight in range(count):
         m = frame.label[sight]
-        if not frame.seen[sight] or worn.slender[m] < 0.0 or not frame.widths[sight] > 0.0:
+        if not frame.sizes[sight] > 0.0 or worn.slender[m] < 0.0:
             continue
-        width = frame.widths[sight] * metres_per_px(worn, cameras, estimate, m, camera, points[m])
+        width = frame.sizes[sight]
         hidden = _hidden(estimate, m, width / math.sqrt(parts[m]), frame.plain[sight])
         estimate.looks[camera, m, LOOK_HIDDEN] = hidden
-        varies = VARIES + VARIES_PER_M_S * min(_speed(jacobian[m], estimate.velocity), FASTEST_M_S)
+        varies = VARIES + VARIES_PER_M_S * min(speed_of(jacobian[m], estimate.velocity), FASTEST_M_S)
         most = _most_hidden(estimate, camera, m)
         shift = SHIFT * 0.5 * width * math.sqrt(max(most**3 - varies**3, 0.0))
         set_bias_variance(estimate, m, made[m] + shift * shift)
@@ -94,12 +97,18 @@ def shown_parts(worn: Worn, estimate: Estimate, camera: Array, points: Array, ou
             line_of_sight(camera, points[m], sight)
             bone = frames[dh.point_row[m]]
             along = bone[0, 0] * sight[0] + bone[1, 0] * sight[1] + bone[2, 0] * sight[2]
-            side = math.sqrt(max(1.0 - along * along, 0.0))
-            out[m] = (1.0 + worn.slender[m] * side) / (1.0 + worn.slender[m])
+            out[m] = shown_part(worn.slender[m], math.sqrt(max(1.0 - along * along, 0.0)))
 
 
 @njit(cache=True)
-def _is_placed(estimate: Estimate, camera: int) -> bool:
+def shown_part(slender: float, side: float) -> float:
+    """The part of its largest area that a fingertip shows, `Worn.slender`, of which `side` is the sine of the angle
+    between it and the line of sight."""
+    return (1.0 + slender * side) / (1.0 + slender)
+
+
+@njit(cache=True)
+def is_placed(estimate: Estimate, camera: int) -> bool:
     """Whether it is known how far away the hand is: cameras other than this one see it too."""
     for other in range(estimate.unseen.shape[0]):
         if other != camera and np.sum(estimate.unseen[other] < FRESH_S) >= PLACED_BY:
@@ -113,10 +122,12 @@ def _hidden(estimate: Estimate, m: int, size: float, plain: bool) -> float:
     from its side. Learns from sights in plain view."""
     known = estimate.width[m]
     if known == 0.0:
-        estimate.width[m] = size
+        estimate.width[m], estimate.width_varies[m] = size, VARIED**2
         return 0.0
     hidden = 1.0 - (size / known) ** 2
     if plain and hidden < LIKE:
+        off = math.log(size / known)
+        estimate.width_varies[m] += VARIES_LEARNT * (off * off - estimate.width_varies[m])
         estimate.width[m] += (LEARNT if size > known else SHRINKS) * (size - known)
     return hidden
 
@@ -132,7 +143,7 @@ def _most_hidden(estimate: Estimate, camera: int, m: int) -> float:
 
 
 @njit(cache=True)
-def _speed(jacobian: Array, velocity: Array) -> float:
+def speed_of(jacobian: Array, velocity: Array) -> float:
     """m/s, of what has `jacobian` (3, 27)."""
     square = 0.0
     for i in range(3):

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.tracking.kalman.apparent_size import weigh_sizes
 from rhot_app.tracking.kalman.association import relabel
 from rhot_app.tracking.kalman.covering import leave_out_covered
 from rhot_app.tracking.kalman.estimate import POSE
@@ -18,6 +19,7 @@ from rhot_app.tracking.kalman.markers import Frame, Outfit, append_markers, plac
 from rhot_app.tracking.kalman.partial import doubt_partial
 from rhot_app.tracking.kalman.rows import Page
 from rhot_app.tracking.kalman.share import Share
+from rhot_app.tracking.kalman.sizes import measure_sizes
 from rhot_app.tracking.kalman.wearing import Wearing
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
@@ -42,10 +44,11 @@ class MarkerBlock:
         sized = not math.isnan(observations.detect_s)  # text datagrams tell no sizes
         self.frame = Frame(np.array([observations.camera]), np.empty(count, np.bool_), observations.pixels,
                            observations.covariances, np.empty(count), np.empty(count, np.int64),
-                           observations.diameters if sized else np.zeros(count), observations.flags == 0,
+                           observations.diameters if sized else np.zeros(count), np.zeros(count),
+                           np.array([1e-9 * observations.row_time_ns]), observations.flags == 0,
                            np.zeros(count, np.bool_), np.zeros(count), np.ones(count))
         self.shared, self._outfit = Share(Sighting(self.frame, observations.flags)), wearing.outfit
-        after_ns, self.sights = _read(self._outfit, self.shared, 1e-9 * observations.row_time_ns)
+        after_ns, self.sights = _read(self._outfit, self.shared)
         self.t_ns = observations.t_row0_master_ns + int(after_ns)
 
     def as_of(self, t_ns: int) -> MarkerBlock:
@@ -76,9 +79,11 @@ def _associate(outfit: Share, shared: Share, page: Share) -> int:
     changed = relabel(worn, cameras, frame, estimate, points, jacobian)
     if changed > 0:
         estimate.untroubled[0] = 0.0
+    measure_sizes(worn, cameras, frame, estimate, points, jacobian)
     doubt_partial(worn, cameras, frame, estimate, points, jacobian)
     judge_fingertips(worn, cameras, frame, estimate, points, jacobian, worn_by.made)
-    leave_out_covered(worn, cameras, frame, estimate, worn_by.made)
+    leave_out_covered(worn, cameras, frame, estimate, points, worn_by.made)
+    weigh_sizes(worn, cameras, frame, estimate, points, jacobian)
     return changed
 
 
@@ -91,13 +96,13 @@ def _linearise(outfit: Share, shared: Share, page: Share) -> None:
 
 
 @njit(cache=True)
-def _read(outfit: Share, shared: Share, row_time_s: float) -> tuple[float, int]:
+def _read(outfit: Share, shared: Share) -> tuple[float, int]:
     """Fill the frame's `seen`, `late_s` and, as the sights say themselves, `label`; returns the mean time of the sights
     after row 0, ns, and how many they are. The middle row is that of the optical axis."""
     worn_by: Outfit = outfit.of
     sighting: Sighting = shared.of
     frame = sighting.frame
-    total, count = 0.0, 0
+    total, count, row_time_s = 0.0, 0, frame.row_s[0]
     for m in range(frame.seen.shape[0]):
         frame.label[m] = m
         x, y = frame.pixels[m]

@@ -78,7 +78,8 @@ class Frame(NamedTuple):
     """What one camera saw: `camera` (1,) its index; `seen` (M,) which markers count; `pixels` (M, 2) raw px with
     `covariances` (M, 2, 2); `late_s` (M,): when each was seen, s after the estimate's instant (before: negative).
     `label` (M,): which of the hand's markers the m-th sight is of. `widths` (M,) px: diameters of discs of their areas,
-    0 where unknown; `plain` (M,): without any flag; `covered` (M,): shows too little of its marker to be weighed;
+    0 where unknown, `sizes` (M,) m: those where the hand is (`sizes.py`); `row_s` (1,): from one row of the picture to
+    the next; `plain` (M,): without any flag; `covered` (M,): shows too little of its marker to be weighed;
     `doubt` (M,) px^2: how far off, per axis, what is covered of it may have brought it; `own` (M,): the part of its
     stated variance that counts: what is this camera's alone, or what is left of a node's caution."""
 
@@ -89,6 +90,8 @@ class Frame(NamedTuple):
     late_s: Array
     label: Indices
     widths: Array
+    sizes: Array
+    row_s: Array
     plain: NDArray[np.bool_]
     covered: NDArray[np.bool_]
     doubt: Array

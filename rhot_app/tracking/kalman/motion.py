@@ -34,7 +34,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.sighted import FRESH_S, fingers_away
+from rhot_app.tracking.kalman.sighted import FRESH_S, eyes_on, fingers_away
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -72,7 +72,7 @@ TURNING_S = 1.0
 """A palm that turned is taken to turn for this long."""
 
 WIDTH_S = 300.0
-"""How wide paint is, is forgotten with this time constant, lest a wrong size stay."""
+"""How wide paint is, is forgotten with this time constant while two cameras see it, lest a wrong size stay."""
 
 BIAS_S = 3.0
 """Markers' biases change with this time constant: they turn with the hand and its light."""
@@ -108,7 +108,9 @@ def predict(estimate: Estimate, dt: float, part: Indices, habits: Habits, bias_v
     estimate.untroubled[0] += dt
     estimate.looks[:, :, LOOK_AGE] += dt
     estimate.turning[0] = max(estimate.turning[0] * math.exp(-dt / TURNING_S), speeds(estimate)[TURN])
-    estimate.width[:] *= math.exp(-dt / WIDTH_S)
+    for m in range(estimate.width.shape[0]):
+        if eyes_on(estimate.unseen, m)[0] > 1:
+            estimate.width[m] *= math.exp(-dt / WIDTH_S)
     _keep_awake(estimate)
     _go_along(estimate, part)
     shake(estimate.covariance, liveliness(estimate), habits.together, dt)

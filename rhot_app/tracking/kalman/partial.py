@@ -70,18 +70,17 @@ def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate
                   jacobian: Array) -> None:
     """Set `frame.doubt`, px^2, `frame.own` and `frame.covered`; remember what this camera sees, `estimate.looks`.
 
-    To be called when `frame.label` is known. Sights with a flag are widened by their node, and are no standard, and
+    To be called after `measure_sizes`. Sights with a flag are widened by their node, and are no standard, and
     neither are those that were not believed. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them.
     """
     camera, count = frame.camera[0], worn.part.shape[0]
     alike = estimate.untroubled[0] > CALM_S  # and everything is in plain view of two cameras
     for sight in range(count):
         frame.doubt[sight], frame.own[sight], frame.covered[sight] = 0.0, 1.0, False
-        if not frame.seen[sight] or not frame.widths[sight] > 0.0:
+        if not frame.sizes[sight] > 0.0:
             alike = False
             continue
-        m = frame.label[sight]
-        width = frame.widths[sight] * metres_per_px(worn, cameras, estimate, m, camera, points[m])
+        m, width = frame.label[sight], frame.sizes[sight]
         rival = _widest_other(cameras, estimate, camera, m, points[m])
         missing = 1.0 - (width / max(width, estimate.looks[rival, m, LOOK_WIDTH])) ** 2 if rival >= 0 else 0.0
         if missing > AGREE:
@@ -90,15 +89,15 @@ def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate
         if missing > LESS:
             frame.covered[sight] = _misses(worn, cameras, frame, estimate, sight, rival, points[m], jacobian[m])
         alike &= rival >= 0 and frame.plain[sight] and missing <= AGREE and not frame.covered[sight]
-        _remember(estimate.looks[camera, m], frame, sight, width)
+        _remember(estimate.looks[camera, m], frame, sight)
     if alike:
         frame.own[:] = OWN
 
 
 @njit(cache=True)
-def _remember(look: Array, frame: Frame, sight: int, width: float) -> None:
+def _remember(look: Array, frame: Frame, sight: int) -> None:
     """Fill `look` (6,) with what a frame shows of a marker."""
-    look[LOOK_WIDTH] = width if frame.plain[sight] else 0.0
+    look[LOOK_WIDTH] = frame.sizes[sight] if frame.plain[sight] else 0.0
     look[LOOK_X], look[LOOK_Y] = frame.pixels[sight]
     look[LOOK_VARIANCE] = max(_variance(frame, sight), EXACT_PX2)  # zero is for what was never seen
     look[LOOK_AGE] = -frame.late_s[sight]
@@ -138,17 +137,6 @@ def _unsteadiness(estimate: Estimate, jacobian: Array) -> float:
         lever = jacobian[0, j] ** 2 + jacobian[1, j] ** 2 + jacobian[2, j] ** 2
         total += lever * estimate.covariance[VELOCITY + j, VELOCITY + j]
     return total / 3.0
-
-
-@njit(cache=True)
-def metres_per_px(worn: Worn, cameras: Cameras, estimate: Estimate, m: int, camera: int, point: Array) -> float:
-    """How large a pixel is, as a ball at `point` (3,) m covers them, wherever in the picture; 0 behind the camera."""
-    view = View(np.empty(2), np.empty((2, 3)))
-    if not _view(worn, cameras, estimate, m, camera, point, np.zeros(2), view):
-        return 0.0
-    u, v = view.slope[0], view.slope[1]
-    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-    return 1.0 / math.sqrt(math.sqrt(x * x + y * y + z * z))
 
 
 @njit(cache=True)

@@ -95,12 +95,15 @@ def keep_shown(estimate: Estimate, part: Indices, palmar: Mask, cameras: Array, 
 
 
 @njit(cache=True)
-def line_of_sight(camera: Array, point: Array, out: Array) -> None:
-    """Fill `out` (3,) with the unit vector from a camera, (3, 4) camera_from_world, to a point (3,), world."""
-    length = 0.0
+def line_of_sight(camera: Array, point: Array, out: Array) -> float:
+    """Fill `out` (3,) with the unit vector from a camera, (3, 4) camera_from_world, to a point (3,), world; returns how
+    far apart they are."""
+    square = 0.0
     for i in range(3):
         out[i] = point[i]
         for k in range(3):
             out[i] += camera[k, i] * camera[k, 3]
-        length += out[i] ** 2
-    out /= math.sqrt(length)
+        square += out[i] ** 2
+    distance = math.sqrt(square)
+    out /= distance
+    return distance

@@ -8,7 +8,6 @@ import pytest
 from modelled_hand import model_rig, moving, sights
 from scipy.spatial.transform import Rotation
 
-from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import neutral_pose
 from rhot_app.project import Rig
 from rhot_app.simulator.motion import FACING
@@ -19,11 +18,13 @@ from rhot_app.tracking.kalman.covering import (
     leave_out_covered,
     set_bias_variance,
 )
-from rhot_app.tracking.kalman.estimate import BIAS, empty_estimate
+from rhot_app.tracking.kalman.estimate import BIAS, POSE, empty_estimate
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
+from rhot_app.tracking.kalman.markers import place_markers, project_marker
 from rhot_app.tracking.kalman.rows import Page, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import FRESH_S, KEPT_S
+from rhot_app.tracking.kalman.sizes import measure_sizes
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_node.wire.messages import MarkerFlag
 
@@ -42,7 +43,6 @@ def painted_rig() -> Rig:
 
 RIG = painted_rig()
 WEARING = compile_wearing(RIG)
-CAMERAS = [CameraModel.from_rig(node.intrinsics, node.pose) for node in RIG.nodes]
 COUNT = len(WEARING.roles)
 MADE = WEARING.bias_variance
 
@@ -66,10 +66,13 @@ def seen_by(camera, estimate, widths_m, flags=0, marker=INDEX_KNUCKLE):
     frame = sights(RIG, moving(markers="rhot8"), 0.1)[camera]
     rows = np.zeros(COUNT, np.uint16)
     rows[marker] = flags
-    depth = np.array([(CAMERAS[camera].camera_from_world @ [*point, 1.0])[2] for point in points_of(estimate)])
-    focal = np.sqrt(CAMERAS[camera].intrinsics[0] * CAMERAS[camera].intrinsics[1])
+    pixel, slope, px_per_m = np.empty(2), np.empty((2, 3)), np.empty(COUNT)
+    for m, point in enumerate(points_of(estimate)):
+        project_marker(point, estimate.world, WEARING.worn.half_axes[m], WEARING.cameras.pose[camera],
+                       WEARING.cameras.intrinsics[camera], pixel, slope)
+        px_per_m[m] = np.sqrt(np.linalg.norm(np.cross(*slope)))
     return MarkerBlock(WEARING, replace(frame, camera=camera, flags=rows,
-                                        diameters=np.broadcast_to(widths_m, COUNT) * focal / depth))
+                                        diameters=np.broadcast_to(widths_m, COUNT) * px_per_m))
 
 
 def points_of(estimate):
@@ -78,7 +81,10 @@ def points_of(estimate):
 
 
 def covered_in(block, estimate):
-    leave_out_covered(WEARING.worn, WEARING.cameras, block.frame, estimate, MADE)
+    points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
+    place_markers(WEARING.worn, estimate, points, jacobian)
+    measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
+    leave_out_covered(WEARING.worn, WEARING.cameras, block.frame, estimate, points, MADE)
     return np.flatnonzero(block.frame.covered).tolist()
 
 

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -27,9 +26,9 @@ from rhot_app.tracking.kalman.partial import (
     View,
     disagreement,
     doubt_partial,
-    metres_per_px,
 )
 from rhot_app.tracking.kalman.sighted import FRESH_S
+from rhot_app.tracking.kalman.sizes import measure_sizes
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_node.wire.messages import MarkerFlag
 
@@ -82,6 +81,7 @@ def judged(block, estimate):
     """Standard deviations (M,) of the doubt, px, and which markers are left out."""
     points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
     place_markers(WEARING.worn, estimate, points, jacobian)
+    measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
     doubt_partial(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
     return np.sqrt(block.frame.doubt), np.flatnonzero(block.frame.covered).tolist()
 
@@ -170,23 +170,3 @@ def test_no_place_of_the_marker_is_a_disagreement(turned, off):
 def test_sights_that_no_place_explains_disagree_by_how_far_they_must_move():
     up, down = np.array([0.3, 1.0]), np.array([-0.2, -1.0])
     assert disagreement(View(up, ABREAST[0]), View(down, ABREAST[1])) == pytest.approx(np.sqrt(2.0))
-
-
-@pytest.mark.parametrize("place_m", [(0.0, 0.0, 0.6), (0.3, 0.1, 0.6), (-0.25, -0.15, 0.5)])
-def test_a_ball_looks_equally_wide_wherever_it_is_before_any_lens(place_m):
-    """Its silhouette grows towards the picture's edge and shrinks with a barrel's distortion."""
-    nodes = [msgspec.structs.replace(node, intrinsics=msgspec.structs.replace(
-        node.intrinsics, distortion=(-0.28, 0.09, 0.0, 0.0, 0.0))) for node in RIG.nodes]
-    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in nodes]
-    there = WEARING.cameras._replace(intrinsics=np.array([camera.intrinsics for camera in cameras]))
-    angles = np.linspace(0.0, 2.0 * np.pi, 200)
-    for camera, model in enumerate(cameras):
-        sight = (model.camera_from_world @ [*place_m, 1.0])[:3]
-        across = np.linalg.svd(sight[None])[2][1:]  # the outline is a circle about the line of sight
-        circle = 0.5 * WIDTH_M * np.column_stack([np.cos(angles), np.sin(angles)])
-        outline = np.array(place_m) + circle @ across @ model.camera_from_world[:3, :3]
-        x, y = model.project(outline).T
-        area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
-        width = np.sqrt(4.0 * area / np.pi) * metres_per_px(WEARING.worn, there, hand(), INDEX, camera,
-                                                            np.array(place_m))
-        assert width == pytest.approx(WIDTH_M, rel=0.004)

@@ -1,0 +1,161 @@
+"""How far away a fingertip is that one camera sees, by how large it looks.
+
+A single camera does not see distance, and what it leaves open is held to its course (`holding.py`). While two cameras
+saw the hand it was learnt how large its fingertips are, and how much that varies (`hiding.py`). As they look larger or
+smaller now, the hand is nearer or farther away.
+
+A hand that is taken to be nearer than it is has its fingers bent more, to look as it does, and a fingertip that points
+at the camera shows less of itself: how large a fingertip should look depends on the whole pose. Many things make a
+fingertip look smaller - another finger before it, paint that ends, shade -, hardly any makes it look larger: one that
+looks too small beside the others is believed less.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.kinematics import direction_jacobian, forward_arrays
+from rhot_app.tracking.kalman.estimate import POSE, ROTATION, Estimate, displace
+from rhot_app.tracking.kalman.hiding import is_placed, shown_part
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
+from rhot_app.tracking.kalman.sighted import line_of_sight
+
+Array = NDArray[np.float64]
+
+NEEDED = 3
+"""A hand that only one camera sees is brought by so many fingertips of known size, not by fewer."""
+
+EACH, ALL = 0.005, 0.005
+"""Logarithms of widths are off by at least this, one standard deviation: each by itself, and all alike."""
+
+LASTING = 2.0
+"""Of this many times its variance a fingertip's width is weighed, and less the better it is known: what is wrong with
+it is wrong in many frames, and what they all say is not known better for that."""
+
+TOO_SMALL = 0.5
+"""What looks too small by some part is believed as if this much of it were one standard deviation."""
+
+UNLIKELY = 2.0
+"""What is off by more than so many standard deviations is followed as if these were larger."""
+
+ROUNDS = 5
+"""Times that it is judged which fingertips look too small."""
+
+END_ON = 0.03
+"""Sine of the angle between a fingertip and the line of sight, at least: nobody knows it better."""
+
+
+class Sizes(NamedTuple):
+    """K fingertips: `larger` (K,) by how much the logarithm of each one's width is more than the estimate has it,
+    `slope` (K, 27) what that is per pose number, `variance` (K,) of it by what fingertips are."""
+
+    larger: Array
+    slope: Array
+    variance: Array
+
+
+@njit(cache=True)
+def weigh_sizes(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array) -> None:
+    """Correct the estimate of a hand that only this camera sees by how large its fingertips look.
+
+    To be called after `measure_sizes`. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them.
+    """
+    camera, count = frame.camera[0], worn.part.shape[0]
+    if is_placed(estimate, camera):
+        return
+    sizes, sight = Sizes(np.empty(count), np.empty((count, POSE)), np.empty(count)), np.zeros(3)
+    used = _read(worn, cameras.pose[camera], frame, estimate, points, jacobian, sizes, sight)
+    if used < NEEDED:
+        return
+    sight /= math.sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2)
+    _doubt_small(estimate.covariance, sight, sizes, used)
+    _correct(estimate, sizes, used)
+
+
+@njit(cache=True)
+def _read(worn: Worn, camera: Array, frame: Frame, estimate: Estimate, points: Array, jacobian: Array, out: Sizes,
+          sight: Array) -> int:
+    """Fill `out`, and add up the lines of sight in `sight` (3,); returns how many fingertips there are."""
+    dh, used = worn.dh, 0
+    frames, ignored = np.empty((dh.parent.shape[0], 3, 4)), np.empty(points.shape)
+    line, turning = np.empty(3), np.empty((3, POSE))
+    forward_arrays(dh, estimate.world, estimate.angles, frames, ignored)
+    for s in range(points.shape[0]):
+        m = frame.label[s]
+        if worn.slender[m] < 0.0 or not frame.plain[s] or not frame.sizes[s] > 0.0 or not estimate.width[m] > 0.0:
+            continue
+        distance = line_of_sight(camera, points[m], line)
+        bone = frames[dh.point_row[m], :, 0].copy()
+        direction_jacobian(dh, estimate.world, frames, m, bone, turning)
+        along = bone[0] * line[0] + bone[1] * line[1] + bone[2] * line[2]
+        side = max(math.sqrt(max(1.0 - along * along, 0.0)), END_ON)
+        shown = -0.5 * worn.slender[m] / (1.0 + worn.slender[m] * side) * along / side  # of the width, per `along`
+        for j in range(POSE):
+            farther, turned = 0.0, 0.0
+            for i in range(3):
+                farther += line[i] * jacobian[m, i, j]
+            for i in range(3):
+                turned += line[i] * turning[i, j] + bone[i] * (jacobian[m, i, j] - farther * line[i]) / distance
+            out.slope[used, j] = shown * turned - farther / distance
+        expected = estimate.width[m] * math.sqrt(shown_part(worn.slender[m], side))
+        out.larger[used] = math.log(frame.sizes[s] / expected)
+        out.variance[used] = EACH**2 + estimate.width_varies[m]
+        sight += line
+        used += 1
+    return used
+
+
+@njit(cache=True)
+def _doubt_small(covariance: Array, sight: Array, sizes: Sizes, used: int) -> None:
+    """Widen the variance of what looks too small beside the others, which agree about how far away along `sight` (3,)
+    the hand is, with all that is taken to go with it."""
+    with_place = np.zeros(POSE)
+    for i in range(ROTATION):
+        with_place += sight[i] * covariance[i, :POSE]
+    variance = sight[0] * with_place[0] + sight[1] * with_place[1] + sight[2] * with_place[2]
+    per_m, noise, short = np.zeros(used), np.empty(used), np.zeros(used)
+    for k in range(used):
+        total = 0.0
+        for i in range(POSE):
+            per_m[k] += sizes.slope[k, i] * with_place[i] / variance
+            for j in range(POSE):
+                total += sizes.slope[k, i] * covariance[i, j] * sizes.slope[k, j]
+        noise[k] = sizes.variance[k] + max(total - per_m[k] * per_m[k] * variance, 0.0)
+    for _ in range(ROUNDS):
+        said, known = 0.0, 0.0
+        for k in range(used):
+            trust = per_m[k] / (noise[k] + (TOO_SMALL * short[k]) ** 2)
+            said += trust * sizes.larger[k]
+            known += trust * per_m[k]
+        for k in range(used):
+            short[k] = max(per_m[k] * said / known - sizes.larger[k], 0.0) if known > 0.0 else 0.0
+    for k in range(used):
+        sizes.variance[k] += (TOO_SMALL * short[k]) ** 2 + used * ALL**2
+
+
+@njit(cache=True)
+def _correct(estimate: Estimate, sizes: Sizes, used: int) -> None:
+    """One fingertip after the other."""
+    covariance, size = estimate.covariance, estimate.covariance.shape[0]
+    step, seen = np.zeros(size), np.empty(size)
+    for k in range(used):
+        seen[:] = 0.0
+        for j in range(POSE):
+            for i in range(size):
+                seen[i] += sizes.slope[k, j] * covariance[j, i]
+        known, residual = 0.0, sizes.larger[k]
+        for j in range(POSE):
+            known += sizes.slope[k, j] * seen[j]
+            residual -= sizes.slope[k, j] * step[j]
+        own = LASTING * sizes.variance[k]
+        total = max(known + own * max(1.0, own / known), (residual / UNLIKELY) ** 2)
+        for i in range(size):
+            step[i] += seen[i] * residual / total
+            for j in range(size):
+                covariance[i, j] -= seen[i] * seen[j] / total
+    displace(estimate, step, estimate)
