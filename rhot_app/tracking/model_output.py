@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
+from rhot_app.tracking.bends import tell_of_bends
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, Estimate, scale_of
 from rhot_app.tracking.kalman.markers import Cameras
 from rhot_app.tracking.kalman.share import Share
@@ -122,6 +123,8 @@ def describe(account: Share, t_ns: int, report: Report) -> bool:
     report.palm_covariance[:] = covariance[:ANGLES, :ANGLES]
     jacobian = np.empty((count, 3, POSE))
     _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
+    tell_of_bends(estimate, subject.cameras.pose, subject.tips, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:],
+                  covariance)
     _cover_all(world, covariance, jacobian, report.points, report.covariances)
     located = np.empty((count - FIRST_MARKER, 3, 3))
     _locate(world, estimate.velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, t_ns,

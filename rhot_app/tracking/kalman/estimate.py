@@ -67,7 +67,8 @@ class Estimate(NamedTuple):
     last believed to see each marker. `held` (1,): how the last update held the hand
     (`holding.py`). `turning` (1,): how fast the palm turned of late, rad/s. `width` (M,) m: how wide fingertips, and
     paint on the inner side of the palm, are known to be, 0 where nobody knows; `width_varies` (M,): variance of its
-    logarithm in plain view; `bias_variance` (M,) m^2: what the
+    logarithm in plain view; `placed_angles` (21,) rad: as they were when two cameras last saw the hand;
+    `bias_variance` (M,) m^2: what the
     biases' variances tend to now (both: `covering.py`, `hiding.py`). `looks` (C, M, 6): what each camera saw of each
     marker last, its width m (0 where it says little), place px (2), variance px^2, s since then (`partial.py`), and the
     part of it that was hidden (`hiding.py`). `left_open` (27, 27): what habit leaves to
@@ -91,6 +92,7 @@ class Estimate(NamedTuple):
     turning: Array
     width: Array
     width_varies: Array
+    placed_angles: Array
     bias_variance: Array
     looks: Array
     left_open: Array
@@ -105,7 +107,7 @@ def empty_estimate(cameras: int, markers: int) -> Estimate:
     shapes = {"world": (4, 4), "angles": (21,), "velocity": (POSE,), "acceleration": (POSE,), "log_scale": (1,),
               "bias": (markers, 3), "covariance": (size, size), "agitation": (GROUPS,), "trend": (POSE,),
               "unfaded": (2,), "unseen": (cameras, markers), "held": (1,), "turning": (1,), "width": (markers,),
-              "width_varies": (markers,),
+              "width_varies": (markers,), "placed_angles": (21,),
               "bias_variance": (markers,), "looks": (cameras, markers, 6), "left_open": (POSE, POSE),
               "untroubled": (1,), "pace": (cameras,)}
     memory, end = np.zeros(sum(map(math.prod, shapes.values()))), 0

@@ -132,7 +132,7 @@ class HandFilter:
         for array in (estimate.velocity, estimate.acceleration, estimate.bias, estimate.trend, estimate.left_open,
                       estimate.untroubled, covariance):
             array[:] = 0.0
-        estimate.log_scale[0] = self._desk.size[0]
+        estimate.placed_angles[:], estimate.log_scale[0] = estimate.angles, self._desk.size[0]
         estimate.agitation[:] = START_AGITATION
         estimate.unseen[:], estimate.unfaded[:], estimate.turning[:], estimate.held[:] = 0.0, 0.0, START_TURNING, FREE
         estimate.bias_variance[:], estimate.looks[:] = self._desk.bias_variance, 0.0

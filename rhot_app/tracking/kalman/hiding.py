@@ -55,7 +55,7 @@ LIKE = 0.1
 def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array,
                      made: Array) -> None:
     """Set the biases' variances of fingertips that are hidden in part, and back, and `frame.own` of those in plain
-    view; learn their sizes (`estimate.width`).
+    view; learn their sizes (`estimate.width`) and how the hand is bent (`estimate.placed_angles`).
 
     To be called after `doubt_partial`. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them;
     `made` (M,) m^2: variance of the markers' places by their making.
@@ -63,6 +63,8 @@ def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estim
     camera, count = frame.camera[0], worn.part.shape[0]
     if not is_placed(estimate, camera):
         return
+    if np.sum(frame.seen) >= PLACED_BY:
+        estimate.placed_angles[:] = estimate.angles
     parts = np.empty(count)
     shown_parts(worn, estimate, cameras.pose[camera], points, parts)
     for sight in range(count):

@@ -8,6 +8,8 @@ from rhot_app.tracking.kalman.apparent_size import EACH, NEEDED, weigh_sizes
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
+    GOES_ON,
+    PALM_HELD,
     POSE,
     UNSEEN_S,
     copy_estimate,
@@ -73,18 +75,25 @@ def test_a_hand_that_looks_too_large_is_nearer(off_m, bent):
     assert np.degrees(np.abs(estimate.angles - true.angles).max()) < 1.0
 
 
-def test_fingers_that_would_look_another_size_are_bent_with_it():
-    """What a hand's fingers are is known by where they are seen: nearer, they are bent more."""
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_fingers_that_would_look_another_size_are_bent_with_it_by_a_palm_that_goes_on_turning(goes_on):
+    """Nearer, they are bent more, to be where they are seen. Otherwise they are left to where they are seen."""
     true = alone(0.5)
     with_distance = np.zeros(SIZE)
     with_distance[:3], with_distance[ANGLES + 5:POSE] = sight_of(true), -5.0
     true.covariance[:] = 1e-6 * np.eye(SIZE) + 0.03**2 * np.outer(with_distance, with_distance)
     estimate = copied(true)
     displace(true, OFF_M * with_distance, estimate)
-    weigh(seen(true, 0), estimate, 10)
+    estimate.held[0] = GOES_ON if goes_on else PALM_HELD
+    weigh(seen(true, 0), estimate, 20)
     left = difference_of(estimate, true)
-    assert abs(left[:3] @ sight_of(true)) < 0.15 * OFF_M
-    assert np.abs(left[ANGLES + 5:POSE]).max() < 0.15 * 5.0 * OFF_M
+    if goes_on:
+        assert abs(left[:3] @ sight_of(true)) < 0.15 * OFF_M
+        assert np.abs(left[ANGLES + 5:POSE]).max() < 0.15 * 5.0 * OFF_M
+    else:
+        assert abs(left[:3] @ sight_of(true)) < 0.5 * OFF_M
+        assert left[ANGLES + 5:POSE] == pytest.approx(-5.0 * OFF_M)
+        assert np.diag(estimate.covariance)[ANGLES + 5:POSE] == pytest.approx(np.diag(true.covariance)[ANGLES + 5:POSE])
 
 
 def difference_of(a, b):
@@ -99,10 +108,10 @@ def test_a_fingertip_that_is_hidden_in_part_does_not_push_the_hand_away():
         pushed = []
         for shares in (hidden, dict.fromkeys(range(5), 0.85)):
             estimate = copied(true)
-            weigh(seen(true, 0, shares), estimate, 10)
+            weigh(seen(true, 0, shares), estimate, 30)
             pushed.append((estimate.world[:3, 3] - true.world[:3, 3]) @ sight_of(true))
         assert abs(pushed[0]) < 0.12 * pushed[1]
-        assert pushed[1] == pytest.approx((0.85**-0.5 - 1.0) * DISTANCE_M, rel=0.15)  # if all are, it is farther away
+        assert pushed[1] == pytest.approx((0.85**-0.5 - 1.0) * DISTANCE_M, rel=0.25)  # if all are, it is farther away
 
 
 def test_what_has_been_learnt_of_sizes_is_not_learnt_again():
