@@ -20,9 +20,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import direction_jacobian, forward_arrays
-from rhot_app.tracking.kalman.estimate import GOES_ON, POSE, ROTATION, SCALE, Estimate, displace
+from rhot_app.tracking.kalman.estimate import GOES_ON, LINEAR, PALM_HELD, POSE, ROTATION, SCALE, Estimate, displace
 from rhot_app.tracking.kalman.hiding import is_placed, shown_part
+from rhot_app.tracking.kalman.holding import HURRIES_M_S
 from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
+from rhot_app.tracking.kalman.motion import speeds
 from rhot_app.tracking.kalman.sighted import line_of_sight
 
 Array = NDArray[np.float64]
@@ -61,12 +63,13 @@ class Sizes(NamedTuple):
 
 @njit(cache=True)
 def weigh_sizes(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array) -> None:
-    """Correct the estimate of a hand that only this camera sees by how large its fingertips look.
+    """Correct the estimate of a hand whose distance is held (`holding.py`), because only this camera sees it, by how
+    large its fingertips look.
 
     To be called after `measure_sizes`. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them.
     """
     camera, count = frame.camera[0], worn.part.shape[0]
-    if is_placed(estimate, camera):
+    if estimate.held[0] not in (PALM_HELD, GOES_ON) or is_placed(estimate, camera):
         return
     sizes, sight = Sizes(np.empty(count), np.empty((count, POSE)), np.empty(count)), np.zeros(3)
     used = _read(worn, cameras.pose[camera], frame, estimate, points, jacobian, sizes, sight)
@@ -140,10 +143,11 @@ def _doubt_small(covariance: Array, sight: Array, sizes: Sizes, used: int) -> No
 
 @njit(cache=True)
 def _correct(estimate: Estimate, sizes: Sizes, used: int) -> None:
-    """Weigh one fingertip after the other. Of a hand whose palm's turn is held only the palm's place and its speed are
-    corrected; what is not known of its fingers is taken into account and left as it is (Schmidt 1966): of how they are
-    bent sizes say too little not to be misled."""
-    covariance, size, whole = estimate.covariance, estimate.covariance.shape[0], estimate.held[0] == GOES_ON
+    """Weigh one fingertip after the other. Of a hand that neither hurries nor turns only the palm's place and its speed
+    are corrected; what is not known of its fingers is taken into account and left as it is (Schmidt 1966): of how they
+    are bent sizes say too little not to be misled."""
+    covariance, size = estimate.covariance, estimate.covariance.shape[0]
+    whole = estimate.held[0] == GOES_ON or speeds(estimate)[LINEAR] > HURRIES_M_S
     step, seen, gain = np.zeros(size), np.empty(size), np.zeros(size)
     for k in range(used):
         seen[:] = 0.0

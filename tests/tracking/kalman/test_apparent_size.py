@@ -8,15 +8,19 @@ from rhot_app.tracking.kalman.apparent_size import EACH, NEEDED, weigh_sizes
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
+    FREE,
     GOES_ON,
     PALM_HELD,
+    PLACED,
     POSE,
+    TURN_HELD,
     UNSEEN_S,
     copy_estimate,
     displace,
     empty_estimate,
 )
 from rhot_app.tracking.kalman.hiding import PLACED_BY
+from rhot_app.tracking.kalman.holding import HURRIES_M_S
 from rhot_app.tracking.kalman.sighted import line_of_sight
 from rhot_app.tracking.kalman.sizes import measure_sizes
 from rhot_node.wire.messages import MarkerFlag
@@ -34,7 +38,7 @@ def copied(estimate):
 def alone(bent=0.0):
     """A hand that the second camera no longer sees: its distance is known to 3 cm."""
     estimate = looked_at(bent)
-    estimate.unseen[1] = UNSEEN_S
+    estimate.unseen[1], estimate.held[0] = UNSEEN_S, PALM_HELD
     sight = sight_of(estimate)
     estimate.covariance[:3, :3] = 1e-3**2 * np.eye(3) + 0.03**2 * np.outer(sight, sight)
     estimate.covariance[ANGLES:POSE, ANGLES:POSE] = np.radians(1.0) ** 2 * np.eye(POSE - ANGLES)
@@ -75,8 +79,8 @@ def test_a_hand_that_looks_too_large_is_nearer(off_m, bent):
     assert np.degrees(np.abs(estimate.angles - true.angles).max()) < 1.0
 
 
-@pytest.mark.parametrize("goes_on", [True, False])
-def test_fingers_that_would_look_another_size_are_bent_with_it_by_a_palm_that_goes_on_turning(goes_on):
+@pytest.mark.parametrize(("held", "speed_m_s"), [(GOES_ON, 0.0), (PALM_HELD, 0.3), (PALM_HELD, 0.1)])
+def test_fingers_that_would_look_another_size_are_bent_with_it_if_the_palm_turns_or_hurries(held, speed_m_s):
     """Nearer, they are bent more, to be where they are seen. Otherwise they are left to where they are seen."""
     true = alone(0.5)
     with_distance = np.zeros(SIZE)
@@ -84,10 +88,10 @@ def test_fingers_that_would_look_another_size_are_bent_with_it_by_a_palm_that_go
     true.covariance[:] = 1e-6 * np.eye(SIZE) + 0.03**2 * np.outer(with_distance, with_distance)
     estimate = copied(true)
     displace(true, OFF_M * with_distance, estimate)
-    estimate.held[0] = GOES_ON if goes_on else PALM_HELD
+    estimate.held[0], estimate.velocity[0] = held, speed_m_s
     weigh(seen(true, 0), estimate, 20)
     left = difference_of(estimate, true)
-    if goes_on:
+    if held == GOES_ON or speed_m_s > HURRIES_M_S:
         assert abs(left[:3] @ sight_of(true)) < 0.15 * OFF_M
         assert np.abs(left[ANGLES + 5:POSE]).max() < 0.15 * 5.0 * OFF_M
     else:
@@ -149,6 +153,14 @@ def test_a_hand_that_another_camera_places_is_left_alone():
         estimate = moved(true, OFF_M * sight_of(true))
         estimate.unseen[1, :others] = 0.0
         assert unmoved(seen(true, 0), estimate) == (others >= PLACED_BY)
+
+
+def test_only_a_hand_whose_distance_is_held_is_brought():
+    true = alone()
+    for held in (FREE, TURN_HELD, PLACED, PALM_HELD, GOES_ON):
+        estimate = moved(true, OFF_M * sight_of(true))
+        estimate.held[0] = held
+        assert unmoved(seen(true, 0), estimate) == (held in (FREE, TURN_HELD, PLACED))
 
 
 def test_too_few_fingertips_of_known_size_say_nothing():
