@@ -2,7 +2,7 @@
 
 A single camera does not see distance, and what it leaves open is held to its course (`holding.py`). While two cameras
 saw the hand it was learnt how large its fingertips are, and how much that varies (`hiding.py`). As they look larger or
-smaller now, the palm is brought nearer or farther away; its fingers go on to be where they are seen.
+smaller now, the hand is nearer or farther away.
 
 A hand that is taken to be nearer than it is has its fingers bent more, to look as it does, and a fingertip that points
 at the camera shows less of itself: how large a fingertip should look depends on the whole pose. Many things make a
@@ -20,11 +20,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import direction_jacobian, forward_arrays
-from rhot_app.tracking.kalman.estimate import GOES_ON, LINEAR, PALM_HELD, POSE, ROTATION, SCALE, Estimate, displace
+from rhot_app.tracking.kalman.estimate import GOES_ON, PALM_HELD, POSE, ROTATION, Estimate, displace
 from rhot_app.tracking.kalman.hiding import is_placed, shown_part
-from rhot_app.tracking.kalman.holding import HURRIES_M_S
 from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
-from rhot_app.tracking.kalman.motion import speeds
 from rhot_app.tracking.kalman.sighted import line_of_sight
 
 Array = NDArray[np.float64]
@@ -35,7 +33,7 @@ NEEDED = 3
 EACH, ALL = 0.005, 0.005
 """Logarithms of widths are off by at least this, one standard deviation: each by itself, and all alike."""
 
-LASTING = 4.0
+LASTING = 2.0
 """Of this many times its variance a fingertip's width is weighed, and less the better it is known: what is wrong with
 it is wrong in many frames, and what they all say is not known better for that."""
 
@@ -143,12 +141,9 @@ def _doubt_small(covariance: Array, sight: Array, sizes: Sizes, used: int) -> No
 
 @njit(cache=True)
 def _correct(estimate: Estimate, sizes: Sizes, used: int) -> None:
-    """Weigh one fingertip after the other. Of a hand that neither hurries nor turns only the palm's place and its speed
-    are corrected; what is not known of its fingers is taken into account and left as it is (Schmidt 1966): of how they
-    are bent sizes say too little not to be misled."""
+    """Weigh one fingertip after the other."""
     covariance, size = estimate.covariance, estimate.covariance.shape[0]
-    whole = estimate.held[0] == GOES_ON or speeds(estimate)[LINEAR] > HURRIES_M_S
-    step, seen, gain = np.zeros(size), np.empty(size), np.zeros(size)
+    step, seen = np.zeros(size), np.empty(size)
     for k in range(used):
         seen[:] = 0.0
         for j in range(POSE):
@@ -161,10 +156,7 @@ def _correct(estimate: Estimate, sizes: Sizes, used: int) -> None:
         own = LASTING * sizes.variance[k]
         total = max(known + own * max(1.0, own / known), (residual / UNLIKELY) ** 2)
         for i in range(size):
-            if whole or (i < SCALE and i % POSE < ROTATION):
-                gain[i] = seen[i] / total
-                step[i] += gain[i] * residual
-        for i in range(size):
-            for j in range(size):  # Joseph's form
-                covariance[i, j] += total * gain[i] * gain[j] - gain[i] * seen[j] - seen[i] * gain[j]
+            step[i] += seen[i] * residual / total
+            for j in range(size):
+                covariance[i, j] -= seen[i] * seen[j] / total
     displace(estimate, step, estimate)
