@@ -43,6 +43,7 @@ Results = dict[str, Figures]
 
 RAMP = str(Path(__file__).parent / "motions" / "ramp.json")
 CROSS_S, START_EVERY_S, SCALE_S = 60.0, 1.0, 40.0
+LEAST_S = scenarios.BLIND_FROM_S + scenarios.BLIND_S
 WRONG_SCALES = (1.1, 0.9)
 BETAS = (0.1, 0.4, 1.5, 8.0, 40.0)
 POSITION_PER_PIXEL_BETA = 500.0  # the defaults' own proportion
@@ -183,10 +184,13 @@ def main() -> int:
                         help="where the logs are kept, and found again")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
-    if args.seeds < 1 or args.seed < 0:
-        parser.error(f"--seeds {args.seeds} --seed {args.seed}: the first must be 1 or more, the second 0 or more")
-    if not 2.0 <= args.seconds < float("inf"):
-        parser.error(f"--seconds {args.seconds}: must be 2 or more, and end")
+    if args.seeds < 1:
+        parser.error(f"--seeds {args.seeds}: must be 1 or more")
+    if args.seed < 0:
+        parser.error(f"--seed {args.seed}: must be 0 or more")
+    if not LEAST_S <= args.seconds < float("inf"):
+        parser.error(f"--seconds {args.seconds}: must be {LEAST_S:g} or more, for a camera to be covered for a second; "
+                     f"and have an end")
     if not 0.0 < args.minutes < float("inf"):
         parser.error(f"--minutes {args.minutes}: must be more than 0, and end")
     if not 0.001 <= args.hidden_for[0] <= args.hidden_for[1] <= args.seconds:

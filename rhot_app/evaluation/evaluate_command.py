@@ -88,7 +88,8 @@ def _motions_of(args: argparse.Namespace, usual: Sequence[str]) -> list[str]:
 
     if args.motion is not None:
         raise SimulatorError(f"--compare takes --motions, a list: write --motions {args.motion} instead of --motion.")
-    motions = list(usual) if args.motions is None else list(dict.fromkeys(args.motions.split(",")))
+    named = [] if args.motions is None else [name.strip() for name in args.motions.split(",")]
+    motions = list(usual) if args.motions is None else list(dict.fromkeys(named))
     if not all(motions):
         raise SimulatorError(f"--motions {args.motions!r}: put commas between names of motions only.")
     if args.recording is not None and not Path(args.recording).is_file():

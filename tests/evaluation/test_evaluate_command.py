@@ -15,7 +15,7 @@ from rhot_app.evaluation.takes import Order
 from rhot_app.simulator.scene import make_scene, twin_defaults
 
 RAMP = Path(__file__).resolve().parents[2] / "benchmarks" / "motions" / "ramp.json"
-QUICK = ("evaluate", "--compare", "--sketched", "--trackers", "classic", "--motions", "rest,pinch", "--seeds", "2",
+QUICK = ("evaluate", "--compare", "--sketched", "--trackers", "classic", "--motions", "rest, pinch", "--seeds", "2",
          "--seconds", "1.6")
 
 
