@@ -189,8 +189,8 @@ def main() -> int:
     if args.seed < 0:
         parser.error(f"--seed {args.seed}: must be 0 or more")
     if not LEAST_S <= args.seconds < float("inf"):
-        parser.error(f"--seconds {args.seconds}: must be {LEAST_S:g} or more, for a camera to be covered for a second; "
-                     f"and have an end")
+        parser.error(f"--seconds {args.seconds}: must be {LEAST_S:g} or more, for a camera to be covered for a second, "
+                     "and have an end")
     if not 0.0 < args.minutes < float("inf"):
         parser.error(f"--minutes {args.minutes}: must be more than 0, and end")
     if not 0.001 <= args.hidden_for[0] <= args.hidden_for[1] <= args.seconds:

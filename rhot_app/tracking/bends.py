@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 OTHERWISE = 0.3
-"""Of how far a finger has bent, its joints may each have bent otherwise, one standard deviation. (Measured of grasping
-hands, 0.4 and lasting; of pinching and waving ones less.)"""
+"""Of how far a finger has bent, its joints may each have bent otherwise, one standard deviation. (Looked
+at in two of the twin's grasps: about 0.4. With it 0.98 of the axes of grasping fingertips are within three.)"""
 
 ACROSS_M = 5e-4
 """Across its line of sight a fingertip is known to this anyway."""

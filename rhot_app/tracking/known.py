@@ -4,7 +4,7 @@ Three things differ. The filter takes markers' seen middles to lie farther from 
 hand that trusts its fingertips too far follows them where its palm does not go. What is told takes them to lie as near
 as they do.
 How a palm is turned that only fingers show is believed to be known better than habit leaves it: it is told as no better
-known. And no angle is known less than by habit.
+known. And no angle is known less than by habit. How fingers bend before one camera comes on top (`bends.py`).
 """
 
 from __future__ import annotations
