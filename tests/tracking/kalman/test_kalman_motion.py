@@ -20,7 +20,7 @@ from rhot_app.tracking.kalman.estimate import (
     TURN,
     VELOCITY,
 )
-from rhot_app.tracking.kalman.motion import MOST, TURNING_S, liveliness, predict, speeds
+from rhot_app.tracking.kalman.motion import MOST, TURNING_S, WIDTH_S, liveliness, predict, speeds
 from rhot_app.tracking.kalman.sighted import FRESH_S
 
 DT = 0.0125
@@ -200,3 +200,13 @@ def test_a_palm_that_is_held_does_not_wake_by_moving(how):
     estimate.held[0] = how
     awake = carried(estimate).agitation > 0.0
     assert awake[FIRST_FINGER + 1] and awake[LINEAR] == awake[TURN] == (how != PALM_HELD)
+
+
+def test_how_wide_paint_is_is_forgotten_only_while_two_cameras_see_it():
+    """One camera tells by it how far away the hand is, for as long as it is alone."""
+    estimate = moving_estimate()
+    estimate.width[:], estimate.unseen[:] = 0.02, 0.0
+    estimate.unseen[1, :3] = 2.0 * FRESH_S
+    after = carried(estimate)
+    assert after.width[:3] == pytest.approx(0.02, rel=1e-12)
+    assert after.width[3:] == pytest.approx(0.02 * np.exp(-DT / WIDTH_S), rel=1e-12)
