@@ -9,7 +9,8 @@ from pathlib import Path
 
 from rhot_app.engine.directory import default_directory
 from rhot_app.project import load_rig
-from rhot_app.ui.backend.session import Session, TwinChoice
+from rhot_app.ui.backend.contract import TwinChoice
+from rhot_app.ui.backend.session import Session
 from rhot_app.ui.environment import cap_software_gl, choose_gl_platform, give_way
 
 

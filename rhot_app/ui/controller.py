@@ -14,8 +14,8 @@ from PySide6.QtCore import QObject, Signal
 
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
+from rhot_app.ui.backend.contract import Backend, Opened, TwinChoice, TwinPace
 from rhot_app.ui.backend.live import SILENCE_S, Live
-from rhot_app.ui.backend.session import Backend, Opened, TwinChoice, TwinPace
 from rhot_app.ui.engine_link import ClosableClient, EngineLink
 from rhot_app.ui.job import Job, Progress
 

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.ui.actions import Actions, MainToolBar
 from rhot_app.ui.appearance import Appearance
-from rhot_app.ui.backend.session import TwinChoice
+from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.controller import Controller
 from rhot_app.ui.dialogs import Dialogs
 from rhot_app.ui.docks import Docks

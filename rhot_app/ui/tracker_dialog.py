@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import Rig, TrackerSettings, model_tracker_obstacle
 from rhot_app.tracking.state import HandState
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.job import Job
 from rhot_app.ui.models.tracker_words import (
     KINDS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rhot_app.engine.status import Advice
-from rhot_app.ui.backend.session import TwinPace
+from rhot_app.ui.backend.contract import TwinPace
 from rhot_app.ui.controller import RESTART_ENGINE, RESTART_TWIN, Controller
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text

@@ -8,7 +8,7 @@ from pathlib import Path
 from fake_engine import FakeClient, FakeEngine
 
 from rhot_app.errors import RigError
-from rhot_app.ui.backend.session import Opened, Report, TwinChoice, TwinPace
+from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 
 
 class FakeBackend:

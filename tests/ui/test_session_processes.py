@@ -16,7 +16,8 @@ from rhot_app.engine.process import running_engine, start_ticks, started_process
 from rhot_app.errors import EngineError, RigError, SimulatorError
 from rhot_app.project import save_rig
 from rhot_app.ui.backend import session as session_module
-from rhot_app.ui.backend.session import Session, TwinChoice, TwinPace
+from rhot_app.ui.backend.contract import TwinChoice, TwinPace
+from rhot_app.ui.backend.session import Session
 
 
 def quiet(text: str, fraction: float) -> None:

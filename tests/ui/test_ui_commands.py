@@ -6,7 +6,7 @@ import pytest
 
 from rhot_app.__main__ import main
 from rhot_app.ui import app, demo_command
-from rhot_app.ui.backend.session import TwinChoice
+from rhot_app.ui.backend.contract import TwinChoice
 from rhot_node.files import resource_path
 
 

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
 
 from rhot_app.project import load_rig, save_rig
-from rhot_app.ui.backend.session import TwinPace
+from rhot_app.ui.backend.contract import TwinPace
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.passing import PassingNotices
 

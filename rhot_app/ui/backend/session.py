@@ -10,15 +10,11 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
 
 import msgspec
 
 from rhot_app.engine.client import EngineClient
-from rhot_app.engine.codec import Published
 from rhot_app.engine.directory import EngineDirectory, open_directory
 from rhot_app.engine.process import (
     end_started,
@@ -28,7 +24,8 @@ from rhot_app.engine.process import (
     started_processes,
 )
 from rhot_app.errors import EngineError, SimulatorError
-from rhot_app.project import Rig, load_rig, parse_rig
+from rhot_app.project import load_rig, parse_rig
+from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 
 ENGINE_ROLE = "engine"
 TWIN_ROLE = "simulated nodes"
@@ -38,109 +35,6 @@ START_TIMEOUT_S = 360.0
 TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.live")
 TWIN_RIG = "simulated.rig.json"
 TWIN_OUTPUT = "twin.out"
-
-Report = Callable[[str, float], None]
-"""``report(text, fraction)``; raises when the work is to be given up."""
-
-
-@dataclass(frozen=True, slots=True)
-class Opened:
-    """A rig that is open now. `ours` is False when somebody else started the engine: closing leaves it running."""
-
-    rig: Rig
-    rig_path: str
-    running: bool
-    ours: bool
-    simulated: bool
-
-
-@dataclass(frozen=True, slots=True)
-class TwinChoice:
-    """What the simulated hand does."""
-
-    motion: str = "grasp"
-    seed: int = 1
-    preset: str = "wide"
-
-
-@dataclass(frozen=True, slots=True)
-class TwinPace:
-    """How fast the simulated cameras are rendered when that is slower than their preset asks for."""
-
-    achieved_hz: float
-    preset_hz: float
-
-
-class Asker(Protocol):
-    """Gives commands to the engine; one per thread."""
-
-    def command(self, name: str, *, timeout_s: float = 3.0, **arguments: Any) -> dict[str, Any]:
-        """Ask the engine; raises EngineError."""
-        ...
-
-    def close(self) -> None:
-        """Disconnect."""
-        ...
-
-
-class Listener(Protocol):
-    """Hears what the engine publishes; one per thread."""
-
-    def poll(self) -> list[Published]:
-        """Everything that arrived since the last call; never waits."""
-        ...
-
-    def close(self) -> None:
-        """Disconnect."""
-        ...
-
-
-class Backend(Protocol):
-    """What the window needs of the processes; `Session` is the real one."""
-
-    def client(self) -> Listener:
-        """A client that hears the hand's states."""
-        ...
-
-    def asker(self) -> Asker:
-        """A client that only gives commands; for workers, each its own."""
-        ...
-
-    def found(self) -> bool:
-        """Whether an engine runs already that the window should attach to."""
-        ...
-
-    def attach(self, report: Report) -> Opened:
-        """Attach to the running engine."""
-        ...
-
-    def open_rig(self, path: Path, report: Report) -> Opened:
-        """Start an engine on a rig file."""
-        ...
-
-    def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
-        """Start simulated nodes and an engine on their rig."""
-        ...
-
-    def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
-        """Start the engine again after it vanished."""
-        ...
-
-    def twin_alive(self) -> bool:
-        """Whether the simulated nodes, if any were started, still run."""
-        ...
-
-    def twin_pace(self) -> TwinPace | None:
-        """How fast the simulated cameras are rendered; None when as fast as they should be."""
-        ...
-
-    def give_up(self) -> None:
-        """End whatever is being started, so that a cancelled start leaves nothing behind."""
-        ...
-
-    def close(self) -> str:
-        """End all that the app started; a sentence about what was left running on purpose, or ""."""
-        ...
 
 
 class Session:

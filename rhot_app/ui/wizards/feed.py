@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import EngineError, RhotError
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.contract import Asker
 
 Image = NDArray[np.uint8]
 

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.chart_page import ChartPage
 from rhot_app.ui.wizards.models.filter_meters import LiveMeters

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QWidget
 
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, parse_rig
-from rhot_app.ui.backend.session import Asker, Listener
+from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.job import Job
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.shapes import shape_icon

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from rhot_app.errors import EngineError
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.wizards.models.movement import Coach, MovementStep
 from rhot_app.ui.wizards.movement_page import MovementPage
 from rhot_app.ui.wizards.plan import Kit

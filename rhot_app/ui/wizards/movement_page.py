@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QLabel, QPushButton
 
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.job import Job
 from rhot_app.ui.wizards.models.movement import MovementStep, Request
 from rhot_app.ui.wizards.models.step import StepView

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rhot_app.project import Rig
-from rhot_app.ui.backend.session import Asker, Listener
+from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.memory import Memory
 from rhot_app.ui.wizards.page import Page

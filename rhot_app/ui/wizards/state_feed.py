@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from rhot_app.errors import RhotError
 from rhot_app.tracking.state import HandState
-from rhot_app.ui.backend.session import Listener
+from rhot_app.ui.backend.contract import Listener
 
 KEPT_S = 4.0
 _PERIOD_S = 0.02

@@ -9,7 +9,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from rhot_app.errors import RhotError
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.job import Job
 
 Settings = dict[str, Any]

@@ -12,7 +12,7 @@ from rhot_app import rig_history
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig, load_rig
 from rhot_app.rig_history import Version
-from rhot_app.ui.backend.session import Asker
+from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.job import Job
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.accept_page import RowTable

@@ -18,7 +18,7 @@ from rhot_app import rig_history
 from rhot_app.engine.status import Advice
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui import actions, main_window
-from rhot_app.ui.backend.session import Opened
+from rhot_app.ui.backend.contract import Opened
 from rhot_app.ui.wizards import catalogue, launcher
 from rhot_app.ui.wizards.catalogue import Wizard
 from rhot_app.ui.wizards.models.rig_rows import rig_rows
