@@ -90,11 +90,12 @@ class LiveCameras:
 
     def _change(self, setting: Setting) -> None:
         """What is new on the stage; a new act begins now."""
-        for renderer, painter in zip(self._renderers, setting.painters, strict=True):
+        for name, renderer, painter in zip(self._scene.names, self._renderers, setting.painters, strict=True):
             if setting.act is not self._setting.act:
                 renderer.show(painter)
-            if setting.lamp != renderer.exposure.lamp:
-                renderer.expose(replace(renderer.exposure, lamp=setting.lamp))
+            exposure = replace(renderer.exposure, lamp=setting.lamp, covered=name in setting.covered)
+            if exposure != renderer.exposure:
+                renderer.expose(exposure)
         if setting.act is not self._setting.act:
             self._began_ns = self._tick_ns
         self._setting = setting

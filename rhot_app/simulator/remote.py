@@ -10,6 +10,7 @@ For the app's wizards on the simulated rig ("hold up the board") and for tests::
         twin.show(RulerShow(length_mm=200.0))                  # a paper ruler
         twin.show(HandShow("rest"))                            # a hand again
         twin.lamp(brightness=0.8, kelvin=3200.0)               # what is not named stays
+        twin.cover("left")                                     # a cap on that lens alone; cover() takes all off
         twin.state().lamp.kelvin
 
 Every call returns when the cameras show the change, and raises SimulatorError with a sentence when they cannot. The
@@ -29,7 +30,14 @@ from rhot_app.errors import SimulatorError
 from rhot_app.simulator.controls import Controls
 from rhot_app.simulator.lamp import Lamp
 from rhot_app.simulator.shows import Show
-from rhot_app.simulator.twin_requests import LampRequest, Request, ShowRequest, StateRequest, door_address
+from rhot_app.simulator.twin_requests import (
+    CoverRequest,
+    LampRequest,
+    Request,
+    ShowRequest,
+    StateRequest,
+    door_address,
+)
 
 ANSWER_S = 180.0
 """A show that was never shown on this machine is compiled first."""
@@ -45,11 +53,12 @@ class CameraState(Controls, frozen=True, kw_only=True):
 
 class TwinState(msgspec.Struct, frozen=True):
     """What the twin shows: `name` in words, as `show`, under `lamp`; `cameras` by name; frames per second of late
-    (0: not known yet), and as they should be."""
+    (0: not known yet), and as they should be; `covered` cameras see nothing."""
 
     name: str
     show: Show
     lamp: Lamp
+    covered: tuple[str, ...] = ()
     cameras: dict[str, CameraState] = {}
     rate_hz: float = 0.0
     preset_hz: float = 0.0
@@ -71,6 +80,10 @@ class TwinRemote:
              flicker: float | None = None) -> TwinState:
         """Change the room's lamp; see `lamp.Lamp`."""
         return self._ask(LampRequest(brightness, kelvin, mains_hz, flicker), ANSWER_S)
+
+    def cover(self, *cameras: str) -> TwinState:
+        """Cover the lenses of these cameras, by name, and uncover all others."""
+        return self._ask(CoverRequest(cameras), ANSWER_S)
 
     def state(self) -> TwinState:
         """What is shown now."""

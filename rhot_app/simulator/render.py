@@ -27,17 +27,20 @@ class Optics:
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """How the picture comes about: the lamp, the shutter, the camera's settings, and the exposure time (s) at which a
-    lamp of brightness 1 gives the scene its own grey levels."""
+    """How the picture comes about: the lamp, the shutter, the camera's settings, the exposure time (s) at which a
+    lamp of brightness 1 gives the scene its own grey levels, and whether a cap is on the lens."""
 
     shutter: Shutter
     nominal_s: float
     lamp: Lamp
     controls: Controls
+    covered: bool = False
 
     @property
     def level(self) -> Array:
         """(3,) factors on the grey levels of red, green and blue."""
+        if self.covered:
+            return np.zeros(3)
         return level_gain(lamp_gains(self.lamp) * self.shutter.exposure_s / self.nominal_s * self.controls.gain)
 
 

@@ -17,7 +17,7 @@ from rhot_app.simulator.painter import Painter
 from rhot_app.simulator.scene import Scene
 from rhot_app.simulator.shot import camera_seed
 from rhot_app.simulator.shows import RulerShow, Show
-from rhot_app.simulator.twin_requests import LampRequest, Request, ShowRequest
+from rhot_app.simulator.twin_requests import CoverRequest, LampRequest, Request, ShowRequest
 
 TAKE_UP_S = 5.0
 """A change is taken up with the next frame; a twin that needs longer is stuck."""
@@ -25,12 +25,13 @@ TAKE_UP_S = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What stands on the stage. `painters`: one per camera."""
+    """What stands on the stage. `painters`: one per camera; `covered`: names of the cameras that see nothing of it."""
 
     show: Show
     act: Act
     painters: tuple[Painter, ...]
     lamp: Lamp
+    covered: frozenset[str] = frozenset()
 
 
 class Stage:
@@ -67,14 +68,25 @@ class Stage:
         """Do what is asked and wait until the cameras show it. Raises SimulatorError, RigError, CalibrationError."""
         now = self._setting
         if isinstance(request, ShowRequest):
-            self._put(self._build(request.what, now.lamp))
+            self._put(replace(self._build(request.what, now.lamp), covered=now.covered))
         elif isinstance(request, LampRequest):
             try:
                 self._put(replace(now, lamp=request.change(now.lamp)))
             except msgspec.ValidationError as exc:
                 raise SimulatorError(f"there is no such lamp: {exc}") from exc
+        elif isinstance(request, CoverRequest):
+            self._cover(request.cameras)
         setting = self._setting
-        return {"name": setting.act.name, "show": setting.show, "lamp": setting.lamp, **self.report}
+        return {"name": setting.act.name, "show": setting.show, "lamp": setting.lamp,
+                "covered": sorted(setting.covered), **self.report}
+
+    def _cover(self, cameras: tuple[str, ...]) -> None:
+        strangers = [name for name in cameras if name not in self._scene.names]
+        if strangers:
+            raise SimulatorError(f"there is no camera {strangers[0]!r} to cover, only {', '.join(self._scene.names)}.")
+        covered = frozenset(cameras)
+        if covered != self._setting.covered:
+            self._put(replace(self._setting, covered=covered))
 
     def _build(self, show: Show, lamp: Lamp) -> Setting:
         """An act with painters that have painted once: nothing is loaded or compiled in the cameras' time."""

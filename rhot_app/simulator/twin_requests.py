@@ -1,6 +1,7 @@
 """What may be asked of a live twin, as JSON, and its answers (docs/twin.md). No sockets.
 
-Lamp and stage belong to the room, not to the rig: nothing that is asked here reaches nodes or engine but as pictures.
+Stage, lamp and caps on lenses belong to the room, not to the rig: nothing that is asked here reaches nodes or engine
+but as pictures.
 """
 
 from __future__ import annotations
@@ -46,11 +47,17 @@ class LampRequest(_Request, frozen=True, tag="lamp"):
         return msgspec.convert(msgspec.to_builtins(lamp) | chosen, Lamp)
 
 
+class CoverRequest(_Request, frozen=True, tag="cover"):
+    """Cover these cameras' lenses, by name, and uncover all others."""
+
+    cameras: tuple[str, ...] = ()
+
+
 class StateRequest(_Request, frozen=True, tag="state"):
-    """What is shown, by which lamp, by which settings of the cameras, and how fast."""
+    """What is shown, by which lamp, to which cameras, by which settings of the cameras, and how fast."""
 
 
-Request = ShowRequest | LampRequest | StateRequest
+Request = ShowRequest | LampRequest | CoverRequest | StateRequest
 
 _decoder = msgspec.json.Decoder(Request)
 

@@ -22,7 +22,7 @@ from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.simulator.shows import BoardShow, HandShow, MarkerShow
 from rhot_app.simulator.stage import Stage
 from rhot_app.simulator.twin_door import TwinDoor
-from rhot_app.simulator.twin_requests import LampRequest, ShowRequest, StateRequest
+from rhot_app.simulator.twin_requests import CoverRequest, LampRequest, ShowRequest, StateRequest
 from rhot_node.capture.stream import HEADER_BYTES, StreamHeader, pack_settings, unpack_header
 from rhot_node.config import CameraSettings
 
@@ -50,7 +50,7 @@ class Rig:
         planes = np.frombuffer(self._receive(header.frame_bytes), np.uint8)
         return header, planes[:WIDTH * HEIGHT].reshape(HEIGHT, WIDTH)
 
-    def ask(self, request: ShowRequest | LampRequest) -> None:
+    def ask(self, request: ShowRequest | LampRequest | CoverRequest) -> None:
         """What the door's thread does, while the cameras go on."""
         asking = threading.Thread(target=self.stage.perform, args=(request,))
         asking.start()
@@ -96,6 +96,24 @@ def test_lamp_changes_every_picture_and_stays_for_what_is_shown_next(rig: Rig) -
     rig.ask(ShowRequest(HandShow("rest")))
     rig.ask(LampRequest(kelvin=3000.0))
     assert rig.stage.setting.lamp == Lamp(brightness=0.25, kelvin=3000.0)
+
+
+def test_a_covered_camera_alone_sees_nothing_until_it_is_uncovered(rig: Rig) -> None:
+    rig.frame()
+    before = rig.frame()[1]
+    rig.ask(CoverRequest(("right",)))
+    assert np.abs(rig.frame()[1].astype(float) - before).mean() < 5.0, "it is the other one that is covered"
+    rig.ask(CoverRequest(("left",)))
+    black = rig.frame()[1]
+    assert black.max() < 30 and black.std() > 0.3, "no light, but the sensor's noise"
+    rig.ask(LampRequest(brightness=2.0))
+    rig.ask(ShowRequest(HandShow("rest")))
+    assert rig.frame()[1].max() < 30, "whatever is shown, and by whatever light"
+    assert rig.stage.perform(StateRequest())["covered"] == ["left"]
+    rig.ask(CoverRequest())
+    assert rig.frame()[1].mean() > before.mean(), "uncovered, by the brighter lamp"
+    with pytest.raises(SimulatorError, match=r"'middle'.*left, right"):
+        rig.stage.perform(CoverRequest(("middle",)))
 
 
 def test_what_cannot_be_shown_changes_nothing(rig: Rig) -> None:
@@ -147,6 +165,7 @@ def test_remote_and_door_understand_each_other(rig: Rig, tmp_path: Path) -> None
             assert state.show == BoardShow(pattern="charuco", size="8x6", square_mm=25.0)
             assert state.cameras["right"].contrast == 1.0 and (state.rate_hz, state.preset_hz) == (21.5, 40.0)
             assert twin.lamp(mains_hz=50.0).lamp.mains_hz == 50.0
+            assert twin.cover("right").covered == ("right",) and twin.cover().covered == ()
             with pytest.raises(SimulatorError, match="toe"):
                 twin.show(MarkerShow(marker="toe"))
             with pytest.raises(SimulatorError, match="distance_m"):
