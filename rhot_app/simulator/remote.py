@@ -43,6 +43,8 @@ ANSWER_S = 180.0
 """A show that was never shown on this machine is compiled first."""
 
 STATE_S = 3.0
+COVER_S = 8.0
+"""A cap takes as long as the next frame, on a machine that can hardly keep up."""
 
 
 class CameraState(Controls, frozen=True, kw_only=True):
@@ -83,7 +85,7 @@ class TwinRemote:
 
     def cover(self, *cameras: str) -> TwinState:
         """Cover the lenses of these cameras, by name, and uncover all others."""
-        return self._ask(CoverRequest(cameras), ANSWER_S)
+        return self._ask(CoverRequest(cameras), COVER_S)
 
     def state(self) -> TwinState:
         """What is shown now."""

@@ -29,6 +29,8 @@ class Actions(QObject):
         self.start = self._make("Start", "", "Tell the nodes to stream, or to stop (Space).")
         self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it (R).")
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
+        self.caps = QMenu("Cover a simulated camera", parent)
+        self.caps.setToolTipsVisible(True)
         self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")
         self.nodes = self._make("Connect nodes …", "", "Enter the addresses of two nodes, see whether they answer, and "
                                 "write a rig file for them.")
@@ -98,7 +100,8 @@ class MainToolBar(QToolBar):
         self.addAction(actions.record)
         self.addSeparator()
         a = actions
-        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.save_rig, a.close_rig, None, a.quit])
+        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.caps.menuAction(), a.save_rig,
+                                                 a.close_rig, None, a.quit])
         self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
                                                              a.markers, a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, None,

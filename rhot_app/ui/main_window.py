@@ -22,6 +22,7 @@ from rhot_app.ui.controller import Controller
 from rhot_app.ui.dialogs import Dialogs
 from rhot_app.ui.docks import Docks
 from rhot_app.ui.guide import page_of
+from rhot_app.ui.lens_caps import LensCaps
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.passing import PassingNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
@@ -70,6 +71,7 @@ class MainWindow(QMainWindow):
         self.pages.addWidget(self.welcome)
         self.pages.addWidget(ScenePage(self.screen_parts.scene, self.actions_.scene_bar()))
         self.setCentralWidget(self.pages)
+        self.lens_caps = LensCaps(controller, self.actions_.caps, self.tell)
         self.docks = Docks(self)
         self._add_docks()
         self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fake_engine import FakeClient, FakeEngine
 
-from rhot_app.errors import RigError
+from rhot_app.errors import RigError, SimulatorError
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 
 
@@ -22,6 +22,7 @@ class FakeBackend:
         self.alive = True
         self.pace: TwinPace | None = None
         self.refuse = ""
+        self.covered: tuple[str, ...] = ()
         self.gate = threading.Event()
         self.gate.set()
 
@@ -68,6 +69,15 @@ class FakeBackend:
 
     def twin_pace(self) -> TwinPace | None:
         return self.pace
+
+    def covered_cameras(self) -> tuple[str, ...]:
+        return self.covered
+
+    def cover_cameras(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        if self.refuse:
+            raise SimulatorError(self.refuse)
+        self.covered = names
+        return names
 
     def give_up(self) -> None:
         self.calls.append("give up")

@@ -108,6 +108,14 @@ class Backend(Protocol):
         """How fast the simulated cameras are rendered; None when as fast as they should be."""
         ...
 
+    def covered_cameras(self) -> tuple[str, ...]:
+        """The simulated cameras that have a cap on their lens; raises SimulatorError when there are none to ask."""
+        ...
+
+    def cover_cameras(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Cover these simulated cameras, and uncover the others; returns which are. Raises SimulatorError."""
+        ...
+
     def give_up(self) -> None:
         """End whatever is being started, so that a cancelled start leaves nothing behind."""
         ...

@@ -25,6 +25,7 @@ from rhot_app.engine.process import (
 )
 from rhot_app.errors import EngineError, SimulatorError
 from rhot_app.project import load_rig, parse_rig
+from rhot_app.simulator.remote import TwinRemote
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 
 ENGINE_ROLE = "engine"
@@ -104,6 +105,16 @@ class Session:
     def twin_pace(self) -> TwinPace | None:
         """What the simulated nodes said last about falling short of their preset; None when nothing."""
         return _pace_in(self._place.path / TWIN_OUTPUT) if self._twin_started else None
+
+    def covered_cameras(self) -> tuple[str, ...]:
+        """Which simulated cameras have a cap on their lens; raises SimulatorError when the twin gives no answer."""
+        with TwinRemote(self._place.path) as twin:
+            return twin.state().covered
+
+    def cover_cameras(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Cover these simulated cameras, and uncover the others; returns which are covered. Raises SimulatorError."""
+        with TwinRemote(self._place.path) as twin:
+            return twin.cover(*names).covered
 
     def give_up(self) -> None:
         """End everything that the app started; what waits for it then fails and is forgotten."""
