@@ -30,23 +30,26 @@ from rhot_app.evaluation import scenarios
 from rhot_app.evaluation.accuracy import Figures
 from rhot_app.evaluation.alterations import EPISODE_S
 from rhot_app.evaluation.compare import TRACKERS
-from rhot_app.evaluation.compare_table import cell
 from rhot_app.evaluation.takes import Order, Take, take, takes_folder
 from rhot_app.evaluation.track import rig_with
+from rhot_app.evaluation.trial_table import Results, legend, trial_table
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.skeleton import TIP_ROLES
 from rhot_app.progress import ProgressLine
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene import make_scene, twin_defaults
 
-Results = dict[str, Figures]
-
 RAMP = str(Path(__file__).parent / "motions" / "ramp.json")
-CROSS_S, START_EVERY_S, SCALE_S = 60.0, 1.0, 40.0
+CROSS_S, STILL_S, START_EVERY_S, SCALE_S = 60.0, 12.0, 1.0, 40.0
 LEAST_S = scenarios.BLIND_FROM_S + scenarios.BLIND_S
 WRONG_SCALES = (1.1, 0.9)
 BETAS = (0.1, 0.4, 1.5, 8.0, 40.0)
 POSITION_PER_PIXEL_BETA = 500.0  # the defaults' own proportion
+
+OWN_TAKES: dict[str, tuple[str | None, float | None]] = {
+    "cross": ("cross", CROSS_S), "still": ("still", STILL_S), "ramp": ("ramp", None), "fast": ("fast", None),
+    "curve": ("still, ramp and fast", None), "scale": (None, SCALE_S), "start": ("rest, grasp and wave", None)}
+"""Motion and seconds of trials that have their own; None: what is asked for."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,20 @@ class Bench:
     minutes: float
     motion: str
     hidden_s: tuple[float, float]
+
+    def about(self, trial: str) -> str:
+        """What a trial was tried on, in words."""
+        motion, seconds = OWN_TAKES.get(trial, (None, None))
+        count = {"cross": self.crossings, "compute": 1}.get(trial, len(self.seeds))
+        first, last = self.seeds[0], self.seeds[0] + count - 1
+        return (f"{motion or Path(self.motion).name}, {seconds or self.seconds:g} s, "
+                f"{f'seed {first}' if count == 1 else f'seeds {first} to {last}'}, {Path(self.markers).stem}, "
+                f"{'sketched' if self.sketched else 'rendered'}")
+
+    @property
+    def crossings(self) -> int:
+        """Takes of crossing fingers, a minute each."""
+        return max(1, round(self.minutes))
 
     def takes(self, motion: str, seconds: float | None = None, seeds: Iterable[int] | None = None) -> Iterable[Take]:
         """One take per seed, filmed where it is not there yet."""
@@ -101,7 +118,7 @@ def mixed(bench: Bench) -> Results:
 
 def cross(bench: Bench) -> Results:
     """Minutes of crossing fingers, each minute with a seed of its own."""
-    seeds = range(bench.seeds[0], bench.seeds[0] + max(1, round(bench.minutes)))
+    seeds = range(bench.seeds[0], bench.seeds[0] + bench.crossings)
     return bench.each(bench.takes("cross", CROSS_S, seeds), scenarios.plain)
 
 
@@ -158,7 +175,7 @@ TRIALS: dict[str, Callable[[Bench], Results]] = {
     "blind": partial(blind, says_so=True), "silent": partial(blind, says_so=False),
     "hidden": partial(hidden, together=True), "hidden-apart": partial(hidden, together=False), "mixed": mixed,
     "cross": cross, "wrist": lambda bench: bench.each(bench.takes(bench.motion), scenarios.wrist_alone),
-    "still": lambda bench: bench.each(bench.takes("still", 12.0), scenarios.standing_still),
+    "still": lambda bench: bench.each(bench.takes("still", STILL_S), scenarios.standing_still),
     "ramp": lambda bench: bench.each(bench.takes(RAMP), partial(scenarios.lagging, speeding_up=True)),
     "fast": lambda bench: bench.each(bench.takes("fast"), partial(scenarios.lagging, speeding_up=False)),
     "curve": curve, "scale": scale, "start": start, "compute": compute,
@@ -175,7 +192,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=8.0, help="length of a take (default 8)")
     parser.add_argument("--motion", default="grasp", help="of the trials that need none of their own (default grasp)")
     parser.add_argument("--markers", "--marker-set", default="rhot6", metavar="SET",
-                        help="one of resources/markers, or a file (default rhot6)")
+                        help="one of resources/markers, or a marker file, .json (default rhot6)")
     parser.add_argument("--minutes", type=float, default=10.0, help="of crossing, and of computing (default 10)")
     parser.add_argument("--hidden-for", type=float, nargs=2, metavar=("MIN", "MAX"), default=EPISODE_S,
                         help=f"s, how long markers stay hidden at a time (default {EPISODE_S[0]} to {EPISODE_S[1]})")
@@ -210,29 +227,16 @@ def main() -> int:
         except RhotError as exc:
             print(f"{name}: {exc}", file=sys.stderr)
             continue
-        print(block(name, done[name]), flush=True)
+        print(trial_table(name, bench.about(name), done[name]), flush=True)
         if args.json is not None:
             args.json.write_text(json.dumps(done, indent=1) + "\n")
+    print(legend(done.values()))
     return 0 if len(done) == len(args.only) else 2
 
 
 def _writable(path: Path) -> bool:
     """Whether a file can be written there; none is made yet."""
     return os.access(path if path.exists() else path.parent, os.W_OK) and not path.is_dir()
-
-
-def block(name: str, results: Results) -> str:
-    """A trial's table: a line per tracker."""
-    keys = list(next(iter(results.values())))
-    width = max(len(row) for row in results)
-    lines = [f"{name}", " " * width + "".join(f"  {key:>8}" for key in keys)]
-    lines += [row.ljust(width) + "".join(f"  {_form(figures[key]):>{max(8, len(key))}}" for key in keys)
-              for row, figures in results.items()]
-    return "\n".join(lines) + "\n"
-
-
-def _form(value: float | None) -> str:
-    return cell(value, ".0f" if value is not None and abs(value) >= 1000.0 else ".3f")
 
 
 def _variants() -> Mapping[str, Callable[[Rig], Rig]]:

@@ -66,8 +66,10 @@ class Order:
         """A folder name that differs with the order."""
         facts = [msgspec.to_builtins(self.scene.settings), self.scene.seed, self.seconds, asdict(self.network),
                  asdict(ORDINARY) if self.sketched else False, _motion_digest(self.motion)]
+        if self.scene.settings.markers.endswith(".json"):  # a file may say something else the next time
+            facts.append(msgspec.to_builtins(self.scene.markers))
         digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
-        kind = "sketched" if self.sketched else self.scene.settings.markers
+        kind = "sketched" if self.sketched else Path(self.scene.settings.markers).stem
         return f"{Path(self.motion).stem}-{self.seconds:g}s-{kind}-{self.scene.seed}-{digest[:12]}"
 
 

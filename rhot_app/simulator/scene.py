@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import msgspec
@@ -22,6 +23,7 @@ from rhot_app.simulator.controls import Controls
 from rhot_app.simulator.lamp import Lamp
 from rhot_app.simulator.nodes import NodePorts
 from rhot_node.config import CameraSettings, ClockSettings, NodeSettings
+from rhot_node.errors import SettingsError
 from rhot_node.files import read_document, resource_path
 from rhot_node.markers import MarkerSet, load_markers
 
@@ -133,11 +135,27 @@ class Scene:
         return [round(1e9 * (self.phases_s[index] + k / self.preset.fps)) for k in range(count)]
 
 
+def shipped_or_own(room: str, name: str) -> Path:
+    """The file of a hand or a marker set: by its name in ``resources/room``, or by its own path, which ends in .json.
+    Raises SimulatorError when there is none."""
+    path = Path(name) if name.endswith(".json") else resource_path(room, f"{name}.json")
+    if not path.is_file():
+        shipped = ", ".join(sorted(other.stem for other in resource_path(room).glob("*.json")))
+        raise SimulatorError(f"{room}: there is no {name!r}; there are {shipped}, or give a file (NAME.json).")
+    return path
+
+
+def _worn(path: Path) -> MarkerSet:
+    try:
+        return load_markers(path)
+    except SettingsError as exc:
+        raise SimulatorError(str(exc)) from exc
+
+
 def make_scene(settings: TwinSettings, seed: int) -> Scene:
-    """A left and a right camera side by side, looking ahead in parallel. Raises SimulatorError for an unknown hand."""
-    for room, name in (("hands", settings.hand), ("markers", settings.markers)):
-        if not resource_path(room, f"{name}.json").exists():
-            raise SimulatorError(f"there is no {name!r} in resources/{room}.")
+    """A left and a right camera side by side, looking ahead in parallel. Raises SimulatorError for an unknown hand or
+    marker set, RigError for a hand's file that is none."""
+    hand, markers = shipped_or_own("hands", settings.hand), shipped_or_own("markers", settings.markers)
     preset = settings.presets[settings.preset]
     focal = 0.5 * preset.width / math.tan(0.5 * math.radians(preset.horizontal_fov_deg))
     intrinsics = Intrinsics(width=preset.width, height=preset.height, fx=focal, fy=focal, cx=0.5 * (preset.width - 1),
@@ -146,8 +164,8 @@ def make_scene(settings: TwinSettings, seed: int) -> Scene:
     hours, ppm = settings.clock_offset_hours, settings.clock_drift_ppm
     return Scene(
         settings=settings,
-        hand=load_hand(resource_path("hands", f"{settings.hand}.json")),
-        markers=load_markers(resource_path("markers", f"{settings.markers}.json")),
+        hand=load_hand(hand),
+        markers=_worn(markers),
         names=("left", "right"),
         intrinsics=intrinsics,
         poses=(CameraPose(), CameraPose(translation_m=(1e-3 * settings.baseline_mm, 0.0, 0.0))),

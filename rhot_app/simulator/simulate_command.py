@@ -32,7 +32,7 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--background", default=None, choices=("cloth", "clutter"),
                         help="what stands behind the hand (default cloth)")
     parser.add_argument("--markers", "--marker-set", default=None, metavar="SET",
-                        help="which markers the hand wears: rhot6 (default), rhot8, rich, or another of the project's")
+                        help="which markers the hand wears: rhot6 (default), rhot8, rich, or a marker file (.json)")
     parser.add_argument("--lamp", type=float, default=None, metavar="F",
                         help="brightness of the lamp, a factor on its light (default 1)")
     parser.add_argument("--kelvin", type=float, default=None, metavar="K",

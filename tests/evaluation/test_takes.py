@@ -22,6 +22,7 @@ from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
 from rhot_app.simulator.shot import Shot
 from rhot_app.sources.replay import LogDoor
 from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.files import resource_path
 
 SECONDS = 2.0
 NODES = (1, 2)
@@ -95,6 +96,18 @@ def test_orders_that_differ_have_names_that_differ() -> None:
              Order(scene(), "grasp", 1.0, Network(loss=0.1)).name(), Order(scene(), "grasp", 1.0, CABLE, True).name(),
              Order(make_scene(msgspec.structs.replace(twin_defaults(), markers="rhot8"), 1), "grasp", 1.0).name()}
     assert len(names) == 7
+
+
+def test_a_marker_file_that_says_something_else_is_another_order(tmp_path: Path) -> None:
+    own = tmp_path / "mine.json"
+    names = set()
+    for shipped in ("rhot6", "rhot8"):
+        own.write_bytes(resource_path("markers", f"{shipped}.json").read_bytes())
+        names.add(Order(make_scene(msgspec.structs.replace(twin_defaults(), markers=str(own)), 1), "grasp", 1.0).name())
+    assert len(names) == 2 and all(name.startswith("grasp-1s-mine-1-") for name in names)
+
+
+def test_every_motion_is_ordered_with_every_seed() -> None:
     assert len(orders(scene(), ["rest", "wave"], range(1, 4), 2.0)) == 6
 
 

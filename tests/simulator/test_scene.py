@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from rhot_app.project import load_rig, save_rig
 from rhot_app.simulator.nodes import NodePorts
 from rhot_app.simulator.scene import build_rig, make_scene, node_settings, twin_defaults
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
+from rhot_node.files import resource_path
 
 PORTS = (NodePorts(1001, 1002, 1003), NodePorts(2001, 2002, 2003))
 
@@ -31,6 +33,19 @@ def test_presets_are_the_documented_cameras() -> None:
     assert (wide.preset.fps, fast.preset.fps) == (40.0, 120.0)
     assert (wide.row_time_ns, fast.row_time_ns, wide.exposure_ns) == (48_000, 10_000, 4_000_000)
     assert wide.intrinsics.distortion[0] == -0.05
+
+
+def test_the_hand_wears_the_markers_of_ones_own_file(tmp_path: Path) -> None:
+    own = tmp_path / "mine.json"
+    own.write_bytes(resource_path("markers", "rhot8.json").read_bytes())
+    assert scene_from("--markers", str(own)).markers == scene_from("--markers", "rhot8").markers
+    own.write_text("{}")
+    with pytest.raises(SimulatorError, match=r"mine\.json: this is not a"):
+        scene_from("--markers", str(own))
+    with pytest.raises(SimulatorError, match=r"no 'rhot9'; there are rhot6, rhot8, rich.*or give a file"):
+        scene_from("--markers", "rhot9")
+    with pytest.raises(SimulatorError, match=r"no '/nowhere/mine\.json'"):
+        scene_from("--markers", "/nowhere/mine.json")
 
 
 def test_seed_decides_clocks_and_phases() -> None:
