@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
@@ -36,6 +37,11 @@ def page_of(widget: QWidget | None) -> str:
             return name
         widget = widget.parentWidget()
     return "window"
+
+
+def anchor_of(heading: str) -> str:
+    """What links call a heading: "Two hands" is two-hands."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 class PageBrowser(QTextBrowser):
@@ -81,7 +87,8 @@ class GuideViewer(QDialog):
         QShortcut(QKeySequence("F1"), self, self.close)
 
     def open_page(self, name: str, section: str = "") -> None:
-        """Show a page, from the heading `section` on if there is one, and bring the viewer to the front."""
+        """Show a page, from the heading `section` (its words, or its anchor) on if there is one, and bring the
+        viewer to the front."""
         names = [page for page, _ in PAGES]
         self.list.setCurrentRow(names.index(name) if name in names else 0)
         self.show()
@@ -93,7 +100,7 @@ class GuideViewer(QDialog):
         document = self.browser.document()
         block = document.begin()
         while block.isValid():
-            if block.blockFormat().headingLevel() and block.text() == section:
+            if block.blockFormat().headingLevel() and section in (block.text(), anchor_of(block.text())):
                 self.browser.verticalScrollBar().setValue(round(document.documentLayout().blockBoundingRect(block).top()))
                 return
             block = block.next()
@@ -116,4 +123,4 @@ class GuideViewer(QDialog):
         """Links between pages stay in the viewer; others are left to the reader's own browser."""
         target = Path(url.path())
         if url.isRelative() and target.suffix == ".md":
-            self.open_page(target.stem)
+            self.open_page(target.stem, url.fragment())

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 import pytest
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QPoint, Qt, QUrl
 
-from rhot_app.ui.guide import GUIDE, PAGES, page_of, page_path
+from rhot_app.ui.guide import GUIDE, PAGES, anchor_of, page_of, page_path
 
 
 @pytest.mark.parametrize("name", [name for name, _ in PAGES])
@@ -43,3 +43,19 @@ def test_f1_opens_the_page_of_the_panel_in_use(bench):
     bench.window.dialogs.guide._follow(QUrl("troubles.md"))
     assert bench.window.guide_page == "troubles"
     assert "wrong" in bench.window.dialogs.guide.browser.toPlainText()
+
+
+def test_a_link_to_a_section_leads_there(bench):
+    bench.window.open_guide("window")
+    guide = bench.window.dialogs.guide
+    bench.until(lambda: guide.browser.verticalScrollBar().maximum() > 0)
+    guide._follow(QUrl("tracker.md#when-a-camera-sees-nothing"))
+    bench.until(lambda: guide.browser.verticalScrollBar().value() > 0)
+    bench.until(lambda: "When a camera sees nothing" in guide.browser.cursorForPosition(QPoint(40, 2)).block().text())
+
+
+def test_links_between_pages_name_sections_that_are_there():
+    for name, _ in PAGES:
+        for page, section in re.findall(r"\]\((\w+)?(?:\.md)?#([\w-]+)\)", page_path(name).read_text()):
+            headings = re.findall(r"^#+ (.+)$", page_path(page or name).read_text(), re.MULTILINE)
+            assert section in [anchor_of(heading) for heading in headings], f"{name}: {page}#{section}"
