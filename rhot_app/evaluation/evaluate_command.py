@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=Path, metavar="DIR",
                         help="play this folder of `rhot simulate` instead of rendering; the scene is what it says")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
-    group = parser.add_argument_group("comparing trackers on the same raw logs, without real time (docs/accuracy.md)")
+    group = parser.add_argument_group("comparing trackers on the same raw logs, without real time (docs/comparison.md)")
     group.add_argument("--compare", action="store_true", help="put the same logs through every tracker")
     group.add_argument("--motions", metavar="M,M,...", default=None,
                        help="motions to compare on (default rest,wave,grasp,pinch,fast)")
