@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from rhot_app.engine.codec import encode
 from rhot_app.engine.core import Engine
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import parse_rig
@@ -46,7 +47,7 @@ class Commands:
         self._table: dict[str, Callable[[Arguments], Answer]] = {
             "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
             "record": self._record, "record_stop": self._record_stop, "rig": self._rig, "set_rig": self._set_rig,
-            "save_rig": self._save_rig, "preview": self._set_preview, "quit": self._end,
+            "save_rig": self._save_rig, "preview": self._set_preview, "foretell": self._foretell, "quit": self._end,
         }
 
     @property
@@ -54,16 +55,18 @@ class Commands:
         """All commands that `answer` knows."""
         return tuple(self._table)
 
-    def answer(self, name: str, arguments: Arguments) -> Answer:
-        """Carry out one command; whatever is wrong with it becomes a sentence."""
+    def answer(self, name: str, arguments: Arguments) -> tuple[Answer, bytes | None]:
+        """Carry out one command: the answer, and what is attached to it. Whatever is wrong becomes a sentence."""
         action = self._table.get(name)
         if action is None:
             return refusal(EngineError(f"there is no command {name!r}; there are {', '.join(sorted(self._table))}, "
-                                       "node and still."))
+                                       "node and still.")), None
         try:
-            return {"ok": True, **action(arguments)}
+            done = action(arguments)
         except (RhotError, NodeError) as exc:
-            return refusal(exc)
+            return refusal(exc), None
+        attached = done.pop(done["attachment"]) if "attachment" in done else None
+        return {"ok": True, **done}, attached
 
     def _hello(self, arguments: Arguments) -> Answer:
         engine = self._engine
@@ -110,6 +113,13 @@ class Commands:
             raise EngineError('preview needs "on": true or false.')
         self._preview(on)
         return {}
+
+    def _foretell(self, arguments: Arguments) -> Answer:
+        t_ns = arguments.get("t_master_ns")
+        if not isinstance(t_ns, int) or isinstance(t_ns, bool) or not 0 <= t_ns < 1 << 63:
+            raise EngineError('foretell needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
+        state = self._engine.state_at(t_ns)
+        return {} if state is None else {"attachment": "state", "state": encode(state)}
 
     def _end(self, arguments: Arguments) -> Answer:
         self._quit()

@@ -26,6 +26,7 @@ from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
 from rhot_app.sources.source import ObservationSource, same_network
+from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import Tracker
 
 MakeSource = Callable[[Rig], ObservationSource]
@@ -78,6 +79,11 @@ class Engine:
             self._source.stop()
             self.running = False
             self.session = 0
+
+    def state_at(self, t_ns: int) -> HandState | None:
+        """The hand foretold to master time `t_ns`; None while there is none. Raises EngineError when the rig's tracker
+        foretells nothing."""
+        return self._pipeline.state_at(t_ns)
 
     def record(self, path: Path) -> None:
         """Write the raw log to `path` from now on; raises RecordingError, also when something is recorded already."""

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from rhot_app.engine.codec import encode
 from rhot_app.engine.meters import LatencyMeter, RateMeter
+from rhot_app.errors import EngineError
 from rhot_app.sources.source import ObservationSource
 from rhot_app.tracking.state import HandState
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraObservations, Foretelling, Tracker
 
 PublishState = Callable[[bytes], None]
 AfterState = Callable[[], None]
@@ -88,6 +89,15 @@ class Pipeline:
                 return
             if state is not None:
                 self._after_state()
+
+    def state_at(self, t_ns: int) -> HandState | None:
+        """The hand foretold to master time `t_ns`; None while there is none. Raises EngineError when the tracker
+        foretells nothing."""
+        with self._lock:
+            tracker = self._work.tracker
+            if not isinstance(tracker, Foretelling):
+                raise EngineError("this rig's tracker foretells nothing; choose the model tracker (tracker.kind).")
+            return tracker.state_at(t_ns)
 
     def _process(self, work: Work, frames: list[CameraObservations]) -> HandState | None:
         if work.source.changes != self._changes:

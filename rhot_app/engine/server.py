@@ -110,7 +110,7 @@ class Server:
         except EngineError as exc:
             self._send(client, refusal(exc))
             return
-        self._send(client, self._commands.answer(name, arguments))
+        self._send(client, *self._commands.answer(name, arguments))
 
     def _send(self, client: bytes, answer: Answer, attachment: bytes | None = None) -> None:
         frames = [client, b"", msgspec.json.encode(answer)]

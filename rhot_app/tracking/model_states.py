@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -18,23 +17,22 @@ from rhot_app.tracking.tracker import CameraObservations
 
 
 class Teller:
-    """Tells of one `estimate`, as it is at the moment; `sequence` numbers the states."""
+    """Tells of one `estimate`, as it is at the moment."""
 
-    def __init__(self, rig: RigArrays, sights: Sights, subject: Subject, estimate: Estimate,
-                 sequence: Iterator[int]) -> None:
-        self._rig, self._sights, self._estimate, self._sequence = rig, sights, estimate, sequence
+    def __init__(self, rig: RigArrays, sights: Sights, subject: Subject, estimate: Estimate) -> None:
+        self._rig, self._sights, self._estimate = rig, sights, estimate
         self._account = Share(Account(estimate, subject, sights.seen))
 
-    def tell(self, t_ns: int, newest: CameraObservations, begun: float) -> HandState:
-        """The state of `t_ns`, to which the estimate has been carried; work on it began at `begun`, s of
-        `time.perf_counter`."""
+    def tell(self, t_ns: int, sequence: int, newest: CameraObservations, begun: float) -> HandState:
+        """The state of `t_ns`, to which the estimate has been carried, with its number; work on it began at `begun`, s
+        of `time.perf_counter`."""
         rig, estimate = self._rig, self._estimate
         solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
         complete = describe(self._account, t_ns, report)
         points, covariances = report.points, report.covariances
         seen_pixels, seen_flags = self._sights.last_seen()
         return HandState(
-            sequence=next(self._sequence), t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
+            sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
             condition=Condition.TRACKING if complete else Condition.PARTIAL, marker_ids=rig.marker_ids,
             marker_positions=points[FIRST_MARKER:], marker_raw_positions=report.raw,
             marker_covariances=covariances[FIRST_MARKER:], marker_knowledge=report.marker_knowledge,

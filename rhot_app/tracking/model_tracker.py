@@ -8,7 +8,6 @@ shape and habits tell, with the covariance that says how well that is.
 from __future__ import annotations
 
 import time
-from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -89,8 +88,8 @@ class ModelTracker:
         self._starter = Starter(self._rig, self._wearing)
         self._sights = Sights(cameras, markers)
         self._ahead = empty_estimate(cameras, markers)
-        subject, self._sequence = subject_of(self._wearing, self._rig), count()
-        self._told, self._told_ahead = (Teller(self._rig, self._sights, subject, estimate, self._sequence)
+        subject, self._told_states = subject_of(self._wearing, self._rig), 0
+        self._told, self._told_ahead = (Teller(self._rig, self._sights, subject, estimate)
                                         for estimate in (self._hand.estimate, self._ahead))
         self.reset()
 
@@ -131,18 +130,20 @@ class ModelTracker:
         return self._state(taken[-1], begun)
 
     def state_at(self, t_ns: int) -> HandState | None:
-        """The hand predicted to (or from the past brought to) master time `t_ns`; None while there is no hand.
+        """The hand predicted to (or from the past brought to) master time `t_ns`; None while there is no hand, and when
+        nothing of it was seen in the half second before.
 
-        Beyond `FARTHEST_AHEAD_S` the prediction stops there.
+        Beyond `FARTHEST_AHEAD_S` the prediction stops there. It has the number of the newest state.
         """
         newest = max((frame for frame in self._sights.newest if frame is not None),
                      key=lambda frame: frame.t_receive_ns, default=None)
-        if not self._tracking or newest is None:
+        if not self._tracking or newest is None or t_ns - self._timeline.t_ns > LOST_AFTER_NS:
             return None
         copy_estimate(self._hand.estimate, self._ahead)
         ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
         predict(self._ahead, ahead, self._wearing.worn.part, self._wearing.habits, self._ahead.bias_variance)
-        return self._told_ahead.tell(self._timeline.t_ns + round(1e9 * ahead), newest, time.perf_counter())
+        return self._told_ahead.tell(self._timeline.t_ns + round(1e9 * ahead), self._told_states - 1, newest,
+                                     time.perf_counter())
 
     def observe(self, block: TimedBlock) -> None:
         """Weigh anything that tells about the hand, where it belongs in time; without a hand it is lost.
@@ -279,10 +280,11 @@ class ModelTracker:
             self._plausible_ns = max(self._plausible_ns, block.t_ns)
 
     def _state(self, newest: CameraObservations, begun: float) -> HandState:
+        number, self._told_states = self._told_states, self._told_states + 1
         if not self._tracking:
-            return tell_of_none(self._rig, self._sights, next(self._sequence),
+            return tell_of_none(self._rig, self._sights, number,
                                 Condition.LOST if self._ever else Condition.SEARCHING,
                                 None if self._size is None else self._size.known, newest, begun)
-        state = self._told.tell(self._timeline.t_ns, newest, begun)
+        state = self._told.tell(self._timeline.t_ns, number, newest, begun)
         self._compare(state)
         return state

@@ -79,6 +79,7 @@ class TwoHands:
         if hand is None or other is None:  # both or neither: they see the same frames
             return None
         self._last = hand, other
+        self._sequence += 1
         t_ns = max([state.t_master_ns for state in self._last if _is_there(state)] or [hand.t_master_ns])
         return self._merge(_at(t_ns, hand, self._hand), _at(t_ns, other, self._other))
 
@@ -92,7 +93,6 @@ class TwoHands:
 
     def _merge(self, hand: HandState, other: HandState) -> HandState:
         """The state of `hand` with the markers of both."""
-        self._sequence += 1
         arrays: dict[str, Any] = {name: self._gather(getattr(hand, name), getattr(other, name), axis)
                                  for axis, names in enumerate((_PER_MARKER, _PER_CAMERA)) for name in names}
         latency = hand.latency_s | {stage: hand.latency_s[stage] + other.latency_s[stage] for stage in _WORK}

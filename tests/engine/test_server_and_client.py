@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -70,12 +71,12 @@ class ControlPeer:
 
 
 class Bench:
-    def __init__(self, rig: Rig, path: Path) -> None:
+    def __init__(self, rig: Rig, path: Path, tracker: type[FakeTracker] = FakeTracker) -> None:
         self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         place = open_directory(path)
         nodes = NodeControl(self.context)
         publisher = StatePublisher(self.context, place)
-        self.engine = Engine(rig, None, UdpNodes, FakeTracker, publisher, nodes.message)
+        self.engine = Engine(rig, None, UdpNodes, tracker, publisher, nodes.message)
         self.server = Server(self.context, place, self.engine, nodes)
         self.thread = threading.Thread(target=self.server.run)
         self.thread.start()
@@ -198,6 +199,39 @@ def test_broken_bytes_are_refused_and_the_engine_lives(client: EngineClient, dat
     assert answer["ok"] is False and "command" in answer["error"]
     socket.close()
     assert client.command("hello")["pid"]
+
+
+class Foreteller(FakeTracker):
+    """Says of every instant what it said of the last one."""
+
+    def state_at(self, t_ns: int) -> HandState | None:
+        state = self.solve()
+        return None if state is None else replace(state, t_master_ns=t_ns)
+
+
+def test_a_hand_is_foretold_to_the_instant_that_a_client_asks_for(rig: Rig, tmp_path: Path) -> None:
+    nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
+    bench = Bench(rig, tmp_path / "g", Foreteller)
+    with EngineClient(tmp_path / "g") as client:
+        assert client.foretell(1) is None, "nothing was seen yet"
+        for node in nodes:
+            node.start()
+        client.command("start")
+        collect(client, HandState)
+        eventually(lambda: client.foretell(123_456_789_000) is not None, told=lambda: "no hand was foretold")
+        state = client.foretell(123_456_789_000)
+        assert state is None or state.t_master_ns == 123_456_789_000
+        for nonsense in (-1, 1 << 63, True, "now", 1.5, None):
+            with pytest.raises(EngineError, match="monotonic clock"):
+                client.command("foretell", t_master_ns=nonsense)
+    for node in nodes:
+        node.close()
+    bench.close()
+
+
+def test_a_tracker_that_foretells_nothing_says_so(client: EngineClient) -> None:
+    with pytest.raises(EngineError, match="choose the model tracker"):
+        client.foretell(1)
 
 
 def test_requests_go_to_the_node_and_back(client: EngineClient, peer: ControlPeer) -> None:

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from rhot_app.evaluation import scenarios
+from rhot_app.evaluation.accuracy import accuracy
+from rhot_app.evaluation.deviations import deviations, worn_by
 from rhot_app.evaluation.takes import Order, Take, take
-from rhot_app.evaluation.track import rig_with
+from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene import make_scene, twin_defaults
@@ -121,3 +123,12 @@ def test_figures_are_gathered_each_in_its_way() -> None:
     runs = [dict(zip(keys, values, strict=True)) for values in ((3.0, 9.0, 1.0, -1.0, -5.0, 3.0),
                                                                 (4.0, 7.0, 2.0, 3.0, 4.0, None))]
     assert list(scenarios.gather(runs).values()) == [pytest.approx(np.sqrt(12.5)), 9.0, 3.0, 1.0, -5.0, None]
+
+
+def test_a_hand_is_shown_nearer_to_where_it_is_when_it_is_foretold(grasp: Take) -> None:
+    track = tracked(grasp.records(), rig_with(grasp.rig, MODEL))
+    track = track.where(track.times_s >= 1.0)
+    worn = worn_by(grasp.rig)
+    figures = accuracy(track, deviations(track, grasp.truth, worn), grasp.truth, worn)
+    assert (figures["tip_foretold_mm"] or 9.0) < 0.5 * (figures["tip_display_mm"] or 0.0)
+    assert tracked(grasp.records(), rig_with(grasp.rig, CLASSIC)).foretold is None

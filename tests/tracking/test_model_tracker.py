@@ -262,8 +262,9 @@ def test_prediction_is_nearer_to_what_comes_than_the_newest_state():
             there.append(np.linalg.norm(later.fingertip_positions - tips, axis=1))
             assert np.trace(later.fingertip_covariances[1]) > np.trace(state.fingertip_covariances[1])
     assert np.mean(there) < 0.3 * np.mean(here)
-    far = tracker.state_at(state.t_master_ns + 10**10)
-    assert seconds(far) == pytest.approx(seconds(state) + FARTHEST_AHEAD_S)
+    far = tracker.state_at(state.t_master_ns + 3 * 10**8)
+    assert seconds(far) == pytest.approx(seconds(state) + FARTHEST_AHEAD_S) and far.sequence == state.sequence
+    assert tracker.state_at(state.t_master_ns + 10**9) is None, "nobody knows where a hand is that was not seen since"
 
 
 def test_classic_and_model_tracker_are_exchangeable():

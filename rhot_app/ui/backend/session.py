@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -25,8 +26,10 @@ from rhot_app.engine.process import (
 )
 from rhot_app.errors import EngineError, SimulatorError
 from rhot_app.project import load_rig, parse_rig
-from rhot_app.simulator.remote import TwinRemote
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
+
+if TYPE_CHECKING:
+    from rhot_app.simulator.remote import TwinRemote
 
 ENGINE_ROLE = "engine"
 TWIN_ROLE = "simulated nodes"
@@ -108,12 +111,12 @@ class Session:
 
     def covered_cameras(self) -> tuple[str, ...]:
         """Which simulated cameras have a cap on their lens; raises SimulatorError when the twin gives no answer."""
-        with TwinRemote(self._place.path) as twin:
+        with self._twin() as twin:
             return twin.state().covered
 
     def cover_cameras(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """Cover these simulated cameras, and uncover the others; returns which are covered. Raises SimulatorError."""
-        with TwinRemote(self._place.path) as twin:
+        with self._twin() as twin:
             return twin.cover(*names).covered
 
     def give_up(self) -> None:
@@ -127,6 +130,11 @@ class Session:
         self.give_up()
         return (f"The engine in {self._place.path} was not started by this app and goes on running."
                 if left else "")
+
+    def _twin(self) -> TwinRemote:
+        from rhot_app.simulator.remote import TwinRemote  # with OpenCV, which most commands do without
+
+        return TwinRemote(self._place.path)
 
     def _engine_is_ours(self) -> bool:
         pid = running_engine(self._place.path)
