@@ -49,6 +49,9 @@ class Actions(QObject):
         self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene (F).")
         self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
         self.names = self._make("Marker names", "", "Names beside the markers in the scene.", checkable=True)
+        self.now = self._make("Hand as of now", "N", "Draw the hand where it is when you see it, not where it was in "
+                              "the newest pictures, 10 to 40 ms before. The model tracker foretells it (N).",
+                              checkable=True)
         self.clouds = self._make("Uncertainty", "U", "How well places are known, as ellipsoids: the true place lies "
                                  "inside in 97 of 100 cases (three sigma) (U).", checkable=True)
         self.cloud_kinds = [self._make(f"of {kind}", "", meaning, checkable=True) for kind, meaning in CLOUD_KINDS]
@@ -104,8 +107,8 @@ class MainToolBar(QToolBar):
                                                  a.close_rig, None, a.quit])
         self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
                                                              a.markers, a.hand, None, a.files])
-        self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, None,
-                                                   a.dark, a.light, None, a.reset])
+        self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now,
+                                                   None, a.dark, a.light, None, a.reset])
         self.addAction(actions.guide)
         spacer = QWidget()
         spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)

@@ -21,6 +21,7 @@ from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.controller import Controller
 from rhot_app.ui.dialogs import Dialogs
 from rhot_app.ui.docks import Docks
+from rhot_app.ui.foresight import Foresight
 from rhot_app.ui.guide import page_of
 from rhot_app.ui.lens_caps import LensCaps
 from rhot_app.ui.models.notice import Notice
@@ -65,7 +66,9 @@ class MainWindow(QMainWindow):
         self.screen_parts = Screen(scheme)
         self.advice = AdviceBar(scheme)
         self.actions_ = Actions(self)
-        self.appearance = Appearance(settings, self.actions_, self.screen_parts, self.advice, self)
+        foresight = Foresight(controller)
+        self.screen_parts.shown = foresight.shown
+        self.appearance = Appearance(settings, self.actions_, self.screen_parts, self.advice, foresight, self)
         self.welcome = WelcomePage(settings.motion)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.welcome)
@@ -282,7 +285,7 @@ class MainWindow(QMainWindow):
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
         return [*a.wizards, a.earlier, a.tracker, a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home, a.names,
-                a.clouds]
+                a.clouds, a.now]
 
     def _show_busy(self) -> None:
         if self.controller.opened is None:

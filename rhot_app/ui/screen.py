@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QSplitter
 
 from rhot_app.project import Rig
-from rhot_app.tracking.state import Condition
+from rhot_app.tracking.state import Condition, HandState
 from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.models.hands import each_hand
 from rhot_app.ui.models.pacing import FramePacer
@@ -30,7 +31,10 @@ STALE_S = 1.0
 
 
 class Screen:
-    """Scene, panels and plots. `refresh` is called every tick and draws what is due."""
+    """Scene, panels and plots. `refresh` is called every tick and draws what is due.
+
+    `shown`: what the scene is to draw of the newest state, so long from now, s, as drawing takes.
+    """
 
     def __init__(self, scheme: Scheme) -> None:
         self.scene = SceneView(scheme)
@@ -51,6 +55,7 @@ class Screen:
         self.plots.setChildrenCollapsible(False)
         self.pacer = FramePacer()
         self.scene.frameSwapped.connect(lambda: self.pacer.end(time.monotonic()))
+        self.shown: Callable[[HandState | None, float], HandState | None] = lambda newest, ahead_s: newest
         self._drawn_state = self._drawn_preview = -1
         self._next_panels = self._next_plots = 0.0
         self._state_seen_at = 0.0
@@ -104,7 +109,7 @@ class Screen:
             if self.scene.isVisible() and self.pacer.due(now_s):
                 self.pacer.begin(now_s)
                 self._drawn_state = live.state_count
-                self.scene.show_state(live.state)
+                self.scene.show_state(self.shown(live.state, self.pacer.cost_s))
                 self._frame_once(live)
         elif self._state_seen_at > 0.0 and now_s - self._state_seen_at > STALE_S:
             self.scene.show_state(None)

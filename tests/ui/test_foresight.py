@@ -1,0 +1,64 @@
+"""The scene draws the hand as of now where the rig's tracker foretells it, and the newest state where not."""
+
+from __future__ import annotations
+
+import time
+
+import msgspec
+import pytest
+from fake_backend import FakeBackend
+from fake_engine import FakeEngine, synthetic_rig
+from PySide6.QtCore import Qt
+
+from rhot_app.project import TrackerSettings
+from rhot_app.ui.foresight import Foresight
+
+
+@pytest.fixture
+def engine():
+    return FakeEngine(msgspec.structs.replace(synthetic_rig(), tracker=TrackerSettings(kind="model")), running=False)
+
+
+@pytest.fixture
+def foretelling(make_bench, engine):
+    """The window on a rig with the model tracker, tracking."""
+    bench = make_bench(FakeBackend(engine))
+    bench.track()
+    return bench
+
+
+def test_the_scene_shows_the_hand_as_of_now_until_it_is_switched_off(foretelling, engine, make_bench):
+    foretelling.until(lambda: len(engine.foretold) > 1)
+    asked, now = engine.foretold[-1], time.monotonic_ns()
+    assert -0.5e9 < asked - now < 0.3e9
+    foretelling.press(Qt.Key.Key_N)
+    count = len(engine.foretold)
+    foretelling.run(0.6)
+    assert len(engine.foretold) == count
+    foretelling.press(Qt.Key.Key_N)
+    foretelling.until(lambda: len(engine.foretold) > count)
+    foretelling.press(Qt.Key.Key_N)
+    assert not make_bench().window.actions_.now.isChecked(), "remembered"
+
+
+def test_what_is_foretold_is_drawn_and_what_is_of_a_recording_is_not(foretelling, engine):
+    foresight = Foresight(foretelling.controller)
+    fresh = engine.state(time.monotonic())
+    shown = foresight.shown(fresh, 0.02)
+    assert 0.015e9 < shown.t_master_ns - fresh.t_master_ns < 0.4e9
+    old = engine.state(time.monotonic() - 100.0)
+    assert foresight.shown(old, 0.02) is old and foresight.shown(None, 0.02) is None
+
+
+def test_an_engine_that_does_not_answer_is_let_alone_for_a_while(foretelling, engine):
+    foretelling.window._timer.stop()
+    foresight = Foresight(foretelling.controller)
+    engine.dead = True
+    fresh, count = engine.state(time.monotonic()), len(engine.foretold)
+    assert foresight.shown(fresh, 0.02) is fresh and foresight.shown(fresh, 0.02) is fresh
+    assert len(engine.foretold) == count + 1
+
+
+def test_the_classic_tracker_is_never_asked(tracking):
+    tracking.run(0.5)
+    assert tracking.backend.engine.foretold == []
