@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 from rhot_app.errors import EngineError
 from rhot_app.tracking.state import Condition, HandState
@@ -34,7 +35,19 @@ class Foresight:
                 or abs(now_ns - newest.t_master_ns) > _FRESH_NS or 1e-9 * now_ns < self._not_before_s):
             return newest
         try:
-            return client.foretell(now_ns + round(1e9 * ahead_s), timeout_s=_PATIENCE_S) or newest
+            foretold = client.foretell(now_ns + round(1e9 * ahead_s), timeout_s=_PATIENCE_S)
         except EngineError:
             self._not_before_s = 1e-9 * now_ns + _AGAIN_S
             return newest
+        return newest if foretold is None else _known_as(foretold, newest)
+
+
+def _known_as(foretold: HandState, newest: HandState) -> HandState:
+    """Nothing that is foretold is measured. The scene shows what pictures tell and what they do not: that of `newest`,
+    whose place is foretold. How well it is, ellipsoids say."""
+    other = foretold.other
+    if other is not None and newest.other is not None:
+        other = _known_as(other, newest.other)
+    return replace(foretold, condition=newest.condition, marker_knowledge=newest.marker_knowledge,
+                   joint_knowledge=newest.joint_knowledge, angle_knowledge=newest.angle_knowledge,
+                   palm_knowledge=newest.palm_knowledge, other=other)

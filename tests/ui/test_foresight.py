@@ -46,6 +46,12 @@ def test_what_is_foretold_is_drawn_and_what_is_of_a_recording_is_not(foretelling
     fresh = engine.state(time.monotonic())
     shown = foresight.shown(fresh, 0.02)
     assert 0.015e9 < shown.t_master_ns - fresh.t_master_ns < 0.4e9
+    engine.hidden = {"thumb": "both"}
+    worse = engine.state(time.monotonic())
+    assert (shown.marker_knowledge == fresh.marker_knowledge).all()
+    known = foresight.shown(fresh, 0.02)
+    assert known.condition is fresh.condition and (known.marker_knowledge == fresh.marker_knowledge).all()
+    assert (known.marker_knowledge != worse.marker_knowledge).any(), "how it is known is that of the pictures"
     old = engine.state(time.monotonic() - 100.0)
     assert foresight.shown(old, 0.02) is old and foresight.shown(None, 0.02) is None
 
