@@ -97,7 +97,11 @@ class Pipeline:
             tracker = self._work.tracker
             if not isinstance(tracker, Foretelling):
                 raise EngineError("this rig's tracker foretells nothing; choose the model tracker (tracker.kind).")
-            return tracker.state_at(t_ns)
+            try:
+                return tracker.state_at(t_ns)
+            except Exception as exc:
+                log.exception("the tracker failed to foretell")
+                raise EngineError(f"the tracker failed to foretell ({type(exc).__name__}: {exc}).") from exc
 
     def _process(self, work: Work, frames: list[CameraObservations]) -> HandState | None:
         if work.source.changes != self._changes:

@@ -205,6 +205,8 @@ class Foreteller(FakeTracker):
     """Says of every instant what it said of the last one."""
 
     def state_at(self, t_ns: int) -> HandState | None:
+        if t_ns == 666:
+            raise FloatingPointError("numbers went wrong")
         state = self.solve()
         return None if state is None else replace(state, t_master_ns=t_ns)
 
@@ -221,6 +223,8 @@ def test_a_hand_is_foretold_to_the_instant_that_a_client_asks_for(rig: Rig, tmp_
         eventually(lambda: client.foretell(123_456_789_000) is not None, told=lambda: "no hand was foretold")
         state = client.foretell(123_456_789_000)
         assert state is None or state.t_master_ns == 123_456_789_000
+        with pytest.raises(EngineError, match=r"failed to foretell \(FloatingPointError: numbers went wrong\)"):
+            client.foretell(666)
         for nonsense in (-1, 1 << 63, True, "now", 1.5, None):
             with pytest.raises(EngineError, match="monotonic clock"):
                 client.command("foretell", t_master_ns=nonsense)

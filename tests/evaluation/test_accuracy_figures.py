@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic_track import LATE_S, WORN, make_track, make_truth
 
-from rhot_app.evaluation.accuracy import accuracy, display_error, foretold_error, pooled, ratio
+from rhot_app.evaluation.accuracy import accuracy, display_error, foretold, pooled, ratio
 from rhot_app.evaluation.compare import Comparison, Judged, Run
 from rhot_app.evaluation.compare_table import COLUMNS, honesty_table, table
 from rhot_app.evaluation.deviations import deviations, worn_by
@@ -70,12 +70,14 @@ def test_a_display_that_is_foretold_shows_a_hand_that_moves_on_where_it_is() -> 
     ticks = np.arange(0.0, 3.5, 1.0 / 60.0)
     tips = truth.markers_at(ticks)[:, :5] + np.array([1e-3, 0.0, 0.0])
     tips[100] = np.nan
-    track = replace(make_track(truth, TIMES), foretold=Foretold(ticks, tips, np.full((len(ticks), 5, 3, 3), np.nan)))
-    error = foretold_error(track, truth, WORN)
-    assert np.nanmax(np.abs(error - 1e-3)) < 1e-9 and np.isnan(error).any(axis=1).sum() == 1
+    stated = np.tile(np.diag([0.3e-3, 1e-3, 1e-3])**2, (len(ticks), 5, 1, 1))
+    track = replace(make_track(truth, TIMES), foretold=Foretold(ticks, tips, stated))
+    error, _ = foretold(track, truth, WORN)
+    assert np.nanmax(np.abs(error - [1e-3, 0.0, 0.0])) < 1e-9 and np.isnan(error).any(axis=(1, 2)).sum() == 1
     assert len(error) == ((ticks >= track.receive_s[0]) & (ticks <= track.receive_s[-1])).sum()
     figures = judge(track, truth).figures
     assert figures["tip_foretold_mm"] == pytest.approx(1.0) and (figures["tip_display_mm"] or 0.0) > 10.0
+    assert figures["foretold_3_sd_share"] == pytest.approx(2.0 / 3.0), "along x it is 3.3 standard deviations off"
     assert judge(make_track(truth, TIMES), truth).figures["tip_foretold_mm"] is None
 
 
