@@ -17,23 +17,26 @@ from rhot_app.tracking.tracker import CameraObservations
 
 
 class Teller:
-    """Tells of one `estimate`, as it is at the moment."""
+    """Tells of one `estimate`, as it is at the moment. `complete`: whether all markers of the hand that it last told of
+    are measured."""
 
     def __init__(self, rig: RigArrays, sights: Sights, subject: Subject, estimate: Estimate) -> None:
         self._rig, self._sights, self._estimate = rig, sights, estimate
         self._account = Share(Account(estimate, subject, sights.seen))
+        self.complete = False
 
     def tell(self, t_ns: int, sequence: int, newest: CameraObservations, begun: float) -> HandState:
         """The state of `t_ns`, to which the estimate has been carried, with its number; work on it began at `begun`, s
-        of `time.perf_counter`."""
+        of `time.perf_counter`. It is TRACKING while all markers are in sight, well or badly."""
         rig, estimate = self._rig, self._estimate
         solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
-        complete = describe(self._account, t_ns, report)
+        self.complete = bool(describe(self._account, t_ns, report))
         points, covariances = report.points, report.covariances
         seen_pixels, seen_flags = self._sights.last_seen()
+        condition = Condition.TRACKING if self._sights.all_in_sight(t_ns) else Condition.PARTIAL
         return HandState(
-            sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
-            condition=Condition.TRACKING if complete else Condition.PARTIAL, marker_ids=rig.marker_ids,
+            sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns, condition=condition,
+            marker_ids=rig.marker_ids,
             marker_positions=points[FIRST_MARKER:], marker_raw_positions=report.raw,
             marker_covariances=covariances[FIRST_MARKER:], marker_knowledge=report.marker_knowledge,
             camera_names=rig.camera_names, camera_pixels=seen_pixels, camera_flags=seen_flags,

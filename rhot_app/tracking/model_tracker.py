@@ -188,7 +188,7 @@ class ModelTracker:
         """Begin anew when the estimate's markers stay away from where all cameras together see them, or its fingers
         stay bent as nobody's are."""
         is_strange = self._hand.strangeness > _STRANGEST
-        if (state.condition is Condition.TRACKING and not is_strange and self._sound is not None
+        if (self._told.complete and not is_strange and self._sound is not None
                 and 0 <= self._timeline.t_ns - self._sound.t_ns < _SOUND_NS):
             self._apart = self._strange = 0
             return

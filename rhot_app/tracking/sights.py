@@ -106,6 +106,11 @@ class Sights:
         return int(_believe(self._shared, block.shared, block.t_ns, outcome.believed, outcome.widening,
                             outcome.source))
 
+    def all_in_sight(self, t_ns: int) -> bool:
+        """Whether two cameras or more see every marker, well or badly: they did within twice the time for which a sight
+        is fresh, because a word that a person reads must not change with every frame that misses one."""
+        return bool(_all_in_sight(self._shared, t_ns))
+
     def last_seen(self) -> tuple[Array, Flags]:
         """(C, M, 2) px of each camera's newest frame, NaN where lost, and (C, M) its flags."""
         return self._newest_pixels.copy(), self._newest_flags.copy()
@@ -135,6 +140,18 @@ def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, widening: A
             seen.doubtful[camera, marker] = ((sighting.flags[sight] & DOUBTFUL) != 0
                                              or widening[observation] > UNLIKELY or frame.doubt[sight] > 0.0)
     return count
+
+
+@njit(cache=True)
+def _all_in_sight(shared: Share, t_ns: int) -> bool:
+    seen: Seen = shared.of
+    for m in range(seen.times.shape[1]):
+        count = 0
+        for c in range(seen.times.shape[0]):
+            count += seen.times[c, m] >= 0 and abs(t_ns - seen.times[c, m]) <= 2 * seen.fresh_ns[c]
+        if count < 2:
+            return False
+    return True
 
 
 @njit(cache=True)

@@ -43,8 +43,8 @@ class Foresight:
 
 
 def _known_as(foretold: HandState, newest: HandState) -> HandState:
-    """Nothing that is foretold is measured. The scene shows what pictures tell and what they do not: that of `newest`,
-    whose place is foretold. How well it is, ellipsoids say."""
+    """What is foretold is soon no longer measured. The scene shows what pictures tell and what they do not: that of
+    `newest`, whose place is foretold. How well it is, ellipsoids say."""
     other = foretold.other
     if other is not None and newest.other is not None:
         other = _known_as(other, newest.other)

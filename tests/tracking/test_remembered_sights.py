@@ -78,6 +78,17 @@ def test_clearly_seen_is_what_two_cameras_see_beyond_doubt_just_now():
     assert any(found) and not all(found)
 
 
+def test_all_is_in_sight_while_two_cameras_saw_every_marker_within_two_fresh_times():
+    memory = Sights(CAMERAS, MARKERS)
+    seen, t_ns = memory.seen, 10**9
+    assert not memory.all_in_sight(t_ns)
+    seen.times[:] = t_ns - 2 * seen.fresh_ns[:, None]
+    seen.doubtful[:] = True  # badly seen is seen
+    assert memory.all_in_sight(t_ns)
+    seen.times[1, 3] -= 1
+    assert not memory.all_in_sight(t_ns)
+
+
 def test_sights_are_carried_along_as_the_hand_moves():
     tracker = make_tracker(RIG)
     for frame in sights(RIG, moving(), 0.6):
