@@ -29,14 +29,13 @@ COMMON = 0.8
 
 
 @njit(cache=True)
-def known_of(estimate: Estimate, cameras: Cameras, paint: Array, made: Array, usual: Array) -> Array:
-    """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as it is told.
+def known_of(estimate: Estimate, cameras: Cameras, paint: Array, made: Array) -> Array:
+    """(28, 28) covariance of the pose and, last, of the logarithm of the hand's scale, as markers in sight tell of it.
 
     `paint` (M,) m^2: variances of the markers' seen middles about their places, without what light does to them,
-    infinite where nobody knows; `made` (M,) m^2: the same as the filter takes them to be in plain view; `usual` (27,):
-    variances of the pose by habit. Of a palm that its own markers do not place nothing is told of these: what is wrong
-    with its place is wrong with markers and fingers too, all together, and to know better of one of them would seem to
-    be to know better of the place.
+    infinite where nobody knows; `made` (M,) m^2: the same as the filter takes them to be in plain view. Of a palm that
+    its own markers do not place nothing is told of these: what is wrong with its place is wrong with markers and
+    fingers too, all together, and to know better of one of them would seem to be to know better of the place.
     """
     covariance, out = estimate.covariance, np.empty((POSE + 1, POSE + 1))
     for i in range(POSE):
@@ -44,33 +43,33 @@ def known_of(estimate: Estimate, cameras: Cameras, paint: Array, made: Array, us
             out[i, j] = covariance[i, j]
         out[i, POSE], out[POSE, i] = covariance[i, SCALE], covariance[SCALE, i]
     out[POSE, POSE] = covariance[SCALE, SCALE]
-    as_usual = estimate.held[0] < PLACED
-    if as_usual:
+    if estimate.held[0] < PLACED:
         tell_of_paint(estimate, cameras, paint, made, out)
-    _tell_of_open(estimate.left_open, out)
-    if as_usual:
-        for i in range(ANGLES, POSE):
-            tell_of_habit(out, i, usual[i])
     return out
 
 
 @njit(cache=True)
-def _tell_of_open(left_open: Array, out: Array) -> None:
-    """Add to `out` (28, 28) so much of `left_open` (27, 27), as in `Estimate`, that how the palm is turned is not told
-    to be known better than habit leaves it to a hand with its markers in their places.
+def tell_of_open(estimate: Estimate, usual: Array, out: Array) -> None:
+    """Add to `out`, as `known_of` has it, so much of what habit leaves open that how the palm is turned is not told to
+    be known better than it leaves it to a hand with its markers in their places; then no angle is told to be known less
+    than by habit, `usual` (27,) the variances of the pose.
 
     A filter that linearises anew with every frame takes the sum of what it saw for more: fingers that sweep about their
-    knuckles seem to show where these are, fingers that bend pass for a palm that turns.
+    knuckles seem to show where these are, fingers that bend pass for a palm that turns. Markers in sight do not move in
+    the open directions, to first order: how well these are known is not to be taken from `out` any more.
     """
     left = known = 0.0
     for i in range(ROTATION, ANGLES):
-        left += left_open[i, i]
+        left += estimate.left_open[i, i]
         known += out[i, i]
     if left > known:
         share = 1.0 - known / left
         for i in range(POSE):
             for j in range(POSE):
-                out[i, j] += share * left_open[i, j]
+                out[i, j] += share * estimate.left_open[i, j]
+    if estimate.held[0] < PLACED:
+        for i in range(ANGLES, POSE):
+            tell_of_habit(out, i, usual[i])
 
 
 @njit(cache=True)

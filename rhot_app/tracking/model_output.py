@@ -16,8 +16,9 @@ from rhot_app.tracking.bends import tell_of_bends
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, Estimate, scale_of
 from rhot_app.tracking.kalman.markers import Cameras
 from rhot_app.tracking.kalman.share import Share
+from rhot_app.tracking.kalman.sighted import eyes_on
 from rhot_app.tracking.kalman.wearing import Wearing
-from rhot_app.tracking.known import known_of
+from rhot_app.tracking.known import known_of, tell_of_open
 from rhot_app.tracking.locate import locate_all
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.sights import Seen, bring_together, seen_clearly
@@ -26,16 +27,13 @@ from rhot_app.tracking.state import Knowledge
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED), int(Knowledge.GUESSED)
 
 MEASURED_M, INFERRED_M = 3e-3, 12e-3
 """Standard deviation, the root of the summed variances of its axes, up to which a place counts as measured (when it was
 seen) and as inferred."""
-
-LASTING = 0.3
-"""Of the standard deviation that nodes state, so much is an error of one camera that lasts: in a fingertip of which
-little shows it makes half a millimetre of distance for as long as the hand rests."""
 
 CHANGES_M_S = 0.5
 """A marker that moves so fast looks otherwise with every frame, and what lasts of its errors has half the
@@ -55,8 +53,8 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 class Subject(NamedTuple):
     """What states tell of, unchanging: `dh`, the hand's table with P = 26 + M points: joints, fingertips, M markers;
     `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in
-    `RigArrays`; `paint` and `made` (M,) m^2 and `usual` (27,) as in `known_of`. `tips` (5,) and `wrist`: the markers
-    on the fingertips and on the wrist, -1 where there is none."""
+    `RigArrays`; `paint` and `made` (M,) m^2 as in `known_of`, `lasting` (M,) as in `Wearing`, `usual` (27,) as in
+    `tell_of_open`. `tips` (5,) and `wrist`: the markers on the fingertips and on the wrist, -1 where there is none."""
 
     dh: DhArrays
     part: Indices
@@ -66,6 +64,7 @@ class Subject(NamedTuple):
     shapes: Array
     paint: Array
     made: Array
+    lasting: Array
     usual: Array
     tips: Indices
     wrist: int
@@ -92,7 +91,7 @@ def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
     dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
                       point_offset=np.concatenate([one.point_offset, other.point_offset]))
     return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes,
-                   wearing.paint_variance, wearing.bias_variance, np.diag(wearing.habits.usual).copy(),
+                   wearing.paint_variance, wearing.bias_variance, wearing.lasting, np.diag(wearing.habits.usual).copy(),
                    np.array([wearing.marker_of(role) for role in TIP_ROLES]), wearing.marker_of(WRIST_ROLE))
 
 
@@ -119,13 +118,16 @@ def describe(account: Share, t_ns: int, report: Report) -> bool:
     told: Account = account.of
     estimate, subject, seen = told.estimate, told.subject, told.seen
     world, count = estimate.world, report.points.shape[0]
-    covariance = known_of(estimate, subject.cameras, subject.paint, subject.made, subject.usual)
-    report.palm_covariance[:] = covariance[:ANGLES, :ANGLES]
+    covariance = known_of(estimate, subject.cameras, subject.paint, subject.made)
+    placed = placed_points(estimate.unseen, subject.tips)
     jacobian = np.empty((count, 3, POSE))
     _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
+    _cover_all(world, covariance, jacobian, report.points, placed, report.covariances)
+    tell_of_open(estimate, subject.usual, covariance)
+    report.palm_covariance[:] = covariance[:ANGLES, :ANGLES]
     tell_of_bends(estimate, subject.cameras.pose, subject.tips, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:],
                   covariance)
-    _cover_all(world, covariance, jacobian, report.points, report.covariances)
+    _cover_all(world, covariance, jacobian, report.points, ~placed, report.covariances)
     located = np.empty((count - FIRST_MARKER, 3, 3))
     _locate(world, estimate.velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, t_ns,
             report, located)
@@ -178,7 +180,7 @@ def tell_of_lasting(velocity: Array, subject: Subject, jacobian: Array, located:
             for j in range(POSE):
                 speed += jacobian[m, i, j] * velocity[j]
             square += speed * speed
-        lasting = LASTING * LASTING / (1.0 + square / CHANGES_M_S**2) * located[m]
+        lasting = subject.lasting[m] ** 2 / (1.0 + square / CHANGES_M_S**2) * located[m]
         report.covariances[FIRST_MARKER + m] += lasting
         if m == subject.wrist:
             report.covariances[0] += lasting
@@ -228,12 +230,24 @@ def _worst(covariance: Array) -> float:
 
 
 @njit(cache=True)
-def _cover_all(world: Array, covariance: Array, jacobian: Array, points: Array, out: Array) -> None:
-    """Fill `out` (P, 3, 3) m^2 with the covariances of `points` (P, 3) m with `jacobian` (P, 3, 27); `covariance`
-    (28, 28) as in `known_of`."""
+def placed_points(unseen: Array, tips: Indices) -> Mask:
+    """(P,) which points two cameras see: markers, and fingertips that wear them. No open direction moves these.
+    `unseen` (C, M) as in `Estimate`."""
+    placed = np.zeros(FIRST_MARKER + unseen.shape[1], np.bool_)
+    for m in range(unseen.shape[1]):
+        placed[FIRST_MARKER + m] = eyes_on(unseen, m)[0] > 1
+    for finger in range(tips.shape[0]):
+        placed[FIRST_TIP + finger] = tips[finger] >= 0 and placed[FIRST_MARKER + tips[finger]]
+    return placed
+
+
+@njit(cache=True)
+def _cover_all(world: Array, covariance: Array, jacobian: Array, points: Array, chosen: Mask, out: Array) -> None:
+    """Fill `out` (P, 3, 3) m^2 with the covariances of those of the `points` (P, 3) m, with `jacobian` (P, 3, 27), that
+    are `chosen` (P,); `covariance` (28, 28) as in `known_of`."""
     columns, slopes = np.empty(POSE + 1, np.int64), np.empty((POSE + 1, 3))
     scaled = covariance[POSE, POSE] > 0.0
-    for p in range(points.shape[0]):
+    for p in np.flatnonzero(chosen):
         count = 0
         for j in range(POSE):  # zeros cost nothing
             x, y, z = jacobian[p, 0, j], jacobian[p, 1, j], jacobian[p, 2, j]

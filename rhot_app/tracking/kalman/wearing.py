@@ -34,6 +34,11 @@ shading, and the skin under it. A blob is paint on a knuckle that nobody measure
 PAINT_SD_M = {"capsule": 0.04e-3, "band": 0.3e-3}
 """The same without its shading, as it is told (`known.py`), of shapes that were measured."""
 
+LASTING_BAND, LASTING_OTHERS = 0.8, 0.3
+"""Of the standard deviation that nodes state, so much is an error of one camera that lasts, as it is told: nearly all
+of what a band's outline is off, and of a fingertip's, of which little shows, enough to make half a millimetre of
+distance for as long as the hand rests (`python benchmarks/sight_errors.py`)."""
+
 FINGERS_TOGETHER, THUMB_WITH_FINGERS = 0.8, 0.5
 """Correlation of how fingers begin to bend: most of what hands do in daily life is one movement of all of them
 (Santello et al. 1998, Todorov and Ghahramani 2004)."""
@@ -48,7 +53,8 @@ _COUPLED_SD_RAD = np.radians(0.02)
 class Wearing:
     """`natural`: what is believed of any hand's angles, `habits`: of one that is not seen; `roles` (M,) of the markers,
     `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places, `paint_variance` (M,) m^2 of them as it is
-    told, infinite where nobody knows. `outfit`: an `Outfit`, for compiled functions."""
+    told, infinite where nobody knows, `lasting` (M,) the parts of stated standard deviations that last. `outfit`: an
+    `Outfit`, for compiled functions."""
 
     model: HandModel
     worn: Worn
@@ -60,6 +66,7 @@ class Wearing:
     places: tuple[Place, ...]
     bias_variance: Array
     paint_variance: Array
+    lasting: Array
     outfit: Share = field(init=False)
 
     def __post_init__(self) -> None:
@@ -87,7 +94,8 @@ def compile_wearing(rig: Rig) -> Wearing:
         natural, habits_of(model, natural), limit_set(model, rig.tracker.limits),
         tuple(marker.role or "" for marker in rig.markers.markers), places,
         np.array([PLACE_SD_M[marker.shape] ** 2 for marker in rig.markers.markers]),
-        np.array([PAINT_SD_M.get(marker.shape, math.inf) ** 2 for marker in rig.markers.markers]))
+        np.array([PAINT_SD_M.get(marker.shape, math.inf) ** 2 for marker in rig.markers.markers]),
+        np.array([LASTING_BAND if marker.shape == "band" else LASTING_OTHERS for marker in rig.markers.markers]))
 
 
 def points_on(dh: DhArrays, places: tuple[Place, ...]) -> DhArrays:

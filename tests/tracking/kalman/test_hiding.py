@@ -8,7 +8,7 @@ from painted_fingertips import COUNT, INDEX, WEARING, WRIST, hand, looked_at, op
 from scipy.spatial.transform import Rotation
 
 from rhot_app.simulator.motion import FACING
-from rhot_app.tracking.kalman.estimate import BIAS, LOOK_AGE, LOOK_VARIANCE, POSE
+from rhot_app.tracking.kalman.estimate import BIAS, LOOK_AGE, LOOK_VARIANCE
 from rhot_app.tracking.kalman.hiding import (
     FASTEST_M_S,
     PLACED_BY,
@@ -131,7 +131,6 @@ def test_what_hides_a_fingertip_is_told_of_it():
         np.fill_diagonal(estimate.covariance, 1e-6)
         estimate.covariance[0, 0] = estimate.covariance[column, column] = bias
         estimate.covariance[0, column] = estimate.covariance[column, 0] = -0.999 * bias  # a place as good as its marker
-        told.append(known_of(estimate, WEARING.cameras, WEARING.paint_variance, WEARING.bias_variance,
-                             np.full(POSE, 1e9))[0, 0])
+        told.append(known_of(estimate, WEARING.cameras, WEARING.paint_variance, WEARING.bias_variance)[0, 0])
     assert told[0] < 0.5 * WEARING.bias_variance[INDEX]
     assert told[1] == pytest.approx(2e-3**2, rel=0.05)

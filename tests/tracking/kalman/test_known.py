@@ -22,7 +22,7 @@ from rhot_app.tracking.kalman.estimate import (
     Estimate,
 )
 from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.known import COMMON, known_of, tell_of_habit
+from rhot_app.tracking.known import COMMON, known_of, tell_of_habit, tell_of_open
 
 ANY_HABIT = np.full(POSE, 1e9)
 PAINT = WEARING.bias_variance / 16.0
@@ -31,7 +31,9 @@ LOST_FOCUS_PX = 100.0
 
 
 def told(estimate: Estimate, paint: np.ndarray = PAINT, usual: np.ndarray = ANY_HABIT) -> np.ndarray:
-    return known_of(estimate, WEARING.cameras, paint, WEARING.bias_variance, usual)
+    out = known_of(estimate, WEARING.cameras, paint, WEARING.bias_variance)
+    tell_of_open(estimate, usual, out)
+    return out
 
 
 def worked_with(estimate: Estimate) -> np.ndarray:
