@@ -20,7 +20,7 @@ REACH = 0.45  # of the free space: the disc's radius
 WIDEST_PX, NARROWEST_PX = 12.0, 2.5  # radii of the disc: more only costs time; less does not determine a crossing
 _ASTRAY = 0.12  # of the free space: a corner farther than this from where its neighbours expect it is tried again
 _ASTRAY_PX = 0.5
-_BESIDE = 0.05  # of the free space: how well neighbours foretell a corner that was not found
+_BESIDE = 0.05  # of the free space: how well neighbours predict a corner that was not found
 _WORSE = 2.5  # times the misfit of the others
 _FAINTER = 0.6  # of the others' contrast, or the reverse: what has less is not the board
 

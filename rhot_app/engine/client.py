@@ -98,13 +98,13 @@ class EngineClient:
             socket.close()
         return _read_answer(frames)
 
-    def foretell(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
+    def predict(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
         """The hand as it should be at this time of the master's monotonic clock (`time.monotonic_ns()` there), by all
         that the engine has seen until now; at most 0.1 s ahead. None while there is no hand.
 
-        Raises EngineError as `command` does, and when the rig's tracker foretells nothing (the classic one).
+        Raises EngineError as `command` does, and when the rig's tracker predicts nothing (the classic one).
         """
-        encoded = self.command("foretell", timeout_s=timeout_s, t_master_ns=t_master_ns).get("state")
+        encoded = self.command("predict", timeout_s=timeout_s, t_master_ns=t_master_ns).get("state")
         if encoded is None:
             return None
         state = decode(TOPIC_STATE, encoded)

@@ -47,7 +47,7 @@ class Commands:
         self._table: dict[str, Callable[[Arguments], Answer]] = {
             "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
             "record": self._record, "record_stop": self._record_stop, "rig": self._rig, "set_rig": self._set_rig,
-            "save_rig": self._save_rig, "preview": self._set_preview, "foretell": self._foretell, "quit": self._end,
+            "save_rig": self._save_rig, "preview": self._set_preview, "predict": self._predict, "quit": self._end,
         }
 
     @property
@@ -114,10 +114,10 @@ class Commands:
         self._preview(on)
         return {}
 
-    def _foretell(self, arguments: Arguments) -> Answer:
+    def _predict(self, arguments: Arguments) -> Answer:
         t_ns = arguments.get("t_master_ns")
         if not isinstance(t_ns, int) or isinstance(t_ns, bool) or not 0 <= t_ns < 1 << 63:
-            raise EngineError('foretell needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
+            raise EngineError('predict needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
         state = self._engine.state_at(t_ns)
         return {} if state is None else {"attachment": "state", "state": encode(state)}
 

@@ -81,8 +81,8 @@ class Engine:
             self.session = 0
 
     def state_at(self, t_ns: int) -> HandState | None:
-        """The hand foretold to master time `t_ns`; None while there is none. Raises EngineError when the rig's tracker
-        foretells nothing."""
+        """The hand predicted to master time `t_ns`; None while there is none. Raises EngineError when the rig's tracker
+        predicts nothing."""
         return self._pipeline.state_at(t_ns)
 
     def record(self, path: Path) -> None:

@@ -16,7 +16,7 @@ from rhot_app.engine.meters import LatencyMeter, RateMeter
 from rhot_app.errors import EngineError
 from rhot_app.sources.source import ObservationSource
 from rhot_app.tracking.state import HandState
-from rhot_app.tracking.tracker import CameraObservations, Foretelling, Tracker
+from rhot_app.tracking.tracker import CameraObservations, PredictingTracker, Tracker
 
 PublishState = Callable[[bytes], None]
 AfterState = Callable[[], None]
@@ -91,17 +91,17 @@ class Pipeline:
                 self._after_state()
 
     def state_at(self, t_ns: int) -> HandState | None:
-        """The hand foretold to master time `t_ns`; None while there is none. Raises EngineError when the tracker
-        foretells nothing."""
+        """The hand predicted to master time `t_ns`; None while there is none. Raises EngineError when the tracker
+        predicts nothing."""
         with self._lock:
             tracker = self._work.tracker
-            if not isinstance(tracker, Foretelling):
-                raise EngineError("this rig's tracker foretells nothing; choose the model tracker (tracker.kind).")
+            if not isinstance(tracker, PredictingTracker):
+                raise EngineError("this rig's tracker predicts nothing; choose the model tracker (tracker.kind).")
             try:
                 return tracker.state_at(t_ns)
             except Exception as exc:
-                log.exception("the tracker failed to foretell")
-                raise EngineError(f"the tracker failed to foretell ({type(exc).__name__}: {exc}).") from exc
+                log.exception("the tracker failed to predict")
+                raise EngineError(f"the tracker failed to predict ({type(exc).__name__}: {exc}).") from exc
 
     def _process(self, work: Work, frames: list[CameraObservations]) -> HandState | None:
         if work.source.changes != self._changes:

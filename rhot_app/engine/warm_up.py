@@ -12,7 +12,7 @@ from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.hand.places import ROLES, place_of
 from rhot_app.project import OTHER_HAND, Rig, RigNode
 from rhot_app.tracking.kalman.wearing import points_on
-from rhot_app.tracking.tracker import CameraObservations, Foretelling, Tracker
+from rhot_app.tracking.tracker import CameraObservations, PredictingTracker, Tracker
 from rhot_node.wire.codec import decode as decode_datagram
 from rhot_node.wire.codec import encode as encode_datagram
 from rhot_node.wire.marker_table import MarkerTable
@@ -38,7 +38,7 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
             state = tracker.solve()
             if state is not None:
                 encode(state)
-                if isinstance(tracker, Foretelling):
+                if isinstance(tracker, PredictingTracker):
                     tracker.state_at(state.t_master_ns + _PERIOD_NS)
     tracker.reset()
     _read_one(rig)

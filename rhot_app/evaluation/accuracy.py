@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Figures = dict[str, float | None]
 
 _ADDED = ("swaps",)  # over runs these add up; everything else is averaged, root mean square or plain
-_PLAIN = ("states_per_s", "measured_share", "foretold_3_sd_share")
+_PLAIN = ("states_per_s", "measured_share", "predicted_3_sd_share")
 
 
 def accuracy(track: Track, off: Deviations, truth: Truth, worn: Worn) -> Figures:
@@ -25,11 +25,11 @@ def accuracy(track: Track, off: Deviations, truth: Truth, worn: Worn) -> Figures
 
     `tip_visible`: fingertips whose marker both cameras truly see, whatever the tracker says of them; `tip_measured`:
     those that it calls measured; `tip_all`: every state; `tip_display`: of the newest state at each tick of a display,
-    against the truth at the tick; `tip_foretold`: of what the tracker foretells at the tick, and which part of
+    against the truth at the tick; `tip_predicted`: of what the tracker predicts at the tick, and which part of
     its axes is within three of its stated standard deviations. `angles`: of the fingers that wear a marker.
     """
     tips = distances(off.tips)
-    ahead, stated = foretold(track, truth, worn)
+    ahead, stated = predicted(track, truth, worn)
     within, judged = axes_within(ahead, stated, np.ones(ahead.shape[:2], np.bool_))
     span_s = float(track.times_s[-1] - track.times_s[0])
     return {
@@ -37,8 +37,8 @@ def accuracy(track: Track, off: Deviations, truth: Truth, worn: Worn) -> Figures
         "tip_measured_mm": _scaled(rms(tips[off.measured[:, worn.tips]]), 1e3),
         "tip_all_mm": _scaled(rms(tips), 1e3),
         "tip_display_mm": _scaled(rms(display_error(track, truth, worn)), 1e3),
-        "tip_foretold_mm": _scaled(rms(distances(ahead)), 1e3),
-        "foretold_3_sd_share": within / judged if judged else None,
+        "tip_predicted_mm": _scaled(rms(distances(ahead)), 1e3),
+        "predicted_3_sd_share": within / judged if judged else None,
         "marker_mm": _scaled(rms(distances(off.markers)[off.visible]), 1e3),
         "angles_deg": _scaled(rms(off.angles[:, worn.angles]), float(np.degrees(1.0))),
         "palm_turn_deg": _scaled(rms(distances(off.palm[:, 3:])), float(np.degrees(1.0))),
@@ -57,16 +57,16 @@ def display_error(track: Track, truth: Truth, worn: Worn) -> Array:
     return distances(shown - truth.markers_at(ticks)[:, worn.tips])
 
 
-def foretold(track: Track, truth: Truth, worn: Worn) -> tuple[Array, Array]:
+def predicted(track: Track, truth: Truth, worn: Worn) -> tuple[Array, Array]:
     """What the tracker, asked at each tick of a display, says of the tick: how far off fingertips are, (K, T, 3) m, and
-    their covariances (K, T, 3, 3) m^2. K is 0 when it foretells nothing."""
-    if track.foretold is None:
+    their covariances (K, T, 3, 3) m^2. K is 0 when it predicts nothing."""
+    if track.predicted is None:
         return np.empty((0, len(worn.tips), 3)), np.empty((0, len(worn.tips), 3, 3))
-    ticks = track.foretold.times_s
+    ticks = track.predicted.times_s
     asked = (ticks >= track.receive_s[0]) & (ticks <= track.receive_s[-1])
-    shown = track.foretold.fingertip_positions[asked][:, worn.tip_fingers]
+    shown = track.predicted.fingertip_positions[asked][:, worn.tip_fingers]
     return (shown - truth.markers_at(ticks[asked])[:, worn.tips],
-            track.foretold.fingertip_covariances[asked][:, worn.tip_fingers])
+            track.predicted.fingertip_covariances[asked][:, worn.tip_fingers])
 
 
 def pooled(runs: Sequence[Figures]) -> Figures:

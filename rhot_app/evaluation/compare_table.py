@@ -23,8 +23,8 @@ class Column:
 COLUMNS = (
     Column("tip_visible_mm", "tips visible mm", ".2f"), Column("tip_measured_mm", "tips measured mm", ".2f"),
     Column("tip_display_mm", "tips displayed mm", ".2f"),
-    Column("tip_foretold_mm", "tips foretold mm", ".2f", compared=False),
-    Column("foretold_3_sd_share", "foretold 3 sg", ".3f", compared=False), Column("marker_mm", "markers mm", ".2f"),
+    Column("tip_predicted_mm", "tips predicted mm", ".2f", compared=False),
+    Column("predicted_3_sd_share", "predicted 3 sg", ".3f", compared=False), Column("marker_mm", "markers mm", ".2f"),
     Column("angles_deg", "angles deg", ".1f"), Column("palm_turn_deg", "palm turn deg", ".1f"),
     Column("swaps", "swaps", ".0f", compared=False), Column("measured_share", "measured", ".3f", compared=False),
     Column("states_per_s", "states/s", ".0f", compared=False),
@@ -34,12 +34,14 @@ _CELL = 7
 LEGEND = """\
 Root mean squares over all states after the first second; ratio: the last tracker's figure to the first one's.
   tips       fingertips: visible to both cameras in truth, called measured by the tracker, as a 60 Hz display shows them
-             (the newest state), and as the tracker foretells them at the display's instants;
-             foretold 3 sg: part of their axes within three of its standard deviations
+             (the newest state), and as the tracker predicts them at the display's instants;
+             predicted 3 sg: part of their axes within three of its standard deviations
   markers    that both cameras see in truth
   angles     joint angles of the fingers that wear markers
   palm turn  between the palm and the true one
+  swaps      states that show one fingertip where another one is, once each time it happens
   measured   part of what both cameras see that the tracker calls measured
+  states/s   states per second: the classic tracker makes one per pair of frames, the model tracker one per frame
 NEES is 1 where covariances are true, more where they are too small, less where they are too large."""
 
 

@@ -112,11 +112,11 @@ def _compare(args: argparse.Namespace) -> int:
                              "them.")
     if args.frames is not None or args.detector != "fast":
         raise SimulatorError("--compare films its own logs with the fast detector: leave out --frames and --detector.")
-    names = (args.trackers or "classic,model").split(",")
+    names = [name.strip() for name in ("classic,model" if args.trackers is None else args.trackers).split(",")]
     seeds = 5 if args.seeds is None else args.seeds
     unknown = [name for name in names if name not in TRACKERS]
     if unknown:
-        raise SimulatorError(f"there is no tracker {unknown[0]!r}; --trackers takes some of {', '.join(TRACKERS)}.")
+        raise SimulatorError(f"--trackers: there is no tracker {unknown[0]!r}; it takes some of {', '.join(TRACKERS)}.")
     seconds = 8.0 if args.seconds is None else args.seconds
     least_s = SETTLE_S + _JUDGED_S
     for good, rule in ((least_s <= seconds < math.inf, f"--seconds is {least_s:g} or more, and finite"),

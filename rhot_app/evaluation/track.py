@@ -20,7 +20,7 @@ from rhot_app.simulator.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogDoor
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import HandState
-from rhot_app.tracking.tracker import Foretelling, Tracker
+from rhot_app.tracking.tracker import PredictingTracker, Tracker
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ DISPLAY_HZ = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Foretold:
+class Predicted:
     """What a tracker said of the fingertips at each tick of a display, at that tick, by what had arrived; K ticks. NaN
     while there was no hand."""
 
@@ -43,7 +43,7 @@ class Track:
     """N states of a tracker; M markers. Rig frame, m and rad; times are scene times, s. As in `HandState`.
 
     `receive_s` (N,): when the datagram that completed the state arrived. `compute_s` (D,): per datagram, from its bytes
-    to the state, if it made one. `foretold`: None of a tracker that foretells nothing.
+    to the state, if it made one. `predicted`: None of a tracker that predicts nothing.
     """
 
     times_s: Array  # (N,)
@@ -65,7 +65,7 @@ class Track:
     hand_scale: Array  # (N,)
     hand_scale_sd: Array  # (N,)
     compute_s: Array  # (D,)
-    foretold: Foretold | None = None
+    predicted: Predicted | None = None
 
     def where(self, chosen: NDArray[np.bool_]) -> Track:
         """The states of a mask (N,) alone."""
@@ -73,18 +73,18 @@ class Track:
         return Track(**{name: column if name in _OF_RUN else column[chosen] for name, column in columns.items()})
 
 
-_OF_RUN = "compute_s", "foretold"
+_OF_RUN = "compute_s", "predicted"
 _OF_STATES = tuple(field.name for field in fields(Track) if field.name not in ("times_s", "receive_s", *_OF_RUN))
 
 
-def track_of(states: Sequence[HandState], compute_s: Array | None = None, foretold: Foretold | None = None) -> Track:
+def track_of(states: Sequence[HandState], compute_s: Array | None = None, predicted: Predicted | None = None) -> Track:
     """The columns of states of one run. Raises SimulatorError when there are fewer than two."""
     if len(states) < 2:
         raise SimulatorError(f"the tracker made {len(states)} states of the whole log; there is nothing to judge.")
     columns = {name: np.array([getattr(state, name) for state in states]) for name in _OF_STATES}
     return Track(times_s=1e-9 * np.array([state.t_master_ns - T0_MASTER_NS for state in states]),
                  receive_s=1e-9 * np.array([state.t_receive_ns - T0_MASTER_NS for state in states]),
-                 compute_s=np.empty(0) if compute_s is None else compute_s, foretold=foretold, **columns)
+                 compute_s=np.empty(0) if compute_s is None else compute_s, predicted=predicted, **columns)
 
 
 def rig_with(rig: Rig, settings: TrackerSettings) -> Rig:
@@ -99,16 +99,16 @@ def tracked(records: Iterable[Record], rig: Rig, tracker: Tracker | None = None)
     """
     chosen = make_tracker(rig) if tracker is None else tracker
     warm_up(chosen, rig)
-    display = Display(records, chosen) if isinstance(chosen, Foretelling) else None
+    display = Display(records, chosen) if isinstance(chosen, PredictingTracker) else None
     timed = Timed(records if display is None else display)
     states = list(replay_states(timed, LogDoor(rig), chosen))
-    return track_of(states, np.array(timed.compute_s), None if display is None else display.foretold())
+    return track_of(states, np.array(timed.compute_s), None if display is None else display.predicted())
 
 
 class Display:
     """Records that pass, and a display that asks the tracker at each of its ticks where the hand is now."""
 
-    def __init__(self, records: Iterable[Record], tracker: Foretelling) -> None:
+    def __init__(self, records: Iterable[Record], tracker: PredictingTracker) -> None:
         self._records, self._tracker = records, tracker
         self._times_s: list[float] = []
         self._tips: list[Array] = []
@@ -128,9 +128,9 @@ class Display:
         self._tips.append(np.full((5, 3), np.nan) if state is None else state.fingertip_positions)
         self._covariances.append(np.full((5, 3, 3), np.nan) if state is None else state.fingertip_covariances)
 
-    def foretold(self) -> Foretold:
+    def predicted(self) -> Predicted:
         """All that it was told."""
-        return Foretold(np.array(self._times_s), np.array(self._tips).reshape(-1, 5, 3),
+        return Predicted(np.array(self._times_s), np.array(self._tips).reshape(-1, 5, 3),
                         np.array(self._covariances).reshape(-1, 5, 3, 3))
 
 

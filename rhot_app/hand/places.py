@@ -62,7 +62,8 @@ def place_of(marker: Marker, model: HandModel) -> Place:
         row = int(dh.point_row[1 + 4 * finger + bone + 1])
         skin = model.radii[finger, bone] * _dorsal(model, finger, row)
         return Place(row, np.array([-0.5 * model.bones[finger, bone], 0.0, 0.0]) + skin, finger)
-    raise RigError(f"marker {marker.id!r} has the role {marker.role!r}; a hand wears markers at "
+    said = f"the role {marker.role!r}" if marker.role else "no role"
+    raise RigError(f"marker {marker.id!r} has {said}; a hand wears markers at "
                    f"{', '.join(ROLES)}.")
 
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 MOST_PICTURES = 999
 POINT_SIGMA_PX = 0.12
 
+_OPTION_OF = {"distance_m": "distance", "lamp.brightness": "lamp", "lamp.kelvin": "kelvin", "lamp.mains_hz": "mains"}
+"""The options that choose fields of the twin's settings."""
+
 
 def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments that choose the scene; shared by every command that simulates."""
@@ -58,7 +61,16 @@ def scene_of(args: argparse.Namespace) -> Scene:
     try:
         return make_scene(msgspec.convert(merged, TwinSettings), args.seed)
     except msgspec.ValidationError as exc:
-        raise SimulatorError(f"the scene cannot be: {exc}") from exc
+        raise SimulatorError(_objection(str(exc), args)) from exc
+
+
+def _objection(problem: str, args: argparse.Namespace) -> str:
+    """What msgspec says of a field, said of the option that chose it."""
+    for path, option in _OPTION_OF.items():
+        if f"`$.{path}`" in problem:
+            what = problem.split(" - at ")[0].replace("Expected `float`", "expected a number")
+            return f"--{option} {getattr(args, option)}: {what}."
+    return f"the scene cannot be: {problem}"
 
 
 def _with(fields: dict[str, Any], chosen: dict[str, Any]) -> dict[str, Any]:

@@ -56,7 +56,7 @@ class Tracker(Protocol):
 
 
 @runtime_checkable
-class Foretelling(Tracker, Protocol):
+class PredictingTracker(Tracker, Protocol):
     """A tracker that tells of other instants than those of its states: for a display that shows what it draws later."""
 
     def state_at(self, t_ns: int) -> HandState | None:

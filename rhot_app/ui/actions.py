@@ -50,7 +50,7 @@ class Actions(QObject):
         self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
         self.names = self._make("Marker names", "", "Names beside the markers in the scene.", checkable=True)
         self.now = self._make("Hand as of now", "N", "Draw the hand where it is when you see it, not where it was in "
-                              "the newest pictures, 10 to 40 ms before. The model tracker foretells it (N).",
+                              "the newest pictures, 10 to 40 ms before. The model tracker predicts it (N).",
                               checkable=True)
         self.clouds = self._make("Uncertainty", "U", "How well places are known, as ellipsoids: the true place lies "
                                  "inside in 97 of 100 cases (three sigma) (U).", checkable=True)

@@ -1,4 +1,4 @@
-"""Dark or light, names, uncertainty and foresight in the scene: the switches of the View menu, as they were left."""
+"""Dark or light, names, uncertainty and prediction in the scene: the switches of the View menu, as they were left."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication
 
 from rhot_app.ui.actions import CLOUD_KINDS, Actions
-from rhot_app.ui.foresight import Foresight
+from rhot_app.ui.display_prediction import DisplayPrediction
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.advice_bar import AdviceBar
 from rhot_app.ui.scene.ellipsoid_mesh import LARGER, EllipsoidChoice
@@ -24,10 +24,10 @@ class Appearance(QObject):
 
     scheme_changed = Signal()
 
-    def __init__(self, settings: Settings, actions: Actions, parts: Screen, advice: AdviceBar, foresight: Foresight,
-                 parent: QObject | None = None) -> None:
+    def __init__(self, settings: Settings, actions: Actions, parts: Screen, advice: AdviceBar,
+                 prediction: DisplayPrediction, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._foresight = foresight
+        self._prediction = prediction
         self._settings = settings
         self._actions, self._parts, self._advice = actions, parts, advice
         self.scheme: Scheme = scheme_named(settings.scheme)
@@ -45,7 +45,7 @@ class Appearance(QObject):
         a.names.setChecked(s.flag("names"))
         self._parts.scene.show_names(s.flag("names"))
         a.now.setChecked(s.flag("now"))
-        self._foresight.wanted = s.flag("now")
+        self._prediction.wanted = s.flag("now")
         wanted = {name: s.flag(name, default) for name, default in _CLOUD_FLAGS.items()}
         for action, name in zip((a.clouds, *a.cloud_kinds), _CLOUD_FLAGS, strict=False):
             action.setChecked(wanted[name])
@@ -69,7 +69,7 @@ class Appearance(QObject):
 
     def _show_now(self, on: bool) -> None:
         self._settings.set_flag("now", on)
-        self._foresight.wanted = on
+        self._prediction.wanted = on
 
     def _choose_ellipsoids(self) -> None:
         a = self._actions

@@ -20,8 +20,8 @@ from rhot_app.ui.appearance import Appearance
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.controller import Controller
 from rhot_app.ui.dialogs import Dialogs
+from rhot_app.ui.display_prediction import DisplayPrediction
 from rhot_app.ui.docks import Docks
-from rhot_app.ui.foresight import Foresight
 from rhot_app.ui.guide import page_of
 from rhot_app.ui.lens_caps import LensCaps
 from rhot_app.ui.models.notice import Notice
@@ -66,9 +66,9 @@ class MainWindow(QMainWindow):
         self.screen_parts = Screen(scheme)
         self.advice = AdviceBar(scheme)
         self.actions_ = Actions(self)
-        foresight = Foresight(controller)
-        self.screen_parts.shown = foresight.shown
-        self.appearance = Appearance(settings, self.actions_, self.screen_parts, self.advice, foresight, self)
+        prediction = DisplayPrediction(controller)
+        self.screen_parts.shown = prediction.shown
+        self.appearance = Appearance(settings, self.actions_, self.screen_parts, self.advice, prediction, self)
         self.welcome = WelcomePage(settings.motion)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.welcome)

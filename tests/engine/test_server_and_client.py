@@ -201,7 +201,7 @@ def test_broken_bytes_are_refused_and_the_engine_lives(client: EngineClient, dat
     assert client.command("hello")["pid"]
 
 
-class Foreteller(FakeTracker):
+class Predictor(FakeTracker):
     """Says of every instant what it said of the last one."""
 
     def state_at(self, t_ns: int) -> HandState | None:
@@ -211,31 +211,31 @@ class Foreteller(FakeTracker):
         return None if state is None else replace(state, t_master_ns=t_ns)
 
 
-def test_a_hand_is_foretold_to_the_instant_that_a_client_asks_for(rig: Rig, tmp_path: Path) -> None:
+def test_a_hand_is_predicted_to_the_instant_that_a_client_asks_for(rig: Rig, tmp_path: Path) -> None:
     nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
-    bench = Bench(rig, tmp_path / "g", Foreteller)
+    bench = Bench(rig, tmp_path / "g", Predictor)
     with EngineClient(tmp_path / "g") as client:
-        assert client.foretell(1) is None, "nothing was seen yet"
+        assert client.predict(1) is None, "nothing was seen yet"
         for node in nodes:
             node.start()
         client.command("start")
         collect(client, HandState)
-        eventually(lambda: client.foretell(123_456_789_000) is not None, told=lambda: "no hand was foretold")
-        state = client.foretell(123_456_789_000)
+        eventually(lambda: client.predict(123_456_789_000) is not None, told=lambda: "no hand was predicted")
+        state = client.predict(123_456_789_000)
         assert state is None or state.t_master_ns == 123_456_789_000
-        with pytest.raises(EngineError, match=r"failed to foretell \(FloatingPointError: numbers went wrong\)"):
-            client.foretell(666)
+        with pytest.raises(EngineError, match=r"failed to predict \(FloatingPointError: numbers went wrong\)"):
+            client.predict(666)
         for nonsense in (-1, 1 << 63, True, "now", 1.5, None):
             with pytest.raises(EngineError, match="monotonic clock"):
-                client.command("foretell", t_master_ns=nonsense)
+                client.command("predict", t_master_ns=nonsense)
     for node in nodes:
         node.close()
     bench.close()
 
 
-def test_a_tracker_that_foretells_nothing_says_so(client: EngineClient) -> None:
+def test_a_tracker_that_predicts_nothing_says_so(client: EngineClient) -> None:
     with pytest.raises(EngineError, match="choose the model tracker"):
-        client.foretell(1)
+        client.predict(1)
 
 
 def test_requests_go_to_the_node_and_back(client: EngineClient, peer: ControlPeer) -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from synthetic_track import LATE_S, WORN, make_track, make_truth
 
-from rhot_app.evaluation.accuracy import accuracy, display_error, foretold, pooled, ratio
+from rhot_app.evaluation.accuracy import accuracy, display_error, pooled, predicted, ratio
 from rhot_app.evaluation.compare import Comparison, Judged, Run
 from rhot_app.evaluation.compare_table import COLUMNS, honesty_table, table
 from rhot_app.evaluation.deviations import deviations, worn_by
 from rhot_app.evaluation.honesty import squares
-from rhot_app.evaluation.track import Foretold, Track
+from rhot_app.evaluation.track import Predicted, Track
 from rhot_app.project import load_rig
 from rhot_app.simulator.truth import Truth
 from rhot_app.tracking.state import Knowledge
@@ -65,20 +65,20 @@ def test_a_display_shows_the_newest_state_received_of_a_hand_that_moved_on() -> 
     assert ages.max() - ages.min() > 0.015
 
 
-def test_a_display_that_is_foretold_shows_a_hand_that_moves_on_where_it_is() -> None:
+def test_a_display_that_is_predicted_shows_a_hand_that_moves_on_where_it_is() -> None:
     truth = make_truth(lambda times: 0.5 * times)
     ticks = np.arange(0.0, 3.5, 1.0 / 60.0)
     tips = truth.markers_at(ticks)[:, :5] + np.array([1e-3, 0.0, 0.0])
     tips[100] = np.nan
     stated = np.tile(np.diag([0.3e-3, 1e-3, 1e-3])**2, (len(ticks), 5, 1, 1))
-    track = replace(make_track(truth, TIMES), foretold=Foretold(ticks, tips, stated))
-    error, _ = foretold(track, truth, WORN)
+    track = replace(make_track(truth, TIMES), predicted=Predicted(ticks, tips, stated))
+    error, _ = predicted(track, truth, WORN)
     assert np.nanmax(np.abs(error - [1e-3, 0.0, 0.0])) < 1e-9 and np.isnan(error).any(axis=(1, 2)).sum() == 1
     assert len(error) == ((ticks >= track.receive_s[0]) & (ticks <= track.receive_s[-1])).sum()
     figures = judge(track, truth).figures
-    assert figures["tip_foretold_mm"] == pytest.approx(1.0) and (figures["tip_display_mm"] or 0.0) > 10.0
-    assert figures["foretold_3_sd_share"] == pytest.approx(2.0 / 3.0), "along x it is 3.3 standard deviations off"
-    assert judge(make_track(truth, TIMES), truth).figures["tip_foretold_mm"] is None
+    assert figures["tip_predicted_mm"] == pytest.approx(1.0) and (figures["tip_display_mm"] or 0.0) > 10.0
+    assert figures["predicted_3_sd_share"] == pytest.approx(2.0 / 3.0), "along x it is 3.3 standard deviations off"
+    assert judge(make_track(truth, TIMES), truth).figures["tip_predicted_mm"] is None
 
 
 def test_runs_are_pooled_each_figure_in_its_way() -> None:

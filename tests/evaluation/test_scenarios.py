@@ -125,10 +125,10 @@ def test_figures_are_gathered_each_in_its_way() -> None:
     assert list(scenarios.gather(runs).values()) == [pytest.approx(np.sqrt(12.5)), 9.0, 3.0, 1.0, -5.0, None]
 
 
-def test_a_hand_is_shown_nearer_to_where_it_is_when_it_is_foretold(grasp: Take) -> None:
+def test_a_hand_is_shown_nearer_to_where_it_is_when_it_is_predicted(grasp: Take) -> None:
     track = tracked(grasp.records(), rig_with(grasp.rig, MODEL))
     track = track.where(track.times_s >= 1.0)
     worn = worn_by(grasp.rig)
     figures = accuracy(track, deviations(track, grasp.truth, worn), grasp.truth, worn)
-    assert (figures["tip_foretold_mm"] or 9.0) < 0.5 * (figures["tip_display_mm"] or 0.0)
-    assert tracked(grasp.records(), rig_with(grasp.rig, CLASSIC)).foretold is None
+    assert (figures["tip_predicted_mm"] or 9.0) < 0.5 * (figures["tip_display_mm"] or 0.0)
+    assert tracked(grasp.records(), rig_with(grasp.rig, CLASSIC)).predicted is None

@@ -11,10 +11,11 @@ from rhot_app.tracking.make import make_tracker
 RIG = model_rig()
 
 
-def test_a_marker_without_a_place_on_the_hand_is_refused():
-    markers = (*RIG.markers.markers[:5], msgspec.structs.replace(RIG.markers.markers[5], role="elbow"))
+@pytest.mark.parametrize(("role", "said"), [("elbow", "the role 'elbow'"), (None, "no role")])
+def test_a_marker_without_a_place_on_the_hand_is_refused(role, said):
+    markers = (*RIG.markers.markers[:5], msgspec.structs.replace(RIG.markers.markers[5], role=role))
     rig = msgspec.structs.replace(RIG, markers=msgspec.structs.replace(RIG.markers, markers=markers))
-    with pytest.raises(RigError, match=r"marker '.*' has the role 'elbow'; a hand wears markers at thumb_tip"):
+    with pytest.raises(RigError, match=rf"marker '.*' has {said}; a hand wears markers at thumb_tip"):
         make_tracker(rig)
 
 

@@ -87,7 +87,7 @@ class FakeEngine:
         self.refuse_rig = ""  # why the engine takes no other rig
         self.scale = (1.03, 0.008)  # what a floating hand's size is estimated to be
         self.commands: list[tuple[str, dict[str, Any]]] = []
-        self.foretold: list[int] = []
+        self.predicted: list[int] = []
         self.sequence = 0
         self.session = 1
         self._model = build_model(self.rig.hand)
@@ -236,11 +236,11 @@ class FakeClient:
             self._next_preview += 0.25
         return messages
 
-    def foretell(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
-        """The hand at that time, by the same motion; the classic tracker foretells nothing."""
-        self.engine.foretold.append(t_master_ns)
+    def predict(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
+        """The hand at that time, by the same motion; the classic tracker predicts nothing."""
+        self.engine.predicted.append(t_master_ns)
         if self.engine.dead or self.engine.rig.tracker.kind == "classic":
-            raise EngineError("this rig's tracker foretells nothing")
+            raise EngineError("this rig's tracker predicts nothing")
         return self.engine.state(1e-9 * t_master_ns)
 
     def command(self, name: str, **args: Any) -> dict[str, Any]:

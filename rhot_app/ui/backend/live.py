@@ -40,7 +40,7 @@ class Client(Protocol):
         """Ask the engine; raises EngineError."""
         ...
 
-    def foretell(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
+    def predict(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
         """The hand as it should be at that time; raises EngineError."""
         ...
 

@@ -14,11 +14,11 @@ _PATIENCE_S = 0.02
 
 _AGAIN_S = 1.0
 _FRESH_NS = 500_000_000
-"""A state that is older is of a recording, or of a hand that is gone: nothing is foretold of it."""
+"""A state that is older is of a recording, or of a hand that is gone: nothing is predicted of it."""
 
 
-class Foresight:
-    """Asks the engine, in the window's thread, while `wanted`; for a millisecond where the tracker foretells, else not
+class DisplayPrediction:
+    """Asks the engine, in the window's thread, while `wanted`; for a millisecond where the tracker predicts, else not
     at all."""
 
     def __init__(self, controller: Controller) -> None:
@@ -27,7 +27,7 @@ class Foresight:
         self._not_before_s = 0.0
 
     def shown(self, newest: HandState | None, ahead_s: float) -> HandState | None:
-        """What to draw of the `newest` state when it will be seen `ahead_s` from now: the hand foretold to then, else
+        """What to draw of the `newest` state when it will be seen `ahead_s` from now: the hand predicted to then, else
         that state."""
         now_ns, client, rig = time.monotonic_ns(), self._controller.link.client, self._controller.rig
         if (not self.wanted or newest is None or client is None or rig is None or rig.tracker.kind != "model"
@@ -35,19 +35,19 @@ class Foresight:
                 or abs(now_ns - newest.t_master_ns) > _FRESH_NS or 1e-9 * now_ns < self._not_before_s):
             return newest
         try:
-            foretold = client.foretell(now_ns + round(1e9 * ahead_s), timeout_s=_PATIENCE_S)
+            predicted = client.predict(now_ns + round(1e9 * ahead_s), timeout_s=_PATIENCE_S)
         except EngineError:
             self._not_before_s = 1e-9 * now_ns + _AGAIN_S
             return newest
-        return newest if foretold is None else _known_as(foretold, newest)
+        return newest if predicted is None else _known_as(predicted, newest)
 
 
-def _known_as(foretold: HandState, newest: HandState) -> HandState:
-    """What is foretold is soon no longer measured. The scene shows what pictures tell and what they do not: that of
-    `newest`, whose place is foretold. How well it is, ellipsoids say."""
-    other = foretold.other
+def _known_as(predicted: HandState, newest: HandState) -> HandState:
+    """What is predicted is soon no longer measured. The scene shows what pictures tell and what they do not: that of
+    `newest`, whose place is predicted. How well it is, ellipsoids say."""
+    other = predicted.other
     if other is not None and newest.other is not None:
         other = _known_as(other, newest.other)
-    return replace(foretold, condition=newest.condition, marker_knowledge=newest.marker_knowledge,
+    return replace(predicted, condition=newest.condition, marker_knowledge=newest.marker_knowledge,
                    joint_knowledge=newest.joint_knowledge, angle_knowledge=newest.angle_knowledge,
                    palm_knowledge=newest.palm_knowledge, other=other)
