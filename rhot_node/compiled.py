@@ -17,17 +17,18 @@ from pathlib import Path
 VARIABLE = "NUMBA_CACHE_DIR"
 _KEPT = 3  # states of the sources: today's, and those of a checkout or two beside it
 _PACKAGES = ("rhot_node", "rhot_app")
+_COMPILERS = (b"numba", b"rhot_app.lean")
 _COMPLETE = "complete"
 
 
 def sources_hash(folders: Sequence[Path]) -> str:
-    """16 hex digits that change with any source file in `folders` that uses numba, and with where they lie."""
+    """16 hex digits that change with any source file in `folders` that is compiled, and with where they lie."""
     digest = hashlib.sha256()
     for folder in folders:
         digest.update(bytes(folder.resolve()))
         for path in sorted(folder.rglob("*.py")):
             text = path.read_bytes()
-            if b"numba" in text:
+            if any(compiler in text for compiler in _COMPILERS):
                 digest.update(str(path.relative_to(folder.parent)).encode())
                 digest.update(text)
     return digest.hexdigest()[:16]

@@ -10,18 +10,19 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
+from rhot_app.lean import lean, room, slots
 from rhot_app.tracking.bends import tell_of_bends
-from rhot_app.tracking.kalman.estimate import ANGLES, POSE, ROTATION, Estimate, scale_of
-from rhot_app.tracking.kalman.markers import Cameras
+from rhot_app.tracking.kalman.combine import fill
+from rhot_app.tracking.kalman.estimate import ANGLES, MOST_MARKERS, POSE, ROTATION, Estimate
+from rhot_app.tracking.kalman.hiding import speed_of
+from rhot_app.tracking.kalman.markers import Cameras, Places, empty_places, place_markers
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import eyes_on
 from rhot_app.tracking.kalman.wearing import Wearing
-from rhot_app.tracking.known import known_of, tell_of_open
-from rhot_app.tracking.locate import locate_all
-from rhot_app.tracking.rig_arrays import RigArrays
-from rhot_app.tracking.sights import Seen, bring_together, seen_clearly
+from rhot_app.tracking.known import TOLD, Sheet, empty_sheet, fill_known, tell_of_open
+from rhot_app.tracking.raw_places import RawPlaces, locate_raw
+from rhot_app.tracking.sights import Seen, seen_clearly
 from rhot_app.tracking.state import Knowledge
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ variance."""
 
 MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
 
-FIRST_TIP, FIRST_MARKER = 21, 26
+FIRST_TIP, FIRST_MARKER, MOST_POINTS = 21, 26, 26 + MOST_MARKERS
 """Of the points that a state tells of: joints, fingertips, markers."""
 
 _FINGER_OF_JOINT = np.array([-1] + [finger for finger, rows in enumerate(JOINT_SLICES)
@@ -52,16 +53,14 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 
 class Subject(NamedTuple):
     """What states tell of, unchanging: `dh`, the hand's table with P = 26 + M points: joints, fingertips, M markers;
-    `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `focal` (C, 2) px and `shapes` (M, 3, 3) m^2 as in
-    `RigArrays`; `paint` and `made` (M,) m^2 as in `known_of`, `lasting` (M,) as in `Wearing`, `usual` (27,) as in
-    `tell_of_open`. `tips` (5,) and `wrist`: the markers on the fingertips and on the wrist, -1 where there is none."""
+    `part` (M,) and `half_axes` (M, 3) m of the markers as in `Worn`; `paint` and `made` (M,) m^2 as in `fill_known`,
+    `lasting` (M,) as in `Wearing`, `usual` (27,) as in `tell_of_open`. `tips` (5,) and `wrist`: the markers on the
+    fingertips and on the wrist, -1 where there is none."""
 
     dh: DhArrays
     part: Indices
     half_axes: Array
     cameras: Cameras
-    focal: Array
-    shapes: Array
     paint: Array
     made: Array
     lasting: Array
@@ -85,12 +84,12 @@ class Report(NamedTuple):
     palm_covariance: Array  # (6, 6), palm translation m and rotation rad
 
 
-def subject_of(wearing: Wearing, rig: RigArrays) -> Subject:
+def subject_of(wearing: Wearing) -> Subject:
     """The hand with its markers before its cameras."""
     one, other = wearing.model.dh, wearing.worn.dh
     dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
                       point_offset=np.concatenate([one.point_offset, other.point_offset]))
-    return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras, rig.focal, rig.shapes,
+    return Subject(dh, wearing.worn.part, wearing.worn.half_axes, wearing.cameras,
                    wearing.paint_variance, wearing.bias_variance, wearing.lasting, np.diag(wearing.habits.usual).copy(),
                    np.array([wearing.marker_of(role) for role in TIP_ROLES]), wearing.marker_of(WRIST_ROLE))
 
@@ -104,100 +103,91 @@ def empty_report(markers: int) -> Report:
 
 
 class Account(NamedTuple):
-    """What a state tells of: a hand as it is estimated, and what was seen of it."""
+    """What a state tells of - a hand as it is estimated, and what was seen of it -, and room to work in: the `places`
+    of the subject's points, `known` (28, 28) as `fill_known` has it, and `located` (M, 3, 3) m^2, how well sights alone
+    have the markers."""
 
     estimate: Estimate
     subject: Subject
     seen: Seen
+    places: Places
+    known: Array
+    located: Array
+    sheet: Sheet
+
+
+def open_account(estimate: Estimate, subject: Subject, seen: Seen) -> Account:
+    """An account of a hand, with the room that it takes."""
+    markers = len(subject.part)
+    return Account(estimate, subject, seen, empty_places(subject.dh), np.empty((TOLD, TOLD)),
+                   np.empty((markers, 3, 3)), empty_sheet(markers))
 
 
 @njit(cache=True)
 def describe(account: Share, t_ns: int, report: Report) -> bool:
     """Fill `report` from a shared `Account` of `t_ns`; returns whether all markers are measured. One call for all
     that is told of a state: each costs some microseconds."""
-    told: Account = account.of
-    estimate, subject, seen = told.estimate, told.subject, told.seen
-    world, count = estimate.world, report.points.shape[0]
-    covariance = known_of(estimate, subject.cameras, subject.paint, subject.made)
-    placed = placed_points(estimate.unseen, subject.tips)
-    jacobian = np.empty((count, 3, POSE))
-    _place(world, estimate.angles, scale_of(estimate), subject.dh, report.points, jacobian)
-    _cover_all(world, covariance, jacobian, report.points, placed, report.covariances)
-    tell_of_open(estimate, subject.usual, covariance)
-    report.palm_covariance[:] = covariance[:ANGLES, :ANGLES]
-    tell_of_bends(estimate, subject.cameras.pose, subject.tips, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:],
-                  covariance)
-    _cover_all(world, covariance, jacobian, report.points, ~placed, report.covariances)
-    located = np.empty((count - FIRST_MARKER, 3, 3))
-    _locate(world, estimate.velocity, subject, report.points[FIRST_MARKER:], jacobian[FIRST_MARKER:], seen, t_ns,
-            report, located)
-    tell_of_lasting(estimate.velocity, subject, jacobian[FIRST_MARKER:], located, report)
+    return fill_report(account.of, t_ns, report)
+
+
+@lean
+def fill_report(told: Account, t_ns: int, report: Report) -> bool:
+    """All that `describe` does."""
+    estimate, subject, seen, places, known = told.estimate, told.subject, told.seen, told.places, told.known
+    tips, cameras = subject.tips, subject.cameras
+    fill_known(estimate, cameras, subject.paint, subject.made, told.sheet, known)
+    place_markers(subject.dh, estimate, places)
+    for p in range(places.points.shape[0]):
+        fill(report.points[p], places.points[p])
+    placed = slots((MOST_POINTS,))
+    note_placed(estimate.unseen, tips, placed)
+    _cover_all(estimate.world, known, places, placed, 1, report.covariances)
+    tell_of_open(estimate, subject.usual, known)
+    for i in range(ANGLES):
+        fill(report.palm_covariance[i], known[i, :ANGLES])
+    tell_of_bends(estimate, cameras.pose, tips, places.points[FIRST_MARKER:], places.jacobian[FIRST_MARKER:], known)
+    _cover_all(estimate.world, known, places, placed, 0, report.covariances)
+    locate_raw(subject.half_axes, cameras, estimate, places, FIRST_MARKER, t_ns, seen,
+               RawPlaces(report.raw, told.located, report.errors))
+    tell_of_lasting(estimate.velocity, subject, places.jacobian[FIRST_MARKER:], told.located, report)
     all_measured = True
-    for m in range(count - FIRST_MARKER):
+    for m in range(subject.part.shape[0]):
         report.marker_knowledge[m] = _know(_worst(report.covariances[FIRST_MARKER + m]),
                                            seen_clearly(seen, t_ns, m), MEASURED_M, INFERRED_M)
         all_measured &= report.marker_knowledge[m] == _MEASURED
-    _conclude(covariance, subject, report)
+    _conclude(known, subject, report)
     return all_measured
 
 
-@njit(cache=True)
-def _place(world: Array, angles: Array, scale: float, dh: DhArrays, points: Array, jacobian: Array) -> None:
-    """Fill `points` (P, 3) m and `jacobian` (P, 3, 27) of a hand of any size."""
-    frames = np.empty((dh.parent.shape[0], 3, 4))
-    forward_arrays(dh, world, angles, frames, points)
-    jacobian_arrays(dh, world, frames, points, jacobian)
-    if scale != 1.0:
-        for p in range(points.shape[0]):
-            for i in range(3):
-                points[p, i] = world[i, 3] + scale * (points[p, i] - world[i, 3])
-                for j in range(ROTATION, POSE):
-                    jacobian[p, i, j] *= scale
-
-
-@njit(cache=True)
-def _locate(world: Array, velocity: Array, subject: Subject, markers: Array, jacobian: Array, seen: Seen, t_ns: int,
-            report: Report, covariances: Array) -> None:
-    """Where the sights alone have the markers, with `covariances` (M, 3, 3) m^2: they are of several instants, and the
-    hand says how it moved since."""
-    shape, cameras = seen.times.shape, subject.cameras
-    pixels, used = np.empty((shape[0], shape[1], 2)), np.empty(shape, np.bool_)
-    bring_together(subject.half_axes, cameras, world, velocity, markers, jacobian, t_ns, seen, pixels, used)
-    locate_all(pixels, seen.covariances, used, cameras.intrinsics, cameras.pose, subject.focal, subject.shapes,
-               report.raw, covariances, report.errors)
-
-
-@njit(cache=True)
+@lean
 def tell_of_lasting(velocity: Array, subject: Subject, jacobian: Array, located: Array, report: Report) -> None:
     """Add to what is told of markers, the fingertips and the wrist that wear them what no waiting takes away: errors of
     one camera that last, part of the covariances (M, 3, 3) m^2 of the places that its sights have."""
     for m in range(located.shape[0]):
         if not np.isfinite(located[m, 0, 0]):
             continue
-        square = 0.0
+        share = subject.lasting[m] ** 2 / (1.0 + (speed_of(jacobian[m], velocity) / CHANGES_M_S) ** 2)
         for i in range(3):
-            speed = 0.0
-            for j in range(POSE):
-                speed += jacobian[m, i, j] * velocity[j]
-            square += speed * speed
-        lasting = subject.lasting[m] ** 2 / (1.0 + square / CHANGES_M_S**2) * located[m]
-        report.covariances[FIRST_MARKER + m] += lasting
-        if m == subject.wrist:
-            report.covariances[0] += lasting
-            report.palm_covariance[:3, :3] += lasting
-        for finger in range(subject.tips.shape[0]):
-            if m == subject.tips[finger]:
-                report.covariances[FIRST_TIP + finger] += lasting
+            for j in range(3):
+                lasting = share * located[m, i, j]
+                report.covariances[FIRST_MARKER + m, i, j] += lasting
+                if m == subject.wrist:
+                    report.covariances[0, i, j] += lasting
+                    report.palm_covariance[i, j] += lasting
+                for finger in range(subject.tips.shape[0]):
+                    if m == subject.tips[finger]:
+                        report.covariances[FIRST_TIP + finger, i, j] += lasting
 
 
-@njit(cache=True)
+@lean
 def _conclude(covariance: Array, subject: Subject, report: Report) -> None:
     """What is measured, the images alone determine; what they determine through habit is inferred, however well.
 
     A fingertip needs its marker, an inner joint two markers on its finger, a palm's rotation three on the palm, an
     angle two on its finger beside those.
     """
-    shown = np.zeros(6, np.int64)  # markers measured on the palm, then on each finger
+    shown = slots((6,))  # markers measured on the palm, then on each finger
+    shown[:] = 0
     for m in range(subject.part.shape[0]):
         shown[subject.part[m] + 1] += report.marker_knowledge[m] == _MEASURED
     turn = shown[0] >= 3
@@ -216,38 +206,40 @@ def _conclude(covariance: Array, subject: Subject, report: Report) -> None:
     report.palm[0] = _know(sd, turn, MEASURED_RAD, INFERRED_RAD)
 
 
-@njit(cache=True)
+@lean
 def _know(sd: float, shown: bool, measured: float, inferred: float) -> int:
     if sd <= measured and shown:
         return _MEASURED
     return _INFERRED if sd <= inferred else _GUESSED
 
 
-@njit(cache=True)
+@lean
 def _worst(covariance: Array) -> float:
     """Standard deviation along the worst axis of a (3, 3) covariance, from its trace: at most sqrt(3) too large."""
     return math.sqrt(max(covariance[0, 0] + covariance[1, 1] + covariance[2, 2], 0.0))
 
 
-@njit(cache=True)
-def placed_points(unseen: Array, tips: Indices) -> Mask:
-    """(P,) which points two cameras see: markers, and fingertips that wear them. No open direction moves these.
-    `unseen` (C, M) as in `Estimate`."""
-    placed = np.zeros(FIRST_MARKER + unseen.shape[1], np.bool_)
+@lean
+def note_placed(unseen: Array, tips: Indices, out: Indices) -> None:
+    """Fill `out` (P,), 1 for points that two cameras see: markers, and fingertips that wear them. No open direction
+    moves these. `unseen` (C, M) as in `Estimate`."""
+    out[:] = 0
     for m in range(unseen.shape[1]):
-        placed[FIRST_MARKER + m] = eyes_on(unseen, m)[0] > 1
+        out[FIRST_MARKER + m] = eyes_on(unseen, m)[0] > 1
     for finger in range(tips.shape[0]):
-        placed[FIRST_TIP + finger] = tips[finger] >= 0 and placed[FIRST_MARKER + tips[finger]]
-    return placed
+        if tips[finger] >= 0:
+            out[FIRST_TIP + finger] = out[FIRST_MARKER + tips[finger]]
 
 
-@njit(cache=True)
-def _cover_all(world: Array, covariance: Array, jacobian: Array, points: Array, chosen: Mask, out: Array) -> None:
-    """Fill `out` (P, 3, 3) m^2 with the covariances of those of the `points` (P, 3) m, with `jacobian` (P, 3, 27), that
-    are `chosen` (P,); `covariance` (28, 28) as in `known_of`."""
-    columns, slopes = np.empty(POSE + 1, np.int64), np.empty((POSE + 1, 3))
+@lean
+def _cover_all(world: Array, covariance: Array, places: Places, placed: Indices, chosen: int, out: Array) -> None:
+    """Fill `out` (P, 3, 3) m^2 with the covariances of those of the points of which `placed` (P,) is as `chosen`;
+    `covariance` (28, 28) as `fill_known` has it."""
+    columns, slopes, points, jacobian = slots((TOLD,)), room((TOLD, 3)), places.points, places.jacobian
     scaled = covariance[POSE, POSE] > 0.0
-    for p in np.flatnonzero(chosen):
+    for p in range(points.shape[0]):
+        if placed[p] != chosen:
+            continue
         count = 0
         for j in range(POSE):  # zeros cost nothing
             x, y, z = jacobian[p, 0, j], jacobian[p, 1, j], jacobian[p, 2, j]
@@ -263,7 +255,7 @@ def _cover_all(world: Array, covariance: Array, jacobian: Array, points: Array, 
         _cover(covariance, columns[:count], slopes, out[p])
 
 
-@njit(cache=True)
+@lean
 def _cover(covariance: Array, columns: Indices, slopes: Array, out: Array) -> None:
     """Fill `out` (3, 3) with the covariance of what changes by `slopes` (K, 3) per number of the state in `columns`."""
     xx = xy = xz = yy = yz = zz = 0.0

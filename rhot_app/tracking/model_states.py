@@ -9,7 +9,7 @@ import numpy as np
 
 from rhot_app.tracking.kalman.estimate import SCALE, Estimate
 from rhot_app.tracking.kalman.share import Share
-from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, Account, Subject, describe, empty_report
+from rhot_app.tracking.model_output import FIRST_MARKER, FIRST_TIP, Subject, describe, empty_report, open_account
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.sights import Sights
 from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
@@ -22,7 +22,7 @@ class Teller:
 
     def __init__(self, rig: RigArrays, sights: Sights, subject: Subject, estimate: Estimate) -> None:
         self._rig, self._sights, self._estimate = rig, sights, estimate
-        self._account = Share(Account(estimate, subject, sights.seen))
+        self._account = Share(open_account(estimate, subject, sights.seen))
         self.complete = False
 
     def tell(self, t_ns: int, sequence: int, newest: CameraObservations, begun: float) -> HandState:

@@ -81,14 +81,13 @@ class ModelTracker:
     def __init__(self, rig: Rig) -> None:
         self._rig, self._wearing = compile_rig(rig), compile_wearing(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
-        self._hand = HandFilter(self._wearing.worn, self._wearing.cameras, self._wearing.habits, self._wearing.limits,
-                                self._wearing.bias_variance)
+        self._hand = HandFilter(self._wearing.outfit, self._wearing.habits, self._wearing.limits)
         self._size = HandSize(self._wearing) if rig.tracker.float_scale else None
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)
         self._sights = Sights(cameras, markers)
         self._ahead = empty_estimate(cameras, markers)
-        subject, self._told_states = subject_of(self._wearing, self._rig), 0
+        subject, self._told_states = subject_of(self._wearing), 0
         self._told, self._told_ahead = (Teller(self._rig, self._sights, subject, estimate)
                                         for estimate in (self._hand.estimate, self._ahead))
         self.reset()

@@ -8,9 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.estimate import POSE
+from rhot_app.lean import lean
 from rhot_app.tracking.kalman.marker_block import MarkerBlock, Sighting
-from rhot_app.tracking.kalman.markers import Cameras, project_marker
 from rhot_app.tracking.kalman.rows import Outcome
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.surprise import UNLIKELY
@@ -118,9 +117,12 @@ class Sights:
 
 @njit(cache=True)
 def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, widening: Array, source: Indices) -> int:
-    """Enter a frame, a shared `Sighting` of `t_ns`, into a shared `Seen`; the others as in `Outcome`."""
-    seen: Seen = shared.of
-    sighting: Sighting = block.of
+    return note_believed(shared.of, block.of, t_ns, believed, widening, source)
+
+
+@lean
+def note_believed(seen: Seen, sighting: Sighting, t_ns: int, believed: Mask, widening: Array, source: Indices) -> int:
+    """All that `Sights.believe` does, of a frame of `t_ns`; the others as in `Outcome`."""
     frame = sighting.frame
     camera, count = frame.camera[0], 0
     for observation in range(believed.shape[0]):
@@ -144,7 +146,12 @@ def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, widening: A
 
 @njit(cache=True)
 def _all_in_sight(shared: Share, t_ns: int) -> bool:
-    seen: Seen = shared.of
+    return all_in_sight(shared.of, t_ns)
+
+
+@lean
+def all_in_sight(seen: Seen, t_ns: int) -> bool:
+    """As `Sights.all_in_sight`."""
     for m in range(seen.times.shape[1]):
         count = 0
         for c in range(seen.times.shape[0]):
@@ -154,7 +161,7 @@ def _all_in_sight(shared: Share, t_ns: int) -> bool:
     return True
 
 
-@njit(cache=True)
+@lean
 def seen_clearly(seen: Seen, t_ns: int, marker: int) -> bool:
     """Whether two cameras or more see a marker beyond doubt at `t_ns`, by fresh sights of cameras that are not too
     slow."""
@@ -165,32 +172,7 @@ def seen_clearly(seen: Seen, t_ns: int, marker: int) -> bool:
     return count >= 2
 
 
-@njit(cache=True)
+@lean
 def is_fresh(seen: Seen, t_ns: int, camera: int, marker: int) -> bool:
     """Whether a sight counts as of `t_ns`."""
     return bool(seen.times[camera, marker] >= 0 and abs(t_ns - seen.times[camera, marker]) <= seen.fresh_ns[camera])
-
-
-@njit(cache=True)
-def bring_together(half_axes: Array, cameras: Cameras, world: Array, velocity: Array, points: Array, jacobian: Array,
-                   t_ns: int, seen: Seen, out: Array, used: Mask) -> None:
-    """Fill `out` (C, M, 2) px: each camera's last sight of each marker, carried to `t_ns` as the hand moved since.
-
-    `half_axes` (M, 3) as in `Worn`, `world` and `velocity` as in `Estimate`, `points` (M, 3) m and `jacobian`
-    (M, 3, 27) as `place_markers` has them. Sights that are not fresh are NaN and not `used` (C, M).
-    """
-    pixel, slope, speed = np.empty(2), np.empty((2, 3)), np.empty(3)
-    for m in range(points.shape[0]):
-        for i in range(3):
-            speed[i] = 0.0
-            for j in range(POSE):
-                speed[i] += jacobian[m, i, j] * velocity[j]
-        for c in range(out.shape[0]):
-            used[c, m] = is_fresh(seen, t_ns, c, m) and project_marker(
-                points[m], world, half_axes[m], cameras.pose[c], cameras.intrinsics[c], pixel, slope)
-            elapsed_s = 1e-9 * (t_ns - seen.times[c, m])
-            for k in range(2):
-                out[c, m, k] = np.nan
-                if used[c, m]:
-                    shift = slope[k, 0] * speed[0] + slope[k, 1] * speed[1] + slope[k, 2] * speed[2]
-                    out[c, m, k] = seen.pixels[c, m, k] + shift * elapsed_s

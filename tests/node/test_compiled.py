@@ -22,11 +22,13 @@ def package(tmp_path: Path) -> Path:
     return folder
 
 
-def test_the_hash_follows_compiled_sources_only(package: Path) -> None:
+@pytest.mark.parametrize("imported", ["from numba import njit", "from rhot_app.lean import lean"])
+def test_the_hash_follows_compiled_sources_only(package: Path, imported: str) -> None:
+    (package / "fast.py").write_text(f"{imported}\n")
     before = sources_hash([package])
     (package / "slow.py").write_text("x = 2\n")
     assert sources_hash([package]) == before
-    (package / "fast.py").write_text("from numba import njit  # changed\n")
+    (package / "fast.py").write_text(f"{imported}  # changed\n")
     changed = sources_hash([package])
     assert changed != before
     (package / "fast.py").rename(package / "other.py")

@@ -17,7 +17,6 @@ from rhot_app.tracking.model_output import (
     subject_of,
     tell_of_lasting,
 )
-from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.state import Knowledge
 
 RIG = model_rig()
@@ -77,7 +76,7 @@ def told_of_lasting(located: np.ndarray, speed_m_s: float = 0.0) -> Report:
     report, jacobian, velocity = empty_report(count), np.zeros((count, 3, 27)), np.zeros(27)
     report.covariances[:], report.palm_covariance[:] = 0.0, 0.0
     jacobian[:, 0, 0], velocity[0] = 1.0, speed_m_s
-    tell_of_lasting(velocity, subject_of(WEARING, compile_rig(RIG)), jacobian, located, report)
+    tell_of_lasting(velocity, subject_of(WEARING), jacobian, located, report)
     return report
 
 

@@ -7,12 +7,11 @@ import pytest
 from modelled_hand import model_rig, moving, sights
 
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.markers import place_markers, project_marker
 from rhot_app.tracking.kalman.rows import Outcome
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.model_start import count_apart
-from rhot_app.tracking.sights import UNLIKELY, Seen, Sights, bring_together, seen_clearly
+from rhot_app.tracking.sights import UNLIKELY, Seen, Sights, seen_clearly
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
 
@@ -87,31 +86,6 @@ def test_all_is_in_sight_while_two_cameras_saw_every_marker_within_two_fresh_tim
     assert memory.all_in_sight(t_ns)
     seen.times[1, 3] -= 1
     assert not memory.all_in_sight(t_ns)
-
-
-def test_sights_are_carried_along_as_the_hand_moves():
-    tracker = make_tracker(RIG)
-    for frame in sights(RIG, moving(), 0.6):
-        tracker.ingest(frame)
-        tracker.solve()
-    estimate, seen, t_ns = tracker._hand.estimate, tracker._sights.seen, tracker._timeline.t_ns
-    seen.times[1, 2], seen.times[0, 3] = t_ns - seen.fresh_ns[1] - 1, -1
-    points, jacobian = np.empty((MARKERS, 3)), np.empty((MARKERS, 3, 27))
-    place_markers(WEARING.worn, estimate, points, jacobian)
-    pixels, used = np.empty((CAMERAS, MARKERS, 2)), np.empty((CAMERAS, MARKERS), np.bool_)
-    bring_together(WEARING.worn.half_axes, WEARING.cameras, estimate.world, estimate.velocity, points, jacobian, t_ns,
-                   seen, pixels, used)
-    expected, pixel, slope = np.full_like(pixels, np.nan), np.empty(2), np.empty((2, 3))
-    for c in range(CAMERAS):
-        for m in range(MARKERS):
-            if (c, m) not in ((1, 2), (0, 3)):
-                project_marker(points[m], estimate.world, WEARING.worn.half_axes[m], WEARING.cameras.pose[c],
-                               WEARING.cameras.intrinsics[c], pixel, slope)
-                elapsed_s = 1e-9 * (t_ns - seen.times[c, m])
-                expected[c, m] = seen.pixels[c, m] + elapsed_s * slope @ jacobian[m] @ estimate.velocity
-    np.testing.assert_array_equal(used, ~np.isnan(expected[..., 0]))
-    np.testing.assert_allclose(pixels, expected, atol=1e-9)
-    assert np.nanmax(np.abs(expected - seen.pixels)) > 0.1
 
 
 def test_the_newest_frames_are_shown_with_what_they_lost():

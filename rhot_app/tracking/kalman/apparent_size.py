@@ -16,13 +16,22 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.kinematics import direction_jacobian, forward_arrays
-from rhot_app.tracking.kalman.estimate import GOES_ON, PALM_HELD, POSE, ROTATION, Estimate, displace
+from rhot_app.hand.kinematics import direction_jacobian
+from rhot_app.lean import lean, room
+from rhot_app.tracking.kalman.combine import dot
+from rhot_app.tracking.kalman.estimate import (
+    GOES_ON,
+    MOST_MARKERS,
+    MOST_NUMBERS,
+    PALM_HELD,
+    POSE,
+    Estimate,
+    displace,
+)
 from rhot_app.tracking.kalman.hiding import is_placed, shown_part
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Places, Worn
 from rhot_app.tracking.kalman.sighted import line_of_sight
 
 Array = NDArray[np.float64]
@@ -59,40 +68,41 @@ class Sizes(NamedTuple):
     variance: Array
 
 
-@njit(cache=True)
-def weigh_sizes(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array) -> None:
+@lean
+def weigh_sizes(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, places: Places) -> None:
     """Correct the estimate of a hand whose distance is held (`holding.py`), because only this camera sees it, by how
     large its fingertips look.
 
-    To be called after `measure_sizes`. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them.
+    To be called after `measure_sizes`. `places` as `place_markers` has them.
     """
-    camera, count = frame.camera[0], worn.part.shape[0]
+    camera = frame.camera[0]
     if estimate.held[0] not in (PALM_HELD, GOES_ON) or is_placed(estimate, camera):
         return
-    sizes, sight = Sizes(np.empty(count), np.empty((count, POSE)), np.empty(count)), np.zeros(3)
-    used = _read(worn, cameras.pose[camera], frame, estimate, points, jacobian, sizes, sight)
+    sizes, sight = Sizes(room((MOST_MARKERS,)), room((MOST_MARKERS, POSE)), room((MOST_MARKERS,))), room((3,))
+    sight[:] = 0.0
+    used = _read(worn, cameras.pose[camera], frame, estimate, places, sizes, sight)
     if used < NEEDED:
         return
-    sight /= math.sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2)
+    length = math.sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2)
+    for i in range(3):
+        sight[i] /= length
     _doubt_small(estimate.covariance, sight, sizes, used)
     _correct(estimate, sizes, used)
 
 
-@njit(cache=True)
-def _read(worn: Worn, camera: Array, frame: Frame, estimate: Estimate, points: Array, jacobian: Array, out: Sizes,
-          sight: Array) -> int:
+@lean
+def _read(worn: Worn, camera: Array, frame: Frame, estimate: Estimate, places: Places, out: Sizes, sight: Array) -> int:
     """Fill `out`, and add up the lines of sight in `sight` (3,); returns how many fingertips there are."""
-    dh, used = worn.dh, 0
-    frames, ignored = np.empty((dh.parent.shape[0], 3, 4)), np.empty(points.shape)
-    line, turning = np.empty(3), np.empty((3, POSE))
-    forward_arrays(dh, estimate.world, estimate.angles, frames, ignored)
+    dh, used, points, jacobian = worn.dh, 0, places.points, places.jacobian
+    line, bone, turning = room((3,)), room((3,)), room((3, POSE))
     for s in range(points.shape[0]):
         m = frame.label[s]
         if worn.slender[m] < 0.0 or not frame.plain[s] or not frame.sizes[s] > 0.0 or not estimate.width[m] > 0.0:
             continue
         distance = line_of_sight(camera, points[m], line)
-        bone = frames[dh.point_row[m], :, 0].copy()
-        direction_jacobian(dh, estimate.world, frames, m, bone, turning)
+        for i in range(3):
+            bone[i] = places.frames[dh.point_row[m], i, 0]
+        direction_jacobian(dh, estimate.world, places.frames, m, bone, turning)
         along = bone[0] * line[0] + bone[1] * line[1] + bone[2] * line[2]
         side = max(math.sqrt(max(1.0 - along * along, 0.0)), END_ON)
         shown = -0.5 * worn.slender[m] / (1.0 + worn.slender[m] * side) * along / side  # of the width, per `along`
@@ -106,26 +116,26 @@ def _read(worn: Worn, camera: Array, frame: Frame, estimate: Estimate, points: A
         expected = estimate.width[m] * math.sqrt(shown_part(worn.slender[m], side))
         out.larger[used] = math.log(frame.sizes[s] / expected)
         out.variance[used] = EACH**2 + estimate.width_varies[m]
-        sight += line
+        for i in range(3):
+            sight[i] += line[i]
         used += 1
     return used
 
 
-@njit(cache=True)
+@lean
 def _doubt_small(covariance: Array, sight: Array, sizes: Sizes, used: int) -> None:
     """Widen the variance of what looks too small beside the others, which agree about how far away along `sight` (3,)
     the hand is, with all that is taken to go with it."""
-    with_place = np.zeros(POSE)
-    for i in range(ROTATION):
-        with_place += sight[i] * covariance[i, :POSE]
+    with_place = room((POSE,))
+    for j in range(POSE):
+        with_place[j] = sight[0] * covariance[0, j] + sight[1] * covariance[1, j] + sight[2] * covariance[2, j]
     variance = sight[0] * with_place[0] + sight[1] * with_place[1] + sight[2] * with_place[2]
-    per_m, noise, short = np.zeros(used), np.empty(used), np.zeros(used)
+    per_m, noise, short = room((MOST_MARKERS,)), room((MOST_MARKERS,)), room((MOST_MARKERS,))
     for k in range(used):
-        total = 0.0
+        total, short[k] = 0.0, 0.0
+        per_m[k] = dot(sizes.slope[k], with_place) / variance
         for i in range(POSE):
-            per_m[k] += sizes.slope[k, i] * with_place[i] / variance
-            for j in range(POSE):
-                total += sizes.slope[k, i] * covariance[i, j] * sizes.slope[k, j]
+            total += sizes.slope[k, i] * dot(covariance[i, :POSE], sizes.slope[k])
         noise[k] = sizes.variance[k] + max(total - per_m[k] * per_m[k] * variance, 0.0)
     for _ in range(ROUNDS):
         said, known = 0.0, 0.0
@@ -139,11 +149,12 @@ def _doubt_small(covariance: Array, sight: Array, sizes: Sizes, used: int) -> No
         sizes.variance[k] += (TOO_SMALL * short[k]) ** 2 + used * ALL**2
 
 
-@njit(cache=True)
+@lean
 def _correct(estimate: Estimate, sizes: Sizes, used: int) -> None:
     """Weigh one fingertip after the other."""
     covariance, size = estimate.covariance, estimate.covariance.shape[0]
-    step, seen = np.zeros(size), np.empty(size)
+    step, seen = room((MOST_NUMBERS,)), room((MOST_NUMBERS,))
+    step[:] = 0.0
     for k in range(used):
         seen[:] = 0.0
         for j in range(POSE):

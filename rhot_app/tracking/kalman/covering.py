@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.lean import lean, room
+from rhot_app.tracking.kalman.combine import scale
 from rhot_app.tracking.kalman.estimate import BIAS, Estimate
 from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
-from rhot_app.tracking.kalman.sighted import FRESH_S, KEPT_S, line_of_sight
+from rhot_app.tracking.kalman.sighted import FRESH_S, KEPT_S, line_of_sight, since_seen
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,7 @@ STRAYS_M_S = 0.007
 """Paint out of sight keeps its place on a palm held to its course, give or take this much per second."""
 
 
-@njit(cache=True)
+@lean
 def leave_out_covered(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array,
                       made: Array) -> None:
     """Set more of `frame.covered`, learn sizes (`estimate.width`), and set the biases' variances of paint that was
@@ -46,14 +47,14 @@ def leave_out_covered(worn: Worn, cameras: Cameras, frame: Frame, estimate: Esti
                 set_bias_variance(estimate, m, made[m])
     for m in range(worn.part.shape[0]):
         if worn.palmar[m]:
-            away = estimate.unseen[:, m].min()
+            away = since_seen(estimate.unseen, m)
             if away >= KEPT_S:
                 set_bias_variance(estimate, m, made[m])
             elif away >= FRESH_S and not _shows(frame, m):
                 set_bias_variance(estimate, m, made[m] + (STRAYS_M_S * away) ** 2)
 
 
-@njit(cache=True)
+@lean
 def _shows(frame: Frame, m: int) -> bool:
     """Whether a marker is weighed in this frame."""
     for sight in range(frame.seen.shape[0]):
@@ -62,14 +63,14 @@ def _shows(frame: Frame, m: int) -> bool:
     return False
 
 
-@njit(cache=True)
+@lean
 def _is_covered(cameras: Cameras, frame: Frame, estimate: Estimate, sight: int, m: int, point: Array) -> bool:
     """Whether a sight shows too little of paint `m`, at `point` (3,) m; learns its size from a sight in plain view.
 
     Flat paint shows less of itself when the palm is turned away, round paint does not; which of the two it is nobody
     knows, so as much as flat paint would show is enough.
     """
-    line, facing = np.empty(3), 0.0
+    line, facing = room((3,)), 0.0
     line_of_sight(cameras.pose[frame.camera[0]], point, line)
     for k in range(3):
         facing += line[k] * estimate.world[k, 2]
@@ -79,7 +80,7 @@ def _is_covered(cameras: Cameras, frame: Frame, estimate: Estimate, sight: int, 
     return width * width < COVERED * abs(facing) * known * known
 
 
-@njit(cache=True)
+@lean
 def set_bias_variance(estimate: Estimate, m: int, variance: float) -> None:
     """Let the bias of marker `m` have a prior variance of `variance`, m^2.
 
@@ -94,5 +95,6 @@ def set_bias_variance(estimate: Estimate, m: int, variance: float) -> None:
         share = math.sqrt(variance / before)
         for k in range(3):
             estimate.bias[m, k] *= share
-            estimate.covariance[first + k] *= share
-            estimate.covariance[:, first + k] *= share
+            scale(estimate.covariance[first + k], share)
+            for j in range(estimate.covariance.shape[0]):
+                estimate.covariance[j, first + k] *= share

@@ -12,20 +12,27 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import move
+from rhot_app.lean import lean, room
 
 Array = NDArray[np.float64]
 
 POSE = 27
 ROTATION = 3
 ANGLES = 6
+HAND_ANGLES = 21
 VELOCITY = 27
 ACCELERATION = 54
 SCALE = 81
 BIAS = 82
+
+MOST_CAMERAS, MOST_MARKERS = 16, 64
+"""As many as a rig and a datagram can have."""
+
+MOST_NUMBERS = BIAS + 3 * MOST_MARKERS
+"""Size of the largest error state."""
 
 GROUPS = 7
 """What accelerates on its own: the palm's translation, its rotation, and each finger's angles."""
@@ -126,11 +133,16 @@ def copy_estimate(source: Estimate, target: Estimate) -> None:
     target.memory[:] = source.memory
 
 
-@njit(cache=True)
+@lean
 def displace(source: Estimate, step: Array, target: Estimate) -> None:
     """Fill the mean of `target` with that of `source` moved by an error state `step` (N,); they may be the same."""
-    world, angles = source.world.copy(), source.angles.copy()
-    move(world, angles, step, target.world, target.angles)
+    world, angles = room((4, 4)), room((HAND_ANGLES,))
+    move(source.world, source.angles, step, world, angles)
+    for i in range(4):
+        for j in range(4):
+            target.world[i, j] = world[i, j]
+    for i in range(POSE - ANGLES):
+        target.angles[i] = angles[i]
     for i in range(POSE):
         target.velocity[i] = source.velocity[i] + step[VELOCITY + i]
         target.acceleration[i] = source.acceleration[i] + step[ACCELERATION + i]
@@ -140,7 +152,7 @@ def displace(source: Estimate, step: Array, target: Estimate) -> None:
             target.bias[m, k] = source.bias[m, k] + step[BIAS + 3 * m + k]
 
 
-@njit(cache=True)
+@lean
 def take_size(estimate: Estimate, size: Array) -> None:
     """Make the hand as large as `size` (2,) says, as well known as that. What goes with the size is known better as it
     is, but not worse all at once: the covariance must stay one."""
@@ -148,13 +160,15 @@ def take_size(estimate: Estimate, size: Array) -> None:
     before = covariance[SCALE, SCALE]
     if before > size[1]:
         share = math.sqrt(size[1] / before)
-        covariance[SCALE] *= share
-        covariance[:, SCALE] *= share
+        for i in range(covariance.shape[0]):
+            covariance[SCALE, i] *= share
+        for i in range(covariance.shape[0]):
+            covariance[i, SCALE] *= share
     covariance[SCALE, SCALE] = size[1]
     estimate.log_scale[0] = size[0]
 
 
-@njit(cache=True)
+@lean
 def scale_of(estimate: Estimate) -> float:
     """Factor on every length of the hand."""
     return math.exp(estimate.log_scale[0])

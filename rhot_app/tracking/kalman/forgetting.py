@@ -18,10 +18,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.linear import factorise
+from rhot_app.lean import lean, room, with_memory
 from rhot_app.tracking.kalman.combine import mirror
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
@@ -30,6 +30,7 @@ from rhot_app.tracking.kalman.estimate import (
     FIRST_FINGER,
     GOES_ON,
     GROUP_OF,
+    MOST_NUMBERS,
     OPENING,
     PLACED,
     POSE,
@@ -40,6 +41,7 @@ from rhot_app.tracking.kalman.estimate import (
 from rhot_app.tracking.kalman.gain import Gain, add_step, contract, project_rows
 from rhot_app.tracking.kalman.holding import ENOUGH
 from rhot_app.tracking.kalman.motion import Habits
+from rhot_app.tracking.kalman.rows import ROWS_MAX
 from rhot_app.tracking.kalman.sighted import FRESH_S
 
 Array = NDArray[np.float64]
@@ -82,7 +84,7 @@ WIDEST = 0.7
 """Standard deviation, m and rad, beyond which a palm's place is not worth knowing."""
 
 
-@njit(cache=True)
+@with_memory
 def open_directions(jacobian: Array, usual: Array, bias_variance: Array) -> Array:
     """(27 + 3 M, 27 + 3 M): the covariance that habit leaves to the pose and the biases of markers that are seen to
     stay in their places.
@@ -111,7 +113,7 @@ def open_directions(jacobian: Array, usual: Array, bias_variance: Array) -> Arra
     return out
 
 
-@njit(cache=True)
+@lean
 def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, jacobian: Array, gain: Gain,
            step: Array, away: Array) -> None:
     """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. `gain` is room to work in; `away` (5,):
@@ -120,12 +122,14 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
     It depends on how the hand is held (`holding.py`).
     """
     step[:] = 0.0
-    estimate.unfaded[:] += dt
+    estimate.unfaded[OPENING] += dt
+    estimate.unfaded[FADING] += dt
     how, what = estimate.held[0], OPENING if estimate.unfaded[OPENING] >= estimate.unfaded[FADING] else FADING
     passed = estimate.unfaded[what]
     if passed >= FADING_S:  # in turns, lest one update in three take twice as long as the others
         if what == FADING:
-            fading = _fading(away)
+            fading = room((POSE,))
+            _fill_fading(away, fading)
             _fade(estimate.covariance, passed, fading)
             if how < PLACED:
                 _return_to_habits(estimate, passed, fading, habits, gain, step)
@@ -142,27 +146,35 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
         estimate.left_open[:] = 0.0
 
 
-@njit(cache=True)
+@lean
 def _shown(jacobian: Array) -> int:
     """How many markers are seen: their places go with the palm's."""
     count = 0
     for m in range(jacobian.shape[0]):
-        if np.any(jacobian[m, :, :ROTATION] != 0.0):
-            count += 1
+        count += _moves(jacobian[m], 0, ROTATION)
     return count
 
 
-@njit(cache=True)
+@lean
 def _palm_shown(jacobian: Array) -> int:
     """How many markers are seen that go with the palm alone."""
     count = 0
     for m in range(jacobian.shape[0]):
-        if np.any(jacobian[m, :, :ROTATION] != 0.0) and not np.any(jacobian[m, :, ANGLES:] != 0.0):
-            count += 1
+        count += _moves(jacobian[m], 0, ROTATION) and not _moves(jacobian[m], ANGLES, POSE)
     return count
 
 
-@njit(cache=True)
+@lean
+def _moves(jacobian: Array, first: int, end: int) -> bool:
+    """Whether what has `jacobian` (3, 27) moves with any of the numbers first to end - 1."""
+    for i in range(3):
+        for j in range(first, end):
+            if jacobian[i, j] != 0.0:
+                return True
+    return False
+
+
+@lean
 def _placed(jacobian: Array) -> bool:
     """Whether any marker is seen by two cameras: then none of its three directions has been left out."""
     most = 0.0
@@ -171,7 +183,7 @@ def _placed(jacobian: Array) -> bool:
     return most > 2.5
 
 
-@njit(cache=True)
+@lean
 def _note_turning(estimate: Estimate, turned: Array) -> None:
     """A palm whose held turn habit has to bring on, by `turned` (3,) rad since knowledge last faded, does turn."""
     doubt = 0.0
@@ -182,7 +194,7 @@ def _note_turning(estimate: Estimate, turned: Array) -> None:
         estimate.turning[0] = max(estimate.turning[0], rate)
 
 
-@njit(cache=True)
+@with_memory
 def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Array, jacobian: Array,
              step: Array) -> None:
     """A `share` of the way back to habit, within the open directions."""
@@ -224,21 +236,21 @@ def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Ar
             covariance[row, column] += 0.5 * kept * (left_open[i, j] + left_open[j, i])
 
 
-@njit(cache=True)
-def _fading(away: Array) -> Array:
-    """(27,) s, the time constants of what is known of each pose number."""
-    out = np.full(POSE, FADE_S)
+@lean
+def _fill_fading(away: Array, out: Array) -> None:
+    """Fill `out` (27,) with the time constants, s, of what is known of each pose number."""
+    out[:] = FADE_S
     for i in range(ANGLES, POSE):
         if away[GROUP_OF[i] - FIRST_FINGER] > FRESH_S:
             out[i] = AWAY_S
-    return out
 
 
-@njit(cache=True)
+@lean
 def _fade(covariance: Array, dt: float, fading: Array) -> None:
     """Give up a part of the information about the pose, but never so much that its place is not worth knowing."""
     size = covariance.shape[0]
-    factor = np.ones(size)
+    factor = room((MOST_NUMBERS,))
+    factor[:] = 1.0
     for i in range(POSE):
         grow = math.exp(0.5 * dt / fading[i])
         factor[i] = grow
@@ -250,20 +262,21 @@ def _fade(covariance: Array, dt: float, fading: Array) -> None:
             row[j] *= own * factor[j]
 
 
-@njit(cache=True)
+@lean
 def _return_to_habits(estimate: Estimate, dt: float, fading: Array, habits: Habits, gain: Gain, step: Array) -> None:
     """Weigh what habits say of `dt` s, in one linear update: as much as fades. `gain` is room for it."""
     count = habits.rows.shape[0]
-    noise, right = np.zeros((count, 2)), habits.values.copy()
+    noise, right = room((ROWS_MAX, 2)), room((ROWS_MAX,))
     for k in range(count):
+        right[k] = habits.values[k]
         shortest = FADE_S
         for a in range(ANGLES, POSE):
             if habits.rows[k, a - ANGLES] != 0.0:
                 shortest = min(shortest, fading[a])
-        noise[k, 0] = -1.0 / math.expm1(-dt / shortest)
+        noise[k, 0], noise[k, 1] = -1.0 / math.expm1(-dt / shortest), 0.0
         gain.jacobian[k] = 0.0
-        gain.jacobian[k, ANGLES:POSE] = habits.rows[k]
         for a in range(ANGLES, POSE):
+            gain.jacobian[k, a] = habits.rows[k, a - ANGLES]
             right[k] -= gain.jacobian[k, a] * (estimate.angles[a - ANGLES] + step[a])
     gain.used[0], gain.used[1] = 0, count
     project_rows(gain, estimate.covariance, noise)

@@ -10,11 +10,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.lean import lean, room
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
     BIAS,
+    FINGERS,
     FREE,
     GROUP_OF,
+    MOST_NUMBERS,
     POSE,
     ROTATION,
     SCALE,
@@ -28,14 +31,13 @@ from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import Gain, contract, empty_gain, misfit, solve
 from rhot_app.tracking.kalman.holding import TURN_ALONE, hold, hold_size, hold_turn, let_go, rest, strangeness
 from rhot_app.tracking.kalman.limits import project
-from rhot_app.tracking.kalman.markers import Cameras, Worn, place_markers
+from rhot_app.tracking.kalman.markers import Outfit, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
 from rhot_app.tracking.kalman.reappearing import loosen, loosen_palm
-from rhot_app.tracking.kalman.rows import Outcome, Page, ResidualBlock, Rows, empty_rows
+from rhot_app.tracking.kalman.rows import ROWS_MAX, Outcome, Page, ResidualBlock, Rows, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown, note_sights
 from rhot_app.tracking.kalman.surprise import UNLIKELY, appraise, note_trend
-from rhot_app.tracking.kalman.withholding import MOST as MOST_HELD
 from rhot_app.tracking.kalman.withholding import Held, bound_biases, empty_held, withhold
 
 Array = NDArray[np.float64]
@@ -62,8 +64,6 @@ they cannot explain would be put down to the palm, by each camera in another dir
 
 NEAR_RAD = 0.02
 """Steps whose turns are smaller are taken without linearising again: what is left is 0.1 px or less."""
-
-ROWS_MAX = 128
 
 START_SD = (0.03, 0.4, 1.0, 3.0, 6.0)
 """Standard deviations at the start: palm's place m, its rotation rad, velocities m/s, palm rad/s, fingers rad/s."""
@@ -92,11 +92,10 @@ class Desk(NamedTuple):
     step: Array  # (N,)
     believed: Mask
     widening: Array
-    worn: Worn
-    cameras: Cameras
+    back: Mask  # (5,) fingers that have just come back into sight
+    outfit: Outfit
     habits: Habits
     limits: Array
-    bias_variance: Array
     size: Array  # (2,): the logarithm of the hand's scale, and the variance of it, 0 for a size that is certain
     strange: Array  # (1,): `holding.strangeness` of the estimate
 
@@ -105,18 +104,17 @@ class HandFilter:
     """An iterated extended Kalman filter on the hand's pose, velocity and markers' biases, for a hand whose size it is
     told.
 
-    `worn`: the markers; `habits`: what is believed of a hand without evidence; `limits` (21, 2) rad; `bias_variance`
-    (M,) m^2.
+    `outfit`: the markers, and the cameras that see them; `habits`: what is believed of a hand without evidence;
+    `limits` (21, 2) rad.
     """
 
-    def __init__(self, worn: Worn, cameras: Cameras, habits: Habits, limits: Array, bias_variance: Array) -> None:
-        shape = len(cameras.pose), len(worn.part)
-        size = BIAS + 3 * len(worn.part)
+    def __init__(self, outfit: Outfit, habits: Habits, limits: Array) -> None:
+        shape = len(outfit.cameras.pose), len(outfit.worn.part)
+        size = BIAS + 3 * shape[1]
         self.estimate = empty_estimate(*shape)
-        self._desk = Desk(self.estimate, empty_estimate(*shape), empty_rows(ROWS_MAX, size),
-                          empty_gain(ROWS_MAX + MOST_HELD, size), empty_held(size), np.empty(size),
-                          np.empty(ROWS_MAX, np.bool_), np.empty(ROWS_MAX), worn, cameras, habits, limits,
-                          bias_variance, np.zeros(2), np.zeros(1))
+        self._desk = Desk(self.estimate, empty_estimate(*shape), empty_rows(size), empty_gain(ROWS_MAX, size),
+                          empty_held(size), np.empty(size), np.empty(ROWS_MAX, np.bool_), np.empty(ROWS_MAX),
+                          np.empty(FINGERS, np.bool_), outfit, habits, limits, np.zeros(2), np.zeros(1))
         self._shared, self._last = Share(self._desk), 0
         self._now, self._tried = (Share(Page(mean, self._desk.rows)) for mean in (self.estimate, self._desk.trial))
 
@@ -135,12 +133,12 @@ class HandFilter:
         estimate.placed_angles[:], estimate.log_scale[0] = estimate.angles, self._desk.size[0]
         estimate.agitation[:] = START_AGITATION
         estimate.unseen[:], estimate.unfaded[:], estimate.turning[:], estimate.held[:] = 0.0, 0.0, START_TURNING, FREE
-        estimate.bias_variance[:], estimate.looks[:] = self._desk.bias_variance, 0.0
+        estimate.bias_variance[:], estimate.looks[:] = self._desk.outfit.made, 0.0
         place, turn, speed, spin, bend = START_SD
         diagonal = np.concatenate([
             np.full(3, place), np.full(3, turn), np.zeros(21), np.full(3, speed), np.full(3, spin), np.full(21, bend),
             np.sqrt(START_AGITATION)[GROUP_OF], [np.sqrt(self._desk.size[1])],
-            np.repeat(np.sqrt(self._desk.bias_variance), 3)])
+            np.repeat(np.sqrt(self._desk.outfit.made), 3)])
         np.fill_diagonal(covariance, diagonal**2)
         covariance[ANGLES:POSE, ANGLES:POSE] = self._desk.habits.usual[ANGLES:, ANGLES:]
 
@@ -229,33 +227,49 @@ class HandFilter:
 
 @njit(cache=True)
 def _carry_on(shared: Share, dt: float) -> None:
-    desk: Desk = shared.of
-    predict(desk.estimate, dt, desk.worn.part, desk.habits, desk.estimate.bias_variance)
+    carry_on(shared.of, dt)
+
+
+@lean
+def carry_on(desk: Desk, dt: float) -> None:
+    """Carry the estimate to the instant of what is observed."""
+    predict(desk.estimate, dt, desk.outfit.worn.part, desk.habits, desk.estimate.bias_variance)
     if desk.size[1] > 0.0:
         take_size(desk.estimate, desk.size)
 
 
 @njit(cache=True)
 def _prepare(shared: Share, dt: float) -> bool:
+    return prepare(shared.of, dt)
+
+
+@lean
+def prepare(desk: Desk, dt: float) -> bool:
     """Decide what is held of the hand and which observations are believed; returns whether they are all likely."""
-    desk: Desk = shared.of
-    estimate, rows, part = desk.estimate, desk.rows, desk.worn.part
-    hold(estimate, rows, part, desk.worn.palmar, desk.cameras.pose, desk.habits, desk.held)
+    estimate, rows, worn, back = desk.estimate, desk.rows, desk.outfit.worn, desk.back
+    hold(estimate, rows, worn.part, worn.palmar, desk.outfit.cameras.pose, desk.habits, desk.held)
     rest(estimate, desk.held.sight, dt)
-    back = loosen(estimate, part, rows, desk.habits.usual)
-    if loosen_palm(estimate, desk.worn, desk.cameras.pose, rows, desk.habits.usual):
+    loosen(estimate, worn.part, rows, desk.habits.usual, back)
+    if loosen_palm(estimate, desk.outfit, rows, desk.habits.usual):
         estimate.held[0] = FREE
         let_go(desk.held)
     hold_size(estimate.covariance, desk.held)
     appraise(rows, estimate, desk.habits.together, back, desk.believed, desk.widening)
     withhold(estimate.covariance, desk.held, desk.gain)
-    return not np.any(desk.widening[:rows.used[1]] > UNLIKELY)
+    unlikely = 0
+    for observation in range(rows.used[1]):
+        unlikely += desk.widening[observation] > UNLIKELY
+    return unlikely == 0
 
 
 @njit(cache=True)
 def _hold_turn_alone(shared: Share) -> None:
+    hold_turn_alone(shared.of)
+
+
+@lean
+def hold_turn_alone(desk: Desk) -> None:
     """Let go of all that is held but the palm's turn."""
-    desk: Desk = shared.of
     let_go(desk.held)
     hold_turn(desk.held)
     hold_size(desk.estimate.covariance, desk.held)
@@ -264,21 +278,30 @@ def _hold_turn_alone(shared: Share) -> None:
 
 @njit(cache=True)
 def _improve(shared: Share, share: float) -> tuple[float, float]:
+    return improve(shared.of, share)
+
+
+@lean
+def improve(desk: Desk, share: float) -> tuple[float, float]:
     """One iteration, a `share` of what it wants to be and no longer than `LONGEST_RAD`; the trial becomes the new mean.
     Returns its largest turn and that of the whole step, rad."""
-    desk: Desk = shared.of
-    estimate, gain, step = desk.estimate, desk.gain, desk.step
-    before = step.copy()
+    estimate, gain, step, before = desk.estimate, desk.gain, desk.step, room((MOST_NUMBERS,))
+    size = step.shape[0]
+    for i in range(size):
+        before[i] = step[i]
     solve(desk.rows, estimate.covariance, desk.believed, desk.widening, step, gain)
     share *= LONGEST_RAD / max(_turn(before, step), LONGEST_RAD)
     if share < 1.0:
-        step[:] = before + share * (step - before)
+        for i in range(size):
+            step[i] = before[i] + share * (step[i] - before[i])
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:gain.used[1]], desk.limits, step)
     displace(estimate, step, desk.trial)
-    return _turn(before, step), _turn(np.zeros_like(step), step)
+    turn = _turn(before, step)
+    before[:] = 0.0
+    return turn, _turn(before, step)
 
 
-@njit(cache=True)
+@lean
 def _turn(one: Array, other: Array) -> float:
     """The largest angle between two steps (N,), rad."""
     turn = 0.0
@@ -289,20 +312,24 @@ def _turn(one: Array, other: Array) -> float:
 
 @njit(cache=True)
 def _conclude(shared: Share, dt: float) -> None:
+    conclude(shared.of, dt)
+
+
+@lean
+def conclude(desk: Desk, dt: float) -> None:
     """Take the new mean, shrink the covariance by what was learnt, forget, keep the limits; the size stays."""
-    desk: Desk = shared.of
-    estimate, worn, gain, step = desk.estimate, desk.worn, desk.gain, desk.step
+    estimate, worn, places, gain, step = desk.estimate, desk.outfit.worn, desk.outfit.places, desk.gain, desk.step
     note_sights(estimate, worn.part, desk.rows, desk.believed)
     note_trend(estimate, step, gain)
     contract(estimate.covariance, gain)
     displace(estimate, step, estimate)
     if gain.used[0] > 0:
         bound_biases(estimate.covariance, estimate.bias_variance)
-    points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
-    place_markers(worn, estimate, points, jacobian)
-    keep_shown(estimate, worn.part, worn.palmar, desk.cameras.pose, points, jacobian)
-    away = fingers_away(estimate, worn.part)
-    forget(estimate, dt, desk.habits, estimate.bias_variance, jacobian, gain, step, away)
+    place_markers(worn.dh, estimate, places)
+    keep_shown(estimate, worn.part, worn.palmar, desk.outfit.cameras.pose, places.points, places.jacobian)
+    away = room((FINGERS,))
+    fingers_away(estimate, worn.part, away)
+    forget(estimate, dt, desk.habits, estimate.bias_variance, places.jacobian, gain, step, away)
     project(estimate.angles, estimate.velocity, estimate.covariance, gain.rows[:0], desk.limits, step)
     displace(estimate, step, estimate)
     desk.strange[0] = strangeness(estimate.angles, desk.habits)

@@ -13,14 +13,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.kinematics import forward_arrays
+from rhot_app.lean import lean, room
+from rhot_app.tracking.kalman.combine import dot, fill
 from rhot_app.tracking.kalman.covering import LEARNT, set_bias_variance
-from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_HIDDEN, POSE, Estimate
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn
-from rhot_app.tracking.kalman.sighted import FRESH_S, line_of_sight
+from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_HIDDEN, Estimate
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Places, Worn
+from rhot_app.tracking.kalman.sighted import FRESH_S, count_seen, line_of_sight
 
 Array = NDArray[np.float64]
 
@@ -51,30 +51,31 @@ LIKE = 0.1
 """A part of its area that a fingertip in plain view may be smaller."""
 
 
-@njit(cache=True)
-def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array, jacobian: Array,
+@lean
+def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, places: Places,
                      made: Array) -> None:
     """Set the biases' variances of fingertips that are hidden in part, and back, and `frame.own` of those in plain
     view; learn their sizes (`estimate.width`) and how the hand is bent (`estimate.placed_angles`).
 
-    To be called after `doubt_partial`. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them;
-    `made` (M,) m^2: variance of the markers' places by their making.
+    To be called after `doubt_partial`. `places` as `place_markers` has them; `made` (M,) m^2: variance of the markers'
+    places by their making.
     """
-    camera, count = frame.camera[0], worn.part.shape[0]
+    camera, seen = frame.camera[0], 0
     if not is_placed(estimate, camera):
         return
-    if np.sum(frame.seen) >= PLACED_BY:
-        estimate.placed_angles[:] = estimate.angles
-    parts = np.empty(count)
-    shown_parts(worn, estimate, cameras.pose[camera], points, parts)
-    for sight in range(count):
+    for sight in range(frame.seen.shape[0]):
+        seen += frame.seen[sight]
+    if seen >= PLACED_BY:
+        fill(estimate.placed_angles, estimate.angles)
+    for sight in range(worn.part.shape[0]):
         m = frame.label[sight]
         if not frame.sizes[sight] > 0.0 or worn.slender[m] < 0.0:
             continue
         width = frame.sizes[sight]
-        hidden = _hidden(estimate, m, width / math.sqrt(parts[m]), frame.plain[sight])
+        part = part_shown(worn, places, cameras.pose[camera], m)
+        hidden = _hidden(estimate, m, width / math.sqrt(part), frame.plain[sight])
         estimate.looks[camera, m, LOOK_HIDDEN] = hidden
-        varies = VARIES + VARIES_PER_M_S * min(speed_of(jacobian[m], estimate.velocity), FASTEST_M_S)
+        varies = VARIES + VARIES_PER_M_S * min(speed_of(places.jacobian[m], estimate.velocity), FASTEST_M_S)
         most = _most_hidden(estimate, camera, m)
         shift = SHIFT * 0.5 * width * math.sqrt(max(most**3 - varies**3, 0.0))
         set_bias_variance(estimate, m, made[m] + shift * shift)
@@ -83,42 +84,37 @@ def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estim
             frame.own[sight] = min(frame.own[sight], PLAIN_PX**2 / max(stated, PLAIN_PX**2))
 
 
-@njit(cache=True)
-def shown_parts(worn: Worn, estimate: Estimate, camera: Array, points: Array, out: Array) -> None:
-    """Fill `out` (M,) with the part of a fingertip's largest area that a camera (3, 4) sees of it when nothing hides
-    it, 1 for other markers; they are at `points` (M, 3) m.
+@lean
+def part_shown(worn: Worn, places: Places, camera: Array, m: int) -> float:
+    """The part of a fingertip's largest area that a camera (3, 4) sees of it when nothing hides it; 1 for others.
 
     A painted fingertip is a capsule: from its end it shows a disc, from its side also what is between its ends.
     """
-    dh = worn.dh
-    frames, ignored, sight = np.empty((dh.parent.shape[0], 3, 4)), np.empty(points.shape), np.empty(3)
-    forward_arrays(dh, estimate.world, estimate.angles, frames, ignored)
-    for m in range(points.shape[0]):
-        out[m] = 1.0
-        if worn.slender[m] > 0.0:
-            line_of_sight(camera, points[m], sight)
-            bone = frames[dh.point_row[m]]
-            along = bone[0, 0] * sight[0] + bone[1, 0] * sight[1] + bone[2, 0] * sight[2]
-            out[m] = shown_part(worn.slender[m], math.sqrt(max(1.0 - along * along, 0.0)))
+    if not worn.slender[m] > 0.0:
+        return 1.0
+    sight, bone = room((3,)), places.frames[worn.dh.point_row[m]]
+    line_of_sight(camera, places.points[m], sight)
+    along = bone[0, 0] * sight[0] + bone[1, 0] * sight[1] + bone[2, 0] * sight[2]
+    return shown_part(worn.slender[m], math.sqrt(max(1.0 - along * along, 0.0)))
 
 
-@njit(cache=True)
+@lean
 def shown_part(slender: float, side: float) -> float:
     """The part of its largest area that a fingertip shows, `Worn.slender`, of which `side` is the sine of the angle
     between it and the line of sight."""
     return (1.0 + slender * side) / (1.0 + slender)
 
 
-@njit(cache=True)
+@lean
 def is_placed(estimate: Estimate, camera: int) -> bool:
     """Whether it is known how far away the hand is: cameras other than this one see it too."""
     for other in range(estimate.unseen.shape[0]):
-        if other != camera and np.sum(estimate.unseen[other] < FRESH_S) >= PLACED_BY:
+        if other != camera and count_seen(estimate.unseen, other) >= PLACED_BY:
             return True
     return False
 
 
-@njit(cache=True)
+@lean
 def _hidden(estimate: Estimate, m: int, size: float, plain: bool) -> float:
     """The part of fingertip `m` that is missing in a sight of `size`, m: the diameter of a disc as large as it is, seen
     from its side. Learns from sights in plain view."""
@@ -134,7 +130,7 @@ def _hidden(estimate: Estimate, m: int, size: float, plain: bool) -> float:
     return hidden
 
 
-@njit(cache=True)
+@lean
 def _most_hidden(estimate: Estimate, camera: int, m: int) -> float:
     """The largest part of a fingertip that is hidden from `camera` or another one that saw it just now."""
     most = max(estimate.looks[camera, m, LOOK_HIDDEN], 0.0)
@@ -144,13 +140,8 @@ def _most_hidden(estimate: Estimate, camera: int, m: int) -> float:
     return most
 
 
-@njit(cache=True)
+@lean
 def speed_of(jacobian: Array, velocity: Array) -> float:
     """m/s, of what has `jacobian` (3, 27)."""
-    square = 0.0
-    for i in range(3):
-        speed = 0.0
-        for j in range(POSE):
-            speed += jacobian[i, j] * velocity[j]
-        square += speed * speed
-    return math.sqrt(square)
+    x, y, z = dot(jacobian[0], velocity), dot(jacobian[1], velocity), dot(jacobian[2], velocity)
+    return math.sqrt(x * x + y * y + z * z)

@@ -14,10 +14,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.combine import dot
+from rhot_app.lean import lean, room, slots
+from rhot_app.tracking.kalman.combine import dot, fill, scale
 from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     ANGLES,
@@ -26,6 +26,8 @@ from rhot_app.tracking.kalman.estimate import (
     FREE,
     GOES_ON,
     GROUP_OF,
+    GROUPS,
+    HAND_ANGLES,
     LINEAR,
     PALM_HELD,
     PLACED,
@@ -39,7 +41,7 @@ from rhot_app.tracking.kalman.estimate import (
 )
 from rhot_app.tracking.kalman.motion import Habits, speeds
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
-from rhot_app.tracking.kalman.sighted import eyes_on, line_of_sight, unseen_now
+from rhot_app.tracking.kalman.sighted import eyes_now, line_of_sight
 from rhot_app.tracking.kalman.withholding import Held
 
 Array = NDArray[np.float64]
@@ -72,18 +74,18 @@ ARRIVE_S = 0.2
 ways are short."""
 
 
-@njit(cache=True)
+@lean
 def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: Array, habits: Habits,
          held: Held) -> None:
     """Decide how the hand is to be held, `estimate.held`, and fill `held.directions`.
 
     `rows` of this update; `part` and `palmar` (M,) as in `Worn`; `cameras` (C, 3, 4) camera_from_world m.
     """
-    unseen = unseen_now(estimate, rows)
     on_palm, placed, most, eye, all_placed = 0, 0, 0, -1, True
-    eyes_of = np.zeros(FINGERS, np.int64)
+    eyes_of = slots((FINGERS,))
+    eyes_of[:] = 0
     for m in range(part.shape[0]):
-        eyes, last = eyes_on(unseen, m)
+        eyes, last = eyes_now(estimate.unseen, m, rows)
         all_placed &= eyes > 1 or palmar[m]
         if part[m] != PALM_PART:
             eyes_of[part[m]] = max(eyes_of[part[m]], eyes)
@@ -92,13 +94,16 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: A
             placed += eyes > 1
             if eyes > most:
                 most, eye = eyes, last
-    moving = speeds(estimate)
+    moving, most_on_finger = room((GROUPS,)), 0
+    speeds(estimate, moving)
+    for finger in range(FINGERS):
+        most_on_finger = max(most_on_finger, eyes_of[finger])
     goes_on = (moving[LINEAR] > HURRIES_M_S or moving[TURN] > HURRIES_RAD_S
                or estimate.turning[0] > (TURNS_RAD_S if all_placed else TURNED_RAD_S))
     strange = strangeness(estimate.angles, habits) > STRANGE
     let_go(held)
     before, estimate.held[0] = estimate.held[0], FREE
-    if on_palm == 0 or (strange and (most > 1 or eyes_of.max() > 1)):
+    if on_palm == 0 or (strange and (most > 1 or most_on_finger > 1)):
         return
     if most > 1:
         _hold_stiff(habits.stiff, eyes_of, held)
@@ -107,39 +112,44 @@ def hold(estimate: Estimate, rows: Rows, part: Indices, palmar: Mask, cameras: A
             hold_turn(held)
     elif goes_on and not strange and before not in (PLACED, PALM_HELD):
         _hold_stiff(habits.stiff, eyes_of, held)
-        if eyes_of.max() < 2:
+        if most_on_finger < 2:
             estimate.held[0] = GOES_ON
             _hold_place(estimate, most, cameras[eye], held)
     else:
-        estimate.held[0] = PLACED if eyes_of.max() > 1 else PALM_HELD
+        estimate.held[0] = PLACED if most_on_finger > 1 else PALM_HELD
         if estimate.held[0] == PALM_HELD:
             _hold_place(estimate, most, cameras[eye], held)
         hold_turn(held)
 
 
-@njit(cache=True)
+@lean
 def strangeness(angles: Array, habits: Habits) -> float:
     """How far from habit `angles` (21,) rad are: the square of the distance, in standard deviations."""
-    away = angles - habits.mean
-    return dot(away, habits.information @ away)
+    away, total = room((HAND_ANGLES,)), 0.0
+    for i in range(HAND_ANGLES):
+        away[i] = angles[i] - habits.mean[i]
+    for i in range(HAND_ANGLES):
+        total += away[i] * dot(habits.information[i], away)
+    return total
 
 
-@njit(cache=True)
+@lean
 def let_go(held: Held) -> None:
     """Hold nothing any more."""
-    held.directions[:held.used[0]] = 0.0
+    for k in range(held.used[0]):
+        held.directions[k] = 0.0
     held.used[0] = 0
     held.sight[:] = 0.0
 
 
-@njit(cache=True)
+@lean
 def hold_turn(held: Held) -> None:
     """Hold how the palm is turned and turns."""
     for i in range(ROTATION):
         _hold_number(ROTATION + i, held)
 
 
-@njit(cache=True)
+@lean
 def hold_size(covariance: Array, held: Held) -> None:
     """Hold how large the hand is, where that is not certain: no single frame tells (`hand_size.py`)."""
     if covariance[SCALE, SCALE] > 0.0:
@@ -147,7 +157,7 @@ def hold_size(covariance: Array, held: Held) -> None:
         held.used[0] += 1
 
 
-@njit(cache=True)
+@lean
 def _hold_number(number: int, held: Held) -> None:
     """Hold one number of the pose, its velocity and its acceleration."""
     for base in (0, VELOCITY, ACCELERATION):
@@ -155,7 +165,7 @@ def _hold_number(number: int, held: Held) -> None:
         held.used[0] += 1
 
 
-@njit(cache=True)
+@lean
 def _hold_place(estimate: Estimate, eyes: int, camera: Array, held: Held) -> None:
     """Hold what is not seen of the palm's place: all of it without `eyes` on it, with one, `camera` (3, 4), how far
     away it is."""
@@ -163,25 +173,28 @@ def _hold_place(estimate: Estimate, eyes: int, camera: Array, held: Held) -> Non
         for i in range(ROTATION):
             _hold_number(i, held)
         return
-    sight = np.empty(3)
+    sight = room((3,))
     line_of_sight(camera, estimate.world[:3, 3], sight)
     for base in (0, VELOCITY, ACCELERATION):
-        held.directions[held.used[0], base:base + 3] = sight
+        fill(held.directions[held.used[0], base:base + 3], sight)
         held.used[0] += 1
     if _alone(estimate.unseen):
-        held.sight[:] = sight
+        fill(held.sight, sight)
 
 
-@njit(cache=True)
+@lean
 def _alone(unseen: Array) -> bool:
     """Whether all cameras but one have seen nothing of the hand for a while; `unseen` (C, M) as in `Estimate`."""
     seeing = 0
     for camera in range(unseen.shape[0]):
-        seeing += unseen[camera].min() < ARRIVE_S
+        newest = unseen[camera, 0]
+        for m in range(unseen.shape[1]):
+            newest = min(newest, unseen[camera, m])
+        seeing += newest < ARRIVE_S
     return seeing < 2
 
 
-@njit(cache=True)
+@lean
 def _hold_stiff(stiff: Array, eyes_of: Indices, held: Held) -> None:
     """A finger that one camera sees is believed to stir as little as may be, and to bend in all its joints at once."""
     for row in range(stiff.shape[0]):
@@ -191,11 +204,11 @@ def _hold_stiff(stiff: Array, eyes_of: Indices, held: Held) -> None:
                 finger = GROUP_OF[i] - FIRST_FINGER
         if eyes_of[finger] == 1:
             for base in (0, VELOCITY, ACCELERATION):
-                held.directions[held.used[0], base:base + POSE] = stiff[row]
+                fill(held.directions[held.used[0], base:base + POSE], stiff[row])
                 held.used[0] += 1
 
 
-@njit(cache=True)
+@lean
 def rest(estimate: Estimate, sight: Array, dt: float) -> None:
     """What is held of the palm is not shaken, and comes to rest. `sight` (3,) as in `Held`."""
     _arrive(estimate, sight, dt)
@@ -206,18 +219,20 @@ def rest(estimate: Estimate, sight: Array, dt: float) -> None:
         estimate.velocity[i] *= share
         estimate.acceleration[i] *= share
         for base in (VELOCITY, ACCELERATION):
-            covariance[base + i] *= share
-            covariance[:, base + i] *= share
+            scale(covariance[base + i], share)
+            for j in range(covariance.shape[0]):
+                covariance[j, base + i] *= share
     estimate.agitation[TURN] = 0.0
     if estimate.held[0] == PALM_HELD:
         estimate.agitation[LINEAR] = 0.0
 
 
-@njit(cache=True)
+@lean
 def _arrive(estimate: Estimate, sight: Array, dt: float) -> None:
     """A way along `sight` (3,) that is not hurried ends. How fast it is is known no better for that: the covariance
     stays."""
-    speed, pull = dot(sight, estimate.velocity[:3]), dot(sight, estimate.acceleration[:3])
+    speed = dot(sight, estimate.velocity[:ROTATION])
+    pull = dot(sight, estimate.acceleration[:ROTATION])
     if abs(speed) > HURRIES_M_S:
         return
     lost = 1.0 - math.exp(-dt / ARRIVE_S)

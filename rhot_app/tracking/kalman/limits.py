@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.estimate import ANGLES, VELOCITY
+from rhot_app.lean import lean, room
+from rhot_app.tracking.kalman.estimate import ANGLES, MOST_NUMBERS, VELOCITY
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ wrong distance, which is a wrong speed at the next frame, and a thumb in plain v
 _ROUNDS = 4
 
 
-@njit(cache=True)
+@lean
 def project(angles: Array, velocity: Array, covariance: Array, gains: Array, limits: Array, step: Array) -> None:
     """Change `step` (N,) so that `angles` (21,) + step keep their `limits` (21, 2), and before that their speeds,
     `velocity` (27,) + step, `FASTEST_RAD_S`.
@@ -51,10 +51,12 @@ def project(angles: Array, velocity: Array, covariance: Array, gains: Array, lim
         step[ANGLES + i] = min(max(angles[i] + step[ANGLES + i], limits[i, 0]), limits[i, 1]) - angles[i]
 
 
-@njit(cache=True)
+@lean
 def _pull(covariance: Array, gains: Array, row: int, target: float, step: Array) -> None:
     """Make one number of the step `target`, and the others what is then most plausible."""
-    column = covariance[row].copy()
+    column = room((MOST_NUMBERS,))[:covariance.shape[0]]
+    for i in range(column.shape[0]):
+        column[i] = covariance[row, i]
     for k in range(gains.shape[0]):
         factor = gains[k, row]
         for i in range(column.shape[0]):

@@ -10,12 +10,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.lean import lean
 from rhot_app.tracking.kalman.apparent_size import weigh_sizes
 from rhot_app.tracking.kalman.association import relabel
 from rhot_app.tracking.kalman.covering import leave_out_covered
-from rhot_app.tracking.kalman.estimate import POSE
+from rhot_app.tracking.kalman.estimate import Estimate
 from rhot_app.tracking.kalman.hiding import judge_fingertips
-from rhot_app.tracking.kalman.markers import Frame, Outfit, append_markers, place_markers
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Outfit, append_markers, place_markers
 from rhot_app.tracking.kalman.partial import doubt_partial
 from rhot_app.tracking.kalman.rows import Page
 from rhot_app.tracking.kalman.share import Share
@@ -47,7 +48,7 @@ class MarkerBlock:
                            observations.diameters if sized else np.zeros(count), np.zeros(count),
                            np.array([1e-9 * observations.row_time_ns]), observations.flags == 0,
                            np.zeros(count, np.bool_), np.zeros(count), np.ones(count))
-        self.shared, self._outfit = Share(Sighting(self.frame, observations.flags)), wearing.outfit
+        self.shared, self._outfit = Share(Sighting(self.frame, observations.flags)), wearing.shared
         after_ns, self.sights = _read(self._outfit, self.shared)
         self.t_ns = observations.t_row0_master_ns + int(after_ns)
 
@@ -70,48 +71,57 @@ class MarkerBlock:
 
 @njit(cache=True)
 def _associate(outfit: Share, shared: Share, page: Share) -> int:
-    worn_by: Outfit = outfit.of
-    sighting: Sighting = shared.of
-    there: Page = page.of
-    worn, cameras, frame, estimate = worn_by.worn, worn_by.cameras, sighting.frame, there.estimate
-    points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
-    place_markers(worn, estimate, points, jacobian)
-    changed = relabel(worn, cameras, frame, estimate, points, jacobian)
+    return look_at_frame(outfit.of, shared.of.frame, page.of.estimate)
+
+
+@lean
+def look_at_frame(outfit: Outfit, frame: Frame, estimate: Estimate) -> int:
+    """All that `MarkerBlock.associate` does."""
+    worn, cameras, places = outfit.worn, outfit.cameras, outfit.places
+    place_markers(worn.dh, estimate, places)
+    changed = relabel(worn, cameras, frame, estimate, places)
     if changed > 0:
         estimate.untroubled[0] = 0.0
-    measure_sizes(worn, cameras, frame, estimate, points, jacobian)
-    doubt_partial(worn, cameras, frame, estimate, points, jacobian)
-    judge_fingertips(worn, cameras, frame, estimate, points, jacobian, worn_by.made)
-    leave_out_covered(worn, cameras, frame, estimate, points, worn_by.made)
-    weigh_sizes(worn, cameras, frame, estimate, points, jacobian)
+    measure_sizes(worn, cameras, frame, estimate, places)
+    doubt_partial(worn, cameras, frame, estimate, places)
+    judge_fingertips(worn, cameras, frame, estimate, places, outfit.made)
+    leave_out_covered(worn, cameras, frame, estimate, places.points, outfit.made)
+    weigh_sizes(worn, cameras, frame, estimate, places)
     return changed
 
 
 @njit(cache=True)
 def _linearise(outfit: Share, shared: Share, page: Share) -> None:
-    worn_by: Outfit = outfit.of
-    sighting: Sighting = shared.of
-    there: Page = page.of
-    append_markers(worn_by.worn, worn_by.cameras, sighting.frame, there.estimate, there.rows)
+    append_frame(outfit.of, shared.of.frame, page.of)
+
+
+@lean
+def append_frame(outfit: Outfit, frame: Frame, page: Page) -> None:
+    """All that `MarkerBlock.linearise` does."""
+    place_markers(outfit.worn.dh, page.estimate, outfit.places)
+    append_markers(outfit.worn, outfit.cameras, frame, page.estimate, outfit.places, page.rows)
 
 
 @njit(cache=True)
 def _read(outfit: Share, shared: Share) -> tuple[float, int]:
+    sighting: Sighting = shared.of
+    return read_frame(outfit.of.cameras, sighting.frame, sighting.flags)
+
+
+@lean
+def read_frame(cameras: Cameras, frame: Frame, flags: NDArray[np.uint16]) -> tuple[float, int]:
     """Fill the frame's `seen`, `late_s` and, as the sights say themselves, `label`; returns the mean time of the sights
     after row 0, ns, and how many they are. The middle row is that of the optical axis."""
-    worn_by: Outfit = outfit.of
-    sighting: Sighting = shared.of
-    frame = sighting.frame
     total, count, row_time_s = 0.0, 0, frame.row_s[0]
     for m in range(frame.seen.shape[0]):
         frame.label[m] = m
-        x, y = frame.pixels[m]
-        frame.seen[m] = not sighting.flags[m] & _LOST and np.isfinite(x + y)
+        x, y = frame.pixels[m, 0], frame.pixels[m, 1]
+        frame.seen[m] = not flags[m] & _LOST and math.isfinite(x + y)
         if frame.seen[m]:
             frame.late_s[m] = y * row_time_s
             total += frame.late_s[m]
             count += 1
-    mean = total / count if count else worn_by.cameras.intrinsics[frame.camera[0], 3] * row_time_s
+    mean = total / count if count else cameras.intrinsics[frame.camera[0], 3] * row_time_s
     for m in range(frame.seen.shape[0]):
         frame.late_s[m] -= mean
     return 1e9 * mean, count

@@ -10,16 +10,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import distort
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.lean import lean, room
+from rhot_app.tracking.kalman.combine import dot
 from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     BIAS,
     FIRST_FINGER,
+    GROUPS,
     LINEAR,
     POSE,
     SCALE,
@@ -66,12 +68,28 @@ class Worn(NamedTuple):
     slender: Array
 
 
+class Places(NamedTuple):
+    """Where the markers of a hand are: `points` (M, 3) m, world, without biases, and `jacobian` (M, 3, 27) per pose
+    number; `frames` (R, 3, 4) world_from_row m of the hand's R rows."""
+
+    points: Array
+    jacobian: Array
+    frames: Array
+
+
+def empty_places(dh: DhArrays) -> Places:
+    """Room for the points of a table."""
+    count = len(dh.point_row)
+    return Places(np.empty((count, 3)), np.empty((count, 3, POSE)), np.empty((len(dh.parent), 3, 4)))
+
+
 class Outfit(NamedTuple):
-    """What never changes: `made` (M,) m^2, the variance of the markers' places by their making."""
+    """What never changes: `made` (M,) m^2, the variance of the markers' places by their making; and room to work in."""
 
     worn: Worn
     cameras: Cameras
     made: Array
+    places: Places
 
 
 class Frame(NamedTuple):
@@ -98,14 +116,13 @@ class Frame(NamedTuple):
     own: Array
 
 
-@njit(cache=True)
-def place_markers(worn: Worn, estimate: Estimate, points: Array, jacobian: Array) -> None:
-    """Fill `points` (M, 3) m, world, without biases, and `jacobian` (M, 3, 27) per pose number."""
-    dh, world = worn.dh, estimate.world
+@lean
+def place_markers(dh: DhArrays, estimate: Estimate, out: Places) -> None:
+    """Where a hand of any size has the points of a table; the frames are those of a hand of its file's size."""
+    world, points, jacobian = estimate.world, out.points, out.jacobian
     scale = math.exp(estimate.log_scale[0])
-    frames = np.empty((dh.parent.shape[0], 3, 4))
-    forward_arrays(dh, world, estimate.angles, frames, points)
-    jacobian_arrays(dh, world, frames, points, jacobian)
+    forward_arrays(dh, world, estimate.angles, out.frames, points)
+    jacobian_arrays(dh, world, out.frames, points, jacobian)
     if scale != 1.0:
         for m in range(points.shape[0]):
             for i in range(3):
@@ -114,14 +131,14 @@ def place_markers(worn: Worn, estimate: Estimate, points: Array, jacobian: Array
                     jacobian[m, i, j] *= scale
 
 
-@njit(cache=True)
+@lean
 def project_marker(point: Array, world: Array, half_axes: Array, camera: Array, intrinsics: Array, pixel: Array,
                    slope: Array) -> bool:
     """Where the silhouette of a marker at `point` (3,) has its centre: `pixel` (2,) px and `slope` (2, 3) px/m.
 
     False when it is not before the camera. `geometry.silhouette` has the formula; its slope is that of a point.
     """
-    local = np.empty(3)
+    local = room((3,))
     for i in range(3):
         local[i] = camera[i, 3]
         for k in range(3):
@@ -153,22 +170,22 @@ def project_marker(point: Array, world: Array, half_axes: Array, camera: Array, 
     return True
 
 
-@njit(cache=True)
-def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, rows: Rows) -> None:
-    """Append one observation of two rows, px, for each marker of `frame` that was seen and is not covered."""
-    count = worn.part.shape[0]
-    points, jacobian = np.empty((count, 3)), np.empty((count, 3, POSE))
-    place_markers(worn, estimate, points, jacobian)
-    camera, lively = frame.camera[0], liveliness(estimate)
-    pixel, slope, place = np.empty(2), np.empty((2, 3)), np.empty(3)
-    for sight in range(count):
+@lean
+def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, places: Places, rows: Rows) -> None:
+    """Append one observation of two rows, px, for each marker of `frame` that was seen and is not covered. `places` as
+    `place_markers` has them."""
+    points, jacobian, velocity, acceleration = places.points, places.jacobian, estimate.velocity, estimate.acceleration
+    camera, lively, way = frame.camera[0], room((GROUPS,)), room((POSE,))
+    pixel, slope, place = room((2,)), room((2, 3)), room((3,))
+    liveliness(estimate, lively)
+    for sight in range(worn.part.shape[0]):
         if not frame.seen[sight] or frame.covered[sight]:
             continue
         m, late = frame.label[sight], frame.late_s[sight]
+        for j in range(POSE):
+            way[j] = late * (velocity[j] + 0.5 * late * acceleration[j])
         for i in range(3):
-            place[i] = points[m, i] + estimate.bias[m, i]
-            for j in range(POSE):
-                place[i] += jacobian[m, i, j] * late * (estimate.velocity[j] + 0.5 * late * estimate.acceleration[j])
+            place[i] = points[m, i] + estimate.bias[m, i] + dot(jacobian[m, i], way)
         row, observation = rows.used[0], rows.used[1]
         rows.jacobian[row:row + 2] = 0.0
         if not project_marker(place, estimate.world, worn.half_axes[m], cameras.pose[camera],
@@ -189,7 +206,7 @@ def append_markers(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimat
         rows.used[0], rows.used[1] = row + 2, observation + 1
 
 
-@njit(cache=True)
+@lean
 def straying(lively: Array, part: int) -> float:
     """Variance of the acceleration of a marker on a finger or the palm (`Worn.part`), (m/s^2)^2, of a hand that is so
     `lively` (7,)."""
@@ -197,7 +214,7 @@ def straying(lively: Array, part: int) -> float:
     return float(lively[LINEAR] + lively[TURN] * _REACH_M**2 + finger)
 
 
-@njit(cache=True)
+@lean
 def _fill(out: Array, slope: Array, jacobian: Array, late: float, point: Array, estimate: Estimate, m: int) -> None:
     """One row's Jacobian: the image's `slope` (3,) times that of the place, `jacobian` (3, 27)."""
     for j in range(POSE):

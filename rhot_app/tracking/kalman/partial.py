@@ -12,10 +12,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.lean import lean, room
+from rhot_app.tracking.kalman.combine import dot
 from rhot_app.tracking.kalman.estimate import (
+    GROUPS,
     LOOK_AGE,
     LOOK_VARIANCE,
     LOOK_WIDTH,
@@ -25,7 +27,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, project_marker, straying
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Places, Worn, project_marker, straying
 from rhot_app.tracking.kalman.motion import liveliness
 from rhot_app.tracking.kalman.sighted import FRESH_S, line_of_sight
 from rhot_app.tracking.locate import EXACT_PX2
@@ -65,13 +67,12 @@ class View(NamedTuple):
     slope: Array
 
 
-@njit(cache=True)
-def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array,
-                  jacobian: Array) -> None:
+@lean
+def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, places: Places) -> None:
     """Set `frame.doubt`, px^2, `frame.own` and `frame.covered`; remember what this camera sees, `estimate.looks`.
 
     To be called after `measure_sizes`. Sights with a flag are widened by their node, and are no standard, and
-    neither are those that were not believed. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them.
+    neither are those that were not believed. `places` as `place_markers` has them.
     """
     camera, count = frame.camera[0], worn.part.shape[0]
     alike = estimate.untroubled[0] > CALM_S  # and everything is in plain view of two cameras
@@ -81,55 +82,60 @@ def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate
             alike = False
             continue
         m, width = frame.label[sight], frame.sizes[sight]
-        rival = _widest_other(cameras, estimate, camera, m, points[m])
+        rival = _widest_other(cameras, estimate, camera, m, places.points[m])
         missing = 1.0 - (width / max(width, estimate.looks[rival, m, LOOK_WIDTH])) ** 2 if rival >= 0 else 0.0
         if missing > AGREE:
             shift = SHIFT if worn.half_axes[m, 0] == worn.half_axes[m, 1] else BAND_SHIFT
             frame.doubt[sight] = (0.5 * shift * frame.widths[sight]) ** 2 * (missing**2 - AGREE**2)
         if missing > LESS:
-            frame.covered[sight] = _misses(worn, cameras, frame, estimate, sight, rival, points[m], jacobian[m])
+            frame.covered[sight] = _misses(worn, cameras, frame, estimate, sight, rival, places)
         alike &= rival >= 0 and frame.plain[sight] and missing <= AGREE and not frame.covered[sight]
         _remember(estimate.looks[camera, m], frame, sight)
     if alike:
         frame.own[:] = OWN
 
 
-@njit(cache=True)
+@lean
 def _remember(look: Array, frame: Frame, sight: int) -> None:
     """Fill `look` (6,) with what a frame shows of a marker."""
     look[LOOK_WIDTH] = frame.sizes[sight] if frame.plain[sight] else 0.0
-    look[LOOK_X], look[LOOK_Y] = frame.pixels[sight]
+    look[LOOK_X], look[LOOK_Y] = frame.pixels[sight, 0], frame.pixels[sight, 1]
     look[LOOK_VARIANCE] = max(_variance(frame, sight), EXACT_PX2)  # zero is for what was never seen
     look[LOOK_AGE] = -frame.late_s[sight]
 
 
-@njit(cache=True)
+@lean
 def _variance(frame: Frame, sight: int) -> float:
     """Of a sight, px^2, the mean of its axes."""
     return 0.5 * float(frame.covariances[sight, 0, 0] + frame.covariances[sight, 1, 1])
 
 
-@njit(cache=True)
-def _misses(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, sight: int, rival: int, point: Array,
-            jacobian: Array) -> bool:
-    """Whether no place of a marker that is about at `point` (3,) m, with `jacobian` (3, 27) per pose number, explains
-    this sight and the last one of camera `rival`."""
-    own, other = View(np.empty(2), np.empty((2, 3))), View(np.empty(2), np.empty((2, 3)))
+@lean
+def _misses(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, sight: int, rival: int,
+            places: Places) -> bool:
+    """Whether no place of a marker that is about where `places` have it explains this sight and the last one of camera
+    `rival`."""
+    own, other = View(room((2,)), room((2, 3))), View(room((2,)), room((2, 3)))
     m, late = frame.label[sight], frame.late_s[sight]
-    look, speed = estimate.looks[rival, m], jacobian @ estimate.velocity
-    if not (_view(worn, cameras, estimate, m, frame.camera[0], point + late * speed, frame.pixels[sight], own)
-            and _view(worn, cameras, estimate, m, rival, point - look[LOOK_AGE] * speed, look[LOOK_X:LOOK_Y + 1],
-                      other)):
+    look, jacobian = estimate.looks[rival, m], places.jacobian[m]
+    now, before, lively = room((3,)), room((3,)), room((GROUPS,))
+    for i in range(3):
+        speed = dot(jacobian[i], estimate.velocity)
+        now[i] = places.points[m, i] + late * speed
+        before[i] = places.points[m, i] - look[LOOK_AGE] * speed
+    if not (_view(worn, cameras, estimate, m, frame.camera[0], now, frame.pixels[sight], own)
+            and _view(worn, cameras, estimate, m, rival, before, look[LOOK_X:LOOK_Y + 1], other)):
         return False
     between = look[LOOK_AGE] + late
-    strayed = (0.25 * between**4 * straying(liveliness(estimate), worn.part[m])
+    liveliness(estimate, lively)
+    strayed = (0.25 * between**4 * straying(lively, worn.part[m])
                + between**2 * _unsteadiness(estimate, jacobian))
     spread = own.slope[0, 0] ** 2 + own.slope[0, 1] ** 2 + own.slope[0, 2] ** 2
     variance = _variance(frame, sight) + look[LOOK_VARIANCE] + spread * strayed
     return disagreement(own, other) > MISS_PX + MISS * math.sqrt(variance)
 
 
-@njit(cache=True)
+@lean
 def _unsteadiness(estimate: Estimate, jacobian: Array) -> float:
     """Variance per axis, (m/s)^2, of the speed of what has `jacobian` (3, 27), as if no velocities went together."""
     total = 0.0
@@ -139,12 +145,12 @@ def _unsteadiness(estimate: Estimate, jacobian: Array) -> float:
     return total / 3.0
 
 
-@njit(cache=True)
+@lean
 def _widest_other(cameras: Cameras, estimate: Estimate, camera: int, m: int, point: Array) -> int:
     """The other camera that sees most of marker `m`, at `point` (3,) m, just now and from nearly the same side; -1 if
     none does."""
     widest, which = 0.0, -1
-    one, two = np.empty(3), np.empty(3)
+    one, two = room((3,)), room((3,))
     line_of_sight(cameras.pose[camera], point, one)
     for other in range(estimate.looks.shape[0]):
         look = estimate.looks[other, m]
@@ -156,32 +162,32 @@ def _widest_other(cameras: Cameras, estimate: Estimate, camera: int, m: int, poi
     return which
 
 
-@njit(cache=True)
+@lean
 def _view(worn: Worn, cameras: Cameras, estimate: Estimate, m: int, camera: int, point: Array, pixel: Array,
           out: View) -> bool:
     """Fill `out` for a marker at `point` (3,) m that `camera` sees at `pixel` (2,); False when it is behind it."""
-    expected = np.empty(2)
-    if not project_marker(point + estimate.bias[m], estimate.world, worn.half_axes[m], cameras.pose[camera],
-                          cameras.intrinsics[camera], expected, out.slope):
+    expected, place = room((2,)), room((3,))
+    for i in range(3):
+        place[i] = point[i] + estimate.bias[m, i]
+    if not project_marker(place, estimate.world, worn.half_axes[m], cameras.pose[camera], cameras.intrinsics[camera],
+                          expected, out.slope):
         return False
-    out.residual[:] = pixel - expected
+    out.residual[0], out.residual[1] = pixel[0] - expected[0], pixel[1] - expected[1]
     return True
 
 
-@njit(cache=True)
+@lean
 def disagreement(one: View, other: View) -> float:
     """How far off, px, two sights are that no place of the marker explains: of four numbers three are its place."""
-    slopes, residuals = np.empty((4, 3)), np.empty(4)
-    slopes[:2], slopes[2:], residuals[:2], residuals[2:] = one.slope, other.slope, one.residual, other.residual
-    normal = np.empty(4)
-    for k in range(4):  # orthogonal to all columns: the minors of the matrix, signs in turn
-        rows = np.array([i for i in range(4) if i != k])
-        a, b, c = slopes[rows[0]], slopes[rows[1]], slopes[rows[2]]
-        minor = (a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
-                 + a[2] * (b[0] * c[1] - b[1] * c[0]))
-        normal[k] = minor if k % 2 == 0 else -minor
-    length = math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2 + normal[3] ** 2)
-    total = 0.0
-    for k in range(4):
-        total += normal[k] * residuals[k]
+    p, q, r, s = one.slope[0], one.slope[1], other.slope[0], other.slope[1]
+    a, b, c, d = _minor(q, r, s), -_minor(p, r, s), _minor(p, q, s), -_minor(p, q, r)  # orthogonal to all columns
+    length = math.sqrt(a * a + b * b + c * c + d * d)
+    total = a * one.residual[0] + b * one.residual[1] + c * other.residual[0] + d * other.residual[1]
     return abs(total) / length if length > 0.0 else 0.0
+
+
+@lean
+def _minor(a: Array, b: Array, c: Array) -> float:
+    """The determinant of three rows (3,)."""
+    return float(a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+                 + a[2] * (b[0] * c[1] - b[1] * c[0]))

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.lean import lean, room, with_memory
 from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     ANGLES,
     FINGERS,
     FIRST_FINGER,
     GROUP_OF,
+    MOST_MARKERS,
     POSE,
     VELOCITY,
     Estimate,
 )
 from rhot_app.tracking.kalman.forgetting import open_directions
 from rhot_app.tracking.kalman.gain import expected_noise
-from rhot_app.tracking.kalman.markers import Worn, place_markers
-from rhot_app.tracking.kalman.rows import PALM_PART, Rows
+from rhot_app.tracking.kalman.markers import Outfit, place_markers
+from rhot_app.tracking.kalman.rows import PALM_PART, ROWS_MAX, Rows
 from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown
 
 Array = NDArray[np.float64]
@@ -43,26 +44,26 @@ SPEED, HASTE = 3.0, 30.0
 """Standard deviations of its angles' velocities, rad/s, and accelerations, rad/s^2."""
 
 
-@njit(cache=True)
-def loosen(estimate: Estimate, part: Indices, rows: Rows, usual: Array) -> Mask:
+@lean
+def loosen(estimate: Estimate, part: Indices, rows: Rows, usual: Array, forgotten: Mask) -> None:
     """Forget all of a finger that is seen again but what habit, `usual` (27, 27) as in `Habits`, says of its angles.
 
     How it was taken to go with the rest of the hand is forgotten too, so that the finger alone goes where it is seen.
-    `part` (M,) as in `Worn`. Returns (5,) which fingers were forgotten.
+    `part` (M,) as in `Worn`. Fills `forgotten` (5,): which fingers were.
     """
-    away, forgotten = fingers_away(estimate, part), np.zeros(FINGERS, np.bool_)
+    away = room((FINGERS,))
+    fingers_away(estimate, part, away)
     for finger in range(FINGERS):
-        back = False
+        back, forgotten[finger] = False, False
         for observation in range(rows.used[1]):
             back |= rows.part[observation] == finger
         if not back or away[finger] < AWAY_S:
             continue
         forget_finger(estimate, finger, usual)
         forgotten[finger] = True
-    return forgotten
 
 
-@njit(cache=True)
+@lean
 def forget_finger(estimate: Estimate, finger: int, usual: Array) -> None:
     """Leave of what is known of a finger's angles only `usual` (27, 27), and of their velocities nothing, not even what
     they seemed to be: a finger seen twice within a moment may seem to move at any speed."""
@@ -82,17 +83,17 @@ def forget_finger(estimate: Estimate, finger: int, usual: Array) -> None:
             covariance[ACCELERATION + i, ACCELERATION + i] = HASTE * HASTE
 
 
-@njit(cache=True)
-def loosen_palm(estimate: Estimate, worn: Worn, cameras: Array, rows: Rows, usual: Array) -> bool:
+@lean
+def loosen_palm(estimate: Estimate, outfit: Outfit, rows: Rows, usual: Array) -> bool:
     """Let a palm be where it is seen again, if it is not likely to be where it was carried on to. True if it is so far
     off that nothing must be held of it.
 
     It is the place that is wrong: were it not doubted, what is seen would be taken for an acceleration, and a palm that
     has strayed by centimetres for one that moves at metres per second. Fingertips that were seen meanwhile stay where
-    they are. `cameras` (C, 3, 4) camera_from_world m; `usual` as in `loosen`.
+    they are. `usual` as in `loosen`.
     """
-    noise, strayed = np.empty((rows.used[1], 3)), 0.0
-    known, back = False, np.zeros(worn.part.shape[0], np.bool_)
+    noise, strayed, known, back = room((ROWS_MAX, 3)), 0.0, False, room((MOST_MARKERS,))
+    back[:] = 0.0
     for observation in range(rows.used[1]):
         camera, marker = rows.source[observation, 0], rows.source[observation, 2]
         if rows.part[observation] != PALM_PART or camera < 0 or estimate.unseen[camera, marker] < AWAY_S:
@@ -101,26 +102,33 @@ def loosen_palm(estimate: Estimate, worn: Worn, cameras: Array, rows: Rows, usua
             expected_noise(rows, estimate.covariance, noise)
             known = True
         row = rows.first[observation]
-        uu, uv, vv = noise[observation]
+        uu, uv, vv = noise[observation, 0], noise[observation, 1], noise[observation, 2]
         u, v = rows.residual[row], rows.residual[row + 1]
         if (vv * u * u - 2.0 * uv * u * v + uu * v * v) / (uu * vv - uv * uv) > UNLIKELY:
             slope = 0.0
             for k in range(3):
                 slope += 0.5 * (rows.jacobian[row, k] ** 2 + rows.jacobian[row + 1, k] ** 2)
             strayed = max(strayed, (u * u + v * v) / slope)
-            back[marker] = True
+            back[marker] = 1.0
     if strayed <= ELSEWHERE_M * ELSEWHERE_M:
         for k in range(3):
             estimate.covariance[k, k] += strayed
         return False
-    points, jacobian = np.empty((worn.part.shape[0], 3)), np.empty((worn.part.shape[0], 3, POSE))
-    place_markers(worn, estimate, points, jacobian)
-    keep_shown(estimate, worn.part, worn.palmar, cameras, points, jacobian)
-    for m in np.flatnonzero(back):
-        jacobian[m] = 0.0
-    left_open = open_directions(jacobian, usual, estimate.bias_variance)
+    worn, places = outfit.worn, outfit.places
+    place_markers(worn.dh, estimate, places)
+    keep_shown(estimate, worn.part, worn.palmar, outfit.cameras.pose, places.points, places.jacobian)
+    for m in range(worn.part.shape[0]):
+        if back[m] > 0.0:
+            places.jacobian[m] = 0.0
+    _open(estimate.covariance, places.jacobian, usual, estimate.bias_variance)
+    return True
+
+
+@with_memory
+def _open(covariance: Array, jacobian: Array, usual: Array, bias_variance: Array) -> None:
+    """Know nothing more of the directions that these markers leave open."""
+    left_open = open_directions(jacobian, usual, bias_variance)
     for i in range(POSE):
         for j in range(POSE):
-            estimate.covariance[i, j] += left_open[i, j]
-            estimate.covariance[VELOCITY + i, VELOCITY + j] += left_open[i, j] / (STRAYED_S * STRAYED_S)
-    return True
+            covariance[i, j] += left_open[i, j]
+            covariance[VELOCITY + i, VELOCITY + j] += left_open[i, j] / (STRAYED_S * STRAYED_S)

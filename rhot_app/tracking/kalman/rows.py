@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+ROWS_MAX = 128
+"""Rows of an update: all markers of two frames, and more."""
+
 PALM_PART = -1
 """The part of the hand that an observation is attached to: the palm, or the index of a finger."""
 
@@ -75,7 +78,8 @@ class Outcome:
     source: NDArray[np.int64]
 
 
-def empty_rows(rows: int, size: int) -> Rows:
-    """Room for `rows` rows of a state with `size` numbers."""
+def empty_rows(size: int) -> Rows:
+    """Room for the rows of an update of a state with `size` numbers."""
+    rows = ROWS_MAX
     return Rows(np.zeros(2, np.int64), np.zeros(rows), np.zeros((rows, size)), np.zeros((rows, 2)),
                 np.zeros(rows + 1, np.int64), np.zeros(rows, np.int64), np.zeros((rows, 3), np.int64))

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.estimate import POSE, Estimate
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Worn, project_marker
+from rhot_app.lean import lean, room
+from rhot_app.tracking.kalman.combine import dot
+from rhot_app.tracking.kalman.estimate import Estimate
+from rhot_app.tracking.kalman.markers import Cameras, Frame, Places, Worn, project_marker
 
 Array = NDArray[np.float64]
 
@@ -22,30 +23,29 @@ LEAST = 0.5
 as fast as that."""
 
 
-@njit(cache=True)
-def measure_sizes(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, points: Array,
-                  jacobian: Array) -> None:
+@lean
+def measure_sizes(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, places: Places) -> None:
     """Fill `frame.sizes` as if nothing moved.
 
-    To be called when `frame.label` is known. `points` (M, 3) m and `jacobian` (M, 3, 27) as `place_markers` has them.
+    To be called when `frame.label` is known. `places` as `place_markers` has them.
     """
     camera = frame.camera[0]
-    place, pixel, slope = np.empty(3), np.empty(2), np.empty((2, 3))
+    place, pixel, slope = room((3,)), room((2,)), room((2, 3))
     for sight in range(worn.part.shape[0]):
         frame.sizes[sight] = 0.0
         if not frame.seen[sight] or not frame.widths[sight] > 0.0:
             continue
         m = frame.label[sight]
         for i in range(3):
-            place[i] = points[m, i] + estimate.bias[m, i]
+            place[i] = places.points[m, i] + estimate.bias[m, i]
         if project_marker(place, estimate.world, worn.half_axes[m], cameras.pose[camera], cameras.intrinsics[camera],
                           pixel, slope):
-            down = frame.row_s[0] * _px_per_s(slope[1], jacobian[m], estimate.velocity)
+            down = frame.row_s[0] * _px_per_s(slope[1], places.jacobian[m], estimate.velocity)
             still = 1.0 - min(max(down, -LEAST), LEAST)
             frame.sizes[sight] = frame.widths[sight] * metres_per_px(slope) * math.sqrt(still)
 
 
-@njit(cache=True)
+@lean
 def metres_per_px(slope: Array) -> float:
     """How large a pixel is, as a ball covers them, where a picture's `slope` is (2, 3) px/m: wherever it is in it."""
     u, v = slope[0], slope[1]
@@ -53,10 +53,8 @@ def metres_per_px(slope: Array) -> float:
     return 1.0 / math.sqrt(math.sqrt(x * x + y * y + z * z))
 
 
-@njit(cache=True)
+@lean
 def _px_per_s(slope: Array, jacobian: Array, velocity: Array) -> float:
     """How fast what has `jacobian` (3, 27) moves along one of a picture's axes, of which `slope` is (3,) px/m."""
-    total = 0.0
-    for j in range(POSE):
-        total += velocity[j] * (slope[0] * jacobian[0, j] + slope[1] * jacobian[1, j] + slope[2] * jacobian[2, j])
-    return total
+    return float(slope[0] * dot(jacobian[0], velocity) + slope[1] * dot(jacobian[1], velocity)
+                 + slope[2] * dot(jacobian[2], velocity))

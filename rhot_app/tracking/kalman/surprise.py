@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.lean import lean, room
 from rhot_app.tracking.kalman.estimate import (
     FIRST_FINGER,
     GROUP_OF,
@@ -30,8 +30,9 @@ from rhot_app.tracking.kalman.estimate import (
     Estimate,
 )
 from rhot_app.tracking.kalman.gain import Gain, expected_noise
+from rhot_app.tracking.kalman.median import median
 from rhot_app.tracking.kalman.motion import AWAKE, MOST, STILL, jerk_gains, shake
-from rhot_app.tracking.kalman.rows import PALM_PART, Rows
+from rhot_app.tracking.kalman.rows import PALM_PART, ROWS_MAX, Rows
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -63,32 +64,35 @@ ASLEEP = 0.25
 _STEP = 3.0
 
 
-@njit(cache=True)
+@lean
 def appraise(rows: Rows, estimate: Estimate, together: Array, back: Mask, believed: Mask, widening: Array) -> None:
     """Raise the agitation (and the covariance by what it did since its onset); fill `believed` and `widening` (L,).
 
     `together` as in `Habits`. Fingers that are `back` (5,) from out of sight do not surprise, wherever they are: where
     they are expected, and how sharply, is linearised about a pose that is far from theirs.
     """
-    count, how, grown = rows.used[1], estimate.held[0], jerk_gains(ONSET_S)
+    count, how = rows.used[1], estimate.held[0]
     if count == 0:
         return
-    noise, per_unit, surprise = np.empty((count, 3)), np.zeros((count, 3, 3)), np.empty(count)
+    noise, per_unit = room((ROWS_MAX, 3)), room((ROWS_MAX, 3, 3))
     expected_noise(rows, estimate.covariance, noise)
-    added = np.zeros(GROUPS)
-    if _as_expected(rows, estimate, noise, per_unit, added, back, believed, widening):
+    if _as_expected(rows, estimate, noise, back, believed, widening):
         return
+    grown, added = room((3, 3)), room((GROUPS,))
+    jerk_gains(ONSET_S, grown)
+    per_unit[:count] = 0.0
+    added[:] = 0.0
     for observation in range(count):
         for kind in range(3):
             group = kind if kind < FIRST_FINGER else FIRST_FINGER + rows.part[observation]
             _effect(rows, observation, group, grown, together, per_unit[observation, kind])
     if how not in (PLACED, PALM_HELD):
-        _raise_palm(rows, estimate, noise, per_unit, LINEAR, added, surprise)
+        _raise_palm(rows, noise, per_unit, LINEAR, added)
         if how != TURN_HELD:
-            _raise_palm(rows, estimate, noise, per_unit, TURN, added, surprise)
+            _raise_palm(rows, noise, per_unit, TURN, added)
     for finger in range(GROUPS - FIRST_FINGER):
         if not back[finger]:
-            _raise_finger(rows, estimate, noise, per_unit, finger, added, surprise)
+            _raise_finger(rows, noise, per_unit, finger, added)
     _follow_trends(estimate, added)
     if how in (PLACED, PALM_HELD):
         added[LINEAR] = 0.0
@@ -104,41 +108,42 @@ def appraise(rows: Rows, estimate: Estimate, together: Array, back: Mask, believ
             estimate.untroubled[0] = 0.0
 
 
-@njit(cache=True)
-def _as_expected(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, added: Array, back: Mask,
-                 believed: Mask, widening: Array) -> bool:
+@lean
+def _as_expected(rows: Rows, estimate: Estimate, noise: Array, back: Mask, believed: Mask, widening: Array) -> bool:
     """Whether nothing surprises, as with most frames: then all is believed, and what acceleration would do need not be
     known."""
-    if np.max(_trends(estimate)) > TREND:
-        return False
+    for i in range(POSE):
+        if _trend(estimate, i) > TREND:
+            return False
     for observation in range(rows.used[1]):
-        value = 0.0 if _is_of(back, rows, observation) else _squared(rows, observation, noise, per_unit, added)
+        value = 0.0 if _is_of(back, rows, observation) else _normalised(rows, observation, noise[observation, 0],
+                                                                        noise[observation, 1], noise[observation, 2])
         if not value <= PLAUSIBLE:
             return False
         believed[observation], widening[observation] = True, max(1.0, value / ROBUST)
     return True
 
 
-@njit(cache=True)
+@lean
 def _is_of(fingers: Mask, rows: Rows, observation: int) -> bool:
     """Whether an observation is attached to one of these `fingers` (5,)."""
     part = rows.part[observation]
     return bool(part != PALM_PART and fingers[part])
 
 
-@njit(cache=True)
-def _trends(estimate: Estimate) -> Array:
-    """(7,) the largest squared normalised trend of each group's velocities."""
-    total = np.zeros(GROUPS)
-    for i in range(POSE):
-        total[GROUP_OF[i]] = max(total[GROUP_OF[i]], estimate.trend[i] ** 2 * (2.0 - LEAK) / LEAK)
-    return total
+@lean
+def _trend(estimate: Estimate, i: int) -> float:
+    """The squared normalised trend of a velocity."""
+    return float(estimate.trend[i] ** 2 * (2.0 - LEAK) / LEAK)
 
 
-@njit(cache=True)
+@lean
 def _follow_trends(estimate: Estimate, added: Array) -> None:
     """Wake the groups whose velocities were corrected the same way for long; a new trend begins."""
-    total = _trends(estimate)
+    total = room((GROUPS,))  # the largest trend of each group's velocities
+    total[:] = 0.0
+    for i in range(POSE):
+        total[GROUP_OF[i]] = max(total[GROUP_OF[i]], _trend(estimate, i))
     for group in range(GROUPS):
         if total[group] > TREND:
             added[group] = max(added[group], AWAKE[group] ** 2)
@@ -147,13 +152,16 @@ def _follow_trends(estimate: Estimate, added: Array) -> None:
             estimate.trend[i] = 0.0
 
 
-@njit(cache=True)
+@lean
 def _of_one_camera(rows: Rows) -> bool:
     """Whether all observations are of the same camera."""
-    return not np.any(rows.source[:rows.used[1], 0] != rows.source[0, 0])
+    others = 0
+    for observation in range(rows.used[1]):
+        others += rows.source[observation, 0] != rows.source[0, 0]
+    return others == 0
 
 
-@njit(cache=True)
+@lean
 def _wake(estimate: Estimate, added: Array, alone: bool) -> None:
     """Wake what surprised, to be as lively as makes it plausible; leave in `added` (7,) what the covariance must learn
     of it.
@@ -169,13 +177,13 @@ def _wake(estimate: Estimate, added: Array, alone: bool) -> None:
             added[group] = max(added[group], awake) if asleep or not alone else 0.0
 
 
-@njit(cache=True)
+@lean
 def _effect(rows: Rows, observation: int, group: int, gains: Array, together: Array, out: Array) -> None:
     """Fill `out` (3,): innovation variance uu, uv, vv per unit of a group's agitation."""
     out[:] = 0.0
     row, last = rows.first[observation], rows.first[observation + 1] - 1
     u, v = rows.jacobian[row], rows.jacobian[last]
-    grown_u, grown_v = np.empty(3), np.empty(3)
+    grown_u, grown_v = room((3,)), room((3,))
     for j in range(POSE):
         if GROUP_OF[j] != group:
             continue
@@ -194,9 +202,9 @@ def _effect(rows: Rows, observation: int, group: int, gains: Array, together: Ar
         out[1], out[2] = 0.0, 0.0
 
 
-@njit(cache=True)
+@lean
 def _total(rows: Rows, observation: int, noise: Array, per_unit: Array, added: Array) -> tuple[float, float, float]:
-    uu, uv, vv = noise[observation]
+    uu, uv, vv = noise[observation, 0], noise[observation, 1], noise[observation, 2]
     for kind in range(3):
         group = kind
         if kind == FIRST_FINGER:
@@ -209,24 +217,29 @@ def _total(rows: Rows, observation: int, noise: Array, per_unit: Array, added: A
     return uu, uv, vv
 
 
-@njit(cache=True)
+@lean
 def _squared(rows: Rows, observation: int, noise: Array, per_unit: Array, added: Array) -> float:
     """Squared normalised innovation of one observation, with the acceleration `added` so far."""
     uu, uv, vv = _total(rows, observation, noise, per_unit, added)
+    return _normalised(rows, observation, uu, uv, vv)
+
+
+@lean
+def _normalised(rows: Rows, observation: int, uu: float, uv: float, vv: float) -> float:
+    """Squared innovation of one observation, normalised by its covariance."""
     row = rows.first[observation]
     u = rows.residual[row]
     v = rows.residual[row + 1] if rows.first[observation + 1] - row > 1 else 0.0
-    return (vv * u * u - 2.0 * uv * u * v + uu * v * v) / (uu * vv - uv * uv)
+    return float((vv * u * u - 2.0 * uv * u * v + uu * v * v) / (uu * vv - uv * uv))
 
 
-@njit(cache=True)
-def _raise_palm(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, group: int, added: Array,
-                surprise: Array) -> None:
+@lean
+def _raise_palm(rows: Rows, noise: Array, per_unit: Array, group: int, added: Array) -> None:
     """Raise one of the palm's groups until the median of the observations that show it is plausible.
 
     Markers on the palm show its translation; the others, and all of them together, its rotation.
     """
-    on_palm = 0
+    on_palm, surprise = 0, room((ROWS_MAX,))
     for observation in range(rows.used[1]):
         on_palm += rows.part[observation] == PALM_PART
     while True:
@@ -235,13 +248,12 @@ def _raise_palm(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, g
             if group == TURN or on_palm == 0 or rows.part[observation] == PALM_PART:
                 surprise[chosen] = _squared(rows, observation, noise, per_unit, added)
                 chosen += 1
-        if np.median(surprise[:chosen]) <= PLAUSIBLE or not _raise(added, group):
+        if median(surprise[:chosen]) <= PLAUSIBLE or not _raise(added, group):
             return
 
 
-@njit(cache=True)
-def _raise_finger(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array, finger: int, added: Array,
-                  surprise: Array) -> None:
+@lean
+def _raise_finger(rows: Rows, noise: Array, per_unit: Array, finger: int, added: Array) -> None:
     while True:
         worst = 0.0
         for observation in range(rows.used[1]):
@@ -251,7 +263,7 @@ def _raise_finger(rows: Rows, estimate: Estimate, noise: Array, per_unit: Array,
             return
 
 
-@njit(cache=True)
+@lean
 def _raise(added: Array, group: int) -> bool:
     """Raise a group by one step; False when no hand can do more."""
     if added[group] >= MOST[group]:
@@ -260,15 +272,18 @@ def _raise(added: Array, group: int) -> bool:
     return True
 
 
-@njit(cache=True)
+@lean
 def note_trend(estimate: Estimate, step: Array, gain: Gain) -> None:
     """Remember how an update corrects the velocities: `step` (N,), and the `gain` by which."""
-    held, total = gain.used
+    held, total = gain.used[0], gain.used[1]
     if total == held:
         return
+    variance = room((POSE,))
+    variance[:] = 0.0
+    for k in range(held, total):
+        learnt = gain.rows[k, VELOCITY:VELOCITY + POSE]
+        for i in range(POSE):
+            variance[i] += learnt[i] ** 2
     for i in range(POSE):
-        variance = 0.0
-        for k in range(held, total):
-            variance += gain.rows[k, VELOCITY + i] ** 2
-        if variance > 0.0:
-            estimate.trend[i] += LEAK * (step[VELOCITY + i] / math.sqrt(variance) - estimate.trend[i])
+        if variance[i] > 0.0:
+            estimate.trend[i] += LEAK * (step[VELOCITY + i] / math.sqrt(variance[i]) - estimate.trend[i])

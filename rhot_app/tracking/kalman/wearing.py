@@ -19,7 +19,7 @@ from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
 from rhot_app.tracking.kalman.forgetting import WIDEST
-from rhot_app.tracking.kalman.markers import Cameras, Outfit, Worn
+from rhot_app.tracking.kalman.markers import Cameras, Outfit, Worn, empty_places
 from rhot_app.tracking.kalman.motion import Habits
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.rig_arrays import band_axes
@@ -53,8 +53,8 @@ _COUPLED_SD_RAD = np.radians(0.02)
 class Wearing:
     """`natural`: what is believed of any hand's angles, `habits`: of one that is not seen; `roles` (M,) of the markers,
     `places` (M,) where they ride, `bias_variance` (M,) m^2 of their places, `paint_variance` (M,) m^2 of them as it is
-    told, infinite where nobody knows, `lasting` (M,) the parts of stated standard deviations that last. `outfit`: an
-    `Outfit`, for compiled functions."""
+    told, infinite where nobody knows, `lasting` (M,) the parts of stated standard deviations that last. `outfit` is
+    `shared` with compiled functions."""
 
     model: HandModel
     worn: Worn
@@ -67,10 +67,13 @@ class Wearing:
     bias_variance: Array
     paint_variance: Array
     lasting: Array
-    outfit: Share = field(init=False)
+    outfit: Outfit = field(init=False)
+    shared: Share = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "outfit", Share(Outfit(self.worn, self.cameras, self.bias_variance)))
+        outfit = Outfit(self.worn, self.cameras, self.bias_variance, empty_places(self.worn.dh))
+        object.__setattr__(self, "outfit", outfit)
+        object.__setattr__(self, "shared", Share(outfit))
 
     def marker_of(self, role: str) -> int:
         """The index of the marker with a role, -1 without."""

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from modelled_hand import model_rig, moving, sights
+from places import places_of
 from scipy.spatial.transform import Rotation
 
 from rhot_app.hand.model import neutral_pose
@@ -26,7 +27,6 @@ from rhot_app.tracking.kalman.estimate import (
 )
 from rhot_app.tracking.kalman.hand_filter import HandFilter
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.markers import place_markers
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.rows import Rows, empty_rows
 from rhot_app.tracking.kalman.wearing import compile_wearing
@@ -39,14 +39,13 @@ SIZE = BIAS + 3 * MARKERS
 
 
 def filter_of_hand() -> HandFilter:
-    return HandFilter(WEARING.worn, WEARING.cameras, WEARING.habits, WEARING.limits, WEARING.bias_variance)
+    return HandFilter(WEARING.outfit, WEARING.habits, WEARING.limits)
 
 
 def placed(estimate: Estimate) -> tuple[np.ndarray, np.ndarray]:
     """(M, 3) m and (M, 3, 27): its markers' places, and what they are per pose number."""
-    points, jacobian = np.empty((MARKERS, 3)), np.empty((MARKERS, 3, POSE))
-    place_markers(WEARING.worn, estimate, points, jacobian)
-    return points, jacobian
+    places = places_of(WEARING.worn, estimate)
+    return places.points, places.jacobian
 
 
 def empty() -> Estimate:
@@ -95,7 +94,7 @@ def difference(a: Estimate, b: Estimate) -> np.ndarray:
 
 def sighting(*seen: tuple[int, int], part: np.ndarray = WEARING.worn.part) -> Rows:
     """Rows of an update in which each `seen` (camera, marker) was observed; they say nothing but that."""
-    rows = empty_rows(2 * len(seen) + 2, SIZE)
+    rows = empty_rows(SIZE)
     for k, (camera, marker) in enumerate(seen):
         rows.source[k] = camera, 0, marker
         rows.part[k] = -1 if marker < 0 else part[marker]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 from modelled_hand import model_rig, moving, sights
+from places import places_of
 from scipy.spatial import ConvexHull
 
 from rhot_app.hand.kinematics import forward
@@ -12,10 +13,10 @@ from rhot_app.hand.model import HandPose, neutral_pose
 from rhot_app.hand.shape import segments
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.simulator.motion import FACING
-from rhot_app.tracking.kalman.estimate import POSE, empty_estimate
+from rhot_app.tracking.kalman.estimate import empty_estimate
 from rhot_app.tracking.kalman.hiding import judge_fingertips
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.markers import place_markers, project_marker
+from rhot_app.tracking.kalman.markers import project_marker
 from rhot_app.tracking.kalman.sizes import measure_sizes
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_node.files import resource_path
@@ -38,9 +39,7 @@ def hand(bent=0.0):
 
 
 def placed(estimate):
-    points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
-    place_markers(WEARING.worn, estimate, points, jacobian)
-    return points, jacobian
+    return places_of(WEARING.worn, estimate)
 
 
 def silhouette_m2(estimate, finger, eye):
@@ -58,7 +57,7 @@ def silhouette_m2(estimate, finger, eye):
 
 def seen(estimate, camera, shares=(), flag=0):
     """What a camera sees of the hand: of some fingertips only these `shares` of their areas, flagged so."""
-    points, _ = placed(estimate)
+    points = placed(estimate).points
     eye = -WEARING.cameras.pose[camera, :, :3].T @ WEARING.cameras.pose[camera, :, 3]
     pixels, slope, flags = np.empty((COUNT, 2)), np.empty((2, 3)), np.zeros(COUNT, np.uint16)
     diameters = np.full(COUNT, 50.0)
@@ -76,11 +75,11 @@ def seen(estimate, camera, shares=(), flag=0):
 
 def opened(block, estimate):
     """(M,) m: standard deviations that the frame's biases tend to beyond those of plain view."""
-    points, jacobian = placed(estimate)
+    places = placed(estimate)
     for sight in range(COUNT):
         block.frame.label[sight] = sight
-    measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
-    judge_fingertips(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian, WEARING.bias_variance)
+    measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, places)
+    judge_fingertips(WEARING.worn, WEARING.cameras, block.frame, estimate, places, WEARING.bias_variance)
     return np.sqrt(np.maximum(estimate.bias_variance - WEARING.bias_variance, 0.0))
 
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from painted_fingertips import COUNT, DISTANCE_M, INDEX, WEARING, WRIST, looked_at, placed, seen
+from painted_fingertips import COUNT, DISTANCE_M, INDEX, WEARING, WRIST, looked_at, seen
+from places import places_of
 
 from rhot_app.tracking.kalman.apparent_size import EACH, NEEDED, weigh_sizes
 from rhot_app.tracking.kalman.estimate import (
@@ -60,9 +61,9 @@ def moved(estimate, by_m):
 def weigh(block, estimate, times=1):
     for _ in range(times):
         block.frame.label[:] = np.arange(COUNT)
-        points, jacobian = placed(estimate)
-        measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
-        weigh_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
+        places = places_of(WEARING.worn, estimate)
+        measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, places)
+        weigh_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, places)
 
 
 @pytest.mark.parametrize("off_m", [-OFF_M, OFF_M])

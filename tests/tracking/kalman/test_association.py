@@ -1,7 +1,8 @@
 """Which marker a sight is of."""
 
 import pytest
-from known_hand import MARKERS, WEARING, filter_of_hand, next_frame, placed, twin
+from known_hand import MARKERS, WEARING, filter_of_hand, next_frame, twin
+from places import places_of
 
 from rhot_app.tracking.kalman.association import relabel
 from rhot_app.tracking.kalman.estimate import copy_estimate
@@ -13,7 +14,8 @@ def carried():
 
 
 def renamed(estimate, frame):
-    return relabel(WEARING.worn, WEARING.cameras, frame, estimate, *placed(estimate)), frame.label.tolist()
+    changed = relabel(WEARING.worn, WEARING.cameras, frame, estimate, places_of(WEARING.worn, estimate))
+    return changed, frame.label.tolist()
 
 
 def test_nothing_is_renamed_when_all_is_well():

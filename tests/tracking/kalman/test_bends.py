@@ -24,7 +24,7 @@ def before_one_camera(bent_rad):
 
 
 def told(estimate, tips=TIPS):
-    points, jacobian = placed(estimate)
+    points, jacobian, _ = placed(estimate)
     covariance = np.zeros((POSE + 1, POSE + 1))
     tell_of_bends(estimate, WEARING.cameras.pose, tips, points, jacobian, covariance)
     return covariance
@@ -33,7 +33,7 @@ def told(estimate, tips=TIPS):
 @pytest.mark.parametrize("bent_rad", [0.2, -0.8])
 def test_a_finger_that_bent_is_known_less_along_the_line_of_sight_and_no_other_is(bent_rad):
     estimate = before_one_camera(bent_rad)
-    covariance, (points, jacobian) = told(estimate), placed(estimate)
+    covariance, (points, jacobian, _) = told(estimate), placed(estimate)
     assert np.flatnonzero(covariance.any(axis=0)).tolist() == COLUMNS.tolist()
     assert np.linalg.eigvalsh(covariance).min() > -1e-12
     assert np.trace(covariance) < len(COLUMNS) * (OTHERWISE * bent_rad) ** 2

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhot_app.tracking.kalman.combine import add_products, add_rows, add_squares, dot, mirror
+from rhot_app.tracking.kalman.combine import add_both, add_chosen, add_rows, add_squares, dot, mirror
 
 RNG = np.random.default_rng(4)
 
@@ -13,7 +13,10 @@ def test_rows_are_added_with_their_weights(count):
     rows, weights, chosen = RNG.normal(size=(12, 23)), RNG.normal(size=count), RNG.permutation(12)[:count]
     target = RNG.normal(size=23)
     expected = target + weights @ rows[chosen]
-    add_rows(target, weights, rows, chosen)
+    add_chosen(target, weights, rows, chosen)
+    np.testing.assert_allclose(target, expected, atol=1e-14)
+    expected -= weights @ rows[:count]
+    add_rows(target, weights, rows, -1.0)
     np.testing.assert_allclose(target, expected, atol=1e-14)
 
 
@@ -31,10 +34,9 @@ def test_squares_are_added_and_what_was_nearly_symmetric_is_symmetric(sign):
 @pytest.mark.parametrize("count", [0, 1, 4, 6])
 def test_a_symmetric_product_is_added(size, count):
     one, other = RNG.normal(size=(2, count, size))
-    left, right = np.concatenate([one, other]), np.concatenate([other, one])
     matrix = np.diag(RNG.random(size))
-    expected = matrix + left.T @ right
-    add_products(matrix, left, right)
+    expected = matrix + one.T @ other + other.T @ one
+    add_both(matrix, one, other)
     np.testing.assert_allclose(matrix, expected, atol=1e-13)
     np.testing.assert_array_equal(matrix, matrix.T)
 

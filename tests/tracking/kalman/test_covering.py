@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from modelled_hand import model_rig, moving, sights
+from places import places_of
 from scipy.spatial.transform import Rotation
 
 from rhot_app.hand.model import neutral_pose
@@ -18,9 +19,9 @@ from rhot_app.tracking.kalman.covering import (
     leave_out_covered,
     set_bias_variance,
 )
-from rhot_app.tracking.kalman.estimate import BIAS, POSE, empty_estimate
+from rhot_app.tracking.kalman.estimate import BIAS, empty_estimate
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.markers import place_markers, project_marker
+from rhot_app.tracking.kalman.markers import project_marker
 from rhot_app.tracking.kalman.rows import Page, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import FRESH_S, KEPT_S
@@ -81,10 +82,9 @@ def points_of(estimate):
 
 
 def covered_in(block, estimate):
-    points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
-    place_markers(WEARING.worn, estimate, points, jacobian)
-    measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
-    leave_out_covered(WEARING.worn, WEARING.cameras, block.frame, estimate, points, MADE)
+    places = places_of(WEARING.worn, estimate)
+    measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, places)
+    leave_out_covered(WEARING.worn, WEARING.cameras, block.frame, estimate, places.points, MADE)
     return np.flatnonzero(block.frame.covered).tolist()
 
 
@@ -99,7 +99,7 @@ def test_paint_that_shows_too_little_is_covered_and_no_other_marker_is(camera):
 def test_covered_paint_makes_no_rows():
     estimate = known_hand()
     block = seen_by(0, estimate, JUST_COVERED * WIDTH_M)
-    rows = empty_rows(2 * COUNT, BIAS + 3 * COUNT)
+    rows = empty_rows(BIAS + 3 * COUNT)
     page = Share(Page(estimate, rows))
     for _ in range(2):  # a frame may be weighed again
         rows.used[:] = 0

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from known_hand import MARKERS, SIZE, WEARING, moved, moving_estimate
+from places import places_of
 
 from rhot_app.hand.skeleton import ANGLE_SLICES
 from rhot_app.tracking.kalman.estimate import (
@@ -26,7 +27,6 @@ from rhot_app.tracking.kalman.forgetting import (
     open_directions,
 )
 from rhot_app.tracking.kalman.gain import empty_gain
-from rhot_app.tracking.kalman.markers import place_markers
 
 HABITS, BIAS_VARIANCE = WEARING.habits, WEARING.bias_variance
 KEPT = np.r_[0:POSE, BIAS:SIZE]  # pose and biases among the estimate's numbers
@@ -37,9 +37,7 @@ NATURAL = np.sqrt(np.diag(HABITS.usual)[ANGLES:])
 
 
 def marker_jacobian(estimate):
-    points, jacobian = np.empty((MARKERS, 3)), np.empty((MARKERS, 3, POSE))
-    place_markers(WEARING.worn, estimate, points, jacobian)
-    return jacobian
+    return places_of(WEARING.worn, estimate).jacobian
 
 
 def seen(estimate):

@@ -14,7 +14,7 @@ def case(seed=3):
     """Rows, covariance, and the block-diagonal noise of the rows."""
     rng = np.random.default_rng(seed)
     count = sum(SIZES)
-    rows, noise = empty_rows(32, SIZE), np.zeros((count, count))
+    rows, noise = empty_rows(SIZE), np.zeros((count, count))
     rows.used[:] = count, len(SIZES)
     rows.first[:len(SIZES) + 1] = np.concatenate([[0], np.cumsum(SIZES)])
     rows.residual[:count] = rng.normal(size=count)

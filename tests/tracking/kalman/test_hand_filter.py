@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from known_hand import SETTLED, SIZE, WEARING, blocks, empty, filter_of_hand, moving_estimate, settled
+from places import places_of
 
 from rhot_app.hand.skeleton import ANGLE_SLICES
 from rhot_app.tracking.kalman import hand_filter
@@ -22,7 +23,6 @@ from rhot_app.tracking.kalman.estimate import (
     copy_estimate,
 )
 from rhot_app.tracking.kalman.hand_filter import FASTEST_RAD_S, take_size
-from rhot_app.tracking.kalman.markers import place_markers
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.sighted import line_of_sight
 
@@ -209,8 +209,7 @@ def test_the_filter_learns_no_size_and_what_is_not_known_of_it_is_doubt_about_th
     assert angles[1] > 1.5 * angles[0]
     tips = []
     for estimate in (sure, unsure):  # where a tip is, cameras show, whatever the size
-        points, jacobian = np.empty((len(WEARING.roles), 3)), np.empty((len(WEARING.roles), 3, POSE))
-        place_markers(WEARING.worn, estimate, points, jacobian)
+        points, jacobian, _ = places_of(WEARING.worn, estimate)
         slope = np.zeros((3, SIZE))
         slope[:, :POSE], slope[:, SCALE] = jacobian[MIDDLE], points[MIDDLE] - estimate.world[:3, 3]
         tips.append(np.sqrt(np.trace(slope @ estimate.covariance @ slope.T)))

@@ -17,10 +17,10 @@ from rhot_app.tracking.kalman.hiding import (
     VARIED,
     VARIES,
     VARIES_PER_M_S,
-    shown_parts,
+    part_shown,
 )
 from rhot_app.tracking.kalman.sighted import FRESH_S
-from rhot_app.tracking.known import known_of
+from rhot_app.tracking.known import TOLD, empty_sheet, fill_known
 from rhot_node.wire.messages import MarkerFlag
 
 
@@ -29,9 +29,8 @@ from rhot_node.wire.messages import MarkerFlag
 def test_a_fingertip_shows_as_much_as_its_silhouette(turn, bent):
     estimate = hand(bent)
     estimate.world[:3, :3] = Rotation.from_rotvec(turn).as_matrix() @ FACING
-    points, _ = placed(estimate)
-    camera, parts = WEARING.cameras.pose[0], np.empty(COUNT)
-    shown_parts(WEARING.worn, estimate, camera, points, parts)
+    camera, places = WEARING.cameras.pose[0], placed(estimate)
+    parts = [part_shown(WEARING.worn, places, camera, m) for m in range(COUNT)]
     eye = -camera[:, :3].T @ camera[:, 3]
     for finger in range(5):
         radius = WEARING.model.radii[finger, 2]
@@ -131,6 +130,8 @@ def test_what_hides_a_fingertip_is_told_of_it():
         np.fill_diagonal(estimate.covariance, 1e-6)
         estimate.covariance[0, 0] = estimate.covariance[column, column] = bias
         estimate.covariance[0, column] = estimate.covariance[column, 0] = -0.999 * bias  # a place as good as its marker
-        told.append(known_of(estimate, WEARING.cameras, WEARING.paint_variance, WEARING.bias_variance)[0, 0])
+        out = np.empty((TOLD, TOLD))
+        fill_known(estimate, WEARING.cameras, WEARING.paint_variance, WEARING.bias_variance, empty_sheet(COUNT), out)
+        told.append(out[0, 0])
     assert told[0] < 0.5 * WEARING.bias_variance[INDEX]
     assert told[1] == pytest.approx(2e-3**2, rel=0.05)

@@ -19,6 +19,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     empty_estimate,
 )
+from rhot_app.tracking.kalman.gain import MOST_HELD
 from rhot_app.tracking.kalman.holding import (
     ARRIVE_S,
     HURRIES_M_S,
@@ -31,7 +32,7 @@ from rhot_app.tracking.kalman.holding import (
 )
 from rhot_app.tracking.kalman.rows import PALM_PART
 from rhot_app.tracking.kalman.sighted import line_of_sight
-from rhot_app.tracking.kalman.withholding import MOST, empty_held
+from rhot_app.tracking.kalman.withholding import empty_held
 
 STIFF, POSES = WEARING.habits.stiff, WEARING.cameras.pose
 TIPS = (0, 1, 2, 3, 4)
@@ -55,7 +56,7 @@ def held_of(estimate, part, *seen, palmar=()):
     held.used[0], held.directions[:7], held.sight[:] = 7, 3.0, 2.0  # of an earlier update
     hold(estimate, sighting(*seen, part=part), part, np.isin(np.arange(len(part)), palmar), POSES, WEARING.habits, held)
     count = held.used[0]
-    assert count <= MOST and not held.directions[count:].any()
+    assert count <= MOST_HELD and not held.directions[count:].any()
     placing = held.directions[:count, :3][held.directions[:count, :3].any(axis=1)]
     alone = np.count_nonzero(estimate.unseen.min(axis=1) < ARRIVE_S) < 2
     np.testing.assert_array_equal(held.sight, placing[0] if alone and len(placing) == 1 else np.zeros(3))

@@ -22,7 +22,7 @@ from rhot_app.tracking.kalman.estimate import (
     Estimate,
 )
 from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.known import COMMON, known_of, tell_of_habit, tell_of_open
+from rhot_app.tracking.known import COMMON, TOLD, empty_sheet, fill_known, tell_of_habit, tell_of_open
 
 ANY_HABIT = np.full(POSE, 1e9)
 PAINT = WEARING.bias_variance / 16.0
@@ -31,7 +31,8 @@ LOST_FOCUS_PX = 100.0
 
 
 def told(estimate: Estimate, paint: np.ndarray = PAINT, usual: np.ndarray = ANY_HABIT) -> np.ndarray:
-    out = known_of(estimate, WEARING.cameras, paint, WEARING.bias_variance)
+    out = np.empty((TOLD, TOLD))
+    fill_known(estimate, WEARING.cameras, paint, WEARING.bias_variance, empty_sheet(MARKERS), out)
     tell_of_open(estimate, usual, out)
     return out
 

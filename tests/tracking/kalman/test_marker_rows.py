@@ -13,7 +13,7 @@ STEP = 1e-6
 
 
 def residuals(block, estimate):
-    rows = empty_rows(64, SIZE)
+    rows = empty_rows(SIZE)
     block.linearise(Share(Page(estimate, rows)))
     return rows
 

@@ -8,13 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from modelled_hand import model_rig, moving, sights
+from places import places_of
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import neutral_pose
 from rhot_app.simulator.motion import FACING
-from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_WIDTH, POSE, empty_estimate
+from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_WIDTH, empty_estimate
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.markers import place_markers, project_marker
+from rhot_app.tracking.kalman.markers import project_marker
 from rhot_app.tracking.kalman.partial import (
     AGREE,
     BAND_SHIFT,
@@ -60,8 +61,7 @@ def hand():
 def seen(estimate, camera, shares=(), shift=(0.0, 0.0), flag=0, late_s=0.0):
     """What a camera sees of the hand `late_s` later: all markers equally wide, but for the `shares` of the areas of
     some, which are seen elsewhere by `shift`, px."""
-    points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
-    place_markers(WEARING.worn, estimate, points, jacobian)
+    points = places_of(WEARING.worn, estimate).points
     pixels, slope, area, flags = np.empty((COUNT, 2)), np.empty((2, 3)), np.ones(COUNT), np.zeros(COUNT, np.uint16)
     px_per_m = np.empty(COUNT)
     for m in range(COUNT):
@@ -79,10 +79,9 @@ def seen(estimate, camera, shares=(), shift=(0.0, 0.0), flag=0, late_s=0.0):
 
 def judged(block, estimate):
     """Standard deviations (M,) of the doubt, px, and which markers are left out."""
-    points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
-    place_markers(WEARING.worn, estimate, points, jacobian)
-    measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
-    doubt_partial(WEARING.worn, WEARING.cameras, block.frame, estimate, points, jacobian)
+    places = places_of(WEARING.worn, estimate)
+    measure_sizes(WEARING.worn, WEARING.cameras, block.frame, estimate, places)
+    doubt_partial(WEARING.worn, WEARING.cameras, block.frame, estimate, places)
     return np.sqrt(block.frame.doubt), np.flatnonzero(block.frame.covered).tolist()
 
 

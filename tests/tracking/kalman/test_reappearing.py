@@ -48,7 +48,7 @@ def loosened(away, rows, part=PART):
     estimate = moving_estimate()
     estimate.unseen[:] = away
     before = estimate.covariance.copy()
-    loosen(estimate, part, rows, USUAL)
+    loosen(estimate, part, rows, USUAL, np.empty(5, np.bool_))
     return estimate, before
 
 
@@ -111,7 +111,8 @@ def test_a_finger_that_is_back_is_believed_where_it_is_and_surprises_nobody(px):
     estimate.unseen[:, 2] = 1.0
     estimate.covariance[:] = 1e-8 * np.eye(SIZE)
     estimate.agitation[:] = 1.0
-    back = loosen(estimate, PART, rows, USUAL)
+    back = np.empty(5, np.bool_)
+    loosen(estimate, PART, rows, USUAL, back)
     np.testing.assert_array_equal(back, np.arange(5) == PART[2])
     believed, widening = np.empty(2, np.bool_), np.empty(2)
     appraise(rows, estimate, WEARING.habits.together, back, believed, widening)
@@ -140,7 +141,7 @@ def palm_back(metres, away_s):
     estimate.unseen[:] = 0.0
     estimate.unseen[0, WRIST] = away_s
     before = estimate.covariance.copy()
-    elsewhere = loosen_palm(estimate, WEARING.worn, WEARING.cameras.pose, off_by(metres), USUAL)
+    elsewhere = loosen_palm(estimate, WEARING.outfit, off_by(metres), USUAL)
     assert elsewhere == (metres > ELSEWHERE_M and away_s > AWAY_S)
     return estimate.covariance, before
 

@@ -17,8 +17,9 @@ from rhot_app.tracking.kalman.estimate import (
     TURN_HELD,
     VELOCITY,
 )
+from rhot_app.tracking.kalman.gain import MOST_HELD
 from rhot_app.tracking.kalman.holding import ARRIVE_S, HURRIES_M_S, REST_S, hold_size, rest
-from rhot_app.tracking.kalman.withholding import MOST, empty_held
+from rhot_app.tracking.kalman.withholding import empty_held
 
 NOWHERE = np.zeros(3)
 
@@ -71,7 +72,7 @@ def test_a_slow_way_along_the_line_of_sight_ends_and_is_known_no_better_for_it(p
 def test_a_size_is_held_where_it_is_in_doubt_and_beside_all_else():
     for doubt, expected in ((0.0, 0), (0.01, 1)):
         covariance, held = np.zeros((BIAS, BIAS)), empty_held(BIAS)
-        covariance[SCALE, SCALE], held.used[0] = doubt, MOST - 1
+        covariance[SCALE, SCALE], held.used[0] = doubt, MOST_HELD - 1
         hold_size(covariance, held)
-        assert held.used[0] == MOST - 1 + expected
+        assert held.used[0] == MOST_HELD - 1 + expected
         assert held.directions.sum() == expected == held.directions[-1, SCALE]

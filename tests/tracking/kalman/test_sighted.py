@@ -9,12 +9,14 @@ from rhot_app.tracking.kalman.rows import PALM_PART
 from rhot_app.tracking.kalman.sighted import (
     FRESH_S,
     KEPT_S,
+    count_seen,
+    eyes_now,
     eyes_on,
     fingers_away,
     keep_shown,
     line_of_sight,
     note_sights,
-    unseen_now,
+    since_seen,
 )
 
 PART, POSES = WEARING.worn.part, WEARING.cameras.pose
@@ -45,11 +47,11 @@ def test_what_no_camera_observed_shows_the_markers_of_its_part():
 
 def test_what_is_seen_now_counts_whether_it_is_believed_or_not():
     estimate = all_unseen()
-    now = unseen_now(estimate, sighting((0, 2), (NOBODY, 3)))
-    expected = np.full((2, MARKERS), LONG)
-    expected[0, 2] = 0.0
-    np.testing.assert_array_equal(now, expected)
-    np.testing.assert_array_equal(estimate.unseen, LONG)
+    estimate.unseen[1, 4] = 0.0
+    now = sighting((0, 2), (NOBODY, 3), (0, 4))
+    assert [eyes_now(estimate.unseen, m, now) for m in range(MARKERS)] == [
+        (2, 1) if m == 4 else (1, 0) if m == 2 else (0, -1) for m in range(MARKERS)]
+    assert eyes_on(estimate.unseen, 2) == (0, -1)
 
 
 @pytest.mark.parametrize(("seen", "eyes"), [((LONG, LONG), (0, -1)), ((0.0, LONG), (1, 0)),
@@ -64,7 +66,16 @@ def test_a_camera_that_saw_a_marker_a_moment_ago_still_sees_it(seen, eyes):
 def test_a_finger_is_away_since_any_camera_saw_any_of_its_markers():
     part, estimate = np.array([0, 1, 1, 3, 4, PALM_PART]), all_unseen(1.0)
     estimate.unseen[1, 2], estimate.unseen[0, 4], estimate.unseen[:, 5] = 0.2, 0.3, 0.0
-    np.testing.assert_array_equal(fingers_away(estimate, part), [1.0, 0.2, UNSEEN_S, 1.0, 0.3])
+    away = np.empty(5)
+    fingers_away(estimate, part, away)
+    np.testing.assert_array_equal(away, [1.0, 0.2, UNSEEN_S, 1.0, 0.3])
+
+
+def test_a_marker_is_unseen_since_the_last_camera_saw_it_and_a_camera_sees_what_it_just_saw():
+    unseen = np.full((2, MARKERS), LONG)
+    unseen[0, 3], unseen[1, 3], unseen[1, 4] = 0.3, 0.5 * FRESH_S, 0.0
+    assert since_seen(unseen, 3) == 0.5 * FRESH_S and since_seen(unseen, 0) == LONG
+    assert [count_seen(unseen, camera) for camera in range(2)] == [0, 2]
 
 
 @pytest.mark.parametrize("camera", [0, 1])

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from modelled_hand import model_rig, moving, sights
+from places import places_of
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import neutral_pose
 from rhot_app.simulator.motion import FACING
-from rhot_app.tracking.kalman.estimate import POSE, empty_estimate
+from rhot_app.tracking.kalman.estimate import empty_estimate
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.markers import place_markers
 from rhot_app.tracking.kalman.sizes import measure_sizes
 from rhot_app.tracking.kalman.wearing import compile_wearing
 
@@ -42,13 +42,11 @@ def hand(place_m):
 
 
 def placed(estimate):
-    points, jacobian = np.empty((COUNT, 3)), np.empty((COUNT, 3, POSE))
-    place_markers(WEARING.worn, estimate, points, jacobian)
-    return points, jacobian
+    return places_of(WEARING.worn, estimate)
 
 
 def measured(block, estimate, cameras=WEARING.cameras):
-    measure_sizes(WEARING.worn, cameras, block.frame, estimate, *placed(estimate))
+    measure_sizes(WEARING.worn, cameras, block.frame, estimate, placed(estimate))
     return block.frame.sizes
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rhot_app.tracking.kalman.estimate import BIAS
 from rhot_app.tracking.kalman.gain import contract, empty_gain, solve
 from rhot_app.tracking.kalman.rows import empty_rows
-from rhot_app.tracking.kalman.withholding import MOST, bound_biases, empty_held, withhold
+from rhot_app.tracking.kalman.withholding import bound_biases, empty_held, withhold
 
 MARKERS = 2
 SIZE = BIAS + 3 * MARKERS
@@ -38,18 +38,18 @@ def known(covariance, directions):
 
 def update_of(rng, count=7):
     """Rows of one number each, and their noise."""
-    rows = empty_rows(count, SIZE)
+    rows = empty_rows(SIZE)
     rows.used[:] = count, count
-    rows.first[:] = np.arange(count + 1)
-    rows.residual[:] = rng.normal(size=count)
-    rows.jacobian[:] = rng.normal(size=(count, SIZE)) * (rng.random((count, SIZE)) < 0.4)
-    rows.noise[:, 0] = 0.1 + rng.random(count)
+    rows.first[:count + 1] = np.arange(count + 1)
+    rows.residual[:count] = rng.normal(size=count)
+    rows.jacobian[:count] = rng.normal(size=(count, SIZE)) * (rng.random((count, SIZE)) < 0.4)
+    rows.noise[:count, 0] = 0.1 + rng.random(count)
     return rows
 
 
 def updated(covariance, held, rows, bias_variance=ANY_BIAS):
     """The step, and the covariance after withholding and weighing."""
-    after, gain, step = covariance.copy(), used_gain(len(rows.residual)), np.zeros(SIZE)
+    after, gain, step = covariance.copy(), used_gain(rows.used[0]), np.zeros(SIZE)
     withhold(after, held, gain)
     np.testing.assert_array_equal(after, covariance)
     solve(rows, after, np.ones(rows.used[1], bool), np.ones(rows.used[1]), step, gain)
@@ -61,7 +61,7 @@ def updated(covariance, held, rows, bias_variance=ANY_BIAS):
 
 def used_gain(count):
     """Room that an earlier update has left behind."""
-    gain = empty_gain(count + MOST, SIZE)
+    gain = empty_gain(count, SIZE)
     gain.used[:], gain.rows[:], gain.factor[:] = 3, 7.0, 5.0
     return gain
 
@@ -99,11 +99,12 @@ def test_what_is_known_already_is_held_at_no_cost():
 def test_the_update_is_josephs_with_the_gain_of_the_rest(seed, count):
     rng = np.random.default_rng(seed)
     covariance, held, rows = covariance_of(rng), held_of(rng, count), update_of(rng)
-    rest, noise, jacobian = known(covariance, held.directions[:count]), np.diag(rows.noise[:, 0]), rows.jacobian
+    used, rest = rows.used[0], known(covariance, held.directions[:count])
+    noise, jacobian = np.diag(rows.noise[:used, 0]), rows.jacobian[:used]
     gain = rest @ jacobian.T @ np.linalg.inv(jacobian @ rest @ jacobian.T + noise)
     left = np.eye(SIZE) - gain @ jacobian
     step, after = updated(covariance, held, rows)
-    np.testing.assert_allclose(step, gain @ rows.residual, atol=1e-9)
+    np.testing.assert_allclose(step, gain @ rows.residual[:used], atol=1e-9)
     np.testing.assert_allclose(after, left @ covariance @ left.T + gain @ noise @ gain.T, atol=1e-9)
 
 
