@@ -22,7 +22,7 @@ from rhot_app.tracking.kalman.sighted import eyes_on
 from rhot_app.tracking.kalman.wearing import Wearing
 from rhot_app.tracking.known import TOLD, Sheet, empty_sheet, fill_known, tell_of_open
 from rhot_app.tracking.raw_places import RawPlaces, locate_raw
-from rhot_app.tracking.sights import Seen, seen_clearly
+from rhot_app.tracking.sights import Seen, all_in_sight, seen_clearly
 from rhot_app.tracking.state import Knowledge
 
 Array = NDArray[np.float64]
@@ -124,15 +124,15 @@ def open_account(estimate: Estimate, subject: Subject, seen: Seen) -> Account:
 
 
 @njit(cache=True)
-def describe(account: Share, t_ns: int, report: Report) -> bool:
-    """Fill `report` from a shared `Account` of `t_ns`; returns whether all markers are measured. One call for all
-    that is told of a state: each costs some microseconds."""
-    return fill_report(account.of, t_ns, report)
+def describe(account: Share, t_ns: int, report: Report) -> tuple[bool, bool]:
+    """Fill `report` from a shared `Account` of `t_ns`; returns whether all markers are measured, and whether all are in
+    sight (`sights.all_in_sight`). One call for all that is told of a state: each costs some microseconds."""
+    return fill_report(account.of, t_ns, report), all_in_sight(account.of.seen, t_ns)
 
 
 @lean
 def fill_report(told: Account, t_ns: int, report: Report) -> bool:
-    """All that `describe` does."""
+    """Returns whether all markers are measured."""
     estimate, subject, seen, places, known = told.estimate, told.subject, told.seen, told.places, told.known
     tips, cameras = subject.tips, subject.cameras
     fill_known(estimate, cameras, subject.paint, subject.made, told.sheet, known)

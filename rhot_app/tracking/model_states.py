@@ -30,12 +30,12 @@ class Teller:
         of `time.perf_counter`. It is TRACKING while all markers are in sight, well or badly."""
         rig, estimate = self._rig, self._estimate
         solved, report = time.perf_counter(), empty_report(len(rig.marker_ids))
-        self.complete = bool(describe(self._account, t_ns, report))
+        self.complete, in_sight = describe(self._account, t_ns, report)
         points, covariances = report.points, report.covariances
         seen_pixels, seen_flags = self._sights.last_seen()
-        condition = Condition.TRACKING if self._sights.all_in_sight(t_ns) else Condition.PARTIAL
         return HandState(
-            sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns, condition=condition,
+            sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
+            condition=Condition.TRACKING if in_sight else Condition.PARTIAL,
             marker_ids=rig.marker_ids,
             marker_positions=points[FIRST_MARKER:], marker_raw_positions=report.raw,
             marker_covariances=covariances[FIRST_MARKER:], marker_knowledge=report.marker_knowledge,

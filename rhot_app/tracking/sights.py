@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.lean import lean
 from rhot_app.tracking.kalman.marker_block import MarkerBlock, Sighting
-from rhot_app.tracking.kalman.rows import Outcome
+from rhot_app.tracking.kalman.rows import Outcome, Verdict
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.surprise import UNLIKELY
 from rhot_app.tracking.tracker import CameraObservations
@@ -102,13 +102,7 @@ class Sights:
 
     def believe(self, block: MarkerBlock, outcome: Outcome) -> int:
         """Note which sights of a frame were believed, under the names that the hand gave them; returns how many."""
-        return int(_believe(self._shared, block.shared, block.t_ns, outcome.believed, outcome.widening,
-                            outcome.source))
-
-    def all_in_sight(self, t_ns: int) -> bool:
-        """Whether two cameras or more see every marker, well or badly: they did within twice the time for which a sight
-        is fresh, because a word that a person reads must not change with every frame that misses one."""
-        return bool(_all_in_sight(self._shared, t_ns))
+        return int(_believe(self._shared, block.shared, block.t_ns, outcome.shared, outcome.first, outcome.last))
 
     def last_seen(self) -> tuple[Array, Flags]:
         """(C, M, 2) px of each camera's newest frame, NaN where lost, and (C, M) its flags."""
@@ -116,20 +110,20 @@ class Sights:
 
 
 @njit(cache=True)
-def _believe(shared: Share, block: Share, t_ns: int, believed: Mask, widening: Array, source: Indices) -> int:
-    return note_believed(shared.of, block.of, t_ns, believed, widening, source)
+def _believe(shared: Share, block: Share, t_ns: int, verdict: Share, first: int, last: int) -> int:
+    return note_believed(shared.of, block.of, t_ns, verdict.of, first, last)
 
 
 @lean
-def note_believed(seen: Seen, sighting: Sighting, t_ns: int, believed: Mask, widening: Array, source: Indices) -> int:
-    """All that `Sights.believe` does, of a frame of `t_ns`; the others as in `Outcome`."""
+def note_believed(seen: Seen, sighting: Sighting, t_ns: int, verdict: Verdict, first: int, last: int) -> int:
+    """All that `Sights.believe` does, of a frame of `t_ns`, of which observations `first` to `last` - 1 are."""
     frame = sighting.frame
     camera, count = frame.camera[0], 0
-    for observation in range(believed.shape[0]):
-        if not believed[observation]:
+    for observation in range(first, last):
+        if not verdict.believed[observation]:
             continue
         count += 1
-        sight = source[observation, 1]
+        sight = verdict.source[observation, 1]
         marker = frame.label[sight]
         time_ns = t_ns + int(1e9 * frame.late_s[sight])
         if time_ns >= seen.times[camera, marker]:
@@ -140,18 +134,14 @@ def note_believed(seen: Seen, sighting: Sighting, t_ns: int, believed: Mask, wid
                     seen.covariances[camera, marker, i, j] = frame.covariances[sight, i, j]
                 seen.covariances[camera, marker, i, i] += frame.doubt[sight]
             seen.doubtful[camera, marker] = ((sighting.flags[sight] & DOUBTFUL) != 0
-                                             or widening[observation] > UNLIKELY or frame.doubt[sight] > 0.0)
+                                             or verdict.widening[observation] > UNLIKELY or frame.doubt[sight] > 0.0)
     return count
-
-
-@njit(cache=True)
-def _all_in_sight(shared: Share, t_ns: int) -> bool:
-    return all_in_sight(shared.of, t_ns)
 
 
 @lean
 def all_in_sight(seen: Seen, t_ns: int) -> bool:
-    """As `Sights.all_in_sight`."""
+    """Whether two cameras or more see every marker, well or badly: they did within twice the time for which a sight is
+    fresh, because a word that a person reads must not change with every frame that misses one."""
     for m in range(seen.times.shape[1]):
         count = 0
         for c in range(seen.times.shape[0]):

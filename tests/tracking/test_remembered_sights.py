@@ -7,11 +7,12 @@ import pytest
 from modelled_hand import model_rig, moving, sights
 
 from rhot_app.tracking.kalman.marker_block import MarkerBlock
-from rhot_app.tracking.kalman.rows import Outcome
+from rhot_app.tracking.kalman.rows import Outcome, Verdict
+from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.model_start import count_apart
-from rhot_app.tracking.sights import UNLIKELY, Seen, Sights, seen_clearly
+from rhot_app.tracking.sights import UNLIKELY, Seen, Sights, all_in_sight, seen_clearly
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
 
@@ -23,6 +24,7 @@ FRESH_NS = 60_000_000
 
 def twin(seen, block, outcome):
     """What `Sights.believe` shall make of `seen`, in plain numpy."""
+    outcome = outcome.verdict
     frame, camera = block.frame, block.observations.camera
     found = Seen(*(array.copy() for array in seen))
     sight = outcome.source[outcome.believed, 1]
@@ -48,8 +50,9 @@ def random_frames(seed):
         block.frame.label[:] = rng.permutation(MARKERS)
         shown = np.flatnonzero(block.frame.seen)
         source = np.array([(block.observations.camera, sight, block.frame.label[sight]) for sight in shown])
-        yield block, Outcome(rng.random(len(shown)) < 0.7, rng.choice([1.0, 2.0, 3.0], len(shown)),
-                             source.reshape(-1, 3).astype(np.int64))
+        verdict = Verdict(rng.random(len(shown)) < 0.7, rng.choice([1.0, 2.0, 3.0], len(shown)),
+                          source.reshape(-1, 3).astype(np.int64))
+        yield block, Outcome(Share(verdict), 0, len(shown))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -57,7 +60,7 @@ def test_what_is_believed_is_remembered_as_plain_numpy_would(seed):
     memory = Sights(CAMERAS, MARKERS)
     for block, outcome in random_frames(seed):
         expected = twin(memory.seen, block, outcome)
-        assert memory.believe(block, outcome) == np.count_nonzero(outcome.believed)
+        assert memory.believe(block, outcome) == np.count_nonzero(outcome.verdict.believed)
         for name, array, other in zip(Seen._fields, memory.seen, expected, strict=True):
             np.testing.assert_array_equal(array, other, err_msg=name)
     assert memory.seen.doubtful.any() and (memory.seen.times >= 0).all()
@@ -78,14 +81,13 @@ def test_clearly_seen_is_what_two_cameras_see_beyond_doubt_just_now():
 
 
 def test_all_is_in_sight_while_two_cameras_saw_every_marker_within_two_fresh_times():
-    memory = Sights(CAMERAS, MARKERS)
-    seen, t_ns = memory.seen, 10**9
-    assert not memory.all_in_sight(t_ns)
+    seen, t_ns = Sights(CAMERAS, MARKERS).seen, 10**9
+    assert not all_in_sight(seen, t_ns)
     seen.times[:] = t_ns - 2 * seen.fresh_ns[:, None]
     seen.doubtful[:] = True  # badly seen is seen
-    assert memory.all_in_sight(t_ns)
+    assert all_in_sight(seen, t_ns)
     seen.times[1, 3] -= 1
-    assert not memory.all_in_sight(t_ns)
+    assert not all_in_sight(seen, t_ns)
 
 
 def test_the_newest_frames_are_shown_with_what_they_lost():

@@ -69,25 +69,26 @@ class Sizes(NamedTuple):
 
 
 @lean
-def weigh_sizes(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, places: Places) -> None:
+def weigh_sizes(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate, places: Places) -> bool:
     """Correct the estimate of a hand whose distance is held (`holding.py`), because only this camera sees it, by how
-    large its fingertips look.
+    large its fingertips look; returns whether it was.
 
     To be called after `measure_sizes`. `places` as `place_markers` has them.
     """
     camera = frame.camera[0]
     if estimate.held[0] not in (PALM_HELD, GOES_ON) or is_placed(estimate, camera):
-        return
+        return False
     sizes, sight = Sizes(room((MOST_MARKERS,)), room((MOST_MARKERS, POSE)), room((MOST_MARKERS,))), room((3,))
     sight[:] = 0.0
     used = _read(worn, cameras.pose[camera], frame, estimate, places, sizes, sight)
     if used < NEEDED:
-        return
+        return False
     length = math.sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2)
     for i in range(3):
         sight[i] /= length
     _doubt_small(estimate.covariance, sight, sizes, used)
     _correct(estimate, sizes, used)
+    return True
 
 
 @lean

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -34,7 +33,7 @@ from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Outfit, place_markers
 from rhot_app.tracking.kalman.motion import MOST, Habits, predict
 from rhot_app.tracking.kalman.reappearing import loosen, loosen_palm
-from rhot_app.tracking.kalman.rows import ROWS_MAX, Outcome, Page, ResidualBlock, Rows, empty_rows
+from rhot_app.tracking.kalman.rows import ROWS_MAX, Outcome, Page, ResidualBlock, Rows, Verdict, empty_rows
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown, note_sights
 from rhot_app.tracking.kalman.surprise import UNLIKELY, appraise, note_trend
@@ -51,6 +50,7 @@ FITS, CAUTIOUS, CAUTIOUS_STEPS = 25.0, 0.3, 8
 normalised residual beyond the first of these, up to so many more steps go this part of their way; what smaller ones
 leave is there again with the next frame."""
 
+_SHORTENED = 0.99
 LONGEST_RAD = 0.35
 """A step that turns anything by more is shortened to this and the rows are linearised again: what moves along an arc
 would be led off it."""
@@ -115,7 +115,8 @@ class HandFilter:
         self._desk = Desk(self.estimate, empty_estimate(*shape), empty_rows(size), empty_gain(ROWS_MAX, size),
                           empty_held(size), np.empty(size), np.empty(ROWS_MAX, np.bool_), np.empty(ROWS_MAX),
                           np.empty(FINGERS, np.bool_), outfit, habits, limits, np.zeros(2), np.zeros(1))
-        self._shared, self._last = Share(self._desk), 0
+        self._shared, self._first = Share(self._desk), 0
+        self._verdict = Share(Verdict(self._desk.believed, self._desk.widening, self._desk.rows.source))
         self._now, self._tried = (Share(Page(mean, self._desk.rows)) for mean in (self.estimate, self._desk.trial))
 
     def resize(self, log_scale: float, variance: float) -> None:
@@ -145,9 +146,7 @@ class HandFilter:
     @property
     def astray(self) -> bool:
         """Whether the estimate is worth nothing any more: nobody's hand is so fast or so lost."""
-        variances, velocity = self.estimate.covariance.diagonal()[:ROTATION].tolist(), self.estimate.velocity.tolist()
-        return not (sum(variances) < ASTRAY_M**2 and math.hypot(*velocity[:ROTATION]) < FASTEST_M_S
-                    and math.hypot(*velocity[ROTATION:ANGLES]) < FASTEST_RAD_S)
+        return bool(_is_astray(self._shared))
 
     @property
     def strangeness(self) -> float:
@@ -171,58 +170,60 @@ class HandFilter:
         seen was likely."""
         _carry_on(self._shared, dt)
         for block in blocks:
-            block.associate(self._now)
-        self._linearise(blocks, self._now)
-        likely = _prepare(self._shared, dt)
-        turned = self._settle(blocks)
-        if self._misfits(blocks):
-            _hold_turn_alone(self._shared)
-            self._linearise(blocks, self._now)
-            turned = self._settle(blocks)
+            self._first = self._used()
+            block.enter(self._now)
+        likely, holds, turn, turned = _prepare(self._shared, dt)
+        turned = self._settle(blocks, holds, turn, turned)
+        if holds and self.estimate.held[0] == TURN_HELD:
+            self._linearise(blocks, self._tried)
+            if _misfit_of(self._shared) > MISFIT:  # fingers cannot bend as they are held to
+                _hold_turn_alone(self._shared)
+                self._linearise(blocks, self._now)
+                turned = self._settle(blocks, False, *_improve(self._shared, 1.0))
         return turned, likely
 
     def _conclude(self, dt: float) -> Outcome:
         _conclude(self._shared, dt)
-        of_last = slice(self._last, int(self._desk.rows.used[1]))
-        return Outcome(self._desk.believed[of_last], self._desk.widening[of_last], self._desk.rows.source[of_last])
+        return Outcome(self._verdict, self._first, self._used())
+
+    def _used(self) -> int:
+        """How many observations there are so far."""
+        return int(self._desk.rows.used[1])
 
     def _linearise(self, blocks: Sequence[ResidualBlock], page: Share) -> None:
-        used = self._desk.rows.used
-        used[:] = 0
+        self._desk.rows.used[:] = 0
         for block in blocks:
-            self._last = int(used[1])
             block.linearise(page)
 
-    def _settle(self, blocks: Sequence[ResidualBlock]) -> float:
-        """Iterate to the new mean, a step from the old one; returns by how much that turns anything, rad."""
-        self._desk.step[:] = 0.0
-        whole, turned = 0, 0.0
-        for count in range(MOST_STEPS):
-            if count > 0:
-                self._linearise(blocks, self._tried)
-            if whole >= ITERATIONS and (self._holds or self._misfit <= FITS):
-                break
-            turn, turned = _improve(self._shared, 1.0 if whole < ITERATIONS else CAUTIOUS)
-            whole += turn < 0.99 * LONGEST_RAD
+    def _settle(self, blocks: Sequence[ResidualBlock], holds: bool, turn: float, turned: float) -> float:
+        """Iterate to the new mean after a first step, which made one `turn` and was to make all of `turned`, rad;
+        returns by how much the steps together turn anything. `holds`: whether more is held than the palm's turn."""
+        whole = int(turn < _SHORTENED * LONGEST_RAD)
+        for _ in range(1, MOST_STEPS):
             if turn < NEAR_RAD or whole == ITERATIONS + CAUTIOUS_STEPS:
                 break
+            self._linearise(blocks, self._tried)
+            if whole >= ITERATIONS and (holds or _misfit_of(self._shared) <= FITS):
+                break
+            turn, turned = _improve(self._shared, 1.0 if whole < ITERATIONS else CAUTIOUS)
+            whole += turn < _SHORTENED * LONGEST_RAD
         return turned
 
-    def _misfits(self, blocks: Sequence[ResidualBlock]) -> bool:
-        """Whether fingers that are held to bend in all joints at once cannot be where they are seen."""
-        if self.estimate.held[0] != TURN_HELD or not self._holds:
-            return False
-        self._linearise(blocks, self._tried)
-        return self._misfit > MISFIT
 
-    @property
-    def _holds(self) -> bool:
-        """Whether more is held than how the palm is turned, and the hand's size."""
-        return bool(self._desk.held.used[0] > TURN_ALONE + (self._desk.size[1] > 0.0))
+@njit(cache=True)
+def _is_astray(shared: Share) -> bool:
+    return is_astray(shared.of.estimate)
 
-    @property
-    def _misfit(self) -> float:
-        return float(misfit(self._desk.rows, self._desk.believed, self._desk.widening))
+
+@lean
+def is_astray(estimate: Estimate) -> bool:
+    """As `HandFilter.astray`."""
+    variance, speed, spin = 0.0, 0.0, 0.0
+    for i in range(ROTATION):
+        variance += estimate.covariance[i, i]
+        speed += estimate.velocity[i] ** 2
+        spin += estimate.velocity[ROTATION + i] ** 2
+    return not (variance < ASTRAY_M**2 and speed < FASTEST_M_S**2 and spin < FASTEST_RAD_S**2)
 
 
 @njit(cache=True)
@@ -232,21 +233,26 @@ def _carry_on(shared: Share, dt: float) -> None:
 
 @lean
 def carry_on(desk: Desk, dt: float) -> None:
-    """Carry the estimate to the instant of what is observed."""
+    """Carry the estimate to the instant of what is to be observed; nothing is yet."""
+    desk.rows.used[:] = 0
     predict(desk.estimate, dt, desk.outfit.worn.part, desk.habits, desk.estimate.bias_variance)
     if desk.size[1] > 0.0:
         take_size(desk.estimate, desk.size)
 
 
 @njit(cache=True)
-def _prepare(shared: Share, dt: float) -> bool:
-    return prepare(shared.of, dt)
+def _prepare(shared: Share, dt: float) -> tuple[bool, bool, float, float]:
+    likely, holds = prepare(shared.of, dt)
+    turn, turned = improve(shared.of, 1.0)
+    return likely, holds, turn, turned
 
 
 @lean
-def prepare(desk: Desk, dt: float) -> bool:
-    """Decide what is held of the hand and which observations are believed; returns whether they are all likely."""
+def prepare(desk: Desk, dt: float) -> tuple[bool, bool]:
+    """Decide what is held of the hand and which observations are believed; returns whether they are all likely, and
+    whether more is held than how the palm is turned, and the hand's size."""
     estimate, rows, worn, back = desk.estimate, desk.rows, desk.outfit.worn, desk.back
+    desk.step[:] = 0.0
     hold(estimate, rows, worn.part, worn.palmar, desk.outfit.cameras.pose, desk.habits, desk.held)
     rest(estimate, desk.held.sight, dt)
     loosen(estimate, worn.part, rows, desk.habits.usual, back)
@@ -259,7 +265,13 @@ def prepare(desk: Desk, dt: float) -> bool:
     unlikely = 0
     for observation in range(rows.used[1]):
         unlikely += desk.widening[observation] > UNLIKELY
-    return unlikely == 0
+    return unlikely == 0, desk.held.used[0] > TURN_ALONE + (desk.size[1] > 0.0)
+
+
+@njit(cache=True)
+def _misfit_of(shared: Share) -> float:
+    desk: Desk = shared.of
+    return misfit(desk.rows, desk.believed, desk.widening)
 
 
 @njit(cache=True)
@@ -269,7 +281,8 @@ def _hold_turn_alone(shared: Share) -> None:
 
 @lean
 def hold_turn_alone(desk: Desk) -> None:
-    """Let go of all that is held but the palm's turn."""
+    """Let go of all that is held but the palm's turn, and begin anew."""
+    desk.step[:] = 0.0
     let_go(desk.held)
     hold_turn(desk.held)
     hold_size(desk.estimate.covariance, desk.held)

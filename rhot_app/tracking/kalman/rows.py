@@ -6,7 +6,6 @@ that are believed or not believed as a whole.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -56,26 +55,42 @@ class ResidualBlock(Protocol):
     """Something that was observed at an instant: a frame's markers, an edge, an object in the hand. A `Share` carries a
     `Page`."""
 
-    def associate(self, page: Share) -> int:
-        """Decide what the observations are of, given the hand at that instant; returns how many changed."""
+    def enter(self, page: Share) -> None:
+        """Decide what the observations are of, given the hand at that instant, and append them as `linearise` does; the
+        first thing in an update."""
         ...
 
     def linearise(self, page: Share) -> None:
         """Append this block's observations to the page's rows, expected and linearised at the mean of its estimate.
 
-        Called once or more per update; every time it must append the same observations in the same order.
+        Called as often as the update needs; every time it must append the same observations in the same order.
         """
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of a block's L observations: `believed` (L,), `widening` (L,) the factor on their noise, above 1 for
-    what was unlikely, `source` (L, 3) as in `Rows`. Views that the next update overwrites."""
+class Verdict(NamedTuple):
+    """What became of L observations: `believed` (L,), `widening` (L,) the factor on their noise, above 1 for what was
+    unlikely, `source` (L, 3) as in `Rows`."""
 
     believed: Mask
     widening: Array
-    source: NDArray[np.int64]
+    source: Indices
+
+
+class Outcome:
+    """What became of a block's observations: those from `first` to `last` - 1 of a shared `Verdict`, which the next
+    update overwrites."""
+
+    __slots__ = ("first", "last", "shared")
+
+    def __init__(self, shared: Share, first: int, last: int) -> None:
+        self.shared, self.first, self.last = shared, first, last
+
+    @property
+    def verdict(self) -> Verdict:
+        """Views of this block's part."""
+        whole, part = self.shared.lent, slice(self.first, self.last)
+        return Verdict(whole.believed[part], whole.widening[part], whole.source[part])
 
 
 def empty_rows(size: int) -> Rows:

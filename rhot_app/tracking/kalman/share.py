@@ -24,7 +24,7 @@ class _ShareType(types.StructRef):
 class Share(structref.StructRefProxy):
     """Carries a tuple of arrays, `of`, into compiled functions, where they unpack it; arrays are changed in place."""
 
-    lent: tuple[Any, ...]
+    lent: Any
     of: Any
 
     def __new__(cls, of: tuple[Any, ...]) -> Share:

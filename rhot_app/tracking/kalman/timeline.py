@@ -9,13 +9,12 @@ what neither expected is put where both see it, not along one's line of sight.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Protocol
-
-import numpy as np
 
 from rhot_app.tracking.kalman.estimate import ROTATION, Estimate, copy_estimate, empty_estimate
 from rhot_app.tracking.kalman.hand_filter import HandFilter
@@ -120,5 +119,5 @@ class Timeline:
             return None
         beside = self._moments[-1]
         since_ns = block.t_ns - beside.t_ns
-        way_m = 1e-9 * since_ns * float(np.linalg.norm(self._hand.estimate.velocity[:ROTATION]))
+        way_m = 1e-9 * since_ns * math.hypot(*self._hand.estimate.velocity[:ROTATION].tolist())
         return beside if beside.block.camera != block.camera and since_ns < BESIDE_NS and way_m < WAY_M else None

@@ -101,10 +101,9 @@ def test_covered_paint_makes_no_rows():
     block = seen_by(0, estimate, JUST_COVERED * WIDTH_M)
     rows = empty_rows(BIAS + 3 * COUNT)
     page = Share(Page(estimate, rows))
-    for _ in range(2):  # a frame may be weighed again
+    for append in (block.enter, block.linearise, block.enter):  # a frame may be weighed again
         rows.used[:] = 0
-        block.associate(page)
-        block.linearise(page)
+        append(page)
         assert rows.source[:rows.used[1], 2].tolist() == list(range(INDEX_KNUCKLE))
 
 

@@ -51,7 +51,7 @@ def test_one_camera_moves_a_palm_across_its_line_of_sight_only():
         block.frame.pixels[WRIST, 0] += 0.3
 
     after, expected, outcome = weighed(hide)
-    assert after.held[0] == PALM_HELD and outcome.believed.all()
+    assert after.held[0] == PALM_HELD and outcome.verdict.believed.all()
     sight, moved = np.empty(3), after.world[:3, 3] - expected.world[:3, 3]
     line_of_sight(POSES[blocks()[SETTLED].observations.camera], expected.world[:3, 3], sight)
     assert np.linalg.norm(moved) > 3e-5
@@ -66,7 +66,7 @@ def test_a_palm_out_of_sight_stays_while_its_fingers_go_where_one_camera_sees_th
         block.frame.pixels[:, 0] += 0.1
 
     after, expected, outcome = weighed(hide)
-    assert after.held[0] == PALM_HELD and outcome.believed.all()
+    assert after.held[0] == PALM_HELD and outcome.verdict.believed.all()
     np.testing.assert_allclose(after.world, expected.world, atol=1e-8)
     assert np.abs(after.angles - expected.angles).max() > 1e-3
 
@@ -93,7 +93,7 @@ def test_a_palm_out_of_sight_goes_along_with_fingertips_that_two_cameras_see():
         block.frame.pixels[:, 0] += 0.3
 
     after, expected, outcome = weighed(hide)
-    assert after.held[0] == PLACED and outcome.believed.all()
+    assert after.held[0] == PLACED and outcome.verdict.believed.all()
     assert np.linalg.norm(after.world[:3, 3] - expected.world[:3, 3]) > 5e-5
     np.testing.assert_allclose(after.world[:3, :3], expected.world[:3, :3], atol=1e-8)
 
@@ -128,7 +128,7 @@ def test_a_finger_that_cannot_bend_as_it_is_held_to_is_let_go(monkeypatch):
     def bend():
         """How far the finger bends in each of its joints, rad."""
         after, expected, outcome = weighed(stray)
-        assert after.held[0] == TURN_HELD and outcome.believed.all()
+        assert after.held[0] == TURN_HELD and outcome.verdict.believed.all()
         return (after.angles - expected.angles)[ANGLE_SLICES[MIDDLE]][1:]
 
     knuckle, joint, last = bend()
@@ -150,7 +150,7 @@ def test_a_gentle_update_is_not_concluded_when_it_turns_the_hand_or_shows_what_i
     assert (outcome is not None) == taken
     if outcome is not None:
         expected = plain.update(dt, [block])
-        np.testing.assert_array_equal(outcome.widening, expected.widening)
+        np.testing.assert_array_equal(outcome.verdict.widening, expected.verdict.widening)
         np.testing.assert_array_equal(gentle.estimate.memory, plain.estimate.memory)
 
 
