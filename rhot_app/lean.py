@@ -37,9 +37,6 @@ lean_fused: _Decorator = _njit(cache=True, _nrt=False, fastmath={"contract"})
 lean_summed: _Decorator = _njit(cache=True, _nrt=False, fastmath={"contract", "reassoc"})
 """The same, sums in any order."""
 
-with_memory: _Decorator = _njit(cache=True, _nrt=True)
-"""Compiles what does need memory, and is called by lean functions now and then."""
-
 
 def _on_stack(number: Any) -> Any:
     def typed(context: Any, shape: Any) -> Any:

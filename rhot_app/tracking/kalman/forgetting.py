@@ -20,12 +20,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.hand.linear import factorise
-from rhot_app.lean import lean, room, with_memory
+from rhot_app.lean import lean, room
 from rhot_app.tracking.kalman.combine import mirror
 from rhot_app.tracking.kalman.estimate import (
     ANGLES,
-    BIAS,
     FADING,
     FIRST_FINGER,
     GOES_ON,
@@ -41,6 +39,7 @@ from rhot_app.tracking.kalman.estimate import (
 from rhot_app.tracking.kalman.gain import Gain, add_step, contract, project_rows
 from rhot_app.tracking.kalman.holding import ENOUGH
 from rhot_app.tracking.kalman.motion import Habits
+from rhot_app.tracking.kalman.opening import Opening, open_up
 from rhot_app.tracking.kalman.rows import ROWS_MAX
 from rhot_app.tracking.kalman.sighted import FRESH_S
 
@@ -71,12 +70,6 @@ SETTLED_RAD = 0.25
 LEAST_SHOWN = 3
 """With fewer markers in sight the hand's course tells more of it than habit does."""
 
-STRIDE_RAD = 0.1
-"""It goes back to habit in steps of no more than this: the open directions turn on the way."""
-
-SHARPNESS_M = 3e-5
-"""What moves no marker by more than this counts as open."""
-
 FADING_S = 0.04
 """Both are done in steps of this: it is as good, and costs less."""
 
@@ -84,40 +77,11 @@ WIDEST = 0.7
 """Standard deviation, m and rad, beyond which a palm's place is not worth knowing."""
 
 
-@with_memory
-def open_directions(jacobian: Array, usual: Array, bias_variance: Array) -> Array:
-    """(27 + 3 M, 27 + 3 M): the covariance that habit leaves to the pose and the biases of markers that are seen to
-    stay in their places.
-
-    `jacobian` (M, 3, 27) of what is seen of the markers' places per pose number (`sighted.keep_shown`); `usual`
-    (27, 27) as in `Habits`; `bias_variance` (M,).
-    """
-    rows = 3 * jacobian.shape[0]
-    size = POSE + rows
-    out, gains = np.zeros((size, size)), np.zeros((rows, size))
-    out[:POSE, :POSE] = usual
-    gains[:, :POSE] = jacobian.reshape(rows, POSE) @ usual
-    total = np.ascontiguousarray(gains[:, :POSE]) @ jacobian.reshape(rows, POSE).T
-    for k in range(rows):
-        out[POSE + k, POSE + k] = bias_variance[k // 3]
-        gains[k, POSE + k] = bias_variance[k // 3]
-        total[k, k] += bias_variance[k // 3] + SHARPNESS_M * SHARPNESS_M
-    factorise(total)
-    for k in range(rows):  # gains becomes L^-1 J Sigma
-        for other in range(k):
-            for i in range(size):
-                gains[k, i] -= total[k, other] * gains[other, i]
-        for i in range(size):
-            gains[k, i] /= total[k, k]
-    out -= gains.T @ gains
-    return out
-
-
 @lean
 def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, jacobian: Array, gain: Gain,
-           step: Array, away: Array) -> None:
-    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. `gain` is room to work in; `away` (5,):
-    s since each finger was seen; others as in `open_directions`.
+           opening: Opening, step: Array, away: Array) -> None:
+    """Let knowledge fade for `dt` s; fills `step` (N,), what the mean moves by. `gain` and `opening` are room to work
+    in; `away` (5,): s since each finger was seen; others as in `open_directions`.
 
     It depends on how the hand is held (`holding.py`).
     """
@@ -139,7 +103,8 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
                 constant = HIDDEN_S
                 if _palm_shown(jacobian) > 0:
                     constant = SHAPE_S if _placed(jacobian) else ALONE_S
-            _open_up(estimate, -math.expm1(-passed / constant), habits, bias_variance, jacobian, step)
+            open_up(estimate, -math.expm1(-passed / constant), habits, bias_variance, jacobian, opening, step)
+            _note_turning(estimate, step[ROTATION:ANGLES])
         mirror(estimate.covariance)  # rounding must not make it unsymmetric: what fades would let it grow
         estimate.unfaded[what] = 0.0
     if how > TURN_HELD or _palm_shown(jacobian) >= ENOUGH:
@@ -192,48 +157,6 @@ def _note_turning(estimate: Estimate, turned: Array) -> None:
     if estimate.held[0] == TURN_HELD and doubt < SETTLED_RAD * SETTLED_RAD:
         rate = math.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2) / estimate.unfaded[OPENING]
         estimate.turning[0] = max(estimate.turning[0], rate)
-
-
-@with_memory
-def _open_up(estimate: Estimate, share: float, habits: Habits, bias_variance: Array, jacobian: Array,
-             step: Array) -> None:
-    """A `share` of the way back to habit, within the open directions."""
-    covariance = estimate.covariance
-    left_open = open_directions(jacobian, habits.usual, bias_variance)
-    estimate.left_open[:] = left_open[:POSE, :POSE]
-    size, chosen = left_open.shape[0], left_open.shape[0] - POSE
-    back = np.zeros((size, size))  # how far each number goes back, per how far each is from its habit
-    back[:, ANGLES:POSE] = share * (np.ascontiguousarray(left_open[:, ANGLES:POSE]) @ habits.information)
-    away = np.zeros(size)
-    away[ANGLES:POSE] = estimate.angles - habits.mean
-    for k in range(chosen):
-        back[:, POSE + k] = share / bias_variance[k // 3] * left_open[:, POSE + k]
-        away[POSE + k] = estimate.bias[k // 3, k % 3]
-    moved = back @ away
-    farthest = 0.0
-    for i in range(ROTATION, POSE):
-        farthest = max(farthest, abs(moved[i]))
-    if farthest > STRIDE_RAD:
-        shorter = STRIDE_RAD / farthest
-        share *= shorter
-        back *= shorter
-        moved *= shorter
-    step[:POSE], step[BIAS:] = -moved[:POSE], -moved[POSE:]
-    _note_turning(estimate, moved[ROTATION:ANGLES])
-    part = np.empty((size, covariance.shape[0]))
-    part[:POSE], part[POSE:] = covariance[:POSE], covariance[BIAS:]
-    part -= back @ part
-    covariance[:POSE], covariance[BIAS:] = part[:POSE], part[POSE:]
-    across = np.empty((covariance.shape[0], size))
-    across[:, :POSE], across[:, POSE:] = covariance[:, :POSE], covariance[:, BIAS:]
-    across -= across.copy() @ back.T
-    covariance[:, :POSE], covariance[:, BIAS:] = across[:, :POSE], across[:, POSE:]
-    kept = share * (2.0 - share)
-    for i in range(size):
-        row = i if i < POSE else BIAS + i - POSE
-        for j in range(size):
-            column = j if j < POSE else BIAS + j - POSE
-            covariance[row, column] += 0.5 * kept * (left_open[i, j] + left_open[j, i])
 
 
 @lean

@@ -30,6 +30,7 @@ from rhot_app.tracking.kalman.estimate import (
     Estimate,
 )
 from rhot_app.tracking.kalman.motion import ACCELERATION_S, liveliness
+from rhot_app.tracking.kalman.opening import Opening, empty_opening
 from rhot_app.tracking.kalman.rows import Rows
 
 Array = NDArray[np.float64]
@@ -90,6 +91,12 @@ class Outfit(NamedTuple):
     cameras: Cameras
     made: Array
     places: Places
+    opening: Opening
+
+
+def outfit_of(worn: Worn, cameras: Cameras, made: Array) -> Outfit:
+    """An outfit with its room."""
+    return Outfit(worn, cameras, made, empty_places(worn.dh), empty_opening(len(worn.part)))
 
 
 class Frame(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.lean import lean, room, with_memory
+from rhot_app.lean import lean, room
 from rhot_app.tracking.kalman.estimate import (
     ACCELERATION,
     ANGLES,
@@ -17,9 +17,9 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.forgetting import open_directions
 from rhot_app.tracking.kalman.gain import expected_noise
 from rhot_app.tracking.kalman.markers import Outfit, place_markers
+from rhot_app.tracking.kalman.opening import open_directions
 from rhot_app.tracking.kalman.rows import PALM_PART, ROWS_MAX, Rows
 from rhot_app.tracking.kalman.sighted import fingers_away, keep_shown
 
@@ -120,15 +120,10 @@ def loosen_palm(estimate: Estimate, outfit: Outfit, rows: Rows, usual: Array) ->
     for m in range(worn.part.shape[0]):
         if back[m] > 0.0:
             places.jacobian[m] = 0.0
-    _open(estimate.covariance, places.jacobian, usual, estimate.bias_variance)
-    return True
-
-
-@with_memory
-def _open(covariance: Array, jacobian: Array, usual: Array, bias_variance: Array) -> None:
-    """Know nothing more of the directions that these markers leave open."""
-    left_open = open_directions(jacobian, usual, bias_variance)
+    open_directions(places.jacobian, usual, estimate.bias_variance, outfit.opening)
     for i in range(POSE):
         for j in range(POSE):
-            covariance[i, j] += left_open[i, j]
-            covariance[VELOCITY + i, VELOCITY + j] += left_open[i, j] / (STRAYED_S * STRAYED_S)
+            left_open = outfit.opening.left_open[i, j]
+            estimate.covariance[i, j] += left_open
+            estimate.covariance[VELOCITY + i, VELOCITY + j] += left_open / (STRAYED_S * STRAYED_S)
+    return True

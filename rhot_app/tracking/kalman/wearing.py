@@ -19,7 +19,7 @@ from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
 from rhot_app.tracking.kalman.forgetting import WIDEST
-from rhot_app.tracking.kalman.markers import Cameras, Outfit, Worn, empty_places
+from rhot_app.tracking.kalman.markers import Cameras, Outfit, Worn, outfit_of
 from rhot_app.tracking.kalman.motion import Habits
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.rig_arrays import band_axes
@@ -71,7 +71,7 @@ class Wearing:
     shared: Share = field(init=False)
 
     def __post_init__(self) -> None:
-        outfit = Outfit(self.worn, self.cameras, self.bias_variance, empty_places(self.worn.dh))
+        outfit = outfit_of(self.worn, self.cameras, self.bias_variance)
         object.__setattr__(self, "outfit", outfit)
         object.__setattr__(self, "shared", Share(outfit))
 

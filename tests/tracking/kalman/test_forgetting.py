@@ -20,17 +20,15 @@ from rhot_app.tracking.kalman.estimate import (
 from rhot_app.tracking.kalman.forgetting import (
     FADING_S,
     SETTLED_RAD,
-    SHARPNESS_M,
-    STRIDE_RAD,
     WIDEST,
     forget,
-    open_directions,
 )
 from rhot_app.tracking.kalman.gain import empty_gain
+from rhot_app.tracking.kalman.opening import SHARPNESS_M, STRIDE_RAD, empty_opening, open_directions, open_up
 
 HABITS, BIAS_VARIANCE = WEARING.habits, WEARING.bias_variance
 KEPT = np.r_[0:POSE, BIAS:SIZE]  # pose and biases among the estimate's numbers
-GAIN = empty_gain(64, SIZE)
+GAIN, OPENING_ROOM = empty_gain(64, SIZE), empty_opening(MARKERS)
 WRIST = WEARING.roles.index("wrist")
 SEEN = np.zeros(5)
 NATURAL = np.sqrt(np.diag(HABITS.usual)[ANGLES:])
@@ -38,6 +36,13 @@ NATURAL = np.sqrt(np.diag(HABITS.usual)[ANGLES:])
 
 def marker_jacobian(estimate):
     return places_of(WEARING.worn, estimate).jacobian
+
+
+def left_open(jacobian):
+    """(27 + 3 M, 27 + 3 M) what habit leaves open."""
+    room = empty_opening(MARKERS)
+    open_directions(jacobian, HABITS.usual, BIAS_VARIANCE, room)
+    return room.left_open
 
 
 def seen(estimate):
@@ -56,7 +61,7 @@ def faded(estimate, seconds, dt=0.05):
     """The estimate after `seconds` of forgetting alone."""
     for _ in range(round(seconds / dt)):
         step = np.zeros(SIZE)
-        forget(estimate, dt, HABITS, BIAS_VARIANCE, marker_jacobian(estimate), GAIN, step, SEEN)
+        forget(estimate, dt, HABITS, BIAS_VARIANCE, marker_jacobian(estimate), GAIN, OPENING_ROOM, step, SEEN)
         estimate = moved(estimate, step)
     return estimate
 
@@ -69,7 +74,7 @@ def confident():
 
 def test_open_directions_leave_every_marker_in_its_place():
     estimate = moving_estimate()
-    left = open_directions(marker_jacobian(estimate), HABITS.usual, BIAS_VARIANCE)
+    left = left_open(marker_jacobian(estimate))
     np.testing.assert_allclose(left, left.T, atol=1e-10)
     values = np.linalg.eigvalsh(0.5 * (left + left.T))
     assert values.min() > -1e-9
@@ -78,12 +83,33 @@ def test_open_directions_leave_every_marker_in_its_place():
     assert np.sqrt(np.diag(strayed).max()) < 1.1 * SHARPNESS_M
 
 
+@pytest.mark.parametrize("share", [0.03, 0.8])
+def test_the_way_back_is_an_ornstein_uhlenbeck_step_in_the_open_directions(share):
+    """What is worked out without any large matrix is what the textbook's matrices give."""
+    estimate, jacobian, step = moving_estimate(), marker_jacobian(moving_estimate()), np.zeros(SIZE)
+    estimate.angles[:] = HABITS.mean + 0.002 * np.random.default_rng(2).normal(size=POSE - ANGLES)
+    before, away, knows = estimate.covariance.copy(), np.zeros(len(KEPT)), np.zeros((len(KEPT), len(KEPT)))
+    away[ANGLES:POSE], away[POSE:] = estimate.angles - HABITS.mean, estimate.bias.ravel()
+    knows[ANGLES:POSE, ANGLES:POSE] = HABITS.information
+    knows[POSE:, POSE:] = np.diag(np.repeat(1.0 / BIAS_VARIANCE, 3))
+    open_up(estimate, share, HABITS, BIAS_VARIANCE, jacobian, OPENING_ROOM, step)
+    left = left_open(jacobian)
+    back = np.eye(SIZE)
+    back[np.ix_(KEPT, KEPT)] -= share * left @ knows
+    expected = back @ before @ back.T
+    expected[np.ix_(KEPT, KEPT)] += share * (2.0 - share) * left
+    np.testing.assert_allclose(step[KEPT], -share * left @ knows @ away, atol=1e-9)
+    assert np.abs(step[KEPT]).max() > 1e-5 and not np.delete(step, KEPT).any()
+    np.testing.assert_allclose(estimate.covariance, expected, atol=1e-10)
+    np.testing.assert_array_equal(estimate.left_open, left[:POSE, :POSE])
+
+
 def test_open_directions_are_what_habit_leaves_when_markers_are_seen():
     estimate = moving_estimate()
     view, before = seen(estimate), prior()
     total = view @ before @ view.T + SHARPNESS_M**2 * np.eye(3 * MARKERS)
     expected = before - before @ view.T @ np.linalg.solve(total, view @ before)
-    left = open_directions(marker_jacobian(estimate), HABITS.usual, BIAS_VARIANCE)
+    left = left_open(marker_jacobian(estimate))
     np.testing.assert_allclose(left, expected, atol=1e-8)
 
 
@@ -128,7 +154,7 @@ def opened(estimate, how=FREE):
     place."""
     estimate.held[0], step, jacobian = how, np.zeros(SIZE), np.zeros((MARKERS, 3, POSE))
     jacobian[:, :, :ROTATION] = np.eye(3)
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, OPENING_ROOM, step, SEEN)
     return step
 
 
@@ -181,7 +207,7 @@ def test_a_palm_that_no_camera_sees_returns_to_habit_sooner_and_later_when_one_s
             jacobian[WRIST] = 0.0
         if fingers == 1:
             jacobian[:, 2] = 0.0  # along the line of sight
-        forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
+        forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, OPENING_ROOM, step, SEEN)
         steps.append(np.abs(step[ANGLES:POSE]).max())
     assert steps[1] > 1.5 * steps[0] and 0.3 * steps[0] > steps[2] > 0.0
 
@@ -195,7 +221,8 @@ def test_a_finger_out_of_sight_soon_bends_as_its_neighbours_do():
         estimate.covariance[ANGLES + 13:ANGLES + 17, ANGLES + 13:ANGLES + 17] = 0.3**2 * np.eye(4)
         for _ in range(10):
             step = np.zeros(SIZE)
-            forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, np.zeros((MARKERS, 3, POSE)), GAIN, step, away)
+            forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, np.zeros((MARKERS, 3, POSE)), GAIN, OPENING_ROOM, step,
+                   away)
             estimate = moved(estimate, step)
         gone.append(estimate.angles[ring][1:3].mean() / estimate.angles[ANGLE_SLICES[2]][1:3].mean())
     assert 0.0 < 2.5 * gone[0] < gone[1] < 1.0
@@ -210,7 +237,7 @@ def test_a_palm_that_habit_turns_is_taken_to_turn_once_it_has_been_found(how, do
     estimate.covariance[:] = 1e-8 * np.eye(SIZE)
     estimate.covariance[3, 3] = doubt_rad**2
     jacobian = marker_jacobian(estimate)
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, OPENING_ROOM, step, SEEN)
     assert (estimate.turning[0] > 0.01) == turns
 
 
@@ -221,10 +248,10 @@ def test_what_is_open_of_a_palm_that_only_fingers_show_to_turn_is_told(how, knuc
     estimate.held[0], estimate.left_open[:] = how, 7.0
     jacobian = marker_jacobian(estimate)
     jacobian[:knuckles] = jacobian[WRIST]  # so many more markers on the palm
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, OPENING_ROOM, step, SEEN)
     if told:
         np.testing.assert_array_equal(estimate.left_open,
-                                      open_directions(jacobian, HABITS.usual, BIAS_VARIANCE)[:POSE, :POSE])
+                                      left_open(jacobian)[:POSE, :POSE])
     else:
         assert not estimate.left_open.any()
 
@@ -234,5 +261,5 @@ def test_a_hand_of_which_hardly_anything_is_seen_is_not_opened():
     jacobian = np.zeros((MARKERS, 3, POSE))
     jacobian[:2, :, :ROTATION] = np.eye(3)
     before = estimate.covariance[:ROTATION, :ROTATION].copy()
-    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, step, SEEN)
+    forget(estimate, FADING_S, HABITS, BIAS_VARIANCE, jacobian, GAIN, OPENING_ROOM, step, SEEN)
     np.testing.assert_allclose(estimate.covariance[:ROTATION, :ROTATION], before, rtol=0.1)

@@ -21,10 +21,11 @@ from rhot_app.tracking.kalman.estimate import (
     TURN_HELD,
     Estimate,
     copy_estimate,
+    take_size,
 )
-from rhot_app.tracking.kalman.hand_filter import FASTEST_RAD_S, take_size
 from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.sighted import line_of_sight
+from rhot_app.tracking.kalman.update import FASTEST_RAD_S
 
 POSES, WRIST, MIDDLE = WEARING.cameras.pose, 5, 2
 HIDDEN = 1.0  # s
