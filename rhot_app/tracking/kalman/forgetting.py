@@ -37,8 +37,8 @@ from rhot_app.tracking.kalman.estimate import (
     Estimate,
 )
 from rhot_app.tracking.kalman.gain import Gain, add_step, contract, project_rows
+from rhot_app.tracking.kalman.habits import Habits
 from rhot_app.tracking.kalman.holding import ENOUGH
-from rhot_app.tracking.kalman.motion import Habits
 from rhot_app.tracking.kalman.opening import Opening, open_up
 from rhot_app.tracking.kalman.rows import ROWS_MAX
 from rhot_app.tracking.kalman.sighted import FRESH_S

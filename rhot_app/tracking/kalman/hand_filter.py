@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.tracking.kalman.estimate import ANGLES, FREE, GROUP_OF, POSE, TURN_HELD
+from rhot_app.tracking.kalman.habits import Habits
 from rhot_app.tracking.kalman.markers import Outfit
-from rhot_app.tracking.kalman.motion import MOST, Habits
+from rhot_app.tracking.kalman.motion import MOST
 from rhot_app.tracking.kalman.rows import Outcome, Page, ResidualBlock, Verdict
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.update import (

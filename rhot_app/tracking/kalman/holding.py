@@ -39,7 +39,8 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.motion import Habits, speeds
+from rhot_app.tracking.kalman.habits import Habits
+from rhot_app.tracking.kalman.motion import speeds
 from rhot_app.tracking.kalman.rows import PALM_PART, Rows
 from rhot_app.tracking.kalman.sighted import eyes_now, line_of_sight
 from rhot_app.tracking.kalman.withholding import Held

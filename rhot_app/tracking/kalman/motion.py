@@ -35,6 +35,7 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
+from rhot_app.tracking.kalman.habits import Habits
 from rhot_app.tracking.kalman.sighted import FRESH_S, eyes_on, fingers_away
 
 Array = NDArray[np.float64]
@@ -77,24 +78,6 @@ WIDTH_S = 300.0
 
 BIAS_S = 3.0
 """Markers' biases change with this time constant: they turn with the hand and its light."""
-
-class Habits(NamedTuple):
-    """What is known of a hand that is not seen.
-
-    `rows` (K, 21) of factors and `values` (K,): beliefs about the angles, in standard deviations; `mean` (21,) and
-    `information` (21, 21): the same as one Gaussian; `usual` (27, 27): the covariance of a pose that follows from it,
-    with a palm that may be anywhere. `together` (27, 27): how the pose's numbers accelerate together, 1 for the
-    liveliest of a group: fingers bend all their joints at once. `stiff` (R, 27): rows of what a finger does least, all
-    but its abduction and its bending at all joints at once.
-    """
-
-    rows: Array
-    values: Array
-    mean: Array
-    information: Array
-    usual: Array
-    together: Array
-    stiff: Array
 
 
 @lean

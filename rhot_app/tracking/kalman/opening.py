@@ -17,7 +17,7 @@ from rhot_app.hand.linear import factorise
 from rhot_app.lean import lean, room
 from rhot_app.tracking.kalman.combine import add_rows, add_squares, dot, fill, scale
 from rhot_app.tracking.kalman.estimate import ANGLES, BIAS, MOST_MARKERS, POSE, ROTATION, Estimate
-from rhot_app.tracking.kalman.motion import Habits
+from rhot_app.tracking.kalman.habits import Habits
 
 Array = NDArray[np.float64]
 

@@ -24,10 +24,11 @@ from rhot_app.tracking.kalman.estimate import (
 )
 from rhot_app.tracking.kalman.forgetting import forget
 from rhot_app.tracking.kalman.gain import Gain, contract, empty_gain, misfit, solve
+from rhot_app.tracking.kalman.habits import Habits
 from rhot_app.tracking.kalman.holding import TURN_ALONE, hold, hold_size, hold_turn, let_go, rest, strangeness
 from rhot_app.tracking.kalman.limits import project
 from rhot_app.tracking.kalman.markers import Outfit, place_markers
-from rhot_app.tracking.kalman.motion import Habits, predict
+from rhot_app.tracking.kalman.motion import predict
 from rhot_app.tracking.kalman.reappearing import loosen, loosen_palm
 from rhot_app.tracking.kalman.rows import ROWS_MAX, Rows, empty_rows
 from rhot_app.tracking.kalman.share import Share

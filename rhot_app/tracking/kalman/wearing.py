@@ -19,8 +19,8 @@ from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
 from rhot_app.tracking.kalman.forgetting import WIDEST
+from rhot_app.tracking.kalman.habits import Habits
 from rhot_app.tracking.kalman.markers import Cameras, Outfit, Worn, outfit_of
-from rhot_app.tracking.kalman.motion import Habits
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.rig_arrays import band_axes
 from rhot_node.markers import Marker, MarkerSet
