@@ -126,6 +126,8 @@ class HandFilter:
         for block in blocks:
             self._first = self._used()
             block.enter(self._now)
+        if len(blocks) > 1:  # each may have taught the hand something that the ones before are to be expected by
+            self._linearise(blocks, self._now)
         likely, holds, turn, turned = prepare(self._shared, dt)
         turned = self._settle(blocks, holds, turn, turned)
         if holds and self.estimate.held[0] == TURN_HELD:
