@@ -2,14 +2,16 @@
 
 numba recompiles a function when its own file changes, but not when a function that it calls, in another file, does:
 after an update, old and new code would run mixed and nobody would notice. A folder named by a hash of all sources that
-numba compiles makes that impossible, and it is writable where the package is not. The hash is of their place as well:
-numba does not find what it compiled of the same sources in another one.
+numba compiles, and of those that these import, whose constants are compiled in, makes that impossible, and it is
+writable where the package is not. The hash is of their place as well: numba does not find what it compiled of the same
+sources in another one.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,20 +20,36 @@ VARIABLE = "NUMBA_CACHE_DIR"
 _KEPT = 3  # states of the sources: today's, and those of a checkout or two beside it
 _PACKAGES = ("rhot_node", "rhot_app")
 _COMPILERS = (b"numba", b"rhot_app.lean")
+_IMPORTS = re.compile(r"^from ([\w.]+) import ([^()\n]+|\([^)]*)", re.MULTILINE)
 _COMPLETE = "complete"
 
 
 def sources_hash(folders: Sequence[Path]) -> str:
-    """16 hex digits that change with any source file in `folders` that is compiled, and with where they lie."""
+    """16 hex digits that change with any source file in `folders` that is compiled, or imported by one that is, and
+    with where they lie."""
     digest = hashlib.sha256()
     for folder in folders:
         digest.update(bytes(folder.resolve()))
-        for path in sorted(folder.rglob("*.py")):
-            text = path.read_bytes()
-            if any(compiler in text for compiler in _COMPILERS):
-                digest.update(str(path.relative_to(folder.parent)).encode())
-                digest.update(text)
+    texts = {".".join(path.relative_to(folder.parent).with_suffix("").parts): path.read_bytes()
+             for folder in folders for path in folder.rglob("*.py")}
+    for module in sorted(_compiled_and_imported(texts)):
+        digest.update(module.encode())
+        digest.update(texts[module])
     return digest.hexdigest()[:16]
+
+
+def _compiled_and_imported(texts: dict[str, bytes]) -> set[str]:
+    """Of modules, by their dotted names, those that are compiled and all that they import, directly or not."""
+    found: set[str] = set()
+    waiting = [module for module, text in texts.items() if any(compiler in text for compiler in _COMPILERS)]
+    while waiting:
+        module = waiting.pop()
+        if module in found or module not in texts:
+            continue
+        found.add(module)
+        for package, names in _IMPORTS.findall(texts[module].decode()):
+            waiting += [package, *(f"{package}.{name}" for name in re.findall(r"\w+", names))]
+    return found
 
 
 def use_own_cache() -> None:

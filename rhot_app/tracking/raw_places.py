@@ -1,7 +1,7 @@
 """Where the cameras' sights alone have the markers, by Gauss-Newton from where the hand has them.
 
-Sights are of several instants: they are carried to one as the hand moved since. Two steps are enough, because the hand
-is never far; the result has forgotten where it began.
+Sights are of several instants: they are carried to one as the hand moved since. The steps go on until they are shorter
+than a hair, so the result has forgotten where it began.
 """
 
 from __future__ import annotations
@@ -23,7 +23,12 @@ from rhot_app.tracking.sights import Seen, is_fresh
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_STEPS = 2
+_STEPS = 10
+_SHORT_M = 1e-5
+"""Nothing is gained after so short a step; one that is never reached leads nowhere."""
+
+_FARTHEST_M = 0.3
+"""A place with a greater standard deviation, all axes together, is none: the rays are as good as parallel."""
 
 
 class RawPlaces(NamedTuple):
@@ -85,8 +90,9 @@ def _carry(half_axes: Array, cameras: Cameras, estimate: Estimate, point: Array,
             elapsed_s = 1e-9 * (t_ns - seen.times[c, m])
             for k in range(2):
                 out.pixels[c, k] = seen.pixels[c, m, k] + elapsed_s * dot(slope[k], speed)
-            out.used[c] = 1
-            count += 1
+            if _determinant(seen.covariances[c, m]) > 0.0 and math.isfinite(out.pixels[c, 0] + out.pixels[c, 1]):
+                out.used[c] = 1
+                count += 1
     return count
 
 
@@ -96,14 +102,13 @@ def _fit(half_axes: Array, cameras: Cameras, world: Array, begin: Array, m: int,
     """Fill `point` (3,) m and `covariance` (3, 3) m^2 of marker `m` from `begin` (3,); returns the error, NaN where the
     views do not determine a place."""
     pixel, slope, normal, side, step = room((2,)), room((2, 3)), room((3, 3)), room((3,)), room((3,))
-    square, count = 0.0, 0
     for i in range(3):
         point[i] = begin[i]
-    for _ in range(_STEPS + 1):  # the last one tells the error
+    for _ in range(_STEPS):
         normal[:], side[:] = 0.0, 0.0
         square, count = 0.0, 0
-        for c in range(views.used.shape[0]):
-            if c >= seen.times.shape[0] or views.used[c] == 0:
+        for c in range(seen.times.shape[0]):
+            if views.used[c] == 0:
                 continue
             if not project_marker(point, world, half_axes, cameras.pose[c], cameras.intrinsics[c], pixel, slope):
                 return math.nan
@@ -115,15 +120,23 @@ def _fit(half_axes: Array, cameras: Cameras, world: Array, begin: Array, m: int,
             return math.nan
         for i in range(3):
             point[i] += step[i]
-    return math.sqrt(square / count)
+        if dot(step, step) < _SHORT_M**2:
+            known = covariance[0, 0] + covariance[1, 1] + covariance[2, 2] < _FARTHEST_M**2
+            return math.sqrt(square / count) if known else math.nan
+    return math.nan
+
+
+@lean
+def _determinant(noise: Array) -> float:
+    """Of a sight's covariance (2, 2) px^2 as it is weighed."""
+    return float(max(noise[0, 0], EXACT_PX2) * max(noise[1, 1], EXACT_PX2) - noise[0, 1] ** 2)
 
 
 @lean
 def _add(normal: Array, side: Array, slope: Array, u: float, v: float, noise: Array) -> None:
     """Add to the normal equations what a sight tells: residuals `u` and `v` px, `slope` (2, 3) px/m, `noise` (2, 2)."""
     uu, vv = max(noise[0, 0], EXACT_PX2), max(noise[1, 1], EXACT_PX2)
-    uv = noise[0, 1]
-    determinant = uu * vv - uv * uv
+    uv, determinant = noise[0, 1], _determinant(noise)
     for i in range(3):
         a = (vv * slope[0, i] - uv * slope[1, i]) / determinant
         b = (uu * slope[1, i] - uv * slope[0, i]) / determinant
@@ -141,7 +154,7 @@ def _give_up_worst(half_axes: Array, cameras: Cameras, world: Array, begin: Arra
         if views.used[c] > 0:
             views.used[c] = 0
             found = _fit(half_axes, cameras, world, begin, m, seen, views, point, covariance)
-            if not found >= best:
+            if found < best or (math.isfinite(found) and not math.isfinite(best)):
                 best, worst = found, c
             views.used[c] = 1
     if worst >= 0:

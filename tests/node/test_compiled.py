@@ -31,6 +31,14 @@ def test_the_hash_follows_compiled_sources_only(package: Path, imported: str) ->
     (package / "fast.py").write_text(f"{imported}  # changed\n")
     changed = sources_hash([package])
     assert changed != before
+    (package / "fast.py").write_text(f"{imported}\nfrom package.slow import x\nfrom package import (\n    other,\n)\n")
+    with_imports = sources_hash([package])
+    (package / "slow.py").write_text("x = 3\n")
+    assert sources_hash([package]) != with_imports, "numbers of what is imported are compiled in"
+    with_imports = sources_hash([package])
+    (package / "other.py").write_text("y = 3\n")
+    assert sources_hash([package]) != with_imports
+    (package / "other.py").unlink()
     (package / "fast.py").rename(package / "other.py")
     assert sources_hash([package]) not in (before, changed)
 

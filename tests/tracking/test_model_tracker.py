@@ -173,6 +173,23 @@ def test_a_lossy_network_and_doubled_and_late_frames():
     assert deviations(after_s(states, 1.0), moving()).rms_mm < 2.0
 
 
+def test_what_a_late_frame_shows_is_remembered_as_if_it_had_come_in_time():
+    frames, seen = sights(RIG, moving(), 0.6), []
+    late = max(k for k, frame in enumerate(frames[:-1]) if frame.camera != frames[-1].camera)
+    fewer = frames[late].flags.copy()
+    fewer[:2] = LOST
+    frames[late] = replace(frames[late], flags=fewer)
+    for order in (frames, [*frames[:late], *frames[late + 1:], frames[late]]):
+        tracker = make_tracker(RIG)
+        for frame in order:
+            tracker.ingest(frame)
+            tracker.solve()
+        seen.append(tracker._sights.seen)
+    for name, in_time, afterwards in zip(seen[0]._fields, *seen, strict=True):
+        np.testing.assert_allclose(afterwards, in_time, rtol=1e-9, err_msg=name)
+    assert (np.diff(seen[0].times[frames[late].camera]) != 0).any()  # it does show fewer
+
+
 def test_a_frame_that_is_far_too_late_changes_nothing():
     frames = sights(RIG, moving(), 0.9)
     tracker = make_tracker(RIG)

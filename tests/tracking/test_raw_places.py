@@ -1,5 +1,7 @@
 """Where sights alone have the markers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from modelled_hand import model_rig, moving, sights
@@ -7,7 +9,7 @@ from places import places_of
 
 from rhot_app.geometry.camera import undistort_point
 from rhot_app.geometry.triangulate import triangulate
-from rhot_app.tracking.kalman.markers import project_marker
+from rhot_app.tracking.kalman.markers import Cameras, project_marker
 from rhot_app.tracking.kalman.wearing import compile_wearing
 from rhot_app.tracking.locate import GATE_FLOOR_PX
 from rhot_app.tracking.make import make_tracker
@@ -53,12 +55,12 @@ def located(estimate, wearing, places, seen):
     return out
 
 
-@pytest.mark.parametrize("off_m", [0.0, 0.03])
+@pytest.mark.parametrize("off_m", [0.0, 0.03, 0.2])
 def test_markers_are_where_sights_meet_however_far_from_the_hand_that_is(off_m):
     hand = hand_before()
     offsets = np.full((len(hand[2].points), 3), off_m)
     out = located(*hand, seen_of(*hand, offsets, (0.0, 0.0)))
-    np.testing.assert_allclose(out.positions, hand[2].points + offsets, atol=2e-5)
+    np.testing.assert_allclose(out.positions, hand[2].points + offsets, atol=1e-6)
     assert out.errors.max() < 0.01
 
 
@@ -108,12 +110,30 @@ def test_rays_that_miss_each_other_meet_nowhere_and_it_is_told_by_how_much():
     assert np.isfinite(out.positions[[0, 2, 3, 4, 5]]).all()
 
 
-def test_of_three_cameras_the_one_that_is_wrong_is_given_up():
+@pytest.mark.parametrize("camera", [0, 1, 2])
+@pytest.mark.parametrize("off_px", [(100.0, 0.0), (-100.0, 0.0), (0.0, 20.0), (np.nan, 0.0)])
+def test_of_three_cameras_the_one_that_is_wrong_is_given_up(camera, off_px):
     hand = hand_before(cameras=3)
     seen = seen_of(*hand, np.zeros((len(hand[2].points), 3)), (0.0, 0.0, 0.0))
-    seen.pixels[2, 1] += 8.0 * GATE_FLOOR_PX
+    seen.pixels[camera, 1] += off_px
     out = located(*hand, seen)
     np.testing.assert_allclose(out.positions, hand[2].points, atol=1e-5)
     assert out.errors.max() < 0.01
 
 
+@pytest.mark.parametrize("covariance", [[[1.0, 1.0], [1.0, 1.0]], [[1.0, 1.1], [1.1, 1.0]]])
+def test_a_sight_whose_covariance_is_none_is_not_used(covariance):
+    hand = hand_before()
+    seen = seen_of(*hand, np.zeros((len(hand[2].points), 3)), (0.0, 0.0))
+    seen.covariances[0, 3] = covariance
+    out = located(*hand, seen)
+    np.testing.assert_array_equal(np.isnan(out.errors), np.arange(len(out.errors)) == 3)
+
+
+def test_rays_that_are_as_good_as_parallel_meet_nowhere():
+    estimate, wearing, places = hand_before()
+    same = Cameras(np.repeat(wearing.cameras.pose[:1], 2, axis=0), np.repeat(wearing.cameras.intrinsics[:1], 2, axis=0))
+    same.pose[1, 0, 3] -= 1e-4
+    hand = estimate, replace(wearing, cameras=same), places
+    out = located(*hand, seen_of(*hand, np.zeros((len(places.points), 3)), (0.0, 0.0)))
+    assert np.isnan(out.positions).all() and np.isnan(out.covariances).all()

@@ -19,6 +19,13 @@ def test_a_marker_without_a_place_on_the_hand_is_refused(role, said):
         make_tracker(rig)
 
 
+def test_two_markers_in_one_place_are_refused():
+    markers = (*RIG.markers.markers[:5], msgspec.structs.replace(RIG.markers.markers[5], role="index_tip"))
+    rig = msgspec.structs.replace(RIG, markers=msgspec.structs.replace(RIG.markers, markers=markers))
+    with pytest.raises(RigError, match=r"markers 'index.*' and 'wrist' both have the role 'index_tip'"):
+        make_tracker(rig)
+
+
 def test_a_rig_without_calibration_is_refused():
     rig = msgspec.structs.replace(RIG, depth=DepthSettings(mode="disparity"))
     with pytest.raises(RigError, match=r"The model tracker needs calibrated cameras.*tracker\.kind"):

@@ -166,9 +166,3 @@ def take_size(estimate: Estimate, size: Array) -> None:
             covariance[i, SCALE] *= share
     covariance[SCALE, SCALE] = size[1]
     estimate.log_scale[0] = size[0]
-
-
-@lean
-def scale_of(estimate: Estimate) -> float:
-    """Factor on every length of the hand."""
-    return math.exp(estimate.log_scale[0])

@@ -103,8 +103,11 @@ def forget(estimate: Estimate, dt: float, habits: Habits, bias_variance: Array, 
                 constant = HIDDEN_S
                 if _palm_shown(jacobian) > 0:
                     constant = SHAPE_S if _placed(jacobian) else ALONE_S
+            settled = _is_settled(estimate)
             open_up(estimate, -math.expm1(-passed / constant), habits, bias_variance, jacobian, opening, step)
-            _note_turning(estimate, step[ROTATION:ANGLES])
+            if settled and how == TURN_HELD:  # what habit has to bring on turns
+                turned = math.sqrt(step[ROTATION] ** 2 + step[ROTATION + 1] ** 2 + step[ROTATION + 2] ** 2)
+                estimate.turning[0] = max(estimate.turning[0], turned / passed)
         mirror(estimate.covariance)  # rounding must not make it unsymmetric: what fades would let it grow
         estimate.unfaded[what] = 0.0
     if how > TURN_HELD or _palm_shown(jacobian) >= ENOUGH:
@@ -149,14 +152,12 @@ def _placed(jacobian: Array) -> bool:
 
 
 @lean
-def _note_turning(estimate: Estimate, turned: Array) -> None:
-    """A palm whose held turn habit has to bring on, by `turned` (3,) rad since knowledge last faded, does turn."""
+def _is_settled(estimate: Estimate) -> bool:
+    """Whether it has been found how the palm is turned."""
     doubt = 0.0
     for i in range(ROTATION, ANGLES):
         doubt += estimate.covariance[i, i]
-    if estimate.held[0] == TURN_HELD and doubt < SETTLED_RAD * SETTLED_RAD:
-        rate = math.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2) / estimate.unfaded[OPENING]
-        estimate.turning[0] = max(estimate.turning[0], rate)
+    return bool(doubt < SETTLED_RAD * SETTLED_RAD)
 
 
 @lean

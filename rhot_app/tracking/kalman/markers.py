@@ -85,7 +85,8 @@ def empty_places(dh: DhArrays) -> Places:
 
 
 class Outfit(NamedTuple):
-    """What never changes: `made` (M,) m^2, the variance of the markers' places by their making; and room to work in."""
+    """What a hand wears before which cameras: `made` (M,) m^2, the variance of the markers' places by their making; and
+    room to work in, which every function fills anew."""
 
     worn: Worn
     cameras: Cameras

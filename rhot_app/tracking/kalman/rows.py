@@ -11,15 +11,15 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.tracking.kalman.estimate import Estimate
+from rhot_app.tracking.kalman.estimate import MOST_MARKERS, Estimate
 from rhot_app.tracking.kalman.share import Share
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-ROWS_MAX = 128
-"""Rows of an update: all markers of two frames, and more."""
+ROWS_MAX = 4 * MOST_MARKERS
+"""Rows of an update: two of each marker in two frames."""
 
 PALM_PART = -1
 """The part of the hand that an observation is attached to: the palm, or the index of a finger."""

@@ -1,9 +1,9 @@
 """One reference to many arrays, lent to compiled functions.
 
 numba unpacks every array of every call, a quarter of a microsecond each, and a filter has eighty of them; a `Share` it
-takes as one. And numba counts references: wherever a function takes arrays, or cuts a row out of one, a counter goes up
-and down again, atomically, 14,000 times per frame of a hand - a quarter of all that a frame took. Arrays of a `Share`
-are lent: they have no counter, and the `Share` itself keeps them alive.
+takes as one. Its arrays are lent: they have no references that numba counts (`lean.py` says what that costs), and the
+`Share` itself keeps them alive. So compiled code must not return any of them. A `Share` that compiled code makes owns
+what is in it.
 """
 
 from __future__ import annotations

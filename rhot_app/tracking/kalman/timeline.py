@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Protocol
@@ -80,22 +80,22 @@ class Timeline:
         self._moments.clear()
         self.t_ns = t_ns
 
-    def add(self, block: TimedBlock) -> list[tuple[TimedBlock, Outcome]]:
-        """Weigh a block, and once more all that are later than it. Returns what became of each; empty: too late."""
+    def add(self, block: TimedBlock) -> Iterator[tuple[TimedBlock, Outcome]]:
+        """Weigh a block, and once more all that are later than it. Yields what became of each before the next one is
+        weighed, which overwrites it; nothing when it came too late."""
         place = bisect_right(self._moments, block.t_ns, key=_INSTANT)
         if block.t_ns < (self._moments[0].before_ns if self._moments else self.t_ns):
             self.dropped += 1
-            return []
+            return
         again: Sequence[_Moment] = self._moments[place:]
         if again:
             copy_estimate(again[0].before, self._hand.estimate)
             self.t_ns = again[0].before_ns
             del self._moments[place:]
-        outcomes = [(block, self._weigh(block))]
+        yield block, self._weigh(block)
         for moment in again:
             self._spare.append(moment.before)
-            outcomes.append((moment.block, self._weigh(moment.block)))
-        return outcomes
+            yield moment.block, self._weigh(moment.block)
 
     def _weigh(self, block: TimedBlock) -> Outcome:
         estimate, beside = self._hand.estimate, self._beside(block)

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.errors import RigError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import NaturalPose
@@ -81,7 +82,13 @@ class Wearing:
 
 
 def compile_wearing(rig: Rig) -> Wearing:
-    """The arrays of a validated rig. Raises RigError when a marker has no place on the hand."""
+    """The arrays of a validated rig. Raises RigError when a marker has no place on the hand, or another one's."""
+    worn_by: dict[str | None, str] = {}
+    for marker in rig.markers.markers:
+        if marker.role is not None and marker.role in worn_by:
+            raise RigError(f"markers {worn_by[marker.role]!r} and {marker.id!r} both have the role {marker.role!r}; give "
+                           "each a place of its own.")
+        worn_by[marker.role] = marker.id
     model = build_model(rig.hand)
     natural = natural_of(model, rig.tracker.variant)
     places = tuple(place_of(marker, model) for marker in rig.markers.markers)

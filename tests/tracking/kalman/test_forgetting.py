@@ -230,7 +230,8 @@ def test_a_finger_out_of_sight_soon_bends_as_its_neighbours_do():
 
 @pytest.mark.parametrize(("how", "doubt_rad", "turns"), [(TURN_HELD, 0.5 * SETTLED_RAD, True),
                                                          (FREE, 0.5 * SETTLED_RAD, False),
-                                                         (TURN_HELD, 1.1 * SETTLED_RAD, False)])
+                                                         (TURN_HELD, 0.98 * SETTLED_RAD, True),
+                                                         (TURN_HELD, 1.02 * SETTLED_RAD, False)])
 def test_a_palm_that_habit_turns_is_taken_to_turn_once_it_has_been_found(how, doubt_rad, turns):
     estimate, step = moving_estimate(), np.zeros(SIZE)
     estimate.held[0], estimate.turning[0] = how, 0.0

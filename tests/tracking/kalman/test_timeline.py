@@ -18,7 +18,7 @@ def follow(frames):
     known, last = settled()
     copy_estimate(known, hand.estimate)
     timeline.begin(last.t_ns)
-    outcomes = [timeline.add(block) for block in frames]
+    outcomes = [list(timeline.add(block)) for block in frames]
     return timeline, twin(hand.estimate), outcomes
 
 
@@ -58,8 +58,8 @@ def test_a_new_beginning_forgets_the_past():
     frames = frames_to_come()
     timeline, _, _ = follow(frames[:10])
     timeline.begin(frames[12].t_ns)
-    assert timeline.add(frames[5]) == [] and timeline.dropped == 1
-    assert len(timeline.add(frames[13])) == 1
+    assert list(timeline.add(frames[5])) == [] and timeline.dropped == 1
+    assert len(list(timeline.add(frames[13]))) == 1
 
 
 def test_what_is_remembered_is_whole_and_its_own():
@@ -110,7 +110,7 @@ def test_a_frame_that_turns_the_hand_is_weighed_with_the_one_before(turns, speed
     timeline = Timeline(hand)
     timeline.begin(0)
     one, other = Glimpse(10_000_000, 0), Glimpse(10_000_000 + since_ns, camera)
-    timeline.add(one)
+    list(timeline.add(one))
     (weighed, outcome), = timeline.add(other)
     told = [(10_000_000, one), (since_ns, other)]
     if together:
