@@ -86,8 +86,8 @@ def compile_wearing(rig: Rig) -> Wearing:
     worn_by: dict[str | None, str] = {}
     for marker in rig.markers.markers:
         if marker.role is not None and marker.role in worn_by:
-            raise RigError(f"markers {worn_by[marker.role]!r} and {marker.id!r} both have the role {marker.role!r}; give "
-                           "each a place of its own.")
+            raise RigError(f"markers {worn_by[marker.role]!r} and {marker.id!r} both have the role {marker.role!r}; "
+                           "give each a place of its own.")
         worn_by[marker.role] = marker.id
     model = build_model(rig.hand)
     natural = natural_of(model, rig.tracker.variant)
