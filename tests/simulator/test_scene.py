@@ -87,5 +87,5 @@ def test_nodes_share_the_markers_and_keep_to_this_machine() -> None:
 
 
 def test_impossible_scenes_are_refused_with_a_sentence() -> None:
-    with pytest.raises(SimulatorError, match="distance_m"):
+    with pytest.raises(SimulatorError, match=r"--distance 0\.01: expected a number >= 0\.15"):
         scene_from("--distance", "0.01")

@@ -100,5 +100,5 @@ def test_colours_of_a_set_are_apart(markers: MarkerSet, apart: float) -> None:
 
 def test_a_role_that_is_no_place_on_the_hand_is_named() -> None:
     right = build_model(load_hand(resource_path("hands", "right.json")))
-    with pytest.raises(RigError, match=r"role None.*palm_index"):
+    with pytest.raises(RigError, match=r"'red' has no role.*palm_index"):
         build_body(right, load_markers(resource_path("markers", "trifinger_cube.json")))
