@@ -13,6 +13,7 @@ import hashlib
 import os
 import re
 import shutil
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -77,6 +78,13 @@ def is_complete() -> bool:
 def is_cold() -> bool:
     """Whether nothing has been compiled yet for the present sources, so that the first start takes long."""
     return VARIABLE not in os.environ or not (is_complete() or any(Path(os.environ[VARIABLE]).rglob("*.nbi")))
+
+
+def announce_compilation() -> None:
+    """Say on standard error why the first run of all takes long; later ones say nothing."""
+    if is_cold():
+        print("rhot: the numerical code is being compiled, once for these sources; that takes up to two minutes.",
+              file=sys.stderr, flush=True)
 
 
 def is_compiled_in(cache: Path) -> bool:

@@ -10,6 +10,7 @@ import functools
 import json
 import logging
 import os
+import sys
 from pathlib import Path
 
 from rhot_app.engine.directory import default_directory
@@ -50,5 +51,9 @@ def run(args: argparse.Namespace) -> int:
             serve.engine.start()
         if args.json:
             print(json.dumps({"pid": os.getpid(), "directory": str(serve.directory.path), "rig": rig.name}), flush=True)
+        else:
+            told = "nodes are told to stream" if args.start else "nodes stream once a client says start"
+            print(f"rhot: the engine of {rig.name} serves clients in {serve.directory.path}; {told}. Ctrl+C ends it.",
+                  file=sys.stderr, flush=True)
         serve.server.run()
     return 0

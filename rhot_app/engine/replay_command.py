@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from rhot_app.engine.command import add_serving_arguments
 from rhot_app.errors import RecordingError
+from rhot_node.compiled import announce_compilation
 
 if TYPE_CHECKING:
     from rhot_app.engine.serve import Serving
@@ -49,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
     reader = LogReader(args.path)
     rig = load_rig(args.rig) if args.rig is not None else reader.rig
     if args.json:
+        announce_compilation()
         print(json.dumps(summarise(reader, rig, make_tracker(rig))))
         return 0
     reader.close()

@@ -20,6 +20,7 @@ from rhot_app.engine.server import Server, StatePublisher
 from rhot_app.project import Rig
 from rhot_app.sources.realtime import share_interpreter
 from rhot_app.tracking.make import make_tracker
+from rhot_node.compiled import announce_compilation
 from rhot_node.keys import KeyPair
 
 _COLLECT_S = 5.0
@@ -42,6 +43,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
 
     Raises EngineError when another engine holds the directory, SourceError when a port is taken.
     """
+    announce_compilation()
     place = open_directory(directory)
     lock = EngineLock(place)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()

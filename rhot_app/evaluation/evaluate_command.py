@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
+from rhot_node.compiled import announce_compilation
 
 _OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs")
 _JUDGED_S = 0.1  # shorter is no run
@@ -133,6 +134,7 @@ def _compare(args: argparse.Namespace) -> int:
     except OSError as exc:
         raise SimulatorError(f"--logs {folder}: logs cannot be kept there ({exc.strerror}); choose another folder."
                              ) from exc
+    announce_compilation()
     line = ProgressLine("")
     result = compare(wanted, folder, {name: TRACKERS[name] for name in names},
                      lambda title: ProgressLine(f"filming {title}"), line.report)

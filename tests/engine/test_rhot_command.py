@@ -114,6 +114,7 @@ def test_background_engine_is_killed_found_dead_and_started_again(tmp_path: Path
     directory = EngineClient(place).directory
     (started,) = started_processes(directory)
     assert (started.pid, started.role) == (pid, "engine")
+    assert f"serves clients in {place}" in directory.log_file.read_text()
     os.kill(pid, signal.SIGKILL)
     eventually(lambda: running_engine(place) is None)
     again = ensure_engine(rig_path, place)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rhot_node.compiled import VARIABLE, is_cold, is_complete, mark_complete, sources_hash
+from rhot_node.compiled import VARIABLE, announce_compilation, is_cold, is_complete, mark_complete, sources_hash
 
 
 @pytest.fixture
@@ -86,11 +86,16 @@ def test_complete_belongs_to_one_folder(tmp_path: Path, monkeypatch: pytest.Monk
     mark_complete()
 
 
-def test_a_cache_is_cold_until_anything_was_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cache_is_cold_until_anything_was_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                     capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     assert is_cold()
+    announce_compilation()
+    assert "being compiled" in capsys.readouterr().err
     (tmp_path / "detect_1").mkdir()
     (tmp_path / "detect_1" / "kernel.py311.nbi").touch()
     assert not is_cold()
+    announce_compilation()
+    assert capsys.readouterr().err == ""
     monkeypatch.delenv(VARIABLE)
     assert is_cold()

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import add_json_argument, announce_compilation, show
+from rhot_app.calibration.commands.output import add_json_argument, show
 from rhot_app.errors import CalibrationError
+from rhot_node.compiled import announce_compilation
 
 if TYPE_CHECKING:
     import numpy as np

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from rhot_app.calibration.verdict import Verdict
-from rhot_node.compiled import is_cold
 
 
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
@@ -23,13 +22,6 @@ def require_folder(out: Path | None) -> None:
 
     if out is not None and not out.parent.is_dir():
         raise CalibrationError(f"{out}: there is no folder {out.parent}. Make it first, or name another place.")
-
-
-def announce_compilation() -> None:
-    """Say on standard error why the first run of all takes long; later ones say nothing."""
-    if is_cold():
-        print("rhot: the numerical code is being compiled, once for these sources; that takes up to a minute.",
-              file=sys.stderr, flush=True)
 
 
 def tell(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json: bool) -> None:
