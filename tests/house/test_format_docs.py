@@ -11,6 +11,7 @@ import pytest
 from rhot_app import project
 from rhot_app.calibration import intrinsics_file
 from rhot_app.hand import anatomy, articulated, couplings
+from rhot_app.tracking.state import HandState
 from rhot_node import config, markers
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -49,3 +50,9 @@ def test_the_page_names_every_field(page: str, format_name: str, version: int,
     missing = [f"{struct.__name__}.{field}" for struct in structs for field in struct.__struct_fields__
                if f"`{field}`" not in text]
     assert not missing, f"docs/{page} does not explain {', '.join(missing)}"
+
+
+def test_the_page_about_states_names_every_field() -> None:
+    text = (DOCS / "states.md").read_text()
+    missing = [name for name in HandState.__slots__ if f"`{name}`" not in text]
+    assert not missing, f"docs/states.md does not explain {', '.join(missing)}"

@@ -1,0 +1,54 @@
+"""The programs that the documents print do what the documents say, as written there."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rhot_app.project import save_rig
+from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def program(page: str) -> str:
+    """The first Python program of a page."""
+    found = re.search(r"```python\n(.*?)```", (DOCS / page).read_text(), re.DOTALL)
+    assert found is not None, f"docs/{page} shows no program"
+    return found[1]
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    """One in which an engine's default directory is the test's own."""
+    return {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "PYTHONUNBUFFERED": "1"}
+
+
+def test_programs_read_states_of_an_engine_and_of_its_log(tmp_path: Path, environment: dict[str, str]) -> None:
+    rig = synthetic_rig()
+    save_rig(tmp_path / "my_rig.json", rig)
+    nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
+    for node in nodes:
+        node.start()
+    command = [sys.executable, "-m", "rhot_app", "engine", "--rig", "my_rig.json", "--start", "--log", "take.rhotlog"]
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True) as engine:
+        assert engine.stderr is not None and "serves clients" in engine.stderr.readline()
+        with subprocess.Popen([sys.executable, "-c", program("states.md")], env=environment, stdout=subprocess.PIPE,
+                              text=True) as reader:
+            assert reader.stdout is not None
+            assert reader.stdout.readline().startswith("[")
+            reader.kill()
+        engine.send_signal(signal.SIGTERM)
+        assert engine.wait(10) == 0
+    for node in nodes:
+        node.close()
+    done = subprocess.run([sys.executable, "-c", program("tracking.md")], cwd=tmp_path, env=environment, text=True,
+                          capture_output=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "TRACKING" in done.stdout
