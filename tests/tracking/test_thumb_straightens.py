@@ -59,3 +59,10 @@ def test_it_does_so_because_what_turns_the_hand_is_weighed_with_the_frame_before
     together = rms(off_mm(0.12))
     monkeypatch.setattr(timeline, "BESIDE_NS", 0)
     assert together < 0.5 * rms(off_mm(0.12))
+
+
+def test_it_is_told_as_well_known_as_it_is_when_it_turns_out_to_bend_the_other_way():
+    truth = bending(1.0, 0.35)
+    told = after_s(states_of(RIG, sights(RIG, truth, 2.2)), 0.9)
+    sd_mm = [1e3 * np.sqrt(np.trace(state.fingertip_covariances[0])) for state in told]
+    assert max(sd_mm) < 5.0

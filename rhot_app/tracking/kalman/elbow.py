@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.finger_ik import solve_finger
-from rhot_app.hand.kinematics import forward
+from rhot_app.hand.kinematics import TWIST, forward, jacobian
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.tracking.kalman.estimate import Estimate
-from rhot_app.tracking.kalman.reappearing import forget_finger
+from rhot_app.hand.skeleton import ANGLE_SLICES, JOINTS, HandPose
+from rhot_app.tracking.kalman.estimate import ANGLES, Estimate
+from rhot_app.tracking.kalman.reappearing import forget_course
 
 Array = NDArray[np.float64]
 
@@ -25,6 +25,9 @@ BACKWARDS_RAD = np.radians(5.0)
 
 _AT_END_RAD, _CLIPPED = np.radians(1.0), 2.0
 """Outer joints this near to the end of their way back would go on if they could: that counts as so much strain."""
+
+_STAYS_M = 1e-4
+"""The tip is as well known afterwards as before, and this much less."""
 
 _THUMB = ANGLE_SLICES[0]
 _ROOT, _OUTER = 1, slice(3, 5)
@@ -40,10 +43,12 @@ def unbend(estimate: Estimate, model: HandModel, usual: Array) -> bool:
     """Bend the thumb forwards if that is more natural and leaves its tip in place; returns whether it was. One that
     is about as natural is preferred to a thumb at the end of its way back.
 
-    `usual` (27, 27) as in `Habits`: what is known of the thumb's angles afterwards.
+    The tip is known as well as before; of how the joints are bent without moving it, nothing is known but `usual`
+    (27, 27), as in `Habits`, and of how they change, nothing.
     """
     world, angles = estimate.world, estimate.angles[_THUMB].copy()
     target = forward(model, HandPose(world, estimate.angles)).marker_centres[0]
+    before = _leverage(estimate, model)
     mirrored = angles.copy()
     mirrored[_OUTER] *= -1.0
     mirrored[_ROOT] += _LEVERS @ angles[_OUTER]
@@ -54,8 +59,30 @@ def unbend(estimate: Estimate, model: HandModel, usual: Array) -> bool:
     if not found.reached or found.angles[_OUTER].sum() < 0.0 or _strain(model, found.angles) >= strain:
         return False
     estimate.angles[_THUMB] = found.angles
-    forget_finger(estimate, 0, usual)
+    _carry_over(estimate, before, _leverage(estimate, model), usual[ANGLES:, ANGLES:][_THUMB, _THUMB])
+    forget_course(estimate, 0)
     return True
+
+
+def _leverage(estimate: Estimate, model: HandModel) -> Array:
+    """(3, 5) m per rad: how the thumb's marker goes with its angles."""
+    pose = HandPose(estimate.world, estimate.angles)
+    return jacobian(model, pose)[len(JOINTS), :, TWIST:][:, _THUMB]
+
+
+def _carry_over(estimate: Estimate, before: Array, after: Array, usual: Array) -> None:
+    """What was known of the thumb's angles by way of its tip, for joints that are bent otherwise.
+
+    The new angles move the tip as the old ones did, each by as much as it usually takes part; what leaves the tip in
+    place is as free as it usually is. So the covariance of the tip stays what it was, with all that it has to do with
+    the palm.
+    """
+    gain = usual @ after.T @ np.linalg.inv(after @ usual @ after.T + _STAYS_M ** 2 * np.eye(3))
+    carried, free = gain @ before, np.eye(len(usual)) - gain @ after
+    rows, covariance = slice(ANGLES + _THUMB.start, ANGLES + _THUMB.stop), estimate.covariance
+    covariance[rows] = carried @ covariance[rows]
+    covariance[:, rows] = covariance[:, rows] @ carried.T
+    covariance[rows, rows] += free @ usual @ free.T + _STAYS_M ** 2 * gain @ gain.T
 
 
 def _strain(model: HandModel, angles: Array) -> float:

@@ -70,15 +70,26 @@ def forget_finger(estimate: Estimate, finger: int, usual: Array) -> None:
     covariance = estimate.covariance
     for i in range(ANGLES, POSE):
         if GROUP_OF[i] == FIRST_FINGER + finger:
-            estimate.velocity[i], estimate.acceleration[i] = 0.0, 0.0
-            for base in (0, VELOCITY, ACCELERATION):
-                covariance[base + i] = 0.0
-                covariance[:, base + i] = 0.0
+            covariance[i] = 0.0
+            covariance[:, i] = 0.0
     for i in range(ANGLES, POSE):
         if GROUP_OF[i] == FIRST_FINGER + finger:
             for j in range(ANGLES, POSE):
                 if GROUP_OF[j] == FIRST_FINGER + finger:
                     covariance[i, j] = usual[i, j]
+    forget_course(estimate, finger)
+
+
+@lean
+def forget_course(estimate: Estimate, finger: int) -> None:
+    """Leave of what is known of how a finger's angles change nothing, not even what they seemed to do."""
+    covariance = estimate.covariance
+    for i in range(ANGLES, POSE):
+        if GROUP_OF[i] == FIRST_FINGER + finger:
+            estimate.velocity[i], estimate.acceleration[i] = 0.0, 0.0
+            for base in (VELOCITY, ACCELERATION):
+                covariance[base + i] = 0.0
+                covariance[:, base + i] = 0.0
             covariance[VELOCITY + i, VELOCITY + i] = SPEED * SPEED
             covariance[ACCELERATION + i, ACCELERATION + i] = HASTE * HASTE
 
