@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import os
 import sys
@@ -61,15 +62,28 @@ def _run(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="rhot", description="Track a hand with two or more cheap cameras. Without a command: open the app.")
     parser.add_argument("--version", action="version", version=f"rhot {version('rhot')}")
+    rooms = {"": parser}
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for key, subcommand in SUBCOMMANDS.items():
         room = commands.add_parser(key, help=subcommand.summary, description=f"{subcommand.summary.capitalize()}.")
+        rooms[key] = room
         if subcommand is chosen:  # only this one's room is imported: help stays fast
             _load(subcommand.module).add_arguments(room)
     module = _load(APP if chosen is None else chosen.module)
     if chosen is None:
         module.add_arguments(parser)
-    return int(module.run(parser.parse_args(arguments)))
+    parsed, strange = parser.parse_known_args(arguments)
+    if strange:
+        asked = rooms["" if chosen is None or name is None else name]
+        asked.error(f"there is no {strange[0]!r} here{_meant(strange[0], asked)}")
+    return int(module.run(parsed))
+
+
+def _meant(strange: str, parser: argparse.ArgumentParser) -> str:
+    """The option that somebody may have meant by a strange one, as the end of a sentence."""
+    known = [option for action in parser._actions for option in action.option_strings]
+    near = difflib.get_close_matches(strange.split("=")[0], known, n=1)
+    return f"; did you mean {near[0]}?" if near else ". See --help."
 
 
 def _load(name: str) -> ModuleType:

@@ -41,6 +41,11 @@ class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     cy: float
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
 
+    @property
+    def nominal(self) -> bool:
+        """Whether nobody has calibrated this lens: exactly centred, without distortion."""
+        return (self.cx, self.cy) == ((self.width - 1) / 2, (self.height - 1) / 2) and not any(self.distortion)
+
 
 class CameraPose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """world_from_camera: unit quaternion wxyz and translation in metres (the camera's centre in the rig frame)."""
@@ -200,6 +205,11 @@ def model_tracker_obstacle(rig: Rig) -> Obstacle | None:
                         "carry none.", "Run rhot-node there and take text_datagrams out of the rig file, or use the "
                         "classic tracker (tracker.kind).")
     return None
+
+
+def with_tracker(rig: Rig, kind: Literal["classic", "model"]) -> Rig:
+    """The rig with another kind of tracker, which may assume what the one before might."""
+    return msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, kind=kind))
 
 
 def load_rig(path: Path) -> Rig:

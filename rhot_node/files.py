@@ -43,7 +43,9 @@ def decode_document(data: bytes, kind: type[T], *, format_name: str, version: in
     """
     try:
         raw: Any = json.loads(data)
-    except (UnicodeDecodeError, json.JSONDecodeError) as exc:
+    except UnicodeDecodeError as exc:
+        raise error(f"{where}: this is no text, so no {format_name} file. Is it the right file?") from exc
+    except json.JSONDecodeError as exc:
         raise error(f"{where}: not valid JSON ({exc}). Is the file complete?") from exc
     if not isinstance(raw, dict) or raw.get("format") != format_name:
         found = raw.get("format") if isinstance(raw, dict) else type(raw).__name__

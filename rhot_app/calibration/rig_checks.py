@@ -58,10 +58,15 @@ def _tracker_findings(rig: Rig) -> list[Finding]:
     obstacle = model_tracker_obstacle(rig)
     if obstacle is not None:
         return [Finding("tracker", Grade.POOR, obstacle.why, remedy=obstacle.remedy)]
+    nominal = [node.name for node in rig.nodes if node.intrinsics.nominal]
+    found = [Finding("tracker", Grade.FAIR, "The model tracker takes lenses as exact, and those of "
+                     f"{' and '.join(nominal)} are nominal: it is surer than it may be.",
+                     remedy="Calibrate, or use the classic tracker until then (tracker.kind).")] if nominal else []
     homeless = [marker.id for marker in rig.markers.markers
                 if (marker.role or "").removeprefix(OTHER_HAND) not in ROLES]
-    return [Finding("tracker", Grade.POOR, f"The model tracker needs a place on the hand for marker {name}.",
-                    remedy="Give it a role, or use the classic tracker (tracker.kind).") for name in homeless]
+    return [*found, *(Finding("tracker", Grade.POOR, f"The model tracker needs a place on the hand for marker {name}.",
+                              remedy="Give it a role, or use the classic tracker (tracker.kind).")
+                      for name in homeless)]
 
 
 def _summary(rig: Rig, findings: list[Finding]) -> str:

@@ -40,12 +40,6 @@ def lens_of(node: RigNode) -> LensStart:
     return LensStart(np.array([lens.fx, lens.fy, lens.cx, lens.cy, *lens.distortion]), (lens.width, lens.height))
 
 
-def is_nominal(node: RigNode) -> bool:
-    """Whether nobody has calibrated this lens: exactly centred, without distortion."""
-    lens = node.intrinsics
-    return (lens.cx, lens.cy) == ((lens.width - 1) / 2, (lens.height - 1) / 2) and not any(lens.distortion)
-
-
 def calibrated_rig(rig: Rig, figures: StereoFigures, frame: WorldFrame | None = None) -> Rig:
     """`rig` with the lenses and places of the calibrated cameras, in the table's `frame` where one was placed.
 

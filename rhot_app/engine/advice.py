@@ -170,6 +170,16 @@ def _link_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     return found
 
 
+def tracker_advice(rig: Rig) -> list[Advice]:
+    """What the rig's tracker takes for granted and is not so."""
+    nominal = [node.name for node in rig.nodes if node.intrinsics.nominal]
+    if rig.tracker.kind != "model" or not nominal:
+        return []
+    return [Advice("warning", f"Nobody has calibrated the lenses of {' and '.join(nominal)}, and the model tracker "
+                              "takes them as exact: it is surer than it may be. Calibrate them, or choose the classic "
+                              "tracker.")]
+
+
 def _sight_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:
     unseen = [(seconds, marker) for seconds, marker in zip(facts.unseen_s, marker_ids, strict=True)
               if seconds > UNSEEN_S]

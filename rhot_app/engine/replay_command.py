@@ -28,6 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", type=Path, metavar="LOG", help="a raw log written by rhot engine --log or the app")
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
+    parser.add_argument("--tracker", choices=("classic", "model"), default=None,
+                        help="track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="N",
                         help="times real time, or max for as fast as possible (default 1)")
     parser.add_argument("--json", action="store_true",
@@ -41,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Replay; with clients to serve, until the log's end, SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.replay_summary import summarise
     from rhot_app.engine.serve import serving
-    from rhot_app.project import load_rig
+    from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogReplay
     from rhot_app.tracking.make import make_tracker
@@ -49,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
     reader = LogReader(args.path)
     rig = load_rig(args.rig) if args.rig is not None else reader.rig
+    if args.tracker is not None:
+        rig = with_tracker(rig, args.tracker)
     if args.json:
         announce_compilation()
         print(json.dumps(summarise(reader, rig, make_tracker(rig))))
@@ -85,7 +89,10 @@ def _speed(text: str) -> float | None:
     """Times real time; None for max."""
     if text == "max":
         return None
-    speed = float(text)
+    try:
+        speed = float(text)
+    except ValueError as exc:
+        raise argparse.ArgumentTypeError(f"{text} is neither a number nor max") from exc
     if not 0.001 <= speed <= 1000.0:
         raise argparse.ArgumentTypeError(f"{text} is not between 0.001 and 1000; say max for as fast as possible")
     return speed

@@ -18,6 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f"what the hand does: {names}, or a motion file (default {TwinChoice().motion})")
     parser.add_argument("--seed", type=int, default=TwinChoice().seed, metavar="N",
                         help=f"seed of noise, clocks and cloth (default {TwinChoice().seed})")
+    parser.add_argument("--tracker", choices=("classic", "model"), default=TwinChoice().tracker,
+                        help=f"what makes a hand of the markers (default {TwinChoice().tracker})")
     add_window_arguments(parser)
 
 
@@ -29,4 +31,4 @@ def run(args: argparse.Namespace) -> int:
         if not Path(motion).exists():
             raise SimulatorError(f"There is no motion {motion!r}; there are {', '.join(names)}, and motion files.")
         motion = str(Path(motion).absolute())
-    return open_window(args, rig=None, twin=TwinChoice(motion=motion, seed=args.seed))
+    return open_window(args, rig=None, twin=TwinChoice(motion=motion, seed=args.seed, tracker=args.tracker))

@@ -22,6 +22,7 @@ from rhot_app.project import (
     TrackerSettings,
     load_rig,
     save_rig,
+    with_tracker,
 )
 from rhot_node.files import resource_path
 
@@ -65,6 +66,8 @@ def test_a_rig_that_nobody_calibrated_is_not_called_good() -> None:
     report = check_rig(load_rig(resource_path("rigs", "two_pis.json")))
     assert report.verdict.codes == {"nominal"}
     assert report.verdict.grade is Grade.FAIR
+    trusting = check_rig(with_tracker(load_rig(resource_path("rigs", "two_pis.json")), "model"))
+    assert trusting.verdict.codes == {"nominal", "tracker"}
 
 
 LENSES: list[tuple[str, Grade, dict[str, object]]] = [

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice
+from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice, tracker_advice
 from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import NodeStatus
+from rhot_app.project import load_rig, with_tracker
+from rhot_node.files import resource_path
 
 IDS = ("thumb", "index", "wrist")
 STATUS = NodeStatus(1, "left", "streaming", False, 100.0, 1000, 0, {}, 1.0, 1e-4, 2e-4, paired=True)
@@ -67,3 +69,10 @@ def test_one_sentence_when_nobody_sees_anything() -> None:
     assert "No camera has seen a marker for 8 s" in advice.text
     assert node_advice(blind, IDS, True, sight=False) == []
     assert no_marker_advice([blind, WELL], running=True) == []
+
+
+def test_lenses_that_nobody_calibrated_are_no_lenses_to_be_sure_of() -> None:
+    rig = load_rig(resource_path("rigs", "two_pis.json"))
+    assert tracker_advice(with_tracker(rig, "classic")) == []
+    (advice,) = tracker_advice(with_tracker(rig, "model"))
+    assert "left and right" in advice.text and "Calibrate" in advice.text

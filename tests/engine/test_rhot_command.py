@@ -49,6 +49,9 @@ def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
         (("engine", "--rig", str(tmp_path / "no.json")), "no.json: no such file"),
         (("engine", "--rig", str(tmp_path / "half.json")), "half.json: not valid JSON"),
         (("replay", str(tmp_path / "foreign.log"), "--json"), "foreign.log: this is not a raw log"),
+        (("engine", "--rig", str(tmp_path / "foreign.log")), "foreign.log: not valid JSON"),
+        (("replay", str(tmp_path / "foreign.log"), "--speed", "fast"), "fast is neither a number nor max"),
+        (("replay", str(tmp_path / "foreign.log"), "--jsn"), "there is no '--jsn' here; did you mean --json?"),
         (("dance",), "dance"),
     ]:
         done = rhot(*arguments)
@@ -82,7 +85,9 @@ def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
         node.close()
     assert running_engine(place) is None
     assert len(list(LogReader(log_path))) > 100
+    by_model = json.loads(rhot("replay", str(log_path), "--json", "--tracker", "model").stdout)
     summary = json.loads(rhot("replay", str(log_path), "--json").stdout)
+    assert by_model["states"] > 1.5 * summary["states"], "one per frame, not one per pair"
     assert summary["states"] > 20
     assert summary["markers"]["wrist"]["measured_fraction"] > 0.9
     ended = rhot("replay", str(log_path), "--speed", "max", "--directory", str(place))

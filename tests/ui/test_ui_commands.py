@@ -28,6 +28,11 @@ def test_the_demo_takes_a_motion_and_a_seed(opened):
     assert opened == [(None, TwinChoice(motion="pinch", seed=7))]
 
 
+def test_the_demo_takes_a_tracker(opened, capsys):
+    assert main(["demo", "--tracker", "model"]) == 0
+    assert opened == [(None, TwinChoice(tracker="model"))]
+
+
 def test_the_demo_takes_a_motion_file(opened, tmp_path):
     path = tmp_path / "mine.json"
     path.write_text("{}")

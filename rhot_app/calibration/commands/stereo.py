@@ -88,7 +88,7 @@ def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig
     from rhot_app.calibration.lens_search import find_lens
     from rhot_app.calibration.stereo import calibrate
     from rhot_app.calibration.stereo_reading import read_shared, read_view
-    from rhot_app.calibration.stereo_rig import is_nominal, lens_of
+    from rhot_app.calibration.stereo_rig import lens_of
     from rhot_app.calibration.world_frame import place_world
 
     board = board_of(args)
@@ -101,7 +101,7 @@ def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig
     nodes = {node.name: node for node in base.nodes}
     report = calibrate(
         read.views, lenses, refine=args.refine_intrinsics, known=known,
-        remembered=[None if is_nominal(nodes[name]) else lens_of(nodes[name]) for name in names],
+        remembered=[None if nodes[name].intrinsics.nominal else lens_of(nodes[name]) for name in names],
         dropped=read.dropped, noticed=[] if read.size is None else [read.size], progress=progress)
     if not tables or report.figures is None:
         return report, None

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from rhot_app.engine.codec import Published
 from rhot_app.project import Rig
@@ -35,6 +35,7 @@ class TwinChoice:
     motion: str = "grasp"
     seed: int = 1
     preset: str = "wide"
+    tracker: Literal["classic", "model"] = "classic"
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ from rhot_app.engine.process import (
     started_processes,
 )
 from rhot_app.errors import EngineError, SimulatorError
-from rhot_app.project import load_rig, parse_rig
+from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 
 if TYPE_CHECKING:
@@ -91,6 +91,7 @@ class Session:
         self._clear(report)
         report("Starting two simulated cameras …", 0.15)
         rig_path = self._start_twin(choice, report)
+        save_rig(rig_path, with_tracker(load_rig(rig_path), choice.tracker))
         return self._start_engine(rig_path, report)
 
     def restart_engine(self, path: str, start: bool, report: Report) -> Opened:

@@ -8,7 +8,7 @@ from rhot_app.calibration.lens_search import find_lens
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.stereo import KnownLengths, calibrate
 from rhot_app.calibration.stereo_report import StereoReport
-from rhot_app.calibration.stereo_rig import is_nominal, lens_of
+from rhot_app.calibration.stereo_rig import lens_of
 from rhot_app.calibration.stereo_views import SharedViews
 from rhot_app.progress import Progress
 from rhot_app.project import RigNode
@@ -24,4 +24,4 @@ def put_together(views: SharedViews, lenses: Sequence[LensStart | None], *, know
 
 def known_lenses(nodes: Sequence[RigNode]) -> list[LensStart | None]:
     """The rig's lenses, None for those that only say what is written on the box."""
-    return [None if is_nominal(node) else lens_of(node) for node in nodes]
+    return [None if node.intrinsics.nominal else lens_of(node) for node in nodes]
