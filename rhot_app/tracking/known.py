@@ -38,9 +38,9 @@ TOLD = POSE + 1
 
 _MOST_BIASES = 3 * MOST_MARKERS
 
-COMMON = 0.8
+COMMON = 0.4
 """Light and paint move a marker's middle in all pictures alike by so many of the standard deviations that nodes state
-(measured: 0.4 to 1 where nothing hurries, 1.4 of thumbs and wristbands, whose paint is taken to lie farther off; in
+(measured: 0.4 to 0.7 where nothing hurries, 1.4 of thumbs and wristbands, whose paint is taken to lie farther off; in
 `fast` less)."""
 
 

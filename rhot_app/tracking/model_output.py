@@ -15,7 +15,7 @@ from rhot_app.lean import lean, room, slots
 from rhot_app.tracking.bends import tell_of_bends
 from rhot_app.tracking.kalman.combine import fill
 from rhot_app.tracking.kalman.estimate import ANGLES, MOST_MARKERS, POSE, ROTATION, Estimate
-from rhot_app.tracking.kalman.hiding import speed_of
+from rhot_app.tracking.kalman.hiding import slightly_moved, speed_of
 from rhot_app.tracking.kalman.markers import Cameras, Places, empty_places, place_markers
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.kalman.sighted import eyes_on
@@ -149,6 +149,7 @@ def fill_report(told: Account, t_ns: int, report: Report) -> bool:
     _cover_all(estimate.world, known, places, placed, 0, report.covariances)
     locate_raw(subject.half_axes, cameras, estimate, places, FIRST_MARKER, t_ns, seen,
                RawPlaces(report.raw, told.located, report.errors))
+    tell_of_hiding(estimate, subject, report)
     tell_of_lasting(estimate.velocity, subject, places.jacobian[FIRST_MARKER:], told.located, report)
     all_measured = True
     for m in range(subject.part.shape[0]):
@@ -157,6 +158,18 @@ def fill_report(told: Account, t_ns: int, report: Report) -> bool:
         all_measured &= report.marker_knowledge[m] == _MEASURED
     _conclude(known, subject, report)
     return all_measured
+
+
+@lean
+def tell_of_hiding(estimate: Estimate, subject: Subject, report: Report) -> None:
+    """Add to what is told of fingertips and their markers how far what hides a little of them may move their middles."""
+    for finger in range(subject.tips.shape[0]):
+        m = subject.tips[finger]
+        if m >= 0:
+            moved = slightly_moved(estimate, m)
+            for i in range(3):
+                report.covariances[FIRST_MARKER + m, i, i] += moved
+                report.covariances[FIRST_TIP + finger, i, i] += moved
 
 
 @lean

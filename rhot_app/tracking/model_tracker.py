@@ -43,6 +43,9 @@ WRONG_AFTER_NS, WRONG_AFTER_PERIODS = 100_000_000, 3.0
 FARTHEST_AHEAD_S = 0.1
 """Predictions beyond this say little."""
 
+RESTLESS_M_S = 5e-3
+"""Hands that are taken to be at rest are not quite: how they drift and tremble, no frame tells beforehand."""
+
 _PENDING = 16
 _JUMP_NS = 1_000_000_000
 """A frame this far ahead of the last ones is of another timeline, and so are several this far behind."""
@@ -141,6 +144,8 @@ class ModelTracker:
         copy_estimate(self._hand.estimate, self._ahead)
         ahead = min(max(1e-9 * (t_ns - self._timeline.t_ns), 0.0), FARTHEST_AHEAD_S)
         predict(self._ahead, ahead, self._wearing.worn.part, self._wearing.habits, self._ahead.bias_variance)
+        for axis in range(3):
+            self._ahead.covariance[axis, axis] += (RESTLESS_M_S * ahead) ** 2
         return self._told_ahead.tell(self._timeline.t_ns + round(1e9 * ahead), self._told_states - 1, newest,
                                      time.perf_counter())
 

@@ -6,6 +6,8 @@ from modelled_hand import model_rig, moving, sights, states_of
 from msgspec.structs import replace
 from synthetic_rig import LOST, altered
 
+from rhot_app.tracking.kalman.estimate import LOOK_AGE, LOOK_HIDDEN
+from rhot_app.tracking.kalman.hiding import slightly_moved
 from rhot_app.tracking.kalman.wearing import LASTING_BAND, LASTING_OTHERS, compile_wearing
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.model_output import (
@@ -68,6 +70,23 @@ def test_what_habit_leaves_open_moves_no_marker_that_two_cameras_see():
     assert np.trace(told[1].fingertip_covariances[2]) > 100.0 * np.trace(told[0].fingertip_covariances[2])
     assert np.trace(told[1].joint_covariances[6]) > 100.0 * np.trace(told[0].joint_covariances[6])
     assert np.trace(told[1].palm_covariance[3:, 3:]) > 2.0 * np.trace(told[0].palm_covariance[3:, 3:])
+
+
+def test_what_hides_a_little_of_a_fingertip_is_told_of_it_alone():
+    tracker = make_tracker(RIG)
+    for frame in sights(RIG, moving(), 0.6):
+        tracker.ingest(frame)
+        tracker.solve()
+    estimate, t_ns = tracker._hand.estimate, tracker._timeline.t_ns
+    estimate.width[TIPS[2]] = 0.014
+    plain = tracker.state_at(t_ns)
+    estimate.looks[0, TIPS[2], [LOOK_AGE, LOOK_HIDDEN]] = 0.0, 0.05
+    told = tracker.state_at(t_ns)
+    moved = slightly_moved(estimate, TIPS[2]) * np.eye(3)
+    assert moved[0, 0] > 1e-9
+    np.testing.assert_allclose(told.fingertip_covariances[2] - plain.fingertip_covariances[2], moved, rtol=1e-9)
+    np.testing.assert_allclose(told.marker_covariances[TIPS[2]] - plain.marker_covariances[TIPS[2]], moved, rtol=1e-9)
+    np.testing.assert_array_equal(told.fingertip_covariances[:2], plain.fingertip_covariances[:2])
 
 
 def told_of_lasting(located: np.ndarray, speed_m_s: float = 0.0) -> Report:

@@ -30,7 +30,8 @@ because motion smears their edges."""
 
 SHIFT = 1.6
 """A part h of its area that is hidden moves the middle of a fingertip by SHIFT h^1.5 of its radius, one standard
-deviation per axis. (Measured of crossing and pinching fingers: 1.25; but it lasts.)"""
+deviation per axis. (Measured of crossing and pinching fingers: 1.25, which is `MOVED`; but it lasts.)"""
+MOVED = 1.25
 
 PLAIN_PX = 0.1
 """A fingertip in plain view is seen to this, one standard deviation per axis, if its node does not even claim more:
@@ -82,6 +83,18 @@ def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estim
         if frame.plain[sight] and -varies < hidden and most < varies:
             stated = 0.5 * (frame.covariances[sight, 0, 0] + frame.covariances[sight, 1, 1])
             frame.own[sight] = min(frame.own[sight], PLAIN_PX**2 / max(stated, PLAIN_PX**2))
+
+
+@lean
+def slightly_moved(estimate: Estimate, m: int) -> float:
+    """How far the middle of fingertip `m` is moved, m^2 per axis, by what hides no more of it than may be missing in
+    plain view anyway. The filter does not count that (it would doubt every sight); `judge_fingertips` counts the rest.
+    """
+    most = 0.0
+    for camera in range(estimate.looks.shape[0]):
+        if estimate.looks[camera, m, LOOK_AGE] < FRESH_S:
+            most = max(most, estimate.looks[camera, m, LOOK_HIDDEN])
+    return (MOVED * 0.5 * estimate.width[m]) ** 2 * min(most, VARIES) ** 3
 
 
 @lean

@@ -32,10 +32,10 @@ PLACE_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e
 """How far a marker's seen middle lies from where the hand file has it, by its shape, as the filter takes it: paint, its
 shading, and the skin under it. A blob is paint on a knuckle that nobody measured."""
 
-PAINT_SD_M = {"capsule": 0.04e-3, "band": 0.3e-3}
+PAINT_SD_M = {"capsule": 0.03e-3, "band": 0.3e-3}
 """The same without its shading, as it is told (`known.py`), of shapes that were measured."""
 
-LASTING_BAND, LASTING_OTHERS = 0.8, 0.3
+LASTING_BAND, LASTING_OTHERS = 0.8, 0.2
 """Of the standard deviation that nodes state, so much is an error of one camera that lasts, as it is told: nearly all
 of what a band's outline is off, and of a fingertip's, of which little shows, enough to make half a millimetre of
 distance for as long as the hand rests (`python benchmarks/sight_errors.py`)."""

@@ -8,9 +8,10 @@ from painted_fingertips import COUNT, INDEX, WEARING, WRIST, hand, looked_at, op
 from scipy.spatial.transform import Rotation
 
 from rhot_app.simulator.motion import FACING
-from rhot_app.tracking.kalman.estimate import BIAS, LOOK_AGE, LOOK_VARIANCE
+from rhot_app.tracking.kalman.estimate import BIAS, LOOK_AGE, LOOK_HIDDEN, LOOK_VARIANCE
 from rhot_app.tracking.kalman.hiding import (
     FASTEST_M_S,
+    MOVED,
     PLACED_BY,
     PLAIN_PX,
     SHIFT,
@@ -18,6 +19,7 @@ from rhot_app.tracking.kalman.hiding import (
     VARIES,
     VARIES_PER_M_S,
     part_shown,
+    slightly_moved,
 )
 from rhot_app.tracking.kalman.sighted import FRESH_S
 from rhot_app.tracking.known import TOLD, empty_sheet, fill_known
@@ -52,6 +54,21 @@ def test_what_is_missing_moves_the_middle_for_all_cameras(bent):
     assert estimate.width[INDEX] == pytest.approx(width_m)  # what is hidden teaches no size
     opened(seen(estimate, 0), estimate)
     assert opened(seen(estimate, 1), estimate).max() == 0.0
+
+
+def test_what_hides_too_little_to_be_doubted_is_told():
+    """A fingertip that shows a twentieth less than it has may do so in plain view, or be hidden by as much."""
+    estimate = looked_at()
+    radius = 0.5 * estimate.width[INDEX]
+    assert slightly_moved(estimate, INDEX) < (0.02 * radius) ** 2
+    assert opened(seen(estimate, 0, {INDEX: 0.95}), estimate)[INDEX] == 0.0
+    hidden = estimate.looks[0, INDEX, LOOK_HIDDEN]
+    assert hidden == pytest.approx(0.05, abs=0.01)
+    assert slightly_moved(estimate, INDEX) == pytest.approx((MOVED * radius) ** 2 * hidden**3, rel=1e-2)
+    opened(seen(estimate, 0, {INDEX: 0.5}), estimate)
+    assert slightly_moved(estimate, INDEX) == pytest.approx((MOVED * radius) ** 2 * VARIES**3, rel=1e-2)  # the rest is a bias
+    estimate.looks[0, :, LOOK_AGE] = 1.1 * FRESH_S
+    assert slightly_moved(estimate, INDEX) < (0.02 * radius) ** 2
 
 
 def test_what_another_camera_saw_long_ago_no_longer_counts():
