@@ -68,7 +68,7 @@ def honesty_table(comparison: Comparison) -> str:
     words = f"{'NEES':>8}{'inside':>7}{'3 sg':>7}"
     margin = max(len(motion) for motion in comparison.motions()) + 1
     lines = [f"NEES by its degrees of freedom, with the 95 % band of the mean of {seeds} seeds; part of the instants "
-             "inside it; part of what is called measured within 3 sigma",
+             "inside it; part of what is called measured (of palms: of all) within 3 sigma",
              " " * (margin + 8) + heads, " " * (margin + 8) + words * len(DEGREES)]
     for motion in comparison.motions():
         for tracker in comparison.trackers():

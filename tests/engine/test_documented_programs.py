@@ -52,3 +52,12 @@ def test_programs_read_states_of_an_engine_and_of_its_log(tmp_path: Path, enviro
                           capture_output=True, timeout=60)
     assert done.returncode == 0, done.stderr
     assert "TRACKING" in done.stdout
+
+
+def test_a_take_is_held_against_its_truth(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "rhot_app", "simulate", "--seconds", "2", "--points", "--out", "take"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", program("twin.md")], cwd=tmp_path, text=True, capture_output=True,
+                          timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert 1e-4 < float(done.stdout.split()[0]) < 2e-3
