@@ -162,7 +162,7 @@ def fill_report(told: Account, t_ns: int, report: Report) -> bool:
 
 @lean
 def tell_of_hiding(estimate: Estimate, subject: Subject, report: Report) -> None:
-    """Add to what is told of fingertips and their markers how far what hides a little of them may move their middles."""
+    """Add to what is told of fingertips and their markers how far what hides a little of them may move them."""
     for finger in range(subject.tips.shape[0]):
         m = subject.tips[finger]
         if m >= 0:
