@@ -225,7 +225,7 @@ class ModelTracker:
         """A thumb that bends backwards may be one that bends forwards."""
         if self._timeline.t_ns - self._thumb_ns > _THUMB_NS and bent_backwards(self._hand.estimate):
             self._thumb_ns = self._timeline.t_ns
-            if unbend(self._hand.estimate, self._wearing.model, self._wearing.habits.usual):
+            if unbend(self._hand.estimate, self._wearing):
                 self._timeline.begin(self._timeline.t_ns)
 
     def _other_time(self, t_ns: int) -> bool:

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from rhot_app.hand.finger_ik import solve_finger
 from rhot_app.hand.kinematics import TWIST, forward, jacobian
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.skeleton import ANGLE_SLICES, JOINTS, HandPose
-from rhot_app.tracking.kalman.estimate import ANGLES, Estimate
-from rhot_app.tracking.kalman.reappearing import forget_course
+from rhot_app.hand.skeleton import ANGLE_SLICES, JOINTS, TIP_ROLES, HandPose
+from rhot_app.tracking.kalman.estimate import ANGLES, PLACED, Estimate
+from rhot_app.tracking.kalman.reappearing import forget_course, forget_finger
+from rhot_app.tracking.kalman.sighted import eyes_on
+from rhot_app.tracking.kalman.wearing import Wearing
 
 Array = NDArray[np.float64]
 
@@ -39,13 +41,14 @@ def bent_backwards(estimate: Estimate) -> bool:
     return sum(estimate.angles[_OUTER].tolist()) < -BACKWARDS_RAD
 
 
-def unbend(estimate: Estimate, model: HandModel, usual: Array) -> bool:
+def unbend(estimate: Estimate, wearing: Wearing) -> bool:
     """Bend the thumb forwards if that is more natural and leaves its tip in place; returns whether it was. One that
     is about as natural is preferred to a thumb at the end of its way back.
 
-    The tip is known as well as before; of how the joints are bent without moving it, nothing is known but `usual`
-    (27, 27), as in `Habits`, and of how they change, nothing.
+    Of the joints nothing is known afterwards but what is usual, and of how they change nothing. A tip that two cameras
+    see is known as well as before; what is believed of another may have been led astray with its joints.
     """
+    model, usual = wearing.model, wearing.habits.usual
     world, angles = estimate.world, estimate.angles[_THUMB].copy()
     target = forward(model, HandPose(world, estimate.angles)).marker_centres[0]
     before = _leverage(estimate, model)
@@ -59,9 +62,17 @@ def unbend(estimate: Estimate, model: HandModel, usual: Array) -> bool:
     if not found.reached or found.angles[_OUTER].sum() < 0.0 or _strain(model, found.angles) >= strain:
         return False
     estimate.angles[_THUMB] = found.angles
-    _carry_over(estimate, before, _leverage(estimate, model), usual[ANGLES:, ANGLES:][_THUMB, _THUMB])
-    forget_course(estimate, 0)
+    if _is_located(estimate, wearing.marker_of(TIP_ROLES[0])):
+        _carry_over(estimate, before, _leverage(estimate, model), usual[ANGLES:, ANGLES:][_THUMB, _THUMB])
+        forget_course(estimate, 0)
+    else:
+        forget_finger(estimate, 0, usual)
     return True
+
+
+def _is_located(estimate: Estimate, marker: int) -> bool:
+    """Whether two cameras or more show where a marker is, -1 for none, on a hand that they show the place of."""
+    return marker >= 0 and eyes_on(estimate.unseen, marker)[0] > 1 and estimate.held[0] < PLACED
 
 
 def _leverage(estimate: Estimate, model: HandModel) -> Array:

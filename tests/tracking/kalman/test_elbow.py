@@ -7,7 +7,7 @@ from known_hand import WEARING, moving_estimate
 from rhot_app.hand.kinematics import forward, jacobian
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINTS, HandPose
 from rhot_app.tracking.kalman.elbow import BACKWARDS_RAD, bent_backwards, unbend
-from rhot_app.tracking.kalman.estimate import ANGLES, POSE
+from rhot_app.tracking.kalman.estimate import ANGLES, FREE, PLACED, POSE
 
 MODEL, USUAL, LIMITS = WEARING.model, WEARING.habits.usual, WEARING.limits
 THUMB = ANGLE_SLICES[0]
@@ -31,7 +31,7 @@ def test_a_thumb_that_bends_backwards_is_bent_forwards_with_its_tip_in_place(fle
     estimate = with_thumb(flexion, mcp, ip)
     before, others, world = joints(estimate), estimate.angles[THUMB.stop:].copy(), estimate.world.copy()
     assert bent_backwards(estimate)
-    assert unbend(estimate, MODEL, USUAL)
+    assert unbend(estimate, WEARING)
     assert estimate.angles[[MCP, IP]].sum() > BACKWARDS_RAD and not bent_backwards(estimate)
     np.testing.assert_allclose(joints(estimate), before, atol=1e-4)
     np.testing.assert_array_equal(estimate.angles[THUMB.stop:], others)
@@ -52,7 +52,8 @@ def test_its_tip_stays_as_well_known_as_it_was(flexion, mcp, ip):
     seen = estimate.covariance[pose, pose] @ lever.T
     estimate.covariance[pose, pose] -= seen @ np.linalg.solve(lever @ seen + 25e-8 * np.eye(3), seen.T)
     before = lever @ estimate.covariance[pose, pose] @ lever.T
-    assert unbend(estimate, MODEL, USUAL)
+    estimate.unseen[:] = 0.0
+    assert unbend(estimate, WEARING)
     lever, covariance = of_tip(estimate), estimate.covariance[pose, pose]
     np.testing.assert_allclose(lever @ covariance @ lever.T, before, atol=3e-8)
     assert np.linalg.eigvalsh(covariance)[0] > -1e-12
@@ -75,7 +76,7 @@ def test_a_thumb_that_has_no_better_way_to_bend_is_left_alone(thumb):
         estimate.angles[:] = WEARING.habits.mean
     assert bent_backwards(estimate) == (thumb is not None)
     angles, covariance = estimate.angles.copy(), estimate.covariance.copy()
-    assert not unbend(estimate, MODEL, USUAL)
+    assert not unbend(estimate, WEARING)
     np.testing.assert_array_equal(estimate.angles, angles)
     np.testing.assert_array_equal(estimate.covariance, covariance)
 
@@ -86,6 +87,17 @@ def test_a_thumb_at_the_end_of_its_way_back_rather_bends_forwards(short_of_end_d
     mcp, ip = LIMITS[THUMB][3:, 0] + np.radians(short_of_end_deg)
     estimate = with_thumb(-0.1, mcp, ip)
     before = joints(estimate)
-    assert bent_backwards(estimate) and unbend(estimate, MODEL, USUAL) == bends
+    assert bent_backwards(estimate) and unbend(estimate, WEARING) == bends
     assert bent_backwards(estimate) != bends
     np.testing.assert_allclose(joints(estimate), before, atol=1e-4)
+
+
+@pytest.mark.parametrize(("seen_s", "held"), [(0.2, FREE), (0.0, PLACED)], ids=["by one camera", "a hand that is held"])
+def test_of_a_thumb_that_two_cameras_do_not_locate_nothing_is_known_afterwards(seen_s, held):
+    estimate = with_thumb(0.3, -0.15, -0.15)
+    estimate.unseen[:], estimate.held[0] = 0.0, held
+    estimate.unseen[1] = seen_s
+    assert unbend(estimate, WEARING)
+    thumb = slice(ANGLES + THUMB.start, ANGLES + THUMB.stop)
+    np.testing.assert_array_equal(estimate.covariance[thumb, thumb], USUAL[thumb, thumb])
+    assert not estimate.covariance[thumb, ANGLES + THUMB.stop:POSE].any()
