@@ -221,8 +221,10 @@ class TrackerDialog(QDialog):
 
     def _fit(self) -> None:
         """As tall as its sentences, which wrap, need it."""
-        layout = self.layout()
-        if layout is not None:
+        inner, layout = self.details.layout(), self.layout()
+        if inner is not None and layout is not None:
+            inner.invalidate()  # what has just been shown or hidden there counts now, not with the next event
+            inner.activate()
             layout.activate()
             self.setFixedHeight(layout.totalHeightForWidth(_WIDTH_PX))
 

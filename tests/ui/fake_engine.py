@@ -85,7 +85,7 @@ class FakeEngine:
         self.log_path = ""
         self.rig_path = ""
         self.refuse_rig = ""  # why the engine takes no other rig
-        self.scale = (1.03, 0.008)  # what a floating hand's size is estimated to be
+        self.scale = (1.03, 0.017)  # what a floating hand's size is estimated to be
         self.commands: list[tuple[str, dict[str, Any]]] = []
         self.predicted: list[int] = []
         self.sequence = 0

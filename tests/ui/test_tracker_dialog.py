@@ -116,12 +116,21 @@ def test_fingers_and_limits_are_chosen_from_lists(opened):
     assert dialog.limits_box.currentData() == "anatomical"
 
 
+def test_a_size_that_takes_two_lines_is_not_cut_off(opened):
+    desk = opened(with_tracker(FLOATING))
+    label, desk.engine.running = desk.dialog.size_label, False
+    desk.until(lambda: label.text().startswith("No size yet"))
+    desk.engine.running = True
+    desk.until(lambda: label.text().startswith("1.03"))
+    assert label.isVisible() and label.height() >= label.heightForWidth(label.width()) > 20
+
+
 def test_the_estimated_size_is_shown_and_put_into_the_hand(opened):
     desk = opened(with_tracker(MODEL))
     dialog, path, before = desk.dialog, desk.path, load_rig(desk.path)
     assert not dialog.size_button.isVisible()
     click_on_word(dialog.size_check)
-    desk.until(lambda: dialog.size_label.text().startswith("1.03 ± 0.01 of the rig's hand"))
+    desk.until(lambda: dialog.size_label.text().startswith("1.03 ± 0.02 of the rig's hand"))
     assert load_rig(path).tracker.float_scale
     desk.until(dialog.size_button.isEnabled)
     QTest.mouseClick(dialog.size_button, Qt.MouseButton.LeftButton)

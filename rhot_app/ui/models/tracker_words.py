@@ -52,7 +52,7 @@ def size_settled(state: HandState | None) -> bool:
 
 
 def scale_text(state: HandState) -> str:
-    """E.g. "1.03 ± 0.01" with the digits that mean something."""
+    """E.g. "1.03 ± 0.02" with the digits that mean something."""
     digits = 2 if state.hand_scale_sd >= 0.005 else 3
     return f"{state.hand_scale:.{digits}f} ± {max(state.hand_scale_sd, 10.0**-digits):.{digits}f}"
 
