@@ -45,11 +45,13 @@ def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
 def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
     (tmp_path / "half.json").write_text('{"format": "rhot-rig", "ver')
     (tmp_path / "foreign.log").write_bytes(b"something else")
+    (tmp_path / "binary.log").write_bytes(b"\xae\xff\x00")
     for arguments, words in [
         (("engine", "--rig", str(tmp_path / "no.json")), "no.json: no such file"),
         (("engine", "--rig", str(tmp_path / "half.json")), "half.json: not valid JSON"),
         (("replay", str(tmp_path / "foreign.log"), "--json"), "foreign.log: this is not a raw log"),
         (("engine", "--rig", str(tmp_path / "foreign.log")), "foreign.log: not valid JSON"),
+        (("engine", "--rig", str(tmp_path / "binary.log")), "binary.log: this is no text, so no rhot-rig file"),
         (("replay", str(tmp_path / "foreign.log"), "--speed", "fast"), "fast is neither a number nor max"),
         (("replay", str(tmp_path / "foreign.log"), "--jsn"), "there is no '--jsn' here; did you mean --json?"),
         (("dance",), "dance"),

@@ -28,7 +28,7 @@ def test_the_demo_takes_a_motion_and_a_seed(opened):
     assert opened == [(None, TwinChoice(motion="pinch", seed=7))]
 
 
-def test_the_demo_takes_a_tracker(opened, capsys):
+def test_the_demo_takes_a_tracker(opened):
     assert main(["demo", "--tracker", "model"]) == 0
     assert opened == [(None, TwinChoice(tracker="model"))]
 
