@@ -77,7 +77,7 @@ def judge_fingertips(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estim
         hidden = _hidden(estimate, m, width / math.sqrt(part), frame.plain[sight])
         estimate.looks[camera, m, LOOK_HIDDEN] = hidden
         varies = VARIES + VARIES_PER_M_S * min(speed_of(places.jacobian[m], estimate.velocity), FASTEST_M_S)
-        most = _most_hidden(estimate, camera, m)
+        most = max(hidden, _most_hidden(estimate, m))
         shift = SHIFT * 0.5 * width * math.sqrt(max(most**3 - varies**3, 0.0))
         set_bias_variance(estimate, m, made[m] + shift * shift)
         if frame.plain[sight] and -varies < hidden and most < varies:
@@ -90,11 +90,7 @@ def slightly_moved(estimate: Estimate, m: int) -> float:
     """How far the middle of fingertip `m` is moved, m^2 per axis, by what hides no more of it than may be missing in
     plain view anyway. The filter does not count that (it would doubt every sight); `judge_fingertips` counts the rest.
     """
-    most = 0.0
-    for camera in range(estimate.looks.shape[0]):
-        if estimate.looks[camera, m, LOOK_AGE] < FRESH_S:
-            most = max(most, estimate.looks[camera, m, LOOK_HIDDEN])
-    return (MOVED * 0.5 * estimate.width[m]) ** 2 * min(most, VARIES) ** 3
+    return (MOVED * 0.5 * estimate.width[m]) ** 2 * min(_most_hidden(estimate, m), VARIES) ** 3
 
 
 @lean
@@ -144,12 +140,12 @@ def _hidden(estimate: Estimate, m: int, size: float, plain: bool) -> float:
 
 
 @lean
-def _most_hidden(estimate: Estimate, camera: int, m: int) -> float:
-    """The largest part of a fingertip that is hidden from `camera` or another one that saw it just now."""
-    most = max(estimate.looks[camera, m, LOOK_HIDDEN], 0.0)
-    for other in range(estimate.looks.shape[0]):
-        if estimate.looks[other, m, LOOK_AGE] < FRESH_S:
-            most = max(most, estimate.looks[other, m, LOOK_HIDDEN])
+def _most_hidden(estimate: Estimate, m: int) -> float:
+    """The largest part of a fingertip that is hidden from a camera that saw it just now."""
+    most = 0.0
+    for camera in range(estimate.looks.shape[0]):
+        if estimate.looks[camera, m, LOOK_AGE] < FRESH_S:
+            most = max(most, estimate.looks[camera, m, LOOK_HIDDEN])
     return most
 
 
