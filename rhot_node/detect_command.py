@@ -28,7 +28,8 @@ recognised. --sequence and --stills say otherwise.
 
 With --json one object is printed:
   {"path", "detector", "frames": [{"index", "file"?, "width", "height", "markers": [
-    {"id", "x", "y", "size", "quality", "flags": [...], "blobs"?: [{"x", "y", "size", "quality", "flags"}]}]}]}
+    {"id", "x", "y", "size", "quality", "flags": [...], "candidates"?: [...], "blobs"?: [...]}]}]}
+candidates: what else may be the marker; blobs: with --all; both lists of {"x", "y", "size", "quality", "flags"}.
 x, y: px, (0, 0) at the centre of the top-left pixel, null when lost; size: equivalent diameter, px; quality: 0..1."""
 
 
@@ -79,7 +80,9 @@ def detect_all(path: Path, markers: MarkerSet, detector_name: str, *, list_blobs
             detector.reset()
         observations = detector.detect(image)
         entries: list[dict[str, Any]] = [{"id": name, **_entry(seen)}
-                                         for name, seen in zip(markers.ids, observations, strict=True)]
+                                         for name, seen in zip(markers.ids, observations, strict=False)]
+        for further in observations[len(entries):]:
+            entries[further.index].setdefault("candidates", []).append(_entry(further))
         if list_blobs:
             for entry, blobs in zip(entries, detector.all_blobs(image), strict=True):
                 entry["blobs"] = [_entry(blob) for blob in blobs]
@@ -148,8 +151,9 @@ def _print_table(report: dict[str, Any]) -> None:
         name = frame.get("file", str(frame["index"]))
         for marker in frame["markers"]:
             _print_row(name, marker["id"], marker)
-            for blob in marker.get("blobs", ()):
-                _print_row(name, "  blob", blob)
+            for kind in ("candidate", "blob"):
+                for one in marker.get(f"{kind}s", ()):
+                    _print_row(name, f"  {kind}", one)
 
 
 def _print_row(frame: str, label: str, entry: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What every detector offers: one image in, one observation per marker of its set out."""
+"""What every detector offers: one image in, the candidates of every marker of its set out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ class Detector(Protocol):
     """A detector keeps small state between frames (windows, sizes); frames must come in order of time."""
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
-        """One observation per marker, in the order of the marker set; lost markers are stated as lost."""
+        """The best candidate of every marker, in the order of the marker set, lost markers stated as lost; then further
+        candidates, if any: at most CANDIDATES_MAX of a marker, the best first."""
         ...
 
     def reset(self) -> None:

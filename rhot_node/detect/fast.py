@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.detect.company import Company
 from rhot_node.detect.find import DOUBTFUL, SEARCH_STEP, Finder
 from rhot_node.detect.gate import Labels
 from rhot_node.detect.image import YuvImage
@@ -20,14 +19,17 @@ from rhot_node.wire.messages import MarkerObservation
 __all__ = ["DOUBTFUL", "GLANCE", "SEARCH_STEP", "FastDetector"]
 
 SUDDENLY = 2  # markers fewer in plain view than in the last frame: was a lamp switched?
-GUESS_EVERY = 20  # frames without all markers in plain view until the light is guessed anew
+GUESS_EVERY, GUESS_SELDOM = 20, 200
+"""Frames without all markers in plain view until the light is guessed anew; the second while enough are in plain view
+to tell the light."""
 STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
-GLANCE = 8  # frames between looks at the light and the hand as a whole while all markers are followed in plain view
+GLANCE = 8  # frames between searches, and looks at the light, while all markers are followed in plain view
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
 
 
 class FastDetector:
-    """Finds every marker of a set in one YUV420 image after the other; see `rhot_node.detect.detector.Detector`."""
+    """Finds the candidates of every marker in one YUV420 image after the other; see
+    `rhot_node.detect.detector.Detector`."""
 
     def __init__(self, markers: MarkerSet, *, precise: bool = True) -> None:
         """`precise` False: markers in plain view are placed by their soft centroid, without a fit of the outline."""
@@ -40,21 +42,17 @@ class FastDetector:
         self._finder = Finder(markers, self._light)
         self._precise = precise
         self._until_glance = 0
-        self._company = Company(self._markers)
-        self._sure_warmth: float | None = None  # the light before a guess that no markers in company have confirmed
-        self._unsure = 0  # frames since that guess
         self.reset()
 
     def reset(self) -> None:
         """Forget all tracks and the light: the next frame is searched as a whole."""
         self.lose_all()
-        self._light.warmth, self._sure_warmth = 0.0, None
+        self._light.warmth = 0.0
         self._fresh = True
 
     def lose_all(self) -> None:
-        """Forget all tracks, but not the light: the next frame is searched as a whole."""
+        """Forget all tracks, but not the light."""
         self._finder.forget()
-        self._company.forget()
 
     def paint_colours(self) -> NDArray[np.float64]:
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was found last."""
@@ -74,87 +72,69 @@ class FastDetector:
         return self._light.warmth
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
-        """One observation per marker, in the order of the marker set; lost markers are stated as lost."""
+        """The best candidate of every marker, in the order of the marker set, lost ones stated as lost; then the other
+        candidates, at most CANDIDATES_MAX of a marker in all."""
         self._fit(image)
         if self._fresh:
             seen = self._find_at_first(image)
         else:
             self._finder.followed.follow(image, self._precise)
-            if self._finder.followed.count == len(self._markers):
-                seen = self._glance(image)
-                return seen if self._company.complete else self._company.judge(seen)
+            followed = self._finder.report_followed()
+            if followed is not None:
+                self._until_glance -= 1
+                if self._until_glance > 0:
+                    return followed
             seen = self._finder.find(image)
             if self._light_in_doubt(seen):
                 seen = self._find_in_guessed_light(image, seen)
-            if self._read_light(seen, STEADY) >= SWITCHED:  # somebody switched a lamp
+            steady = STEADY if followed is None else STEADY**GLANCE
+            if self._read_light(seen, steady) >= SWITCHED:  # somebody switched a lamp
                 seen = self._find_in_new_light(image)
+        self._until_glance = GLANCE
         self._fresh, self._plain = False, len(self._finder.plainly(seen))
-        seen = self._company.judge(seen)
-        self._doubt_light()
         return seen
-
-    def _doubt_light(self) -> None:
-        """Take a guessed light back when no markers in company have shown it to be right for long."""
-        if self._sure_warmth is None:
-            return
-        self._unsure += 1
-        if self._company.vouched >= MARKERS_LEAST:
-            self._sure_warmth = None
-        elif self._unsure >= GUESS_EVERY:
-            self._light.warmth, self._sure_warmth = self._sure_warmth, None
-            self._finder.forget()
 
     def _find_at_first(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """Find the markers in a picture of which nothing is known: by the light of the calibration, if that shows all
         of them, else by the light in which most are recognised."""
-        seen = self._finder.find(image)
-        if len(self._finder.plainly(seen)) < len(seen):
-            return self._find_in_guessed_light(image)
+        seen = self._finder.find(image, whole=True)
+        if len(self._finder.plainly(seen)) < len(self._markers):
+            return self._find_in_guessed_light(image, seen)
         return seen if self._read_light(seen, 0.0) < DEAD_ZONE else self._find_in_new_light(image)
-
-    def _glance(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
-        """The markers when all are followed in plain view; now and then with a look at the light and the hand."""
-        self._until_glance -= 1
-        if self._until_glance > 0:
-            return self._finder.followed.observations()
-        self._until_glance = GLANCE
-        self._plain, self._until_guess = len(self._markers), GUESS_EVERY
-        seen = self._finder.find(image)
-        self._read_light(seen, STEADY**GLANCE)
-        return seen
 
     def _light_in_doubt(self, seen: tuple[MarkerObservation, ...]) -> bool:
         """Whether markers went out of plain view together, or some have not been in plain view for a while."""
         plain = len(self._finder.plainly(seen))
-        self._until_guess -= 1
-        doubt = self._plain - plain >= SUDDENLY or self._until_guess <= 0
-        if doubt or plain == len(seen):
+        if plain == len(self._markers):
             self._until_guess = GUESS_EVERY
-        return doubt and plain < len(seen)
+            return False
+        self._until_guess -= 1
+        if self._until_guess > 0 and not (plain < MARKERS_LEAST and self._plain - plain >= SUDDENLY):
+            return False
+        self._until_guess = GUESS_EVERY if plain < MARKERS_LEAST else GUESS_SELDOM
+        return True
 
-    def _find_in_guessed_light(self, image: YuvImage, seen: tuple[MarkerObservation, ...] = (),
-                               ) -> tuple[MarkerObservation, ...]:
+    def _find_in_guessed_light(self, image: YuvImage,
+                               seen: tuple[MarkerObservation, ...]) -> tuple[MarkerObservation, ...]:
         """Find the markers in the light in which most are recognised, if enough of them then prove to be paint.
 
-        `seen`: what was found by the last known light; nothing: it is searched by that as well.
+        `seen`: what was found by the last known light.
         """
         known = self._light.warmth
-        if guess_light(image, self._light, self._finder.gate, self._set):
-            guessed = self._find_in_new_light(image)
-            plain = self._finder.plainly(guessed)
-            if np.count_nonzero(self._light.strong(plain, self._finder.paint[plain])) >= MARKERS_LEAST:
-                if self._sure_warmth is None:
-                    self._sure_warmth, self._unsure = known, 0
-                return guessed
-            self._light.warmth = known
-            seen = ()
-        return seen or self._find_in_new_light(image)
+        if not guess_light(image, self._light, self._finder.gate, self._set):
+            return seen if not self._fresh else self._find_in_new_light(image)
+        guessed = self._find_in_new_light(image)
+        plain = self._finder.plainly(guessed)
+        if np.count_nonzero(self._light.strong(plain, self._finder.paint[plain])) >= MARKERS_LEAST:
+            return guessed
+        self._light.warmth = known
+        return self._find_in_new_light(image)
 
     def _find_in_new_light(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """Find the markers, read the light from them, and find them again in that."""
         for _ in range(LIGHT_PASSES):
             self._finder.forget()
-            seen = self._finder.find(image)
+            seen = self._finder.find(image, whole=True)
             if self._read_light(seen, 0.0) < DEAD_ZONE:
                 break
         return seen

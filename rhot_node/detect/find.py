@@ -1,100 +1,120 @@
-"""Find the markers in one picture whose light is known: tracked ones carefully near where they are expected, lost ones
-by a search of the whole frame.
+"""Find the markers in one picture whose light is known: tracks near where they are expected, all else by a search.
 
-Markers that are followed in plain view are the quick lane's (`followed`), which shares the tracks.
+A marker has up to CANDIDATES_MAX tracks, one for every thing of its colour: which of them is the marker, the master
+decides. Tracks in plain view are the fast lane's (`followed`); the others are measured carefully.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
-from rhot_node.detect.candidates import Blobs, ranked_by, request_of, worth_of
 from rhot_node.detect.follow import learn_noise, noise_level
 from rhot_node.detect.followed import Followed
-from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.gate import AREA_MIN, ColourGate, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
 from rhot_node.detect.light import Light
 from rhot_node.detect.outline import INTERIOR, OUTSIDE
-from rhot_node.detect.search import AREA, LABEL, SUM_X, SUM_Y
-from rhot_node.detect.track import TRACK_COLUMNS, Track, lost_observation
-from rhot_node.detect.whereabouts import Whereabouts, middle_of
+from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
+from rhot_node.detect.stated import FLOOR_VARIANCE, mask_variance
+from rhot_node.detect.track import ALIVE, EXTENT, MARGIN, TRACK_COLUMNS, Track, lost_observation
+from rhot_node.detect.track import X as TRACK_X
+from rhot_node.detect.track import Y as TRACK_Y
 from rhot_node.markers import MarkerSet
-from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
+from rhot_node.wire.messages import CANDIDATES_MAX, NO_FLAGS, MarkerFlag, MarkerObservation
 
-CANDIDATES = 4  # blobs per marker that are measured until one proves to be paint
 NOISE_START, NOISE_START_BLOCKS = 1.5, 20.0  # grey levels of chroma noise, until so many blocks of paint have told
-LARGEST = 0.12  # of the picture: no worn marker is nearer than that
+LARGEST = 0.12  # of the picture: a larger blob is no marker
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
 PALE = 0.5  # of the least chroma that a search takes for paint: a tracked marker in shade has more
-SEARCH_STEP = 2  # chroma rows: every other one shows where markers are
+SEARCH_STEP = 2  # chroma rows: every other one shows all markers
+INTERLACED = (0, 4, 2, 6)  # chroma rows, of 8, that are searched in turn: four frames search as much as SEARCH_STEP
+
+_NOT_PLAIN = int(DOUBTFUL | MarkerFlag.LOST)
+
+Blob = list[float]  # a row of a search's blobs
 
 
 class Finder:
-    """The tracks of all markers, and what finds them."""
+    """The tracks of all markers, and what finds them. Track s is of marker s modulo the number of markers."""
 
     def __init__(self, markers: MarkerSet, light: Light) -> None:
         """`light`: that of the pictures, read and set by the caller."""
         self._markers, self._light = markers.markers, light
+        self._count = len(self._markers)
         self._directions = directions(markers)
         self._sector = sector_table(markers)
         self.gate = ColourGate(markers)
         self._request = np.zeros(m.REQUEST_COLUMNS)
         self._row = np.zeros(m.MEASURE_COLUMNS)
         self._scratch = m.Scratch(0, 0)
-        self._states = np.zeros((len(self._markers), TRACK_COLUMNS))
-        self._tracks: list[Track] = []
+        self._shapes = [marker.shape for marker in self._markers] * CANDIDATES_MAX
+        self._states = np.zeros((len(self._shapes), TRACK_COLUMNS))
         self._noise_variance = np.array([NOISE_START**2, NOISE_START_BLOCKS])
-        self.followed = Followed([marker.shape for marker in self._markers], self._states, self._noise_variance)
-        self.paint = np.zeros((len(self._markers), 3))
+        self.followed = Followed(self._shapes, self._count, self._states, self._noise_variance)
+        self.paint = np.zeros((self._count, 3))
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was measured."""
-        self._paint_pixels = np.zeros(len(self._markers))
+        self._paint_pixels = np.zeros(self._count)
+        self._searches = 0
+        self._tracked = -1  # tracks, when every marker has one; else -1
+        self._balanced: YuvImage | None = None  # the picture in the light of the calibration, once it is needed
         self.forget()
 
-    def find(self, camera_image: YuvImage) -> tuple[MarkerObservation, ...]:
-        """Every marker, in the picture as it would look in the light of the calibration."""
-        found: dict[int, MarkerObservation] = {}
-        lost = []
-        if self.followed.count:
-            found = {mark.index: mark for mark in self.followed.observations()}
-        image = camera_image if len(found) == len(self._tracks) else self._light.balanced(camera_image)
-        for index, track in enumerate(self._tracks):
-            if index in found:
-                continue
-            if track.alive and self._measure(image, index, track.request(self._request)) \
-                    and not track.is_litter(self._row.tolist()):
-                found[index] = self._observe(index, NO_FLAGS, camera_image)
-            else:
-                lost.append(index)
-        for index in self._strays(found):  # what was taken for a marker, far from the hand
-            self._tracks[index] = Track(self._markers[index].shape, self._states[index])
-            self.followed.drop(index)
-            lost.append(index)
-        if lost:
-            self._acquire(camera_image, lost, found)
-        return tuple(found[index] for index in range(len(self._tracks)))
+    def find(self, camera_image: YuvImage, *, whole: bool = False) -> tuple[MarkerObservation, ...]:
+        """The best candidate of every marker, lost or not, in the order of the set, and then the other candidates.
+
+        `whole`: search all rows, for a picture of which nothing is known; else every eighth, other ones each time.
+        """
+        seen, self._balanced = self.followed.observations(), None
+        for slot in np.flatnonzero(self._states[:, ALIVE]).tolist():
+            if slot not in seen:
+                track = self._tracks[slot]
+                if self._measure(camera_image, slot, track.request(self._request)) \
+                        and not track.is_litter(self._row.tolist()):
+                    seen[slot] = self._observe(slot, NO_FLAGS)
+                    self._follow(camera_image, slot, seen[slot])
+                else:
+                    self._lose(slot)
+        for slot in self._not_markers(seen):
+            del seen[slot]
+            self._lose(slot)
+        self._search(camera_image, seen, whole)
+        complete = len({slot % self._count for slot in seen}) == self._count
+        self._tracked = int(np.count_nonzero(self._states[:, ALIVE])) if complete else -1
+        return self._report(seen)
+
+    def report_followed(self) -> tuple[MarkerObservation, ...] | None:
+        """The observations of a picture in which no marker was lost and every track was followed; None of any other."""
+        return self._report(self.followed.observations()) if self.followed.count == self._tracked else None
 
     def note_paint(self) -> None:
         """The colours of the markers that are followed."""
-        for index, colour in self.followed.paint():
-            self.paint[index] = colour
+        for slot, colour in self.followed.paint():
+            if slot == self._best[slot % self._count]:
+                self.paint[slot % self._count] = colour
 
     def plainly(self, seen: tuple[MarkerObservation, ...]) -> list[int]:
         """Indices of the markers that are in plain view, so that their paint's colour can be relied on."""
-        return [mark.index for mark in seen if mark.found and not mark.flags & DOUBTFUL
-                and self._paint_pixels[mark.index] >= PAINT_PIXELS_MIN]
+        pixels = self._paint_pixels.tolist()
+        return [mark.index for mark in seen[:self._count]
+                if not mark.flags.value & _NOT_PLAIN and pixels[mark.index] >= PAINT_PIXELS_MIN]
 
     def paint_mask(self, image: YuvImage, seen: MarkerObservation) -> NDArray[np.bool_]:
         """(H/2, W/2) the chroma pixels inside a marker that `detect` has just placed in this very `image`.
 
         Its edge, where paint and surroundings share pixels, is left out; small markers have no inside.
         """
-        self._scratch.kind[:] = OUTSIDE
+        self._scratch.kind[:], self._balanced = OUTSIDE, None
         if seen.found:
-            self._measure(self._light.balanced(image), seen.index, self._tracks[seen.index].recall(self._request))
+            slot = self._best[seen.index]
+            self._measure(image, slot, self._tracks[slot].recall(self._request))
         return np.asarray(self._scratch.kind == INTERIOR)
 
     def all_blobs(self, image: YuvImage) -> list[list[MarkerObservation]]:
@@ -102,20 +122,19 @@ class Finder:
 
         In the light of the last frame that was searched for markers.
         """
-        image = self._light.balanced(image)
-        everything: list[list[MarkerObservation]] = []
-        blobs = self.gate.blobs(image, range(len(self._markers))).copy()
-        for index, marker in enumerate(self._markers):
-            own = []
-            for blob in blobs[blobs[:, LABEL] == index + 1]:
-                if self._measure(image, index, self._request_of(index, blob)):
-                    own.append(Track(marker.shape).observe(index, self._row.tolist(), self._noise, MarkerFlag.ACQUIRED))
-            everything.append(sorted(own, key=lambda seen: -seen.diameter))
-        return everything
+        everything: list[list[MarkerObservation]] = [[] for _ in self._markers]
+        self._balanced = None
+        for blob in self.gate.blobs(self._light.balanced(image), range(self._count)).tolist():
+            index = int(blob[LABEL]) - 1
+            if self._measure(image, index, self._request_of(index, blob)):
+                everything[index].append(Track(self._shapes[index]).observe(index, self._row.tolist(), self._noise,
+                                                                            MarkerFlag.ACQUIRED))
+        return [sorted(own, key=lambda seen: -seen.diameter) for own in everything]
 
     def forget(self) -> None:
         """Forget all tracks."""
-        self._tracks = [Track(marker.shape, state) for marker, state in zip(self._markers, self._states, strict=True)]
+        self._tracks = [Track(shape, state) for shape, state in zip(self._shapes, self._states, strict=True)]
+        self._best = list(range(self._count))  # the track of each marker that is stated first
         self.followed.forget()
 
     def fit(self, image: YuvImage) -> bool:
@@ -129,67 +148,152 @@ class Finder:
     def _noise(self) -> float:
         return float(noise_level(self._noise_variance))
 
-    def _measure(self, image: YuvImage, index: int, request: NDArray[np.float64]) -> bool:
-        """Measure marker `index` into `self._row`; the paint's noise is learnt on the way."""
-        row = self._row
+    def _measure(self, camera_image: YuvImage, slot: int, request: NDArray[np.float64], careful: bool = True) -> bool:
+        """Measure the marker of a track into `self._row`; the paint's noise is learnt on the way."""
+        row, index = self._row, slot % self._count
+        if self._balanced is None:
+            self._balanced = self._light.balanced(camera_image)
+        image = self._balanced
         if not m.measure(image.y, image.u, image.v, self._sector, index + 1, self._directions[index], request,
-                         self._scratch.arrays, row):
+                         self._scratch.arrays, careful, row):
             return False
         learn_noise(self._noise_variance, row[m.NOISE_SUM], row[m.NOISE_COUNT])
         return True
 
-    def _request_of(self, index: int, blob: Blobs) -> NDArray[np.float64]:
-        return request_of(blob, self._directions[index], self._markers[index].shape, self._request)
+    def _observe(self, slot: int, flags: MarkerFlag, careful: bool = True) -> MarkerObservation:
+        """Take what was measured into a track."""
+        row, index = self._row, slot % self._count
+        if slot == self._best[index]:
+            self._paint_pixels[index] = row[m.PAINT_PIXELS]
+            if careful:
+                self.paint[index] = self._light.unbalanced(row[m.PAINT_Y:m.PAINT_CR + 1])
+        floor = FLOOR_VARIANCE if careful else mask_variance(row[m.AREA])
+        return self._tracks[slot].observe(index, row.tolist(), self._noise, int(flags), floor)
 
-    def _observe(self, index: int, flags: MarkerFlag, camera_image: YuvImage) -> MarkerObservation:
-        """Take what was measured into the marker's track, and follow it from now on when it is in plain view."""
-        row = self._row
-        self._paint_pixels[index] = row[m.PAINT_PIXELS]
-        self.paint[index] = self._light.unbalanced(row[m.PAINT_Y:m.PAINT_CR + 1])
-        values = row.tolist()
-        seen = self._tracks[index].observe(index, values, self._noise, flags)
-        if not seen.flags & DOUBTFUL:
-            self.followed.start(camera_image, index, values)
-        return seen
+    def _follow(self, camera_image: YuvImage, slot: int, seen: MarkerObservation) -> bool:
+        """Follow what was just measured from now on, when it is in plain view; says whether it is."""
+        return not seen.flags & DOUBTFUL and self.followed.start(camera_image, slot, self._row.tolist())
 
-    def _acquire(self, camera_image: YuvImage, lost: list[int], found: dict[int, MarkerObservation]) -> None:
-        """Search the whole frame for the lost markers and state each as found or lost."""
-        image = self._light.balanced(camera_image)
-        blobs = self.gate.blobs(image, lost, step=SEARCH_STEP).copy()
-        own = {index: blobs[blobs[:, LABEL] == index + 1] for index in lost}
-        worth, hand = worth_of(own, self._markers, self._tracks, self._scratch.mask.shape)
-        for index in lost:
-            track = self._tracks[index]
-            ranked, flags = ranked_by(track, own[index], worth[index])
-            for blob in ranked[:CANDIDATES]:
-                if self._is_elsewhere(index, blob, hand):
-                    continue
-                if self._measure(image, index, self._request_of(index, blob)) and not self._is_pale(
-                        index, self._row[m.LEVEL]):
-                    self._row[m.RIVAL_COST] = np.inf  # rivals were judged over the whole frame
-                    found[index] = self._observe(index, flags, camera_image)
-                    break
+    def _lose(self, slot: int) -> None:
+        self._states[slot, ALIVE] = 0.0
+        self.followed.drop(slot)
+
+    def _not_markers(self, seen: Iterable[int]) -> list[int]:
+        """Tracks that have slid to something too pale, or to where another track of the same marker is."""
+        gone = [slot for slot in seen if self._is_pale(slot, self._tracks[slot].level)]
+        for slot in seen:
+            if slot != self._best[slot % self._count] and slot not in gone:
+                twin = [other for other in seen if other != slot and other not in gone
+                        and other % self._count == slot % self._count and self._apart(slot, other) < 0.5]
+                gone += [slot] if twin else []
+        return gone
+
+    def _apart(self, slot: int, other: int) -> float:
+        """Distance of two tracks, in lengths of the longer one."""
+        one, two = self._states[slot], self._states[other]
+        return math.hypot(one[TRACK_X] - two[TRACK_X], one[TRACK_Y] - two[TRACK_Y]) / max(one[EXTENT], two[EXTENT])
+
+    def _is_pale(self, slot: int, level: float) -> bool:
+        """Whether a level of chroma is too low for the marker's paint."""
+        return bool(level < PALE * self._markers[slot % self._count].chroma.magnitude_min)
+
+    def _search(self, camera_image: YuvImage, seen: dict[int, MarkerObservation], whole: bool) -> None:
+        """Search for blobs that no track explains. The best blob of a lost marker is its track from now on; of the
+        others one a picture is measured. `seen`: by track; what is found is added."""
+        step, first = (SEARCH_STEP, 0) if whole else (8, INTERLACED[self._searches % len(INTERLACED)])
+        self._searches += 1
+        image = self._light.balanced(camera_image, step, first)
+        left: list[tuple[int, Blob]] = []
+        blobs = self.gate.blobs(image, range(self._count), AREA_MIN, step, first).tolist()
+        for index, own in self._unexplained(blobs, seen).items():
+            if not any(slot % self._count == index for slot in seen):
+                own = self._acquire(camera_image, index, own, seen, whole)
+            left += [(index, blob) for blob in own]
+        left = sorted(left, key=lambda one: -one[1][AREA]) if whole else left[self._searches % max(len(left), 1):][:1]
+        for index, blob in left:
+            self._measure_rival(camera_image, index, blob, seen)
+
+    def _unexplained(self, blobs: list[Blob], seen: Iterable[int]) -> dict[int, list[Blob]]:
+        """The blobs of each marker that are not too large and not where a track of the marker is."""
+        tracked: list[list[tuple[float, float, float]]] = [[] for _ in self._markers]
+        for slot in seen:
+            state = self._states[slot].tolist()
+            tracked[slot % self._count].append((state[TRACK_X], state[TRACK_Y], state[EXTENT]))
+        found: dict[int, list[Blob]] = {}
+        for blob in blobs:
+            index, area = int(blob[LABEL]) - 1, blob[AREA]
+            x, y = blob[SUM_X] / area, blob[SUM_Y] / area
+            size = max(blob[X_MAX] - blob[X_MIN], blob[Y_MAX] - blob[Y_MIN]) + 1.0
+            if area < LARGEST * self._scratch.mask.size and not any(
+                    math.hypot(x - there_x, y - there_y) < 0.5 * (size + extent)
+                    for there_x, there_y, extent in tracked[index]):
+                found.setdefault(index, []).append(blob)
+        return found
+
+    def _acquire(self, camera_image: YuvImage, index: int, own: list[Blob], seen: dict[int, MarkerObservation],
+                 careful: bool) -> list[Blob]:
+        """Find a lost marker among its blobs: by motion and size while it is remembered, else the likeliest. Returns
+        the blobs that are left."""
+        slot = self._best[index]
+        track = self._tracks[slot]
+        if len(own) > 1:
+            if track.remembered:
+                worth = [-track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
+                         for blob in own]
             else:
-                track.lose()
-                found[index] = lost_observation(index)
+                worth = merits(np.array(own), self._markers[index], self._scratch.mask.shape).tolist()
+            own = [own[k] for k in np.argsort(worth)[::-1]]
+        for place, blob in enumerate(own[:CANDIDATES_MAX]):
+            if self._measure(camera_image, slot, self._request_of(index, blob), careful) \
+                    and not self._is_pale(slot, self._row[m.LEVEL]):
+                self._row[m.RIVAL_COST] = np.inf  # rivals are judged over the whole frame
+                seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED, careful)
+                return own[:place] + own[place + 1:]
+        return []
 
-    def _is_pale(self, index: int, level: float) -> bool:
-        """Whether a level of chroma is too low for the marker's paint: a track has slid to something else."""
-        return bool(level < PALE * self._markers[index].chroma.magnitude_min)
+    def _measure_rival(self, camera_image: YuvImage, index: int, blob: Blob,
+                       seen: dict[int, MarkerObservation]) -> None:
+        """Measure a further candidate of a marker, and follow it when it is in plain view."""
+        slots = range(index, len(self._shapes), self._count)
+        slot = next((slot for slot in slots if slot not in seen and slot != self._best[index]), None)
+        if slot is None or not self._measure(camera_image, slot, self._request_of(index, blob)) \
+                or self._is_pale(slot, self._row[m.LEVEL]):
+            return
+        self._tracks[slot] = Track(self._shapes[slot], self._states[slot])
+        seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED)
+        if slot in self._not_markers(seen):
+            del seen[slot]
+            self._lose(slot)
+        elif not self._follow(camera_image, slot, seen[slot]):
+            self._lose(slot)  # stated in this picture only
 
-    def _is_elsewhere(self, index: int, blob: Blobs, hand: Whereabouts | None) -> bool:
-        """Whether a blob is where the hand, which wears the marker, cannot reach, or larger than anything it wears."""
-        if self._markers[index].role is None:
-            return False
-        return bool(blob[AREA] > LARGEST * self._scratch.mask.size
-                    or (hand is not None and hand.beyond(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA])))
+    def _request_of(self, index: int, blob: Blob) -> NDArray[np.float64]:
+        """The request to measure a blob as marker `index`."""
+        out, area, direction = self._request, blob[AREA], self._directions[index]
+        out[m.PX], out[m.PY] = blob[SUM_X] / area, blob[SUM_Y] / area
+        out[m.HALF_X] = max(blob[X_MAX] - out[m.PX], out[m.PX] - blob[X_MIN]) + MARGIN
+        out[m.HALF_Y] = max(blob[Y_MAX] - out[m.PY], out[m.PY] - blob[Y_MIN]) + MARGIN
+        out[m.SIGMA] = 1.0 + 0.25 * math.sqrt(area)
+        out[m.AREA_REF] = area
+        out[m.LEVEL_REF] = (blob[SUM_U] * direction[0] + blob[SUM_V] * direction[1]) / area
+        out[m.IS_BAND] = self._shapes[index] == "band"
+        return out
 
-    def _strays(self, found: dict[int, MarkerObservation]) -> list[int]:
-        """Tracked markers that are none: too pale, or worn where no hand can reach from the others."""
-        pale = [index for index in found if self._is_pale(index, self._tracks[index].level)]
-        worn = [index for index in found if self._markers[index].role is not None]
-        hand = middle_of([(self._tracks[index].x, self._tracks[index].y, self._tracks[index].area) for index in worn])
-        if hand is None:
-            return pale
-        return pale + [index for index in worn if index not in pale
-                       and hand.beyond(self._tracks[index].x, self._tracks[index].y)]
+    def _report(self, seen: dict[int, MarkerObservation]) -> tuple[MarkerObservation, ...]:
+        """The observations of one picture as `find` returns them. A marker with several tracks is ambiguous."""
+        if len(seen) == self._count and all(slot in seen for slot in self._best):
+            return tuple([seen[slot] for slot in self._best])
+        first, further = [], []
+        for index in range(self._count):
+            own = [slot for slot in range(index, len(self._shapes), self._count) if slot in seen]
+            if own and self._best[index] not in own:
+                self._best[index] = max(own, key=lambda slot: seen[slot].diameter)
+            own.sort(key=lambda slot: slot != self._best[index])
+            marks = [seen[slot] for slot in own]
+            if np.count_nonzero(self._states[own, ALIVE]) > 1:
+                marks = [msgspec.structs.replace(mark, flags=mark.flags | MarkerFlag.AMBIGUOUS) for mark in marks]
+            if not marks:
+                self._tracks[self._best[index]].lose()
+            first.append(marks[0] if marks else lost_observation(index))
+            further += marks[1:]
+        return (*first, *further)

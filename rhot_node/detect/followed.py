@@ -1,4 +1,7 @@
-"""The markers that are followed in plain view: their state, and the way in and out of the compiled lane."""
+"""The tracks that are followed in plain view: their state, and the way in and out of the compiled lane.
+
+Several tracks may be of one marker: track s is of marker s modulo the number of markers.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +24,13 @@ Array = NDArray[np.float64]
 
 
 class Followed:
-    """What is kept of the markers in plain view from frame to frame, and room to work in: a frame allocates nothing."""
+    """What is kept of the tracks in plain view from frame to frame, and room to work in: a frame allocates nothing."""
 
-    def __init__(self, shapes: Sequence[Shape], tracks: Array, noise_variance: Array) -> None:
-        """`tracks` (M, TRACK_COLUMNS) and `noise_variance` (2,) are shared with the careful lane."""
+    def __init__(self, shapes: Sequence[Shape], markers: int, tracks: Array, noise_variance: Array) -> None:
+        """S tracks of `markers` markers. `tracks` (S, TRACK_COLUMNS) and `noise_variance` (2,) are shared with the
+        careful lane."""
         count = len(shapes)
-        self._tracks, self._noise_variance = tracks, noise_variance
+        self._markers, self._tracks, self._noise_variance = markers, tracks, noise_variance
         self._looks = np.zeros((count, c.LOOK_COLUMNS))
         self._radii, self._rims = np.zeros((count, c.NODES + 1)), np.zeros((count, 2, c.NODES + 1))
         self._marks = np.zeros((count, MARK_COLUMNS))
@@ -36,40 +40,43 @@ class Followed:
         self._soft, self._fitted = np.zeros(3), np.zeros(c.FIT_COLUMNS)
         self._seen = np.zeros((count, OUT_COLUMNS))
         self.count = 0
-        """Markers that were seen in the last frame."""
+        """Tracks that were seen in the last frame."""
 
     def forget(self) -> None:
-        """No marker is followed any more."""
+        """Nothing is followed any more."""
         self._marks[:, READY] = self._seen[:, DONE] = 0.0
         self.count = 0
 
     def drop(self, index: int) -> None:
-        """The marker is no longer followed."""
+        """The track is no longer followed."""
         self._marks[index, READY] = self._seen[index, DONE] = 0.0
 
     def follow(self, image: YuvImage, precise: bool) -> None:
-        """Look for the markers that are followed in the next picture; `precise` False: by their soft centroids."""
+        """Look for what is followed in the next picture; `precise` False: by their soft centroids."""
         self.count = follow(image.y, image.u, image.v, self._tracks, self._looks, self._radii, self._rims, self._marks,
                             self._noise_variance, precise, self._pixels, self._work, self._soft, self._fitted,
                             self._seen)
 
-    def observations(self) -> tuple[MarkerObservation, ...]:
-        """The markers that were seen in the last frame."""
-        return tuple([MarkerObservation(index, x, y, diameter, xx, xy, yy, quality)
-                      for index, (x, y, diameter, xx, xy, yy, quality, done) in enumerate(self._seen.tolist()) if done])
+    def observations(self) -> dict[int, MarkerObservation]:
+        """By track: what was seen in the last frame."""
+        count = self._markers
+        return {slot: MarkerObservation(slot % count, x, y, diameter, xx, xy, yy, quality)
+                for slot, (x, y, diameter, xx, xy, yy, quality, done) in enumerate(self._seen.tolist()) if done}
 
-    def start(self, image: YuvImage, index: int, row: Sequence[float]) -> None:
-        """Follow a marker from now on that was measured in plain view, with the result `row` of `measure`."""
+    def start(self, image: YuvImage, index: int, row: Sequence[float]) -> bool:
+        """Follow track `index` from now on, which was measured in plain view, with the result `row` of `measure`; says
+        whether its outline was found."""
         band = bool(self._marks[index, IS_BAND])
         if band and not row[p.FIT]:
-            return
+            return False
         self._marks[index, SAG_VARIANCE] = row[p.SAG_VARIANCE]
         start(image.y, image.u, image.v, row[p.X], row[p.Y], row[p.VAR_MAJOR], row[p.VAR_MINOR], row[p.AXIS_X],
               row[p.AXIS_Y], row[p.AREA], noise_level(self._noise_variance), band, row[p.SAG], self._marks[index],
               self._looks[index], self._radii[index], self._rims[index], self._pixels, self._work, self._fitted)
+        return bool(self._marks[index, READY])
 
     def paint(self) -> Iterator[tuple[int, tuple[float, float, float]]]:
-        """Index, and Y, Cb and Cr (minus 128) of the paint as the camera showed it, of the markers seen last."""
+        """Track, and Y, Cb and Cr (minus 128) of the paint as the camera showed it, of what was seen last."""
         for index in np.flatnonzero(self._seen[:, DONE]).tolist():
             look = self._looks[index]
             yield index, (look[c.PAINT_Y].item(), look[c.PAINT_U].item() - 128.0, look[c.PAINT_V].item() - 128.0)

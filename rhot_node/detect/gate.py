@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import Table, acquisition_table
-from rhot_node.detect.search import AREA, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN, Searcher, label_at
-from rhot_node.detect.whereabouts import Whereabouts
+from rhot_node.detect.search import AREA, SUM_U, SUM_V, X_MAX, X_MIN, Y_MAX, Y_MIN, Searcher, label_at
 from rhot_node.markers import Marker, MarkerSet
 
 AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
@@ -43,24 +42,22 @@ class ColourGate:
         return out
 
     def blobs(self, image: YuvImage, indices: list[int] | range, area_min: int = AREA_MIN,
-              step: int = 1) -> NDArray[np.float64]:
+              step: int = 1, first: int = 0) -> NDArray[np.float64]:
         """(N, 10) blobs of the markers `indices`, columns as in rhot_node.detect.search; a view, valid until the next.
 
-        A blob has at least `area_min` chroma pixels. Of every `step` chroma rows one stands for the others.
+        A blob has at least `area_min` chroma pixels. Of every `step` chroma rows from `first` on, one stands for the
+        others.
         """
         self._wanted[:] = False
         for index in indices:
             self._wanted[index + 1] = True
-        return self._searcher.find(image.y, image.u, image.v, self._wanted, area_min, step=step)
+        return self._searcher.find(image.y, image.u, image.v, self._wanted, area_min, step=step,
+                                   first=first)
 
 
-def merits(blobs: NDArray[np.float64], marker: Marker, shape: tuple[int, int],
-           hand: Whereabouts | None = None) -> NDArray[np.float64]:
-    """(N,) how likely each blob is the marker: as far as it is compact, of the marker's hue, not cut by the border.
-
-    A worn marker is where the `hand` is and of the size that the others are; where that is not known, and for free
-    markers, the larger blob is the likelier. `shape`: (H/2, W/2) of the chroma planes. A search without any memory
-    takes the blob with the most.
+def merits(blobs: NDArray[np.float64], marker: Marker, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """(N,) how likely each blob is the marker: as far as it is compact, of the marker's hue and not cut by the border,
+    and the larger the likelier. `shape`: (H/2, W/2) of the chroma planes.
     """
     chroma, area = marker.chroma, blobs[:, AREA]
     box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)
@@ -69,11 +66,7 @@ def merits(blobs: NDArray[np.float64], marker: Marker, shape: tuple[int, int],
     height, width = shape
     cut = ((blobs[:, X_MIN] == 0) | (blobs[:, Y_MIN] == 0)
            | (blobs[:, X_MAX] == width - 1) | (blobs[:, Y_MAX] == height - 1))
-    fitting = area / box * match * np.where(cut, 0.5, 1.0)
-    if hand is None or marker.role is None:
-        return np.asarray(fitting * area)
-    near = hand.nearness(blobs[:, SUM_X] / area, blobs[:, SUM_Y] / area)
-    return np.asarray(fitting * near * hand.likeness(area, marker.shape))
+    return np.asarray(area * area / box * match * np.where(cut, 0.5, 1.0))
 
 
 @njit(cache=True)

@@ -66,16 +66,17 @@ class Light:
         self._strengths = np.hypot(*predicted_chroma(markers.markers, self._grid).transpose(2, 0, 1))
         self._u = self._v = np.zeros((0, 0), dtype=np.uint8)
 
-    def balanced(self, image: YuvImage) -> YuvImage:
+    def balanced(self, image: YuvImage, step: int = 1, first: int = 0) -> YuvImage:
         """The picture in the light of the calibration: its chroma corrected; `image` itself when that is the light.
 
-        The planes of the result are valid until the next call.
+        Only every `step`-th chroma row from `first` on need be valid. The planes of the result are so until the next
+        call.
         """
         if abs(self.warmth) < DEAD_ZONE:
             return image
         if self._u.shape != image.u.shape:
             self._u, self._v = np.empty_like(image.u), np.empty_like(image.v)
-        balance(image.y, image.u, image.v, balance_matrix(self.warmth), self._u, self._v)
+        balance(image.y, image.u, image.v, balance_matrix(self.warmth), step, first, self._u, self._v)
         return YuvImage(image.y, self._u, self._v)
 
     def unbalanced(self, colours: Array) -> Array:
@@ -128,9 +129,9 @@ def balance_matrix(warmth: float) -> Array:
 
 
 @njit(cache=True)
-def balance(y, u, v, matrix, out_u, out_v):
-    """Write the chroma planes of another light, rounded and clipped to 8 bits."""
-    for row in range(u.shape[0]):
+def balance(y, u, v, matrix, step, first, out_u, out_v):
+    """Write the chroma planes of another light, every `step`-th row from `first` on, rounded and clipped to 8 bits."""
+    for row in range(first, u.shape[0], step):
         for column in range(u.shape[1]):
             luma = 0.25 * (np.float64(y[2 * row, 2 * column]) + y[2 * row, 2 * column + 1]
                            + y[2 * row + 1, 2 * column] + y[2 * row + 1, 2 * column + 1])

@@ -54,6 +54,34 @@ def centroid(region, coverage, gain, result):
 
 
 @njit(cache=True)
+def mask_centroid(mask, components, own, count, result):
+    """Centroid, area and principal axes of the pixels of the components marked in `own`, numbered in `mask` from 2 on;
+    returns whether they touch the frame's border. Columns of components: see rhot_node.detect.window."""
+    height, width = mask.shape
+    n = s_x = s_y = s_xx = s_xy = s_yy = 0.0
+    at_border = False
+    for number in range(count):
+        if not own[number]:
+            continue
+        x0, x1 = int(components[number, 3]), int(components[number, 4])
+        y0, y1 = int(components[number, 5]), int(components[number, 6])
+        at_border |= x0 == 0 or y0 == 0 or x1 == width - 1 or y1 == height - 1
+        for row in range(y0, y1 + 1):
+            for column in range(x0, x1 + 1):
+                if mask[row, column] == number + 2:
+                    n += 1.0
+                    s_x += column
+                    s_y += row
+                    s_xx += column * column
+                    s_xy += column * row
+                    s_yy += row * row
+    x, y = s_x / n, s_y / n
+    result[X], result[Y], result[AREA] = x, y, n
+    _principal_axes(s_xx / n - x * x, s_xy / n - x * y, s_yy / n - y * y, result)
+    return at_border
+
+
+@njit(cache=True)
 def _principal_axes(m_xx, m_xy, m_yy, result):
     half = 0.5 * (m_xx + m_yy)
     spread = np.hypot(0.5 * (m_xx - m_yy), m_xy)

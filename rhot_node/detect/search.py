@@ -45,10 +45,10 @@ class Searcher:
         self._blobs = np.zeros((BLOBS_MAX, BLOB_COLUMNS), dtype=np.float64)
 
     def find(self, y: Plane, u: Plane, v: Plane, wanted: NDArray[np.bool_], area_min: int, *,
-             step: int = 1) -> NDArray[np.float64]:
+             step: int = 1, first: int = 0) -> NDArray[np.float64]:
         """(N, 10) blobs of the wanted labels with at least `area_min` chroma pixels; a view, valid until the next.
 
-        Of every `step` rows one is looked at and stands for the others.
+        Of every `step` rows from row `first` on, one is looked at and stands for the others.
         """
         words_u = words_v = _NO_WORDS
         if u.shape[1] % WORD == 0 and u.strides[1] == v.strides[1] == 1:
@@ -56,7 +56,7 @@ class Searcher:
             if len(self._bright) != words_u.shape[1]:
                 self._bright = np.zeros(words_u.shape[1], dtype=np.uint64)
         runs = label_runs(y, u, v, words_u, words_v, self._bright, self._dull, self._table, wanted, self._luma_limits,
-                          step, self._runs)
+                          step, first, self._runs)
         count = gather_blobs(self._runs, runs, area_min, step, self._slots, self._blobs)
         return self._blobs[:count]
 
@@ -113,9 +113,10 @@ def _mark_bright(words_u, words_v, row, dull, bright):
 
 
 @njit(cache=True)
-def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limits, step, runs):
+def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limits, step, first_row, runs):
     """Fill `runs` with the runs of equal wanted label, each joined to its neighbours above; return how many.
 
+    Of every `step` rows from `first_row` on, one is looked at.
     Words that are all in the box `dull` (1, 4) are passed over; `words_u` and `words_v` (H/2, W/16) may be empty.
     Scratch: `bright` (W/16,).
     """
@@ -123,7 +124,7 @@ def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limi
     by_words = words_u.shape[1] > 0 and dull[0, 0] <= dull[0, 1]
     block = WORD if by_words else width
     count = above_start = above_end = 0
-    for row in range(0, height, step):
+    for row in range(first_row, height, step):
         row_start = count
         current = 0
         if by_words:

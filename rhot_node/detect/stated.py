@@ -39,6 +39,14 @@ STEADY_AREA = 0.04  # relative change against the expectation beyond which the c
 SMEAR_AREA = 3.0  # more of such change per px of smear and of the square root of the area
 
 
+def mask_variance(area: float) -> float:
+    """Luma px^2, per axis: of the centroid of a disc of `area` px^2 whose edge is rounded to whole pixels.
+
+    A pixel of the edge, one per px of it, is wrong by a uniform share with a variance of 1/12.
+    """
+    return 4.0 / (12.0 * math.sqrt(math.pi * area))
+
+
 @njit(cache=True)
 def edge_width(soft, area, major, minor):
     """Standard deviation of the blur at a marker's edge: for a blurred step the sum of a (1 - a) over the pixels,

@@ -13,7 +13,7 @@ from rhot_node.detect import measure as m
 from rhot_node.detect import position as p
 from rhot_node.detect import stated as st
 from rhot_node.markers import Shape
-from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
+from rhot_node.wire.messages import FLAGS, MarkerFlag, MarkerObservation
 
 Row = list[float]
 
@@ -29,6 +29,7 @@ JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
 SAG_STALE, SAG_HIDDEN = 0.15, 0.5  # of a band's last sag: what it may be off by, whole and partly hidden
 MARGIN = 5.0  # chroma px around a resting marker
+PARTIAL, EDGE, AMBIGUOUS = int(MarkerFlag.PARTIAL), int(MarkerFlag.EDGE), int(MarkerFlag.AMBIGUOUS)
 
 
 # Columns of a track's state; chroma pixels. VX, VY: px per frame. AREA: expected in the next frame; RATE: the trend of
@@ -105,10 +106,12 @@ class Track:
         self.alive = 0.0
         self.missed = min(self.missed + 1, MEMORY_FRAMES)
 
-    def observe(self, index: int, row: Row, noise: float, flags: MarkerFlag) -> MarkerObservation:
+    def observe(self, index: int, row: Row, noise: float, flags: int,
+                floor: float = st.FLOOR_VARIANCE) -> MarkerObservation:
         """Judge a measured row by the last frames, state it as an observation and take it into the track.
 
-        `noise`: standard deviation of the chroma noise, grey levels.
+        `noise`: standard deviation of the chroma noise, grey levels. `flags`: of MarkerFlag. `floor`: luma px^2, the
+        variance of the position without any noise.
         """
         known = self.remembered and self.area > 0.0
         ratio = row[p.AREA] / self.area if known else 1.0
@@ -123,43 +126,43 @@ class Track:
                           left * limb)
         if self.shape == "band" and not row[p.FIT]:
             x, y = x - self.sag_x, y - self.sag_y
-            stale = SAG_STALE if not flags & MarkerFlag.PARTIAL else SAG_HIDDEN
+            stale = SAG_STALE if not flags & PARTIAL else SAG_HIDDEN
             bias = math.hypot(bias, stale * math.hypot(self.sag_x, self.sag_y) if self.fitted else 0.3 * extent)
         self._update(row, x, y, extent, ratio, known, flags)
-        return _observation(index, row, x, y, bias, noise, ratio, flags)
+        return _observation(index, row, x, y, bias, noise, floor, ratio, flags)
 
-    def _judge(self, row: Row, ratio: float, known: bool) -> MarkerFlag:
-        flags = NO_FLAGS
+    def _judge(self, row: Row, ratio: float, known: bool) -> int:
+        flags = 0
         if row[m.AT_BORDER]:
-            flags |= MarkerFlag.EDGE
+            flags |= EDGE
         elongated = self.shape == "sphere" and row[p.VAR_MAJOR] > 1.7 * row[p.VAR_MINOR] + 1.0
         broken = self.shape == "band" and self.fitted and not row[p.FIT]
         if ratio < PARTIAL_AREA or row[m.FRAGMENTS] > 1 or elongated or (broken and ratio < 0.93):
-            flags |= MarkerFlag.PARTIAL
+            flags |= PARTIAL
         if row[m.RIVAL_COST] < row[m.COST] + RIVAL_MARGIN or (known and ratio > JUMP_AREA):
-            flags |= MarkerFlag.AMBIGUOUS
+            flags |= AMBIGUOUS
         return flags
 
-    def _plausible_bias(self, row: Row, ratio: float, extent: float, width: float, flags: MarkerFlag) -> float:
+    def _plausible_bias(self, row: Row, ratio: float, extent: float, width: float, flags: int) -> float:
         """Standard deviation, chroma px, of how far what is hidden or mistaken may have drawn the centroid."""
         whole = max(extent, self.extent)
-        if row[p.FIT] and not flags & MarkerFlag.PARTIAL:  # a band's rims are those of a whole one
+        if row[p.FIT] and not flags & PARTIAL:  # a band's rims are those of a whole one
             bias = st.hidden_bias(math.sqrt(ratio), math.sqrt(12.0 * row[p.VAR_MINOR]), row[p.AREA], width)
         else:
             bias = st.hidden_bias(ratio, whole, row[p.AREA], width)
-        if flags & MarkerFlag.PARTIAL:
+        if flags & PARTIAL:
             bias = max(bias, 0.05 * whole)
-        if flags & MarkerFlag.EDGE:
+        if flags & EDGE:
             bias = max(bias, 0.15 * whole)
-        if flags & MarkerFlag.AMBIGUOUS:
+        if flags & AMBIGUOUS:
             bias = max(bias, 0.3 * whole)
         return bias
 
     def _update(self, row: Row, x: float, y: float, extent: float, ratio: float, known: bool,
-                flags: MarkerFlag) -> None:
+                flags: int) -> None:
         if not known:
             self.state[VX:EXTENT] = self.state[FITTED:ALIVE] = 0.0
-        hidden = bool(flags & (MarkerFlag.PARTIAL | MarkerFlag.EDGE)) and ratio < 1.0
+        hidden = bool(flags & (PARTIAL | EDGE)) and ratio < 1.0
         take(self.state, x, y, row[p.AREA], extent, row[m.LEVEL], hidden)
         if row[p.FIT]:
             sag = 0.25 * math.pi * row[p.SAG]
@@ -191,21 +194,21 @@ def take(state, x, y, area, extent, level, hidden):
     state[ALIVE], state[MISSED] = 1.0, 0.0
 
 
-def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: float, ratio: float,
-                 flags: MarkerFlag) -> MarkerObservation:
+def _observation(index: int, row: Row, x: float, y: float, bias: float, noise: float, floor: float, ratio: float,
+                 flags: int) -> MarkerObservation:
     out = np.empty(7)
-    st.luma_values(x, y, row[p.AREA], row[p.COV_XX], row[p.COV_XY], row[p.COV_YY], st.FLOOR_VARIANCE, bias,
+    st.luma_values(x, y, row[p.AREA], row[p.COV_XX], row[p.COV_XY], row[p.COV_YY], floor, bias,
                    row[m.LEVEL], noise, out)
     if row[p.FIT]:
         st.widen_band(row[p.AXIS_X], row[p.AXIS_Y], math.sqrt(12.0 * row[p.VAR_MAJOR]), out)
     x, y, diameter, cov_xx, cov_xy, cov_yy, quality = out.tolist()
-    if flags & MarkerFlag.PARTIAL:
+    if flags & PARTIAL:
         quality *= min(ratio, 0.8)
-    if flags & MarkerFlag.EDGE:
+    if flags & EDGE:
         quality *= 0.7
-    if flags & MarkerFlag.AMBIGUOUS:
+    if flags & AMBIGUOUS:
         quality *= 0.5
-    return MarkerObservation(index, x, y, diameter, cov_xx, cov_xy, cov_yy, quality, flags)
+    return MarkerObservation(index, x, y, diameter, cov_xx, cov_xy, cov_yy, quality, FLAGS[flags])
 
 
 def lost_observation(index: int) -> MarkerObservation:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from struct import Struct
 from struct import error as struct_error
 
 from rhot_node.errors import WireError
 from rhot_node.wire.discovery import decode_find, decode_here, encode_find, encode_here
-from rhot_node.wire.marker_table import MarkerTable
+from rhot_node.wire.marker_table import candidate_table, marker_table
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
@@ -35,6 +34,7 @@ from rhot_node.wire.seal import TAG_LENGTH, Seal
 
 MAGIC = b"RHOT"
 VERSION = 1
+OBSERVATIONS_VERSION = 2  # of this kind of message; its version 1, without candidates, is still understood
 FLAG_TAGGED = 1  # bit 0 of the header's flags: an authentication tag of TAG_LENGTH bytes ends the datagram
 
 TYPE_OBSERVATIONS = 1
@@ -46,6 +46,8 @@ TYPE_FIND = 6
 TYPE_HERE = 7
 
 MARKERS_MAX = 64
+DATAGRAM_MAX = 1472  # bytes that an Ethernet frame carries by UDP: no datagram is cut in two on its way
+FLAG_TRUNCATED = 1  # bit 0 of the observations' flags: there were more candidates than fit
 IMAGE_SIZE_MAX = 16384  # px
 FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
 
@@ -54,6 +56,7 @@ _FLAGS_AT = 6  # offset of the header's flags
 _TAGGED = FLAG_TAGGED.to_bytes(2, "little")
 _OBSERVATIONS = Struct("<qqIIIHHIIB3s")
 _MARKER = Struct("<HHfffffff")
+CANDIDATES_FIT = (DATAGRAM_MAX - _HEADER.size - _OBSERVATIONS.size - TAG_LENGTH) // _MARKER.size
 _CLOCK_REQUEST = Struct("<q")
 _CLOCK_REPLY = Struct("<qqqIB3s")
 _START = Struct("<B3s")
@@ -133,8 +136,8 @@ def is_tagged(data: Datagram) -> bool:
     magic, version, _, flags, _, _, _ = _HEADER.unpack_from(data)
     if magic != MAGIC:
         raise WireError("magic", repr(magic))
-    if version != VERSION:
-        raise WireError("version", f"{version}, this program speaks {VERSION}")
+    if version not in (VERSION, OBSERVATIONS_VERSION):
+        raise WireError("version", f"{version}, this program speaks {VERSION} and {OBSERVATIONS_VERSION}")
     if flags & ~FLAG_TAGGED:
         raise WireError("flags", f"unknown header flags {flags:#06x}")
     if flags and len(data) < _HEADER.size + TAG_LENGTH:
@@ -143,10 +146,14 @@ def is_tagged(data: Datagram) -> bool:
 
 
 def _decode_body(data: Datagram, payload: memoryview) -> Message:
-    _, _, kind, _, node_id, session, sequence = _HEADER.unpack_from(data)
+    _, version, kind, _, node_id, session, sequence = _HEADER.unpack_from(data)
+    if kind == TYPE_OBSERVATIONS:
+        return _decode_observations(payload, node_id, session, sequence, version)
     decoder = _DECODERS.get(kind)
     if decoder is None:
         raise WireError("type", str(kind))
+    if version != VERSION:
+        raise WireError("version", f"{version} of a message of type {kind}, this program speaks {VERSION}")
     return decoder(payload, node_id, session, sequence)
 
 
@@ -171,24 +178,23 @@ def _encode(message: Message) -> bytes:
             return _header(TYPE_HERE, message.node_id, 0, message.sequence) + encode_here(message)
 
 
-def _header(kind: int, node_id: int, session: int, sequence: int) -> bytes:
-    return _HEADER.pack(MAGIC, VERSION, kind, 0, node_id, session, sequence)
+def _header(kind: int, node_id: int, session: int, sequence: int, version: int = VERSION) -> bytes:
+    return _HEADER.pack(MAGIC, version, kind, 0, node_id, session, sequence)
 
 
 def _encode_observations(message: Observations) -> bytes:
+    found = [mark for mark in message.markers if not mark.flags.value & _LOST]
+    kept = found[:CANDIDATES_FIT]
+    truncated = message.truncated or len(found) > len(kept)
     parts = [
-        _header(TYPE_OBSERVATIONS, message.node_id, message.session, message.sequence),
+        _header(TYPE_OBSERVATIONS, message.node_id, message.session, message.sequence, OBSERVATIONS_VERSION),
         _OBSERVATIONS.pack(message.t_frame_node_ns, message.t_send_node_ns, message.processing_ns,
                            message.exposure_ns, message.row_time_ns, message.width, message.height,
-                           message.frame_number, message.marker_checksum, len(message.markers), _ZEROS),
+                           message.frame_number, message.marker_checksum, message.marker_count,
+                           bytes((len(kept), FLAG_TRUNCATED if truncated else 0, 0))),
     ]
-    for m in message.markers:
-        bits = int(m.flags)
-        if bits & _LOST:
-            parts.append(_MARKER.pack(m.index, bits, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0))
-        else:
-            parts.append(_MARKER.pack(m.index, bits, m.x, m.y, m.diameter, m.cov_xx, m.cov_xy, m.cov_yy,
-                                      m.quality))
+    parts.extend([_MARKER.pack(m.index, m.flags.value, m.x, m.y, m.diameter, m.cov_xx, m.cov_xy, m.cov_yy, m.quality)
+                  for m in kept])
     return b"".join(parts)
 
 
@@ -199,25 +205,32 @@ def _encode_start(message: Start) -> bytes:
     return b"".join(parts)
 
 
-def _decode_observations(payload: memoryview, node_id: int, session: int, sequence: int) -> Observations:
+def _decode_observations(payload: memoryview, node_id: int, session: int, sequence: int,
+                         version: int) -> Observations:
     if len(payload) < _OBSERVATIONS.size:
         raise WireError("length", f"payload of {len(payload)} bytes, observations begin with {_OBSERVATIONS.size}")
     (t_frame, t_send, processing, exposure, row_time, width, height, frame_number, checksum, count,
      reserved) = _OBSERVATIONS.unpack_from(payload)
     if count > MARKERS_MAX:
         raise WireError("count", f"{count} markers, at most {MARKERS_MAX}")
-    expect_length(payload, _OBSERVATIONS.size + count * _MARKER.size)
+    candidates, flags = count, 0
+    if version == OBSERVATIONS_VERSION:
+        candidates, flags, reserved = reserved[0], reserved[1], reserved[2:]
+    expect_length(payload, _OBSERVATIONS.size + candidates * _MARKER.size)
     expect_node(node_id)
     expect_session(session)
     expect_zeros(reserved)
+    if flags & ~FLAG_TRUNCATED:
+        raise WireError("flags", f"unknown flags of observations {flags:#04x}")
     expect_time(t_frame, t_send)
     if not 0 <= t_send - t_frame <= FRAME_AGE_MAX_NS:
         raise WireError("time", f"sent {(t_send - t_frame) / 1e9:.3f} s after its exposure")
     if not (0 < width <= IMAGE_SIZE_MAX and 0 < height <= IMAGE_SIZE_MAX):
         raise WireError("size", f"{width} x {height} px")
-    markers = MarkerTable(bytes(payload[_OBSERVATIONS.size:]), width, height)
+    read = candidate_table if version == OBSERVATIONS_VERSION else marker_table
+    markers = read(bytes(payload[_OBSERVATIONS.size:]), count, width, height)
     return Observations(node_id, session, sequence, t_frame, t_send, processing, exposure, row_time, width, height,
-                        frame_number, checksum, markers)
+                        frame_number, checksum, markers, bool(flags & FLAG_TRUNCATED))
 
 
 def _decode_clock_request(payload: memoryview, node_id: int, session: int, sequence: int) -> ClockRequest:
@@ -268,7 +281,6 @@ def _decode_stop(payload: memoryview, node_id: int, session: int, sequence: int)
 
 
 _DECODERS: dict[int, Callable[[memoryview, int, int, int], Message]] = {
-    TYPE_OBSERVATIONS: _decode_observations,
     TYPE_CLOCK_REQUEST: _decode_clock_request,
     TYPE_CLOCK_REPLY: _decode_clock_reply,
     TYPE_START: _decode_start,

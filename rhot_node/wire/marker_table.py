@@ -11,16 +11,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.errors import WireError
-from rhot_node.wire.messages import MarkerFlag, MarkerObservation
+from rhot_node.wire.messages import CANDIDATES_MAX, FLAGS, MarkerFlag, MarkerObservation
 
 RECORD_SIZE = 32  # bytes of one marker: index u16, flags u16, then x, y, diameter, cov_xx, cov_xy, cov_yy, quality f32
 IMAGE_MARGIN = 64.0  # px; the centre of a marker cut by the border may lie this far outside
 COVARIANCE_MAX = 1e8  # px^2; also keeps the determinant finite in single precision
 
 _LOST = int(MarkerFlag.LOST)
-_FLAGS = tuple(MarkerFlag(bits) for bits in range(2 * int(max(MarkerFlag))))  # building one takes a microsecond
-_KNOWN_FLAGS = len(_FLAGS)
-_SOUND, _INDEX, _UNKNOWN_FLAGS, _LOST_WITH_VALUES, _IMPLAUSIBLE = range(5)
+_KNOWN_FLAGS = len(FLAGS)
+_SOUND, _INDEX, _UNKNOWN_FLAGS, _LOST_WITH_VALUES, _IMPLAUSIBLE, _TOO_MANY = range(6)
 
 Array = NDArray[np.float64]
 Words = NDArray[np.uint16]  # (M, 16), of which the first two are index and flags
@@ -28,20 +27,14 @@ Values = NDArray[np.float32]  # (M, 8), of which the first is index and flags
 
 
 class MarkerTable(Sequence[MarkerObservation]):
-    """The markers of a datagram, in its order; a sequence of `MarkerObservation` that equals any other such."""
+    """The markers of a datagram, as `Observations.markers` has them; a sequence of `MarkerObservation` that equals any
+    other such. `marker_count`: markers of the set."""
 
-    __slots__ = ("_values", "_words")
+    __slots__ = ("_values", "_words", "marker_count")
 
-    def __init__(self, records: bytes, width: int, height: int) -> None:
-        """`records`: RECORD_SIZE bytes per marker, of an image of `width` x `height` px.
-
-        Raises WireError (index, flags or marker) when any of it is not plausible.
-        """
-        self._words: Words = np.frombuffer(records, "<u2").reshape(-1, 16)
-        self._values: Values = np.frombuffer(records, "<f4").reshape(-1, 8)
-        row, fault = _first_fault(self._words, self._values, width, height)
-        if fault:
-            self._refuse(row, fault)
+    def __init__(self, words: Words, values: Values, marker_count: int) -> None:
+        """`words` and `values`: of checked records."""
+        self._words, self._values, self.marker_count = words, values, marker_count
 
     def __len__(self) -> int:
         return len(self._words)
@@ -57,7 +50,7 @@ class MarkerTable(Sequence[MarkerObservation]):
         x, y, diameter, xx, xy, yy, quality = self._values[item, 1:].tolist()
         if bits & _LOST:
             x = y = math.nan  # one NaN object, so that equal markers compare equal
-        return MarkerObservation(index, x, y, diameter, xx, xy, yy, quality, _FLAGS[bits])
+        return MarkerObservation(index, x, y, diameter, xx, xy, yy, quality, FLAGS[bits])
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sequence) and list(self) == list(other)
@@ -65,38 +58,96 @@ class MarkerTable(Sequence[MarkerObservation]):
     __hash__ = None  # type: ignore[assignment]  # as a list's
 
     def columns(self) -> tuple[Array, Array, Array, Array, NDArray[np.uint16]]:
-        """Pixels (M, 2), NaN when lost, covariances (M, 2, 2) px^2, diameters (M,) px, qualities and flags (M,)."""
+        """Pixels (N, 2), NaN when lost, covariances (N, 2, 2) px^2, diameters (N,) px, qualities and flags (N,)."""
         count = len(self)
         numbers, flags = np.empty(8 * count), np.empty(count, np.uint16)
         _read(self._words, self._values, numbers, flags)
         return (numbers[:2 * count].reshape(count, 2), numbers[2 * count:6 * count].reshape(count, 2, 2),
                 numbers[6 * count:7 * count], numbers[7 * count:], flags)
 
-    def _refuse(self, row: int, fault: int) -> None:
-        index, bits = self._words[row, :2].tolist()
-        if fault == _INDEX:
-            raise WireError("index", f"marker {index} at position {row}")
-        if fault == _UNKNOWN_FLAGS:
-            raise WireError("flags", f"unknown marker flags {bits:#06x}")
-        if fault == _LOST_WITH_VALUES:
-            raise WireError("marker", f"marker {index} is lost and yet has values")
-        raise WireError("marker", f"marker {index} is not plausible: {tuple(self._values[row, 1:].tolist())}")
+    def indices(self) -> NDArray[np.intp]:
+        """(N,) which marker each row is of."""
+        return self._words[:, 0].astype(np.intp)
+
+
+def marker_table(records: bytes, count: int, width: int, height: int) -> MarkerTable:
+    """One record a marker, lost or not: observations of version 1. `records`: `count` times RECORD_SIZE bytes, of an
+    image of `width` x `height` px.
+
+    Raises WireError (index, flags or marker) when any of it is not plausible.
+    """
+    words, values = _checked(records, count, width, height, False)
+    return MarkerTable(words, values, count)
+
+
+def candidate_table(records: bytes, count: int, width: int, height: int) -> MarkerTable:
+    """Up to CANDIDATES_MAX records a marker, the best first, none of a lost one: observations of version 2, of a set of
+    `count` markers. Otherwise as `marker_table`."""
+    words, values = _checked(records, count, width, height, True)
+    both = np.empty((count + len(words), 16), "<u2")
+    rows = both.view("<f4")
+    size = _place_candidates(words, values, count, both, rows)
+    return MarkerTable(both[:size], rows[:size], count)
+
+
+def _checked(records: bytes, count: int, width: int, height: int, found_only: bool) -> tuple[Words, Values]:
+    words: Words = np.frombuffer(records, "<u2").reshape(-1, 16)
+    values: Values = np.frombuffer(records, "<f4").reshape(-1, 8)
+    row, fault = _first_fault(words, values, count, width, height, found_only)
+    if fault == _SOUND:
+        return words, values
+    index, bits = words[row, :2].tolist()
+    if fault == _INDEX:
+        raise WireError("index", f"marker {index} at position {row}, of a set of {count}")
+    if fault == _UNKNOWN_FLAGS:
+        raise WireError("flags", f"unknown marker flags {bits:#06x}")
+    if fault == _LOST_WITH_VALUES:
+        raise WireError("marker", f"marker {index} is lost and yet has values")
+    if fault == _TOO_MANY:
+        raise WireError("marker", f"more than {CANDIDATES_MAX} candidates of marker {index}")
+    raise WireError("marker", f"marker {index} is not plausible: {tuple(values[row, 1:].tolist())}")
 
 
 @njit(cache=True)
-def _first_fault(words: Words, values: Values, width: int, height: int) -> tuple[int, int]:
-    """Row and kind of the first fault, (0, _SOUND) without one."""
+def _place_candidates(words: Words, values: Values, count: int, out_words: Words, out_values: Values) -> int:
+    """Write the first record of every marker to its row, or a lost marker's, and the others behind; return how many."""
+    for index in range(count):
+        out_values[index, :] = 0.0
+        out_values[index, 1] = out_values[index, 2] = math.nan
+        out_words[index, 0], out_words[index, 1] = index, _LOST
+    size = count
+    for row in range(words.shape[0]):
+        index = int(words[row, 0])
+        if out_words[index, 1] & _LOST:
+            out_words[index] = words[row]
+        else:
+            out_words[size] = words[row]
+            size += 1
+    return size
+
+
+@njit(cache=True)
+def _first_fault(words: Words, values: Values, count: int, width: int, height: int, found_only: bool,
+                 ) -> tuple[int, int]:
+    """Row and kind of the first fault, (0, _SOUND) without one. `found_only`: candidates of `count` markers; else one
+    record of each."""
+    candidates = np.zeros(count, np.int64)
     x_max, y_max = width - 1 + IMAGE_MARGIN, height - 1 + IMAGE_MARGIN
     diameter_max = 2.0 * max(width, height)
     for row in range(words.shape[0]):
         x, y, diameter = float(values[row, 1]), float(values[row, 2]), float(values[row, 3])
         xx, xy, yy = float(values[row, 4]), float(values[row, 5]), float(values[row, 6])
         quality = float(values[row, 7])
-        if words[row, 0] != row:
+        if (words[row, 0] >= count) if found_only else (words[row, 0] != row):
             return row, _INDEX
         if words[row, 1] >= _KNOWN_FLAGS:
             return row, _UNKNOWN_FLAGS
+        candidates[words[row, 0]] += 1
+        if candidates[words[row, 0]] > CANDIDATES_MAX:
+            return row, _TOO_MANY
         if words[row, 1] & _LOST:
+            if found_only:
+                return row, _LOST_WITH_VALUES
             silent = diameter == 0.0 and xx == 0.0 and xy == 0.0 and yy == 0.0 and quality == 0.0
             if not (math.isnan(x) and math.isnan(y) and silent):
                 return row, _LOST_WITH_VALUES

@@ -38,6 +38,9 @@ class MarkerFlag(enum.IntFlag):
 
 
 NO_FLAGS = MarkerFlag(0)
+FLAGS = tuple(MarkerFlag(bits) for bits in range(2 * int(max(MarkerFlag))))
+"""By their bits: to build a MarkerFlag takes a microsecond."""
+CANDIDATES_MAX = 4  # of one marker in one frame
 
 
 class MarkerObservation(msgspec.Struct, frozen=True, gc=False):
@@ -66,7 +69,8 @@ class MarkerObservation(msgspec.Struct, frozen=True, gc=False):
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """All markers of one frame.
+    """All markers of one frame. `markers`: the best candidate of each, in the order of the set, lost ones among them;
+    then further candidates, at most CANDIDATES_MAX of a marker in all. `truncated`: some did not fit the datagram.
 
     `t_frame_node_ns`: mid-exposure of row 0, node clock; a marker at row y is later by y * `row_time_ns`.
     `t_send_node_ns`: when the datagram was handed to the socket. `processing_ns`: from frame available to then.
@@ -85,6 +89,12 @@ class Observations:
     frame_number: int
     marker_checksum: int
     markers: Sequence[MarkerObservation]
+    truncated: bool = False
+
+    @property
+    def marker_count(self) -> int:
+        """Markers of the set: so many of `markers` are best candidates."""
+        return 1 + max((mark.index for mark in self.markers), default=-1)
 
 
 @dataclass(frozen=True, slots=True)

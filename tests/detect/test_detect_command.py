@@ -49,7 +49,7 @@ def test_an_image(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert [marker["id"] for marker in only["markers"]] == list(RGB)
     assert ring(only)["x"] == pytest.approx(70, abs=0.2)
     assert ring(only)["size"] == pytest.approx(24, rel=0.03)
-    assert ring(only)["flags"] == ["ambiguous", "acquired"]  # alone of a hand's six, it may be any thing
+    assert ring(only)["flags"] == ["acquired"]
     thumb = only["markers"][0]
     assert (thumb["x"], thumb["y"], thumb["size"], thumb["quality"]) == (None, None, None, 0.0)
     assert thumb["flags"] == ["lost"]
@@ -61,9 +61,9 @@ def test_images_are_stills_unless_they_are_said_to_be_a_sequence(
         cv2.imwrite(str(tmp_path / f"{number:03}.png"), to_bgr(image))
     (tmp_path / "notes.txt").write_text("not an image")
     stills = [ring(entry)["flags"] for entry in detect(capsys, tmp_path)["frames"]]
-    assert stills == [["ambiguous", "acquired"]] * 3
+    assert stills == [["acquired"]] * 3
     sequence = [ring(entry)["flags"] for entry in detect(capsys, tmp_path, "--sequence")["frames"]]
-    assert sequence == [["ambiguous", "acquired"], ["ambiguous"], ["partial", "ambiguous"]]
+    assert sequence == [["acquired"], [], ["partial"]]
 
 
 def test_a_recording_is_a_sequence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,9 +74,9 @@ def test_a_recording_is_a_sequence(tmp_path: Path, capsys: pytest.CaptureFixture
     frames = detect(capsys, tmp_path / "rec")["frames"]
     assert [entry["index"] for entry in frames] == [0, 1, 2]
     assert [round(ring(entry)["x"]) for entry in frames] == [50, 60, 70]
-    assert ring(frames[2])["flags"] == ["ambiguous"]
+    assert ring(frames[2])["flags"] == []
     assert "file" not in frames[0]
-    assert ring(detect(capsys, tmp_path / "rec", "--stills")["frames"][2])["flags"] == ["ambiguous", "acquired"]
+    assert ring(detect(capsys, tmp_path / "rec", "--stills")["frames"][2])["flags"] == ["acquired"]
 
 
 def test_a_video(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

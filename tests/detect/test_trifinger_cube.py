@@ -24,7 +24,7 @@ def detect(camera: int, turns: int = 0, flip: bool = False) -> dict[str, MarkerO
     bgr = cv2.imread(str(FOLDER / f"camera{camera}.png"))
     assert bgr is not None
     bgr = np.ascontiguousarray(np.rot90(bgr[:, ::-1] if flip else bgr, turns))
-    return dict(zip(CUBE.ids, FastDetector(CUBE).detect(from_bgr(np.asarray(bgr, dtype=np.uint8))), strict=True))
+    return dict(zip(CUBE.ids, FastDetector(CUBE).detect(from_bgr(np.asarray(bgr, dtype=np.uint8))), strict=False))
 
 
 def mask_centroid(name: str, camera: int) -> np.ndarray | None:

@@ -6,7 +6,6 @@ import math
 import random
 import struct
 
-import msgspec
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_samples import RHOT6_CHECKSUM, SAMPLES, lost, packet
@@ -39,12 +38,20 @@ times = st.integers(-(2**62) + 1, 2**62 - 1)
 def markers(draw: st.DrawFn, index: int) -> MarkerObservation:
     flags = MarkerFlag(draw(st.integers(0, 63)))
     if flags & MarkerFlag.LOST:
-        return msgspec.structs.replace(lost(index), flags=flags)
+        return lost(index)
     xx, yy = (draw(st.floats(0.0009765625, 64.0, width=32)) for _ in range(2))
     correlation = draw(st.floats(-0.99, 0.99))
     (xy,) = struct.unpack("<f", struct.pack("<f", correlation * math.sqrt(xx * yy)))
     return MarkerObservation(index, draw(st.floats(-64, 703, width=32)), draw(st.floats(-64, 543, width=32)),
                              draw(st.floats(0.5, 1280, width=32)), xx, xy, yy, draw(st.floats(0, 1, width=32)), flags)
+
+
+@st.composite
+def candidates(draw: st.DrawFn, count: int) -> tuple[MarkerObservation, ...]:
+    """The best of every marker, and up to three more of those that are found."""
+    best = [draw(markers(index)) for index in range(count)]
+    more = [draw(markers(mark.index)) for mark in best if mark.found for _ in range(draw(st.integers(0, 3)))]
+    return (*best, *(mark for mark in more if mark.found))[:40]
 
 
 @st.composite
@@ -56,7 +63,7 @@ def messages(draw: st.DrawFn) -> Message:
             count = draw(st.integers(0, 12))
             return Observations(node_id, session, sequence, t_frame, t_frame + draw(st.integers(0, 60 * 10**9)),
                                 draw(u32), draw(u32), draw(u32), 640, 480, draw(u32), RHOT6_CHECKSUM,
-                                tuple(draw(markers(i)) for i in range(count)))
+                                draw(candidates(count)), draw(st.booleans()))
         case 2:
             return ClockRequest(node_id, session, sequence, draw(times))
         case 3:

@@ -9,13 +9,12 @@ import struct
 import timeit
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
-from wire_samples import KEY, PACKETS, SAMPLES, SESSION, SIX, TAGGED, found, lost, observations, packet
+from wire_samples import KEY, PACKETS, SAMPLES, SESSION, SIX, TAGGED, VERSION_1, found, lost, observations, packet
 
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import asks_who_is_there, decode, encode
+from rhot_node.wire.codec import asks_who_is_there, decode, decode_sealed, encode
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockRequest,
@@ -30,7 +29,7 @@ from rhot_node.wire.messages import (
 )
 from rhot_node.wire.seal import Seal
 
-OBSERVATIONS = "observations_some_lost"
+OBSERVATIONS = "version_1_observations_some_lost"
 
 
 def patched(name: str, offset: int, layout: str, *values: float | bytes) -> bytes:
@@ -54,7 +53,50 @@ def test_golden_packets_byte_for_byte(name: str) -> None:
 
 
 def test_every_golden_packet_has_its_sample() -> None:
-    assert {path.stem for path in PACKETS.glob("*.bin")} == {*SAMPLES, *TAGGED}
+    older = {*VERSION_1, "version_1_tagged_observations_six", "version_1_tagged_observations_none"}
+    assert {path.stem for path in PACKETS.glob("*.bin")} == {*SAMPLES, *TAGGED, *older}
+
+
+@pytest.mark.parametrize("name", VERSION_1)
+def test_observations_of_version_1_are_understood(name: str) -> None:
+    assert decode(packet(name)) == VERSION_1[name]
+
+
+def test_a_datagram_with_its_tag_fits_one_frame_and_says_what_it_left_out() -> None:
+    best = tuple(found(i, 8.0 * i, 4.0 * i) for i in range(20))
+    second = tuple(found(i, 9.0 * i, 4.0 * i) for i in range(20))
+    third = tuple(found(i, 7.0 * i, 4.0 * i) for i in range(20))
+    data = encode(observations((*best, *second, *third)), Seal(KEY))
+    assert 1472 - 32 < len(data) <= 1472
+    message = decode_sealed(data, Seal(KEY))
+    assert isinstance(message, Observations)
+    assert message.truncated
+    assert message.marker_count == 20
+    assert message.markers == (*best, *second, *third[:3])
+    candidates = decode(packet("observations_candidates"))
+    assert isinstance(candidates, Observations)
+    assert not candidates.truncated
+
+
+@pytest.mark.parametrize(("offset", "layout", "values", "reason"), [
+    (4, "<B", (1,), "length"),
+    (4, "<B", (3,), "version"),
+    (64, "<B", (2,), "index"),
+    (64, "<B", (65,), "count"),
+    (65, "<B", (5,), "length"),
+    (66, "<B", (2,), "flags"),
+    (67, "<B", (1,), "reserved"),
+    (68 + 32, "<H", (0,), "marker"),  # a fifth candidate
+    (70, "<H", (1,), "marker"),  # lost markers have no record
+    (72, "<f", (math.nan,), "marker"),
+])
+def test_a_fault_in_candidates_is_refused_by_its_reason(offset: int, layout: str, values: tuple[float],
+                                                        reason: str) -> None:
+    assert refused(patched("observations_candidates", offset, layout, *values)) == reason
+
+
+def test_only_observations_have_a_second_version() -> None:
+    assert refused(patched("stop", 4, "<B", 2)) == "version"
 
 
 def test_the_document_shows_the_golden_packet() -> None:
@@ -71,7 +113,7 @@ Fault = tuple[int, str, tuple[float | bytes], str]
 
 HEADER_FAULTS: list[Fault] = [
     (0, "<4s", (b"rhot",), "magic"),
-    (4, "<B", (2,), "version"),
+    (4, "<B", (3,), "version"),
     (5, "<B", (0,), "type"),
     (5, "<B", (8,), "type"),
     (6, "<H", (1,), "tag"),
@@ -177,13 +219,14 @@ def test_a_lost_marker_carries_nothing_whatever_the_detector_said() -> None:
     said = MarkerObservation(0, 3.0, math.nan, math.nan, 1.0, 0.0, math.inf, 0.5, MarkerFlag.LOST | MarkerFlag.EDGE)
     message = decode(encode(observations((said,))))
     assert isinstance(message, Observations)
-    assert message.markers == (msgspec.structs.replace(lost(0), flags=MarkerFlag.LOST | MarkerFlag.EDGE),)
+    assert message.markers == (lost(0),)
 
 
 def test_columns_say_what_the_markers_say() -> None:
     message = decode(packet("observations_some_lost"))
     assert isinstance(message, Observations)
     assert isinstance(message.markers, MarkerTable)
+    assert message.markers.indices().tolist() == [marker.index for marker in message.markers]
     pixels, covariances, diameters, qualities, flags = message.markers.columns()
     rows = zip(message.markers, pixels, covariances, diameters, qualities, flags, strict=True)
     for marker, pixel, covariance, diameter, quality, bits in rows:

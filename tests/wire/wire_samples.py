@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -58,7 +59,11 @@ SAMPLES: dict[str, Message] = {
     "observations_all_lost": observations(tuple(lost(i) for i in range(6))),
     "observations_two": observations((SIX[0], lost(1))),
     "observations_none": observations(()),
-    "observations_sixty_four": observations(tuple(found(i, 8.0 * i, 4.0 * i) for i in range(64)), 2**32 - 1),
+    "observations_candidates": observations(
+        (found(0, 4.0, 5.0, MarkerFlag.AMBIGUOUS), lost(1), found(2, 6.0, 7.0), found(0, 99.5, 8.0), found(2, 2.0, 1.0),
+         found(0, 300.0, 9.0, MarkerFlag.ACQUIRED), found(0, 301.0, 9.0))),
+    "observations_truncated": dataclasses.replace(
+        observations(tuple(found(i, 8.0 * i, 4.0 * i) for i in range(43)), 2**32 - 1), truncated=True),
     "clock_request": ClockRequest(2, SESSION, 99, 7_200_000_000_123),
     "clock_request_idle": ClockRequest(2**32 - 1, 0, 0, -5),
     "clock_reply_streaming": ClockReply(2, SESSION, 99, 7_200_000_000_123, FRAME_NS + 1, FRAME_NS + 20_001, 0xB007_B007,
@@ -75,6 +80,12 @@ SAMPLES: dict[str, Message] = {
     "here_longest_name": Here(2**32 - 1, 2**32 - 1, 2**64 - 1, 1, 1, 65535, 2, 3, NodeState.FAULT, TrustState.OPEN,
                               "\U0001d4d7" * 64),
 }
+
+SIXTY_FOUR = observations(tuple(found(i, 8.0 * i, 4.0 * i) for i in range(64)), 2**32 - 1)
+VERSION_1 = {f"version_1_{name}": SAMPLES.get(name, SIXTY_FOUR) for name in (
+    "observations_six", "observations_some_lost", "observations_all_lost", "observations_two", "observations_none",
+    "observations_sixty_four")}
+"""What older nodes send: one record of each marker, lost or not."""
 
 KEY = bytes(range(32))
 TAGGED: dict[str, Message] = {f"tagged_{name}": SAMPLES[name] for name in (
