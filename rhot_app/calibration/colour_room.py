@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,11 +11,9 @@ from numpy.typing import NDArray
 from rhot_app.calibration.colour_samples import View
 from rhot_app.calibration.paint_region import Mask, only
 from rhot_node.detect.colour import Colours, colours_of
-from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.gate import ColourGate, merits
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.search import AREA, SUM_X, SUM_Y
-from rhot_node.detect.whereabouts import Whereabouts, middle_of
 from rhot_node.markers import Marker, MarkerSet
 
 HUE_STEP_DEG = 5
@@ -66,16 +63,15 @@ class RoomColours:
 
 def survey_room(markers: MarkerSet, names: Sequence[str], views: Sequence[View]) -> RoomReport:
     """Search the pictures outside the markers. `names`: of the markers, in the order of the set."""
-    gate, detector = ColourGate(markers), FastDetector(markers)
+    gate = ColourGate(markers)
     histogram = np.zeros(HUE_BINS)
     rivals: list[Rival | None] = [None] * len(names)
     for picture, view in enumerate(views):
         room = outside(view)
-        hand = _hand(view, markers, detector)
         histogram += hue_histogram(view.image, room) / len(views)
         for index, name in enumerate(names):
             if name in view.paint:
-                rival = _rival(gate, markers.markers[index], index, view, picture, room, hand)
+                rival = _rival(gate, markers.markers[index], index, view, picture, room)
                 known = rivals[index]
                 if rival is not None and (known is None or rival.merit > known.merit):
                     rivals[index] = rival
@@ -106,33 +102,18 @@ def room_colours(views: Sequence[View], name: str) -> RoomColours:
     return RoomColours(colours[::step], step / pictures, max(size, 1.0))
 
 
-def _rival(gate: ColourGate, marker: Marker, index: int, view: View, picture: int, room: Mask,
-           hand: Whereabouts | None) -> Rival | None:
+def _rival(gate: ColourGate, marker: Marker, index: int, view: View, picture: int, room: Mask) -> Rival | None:
     name, shape = marker.id, view.image.u.shape
     blobs = gate.blobs(only(view.image, room), [index]).copy()
     if not len(blobs):
         return None
-    worth = merits(blobs, marker, shape, hand)
-    best_own = float(np.max(merits(gate.blobs(only(view.image, view.paint[name].whole), [index]), marker, shape, hand),
-                            initial=0.0)) or (view.paint[name].area if hand is None else 1.0)
+    worth = merits(blobs, marker, shape)
+    own = merits(gate.blobs(only(view.image, view.paint[name].whole), [index]), marker, shape)
+    best_own = float(np.max(own, initial=0.0)) or view.paint[name].area
     best = blobs[int(np.argmax(worth))]
     return Rival(name, picture, x=2.0 * float(best[SUM_X] / best[AREA]) + 0.5,
                  y=2.0 * float(best[SUM_Y] / best[AREA]) + 0.5, area_px=4.0 * float(best[AREA]),
                  passing_px=4.0 * float(blobs[:, AREA].sum()), merit=float(worth.max()) / best_own)
-
-
-def _hand(view: View, markers: MarkerSet, detector: FastDetector) -> Whereabouts | None:
-    """Where the hand is, by the worn markers: those that are known in the picture, and the others as they are found."""
-    worn = []
-    detector.reset()
-    for marker, seen in zip(markers.markers, detector.detect(view.image), strict=True):
-        if marker.role is not None and marker.id in view.paint:
-            region = view.paint[marker.id]
-            y, x = np.argwhere(region.sample).mean(axis=0)
-            worn.append((float(x), float(y), region.area))
-        elif marker.role is not None and seen.found:
-            worn.append((0.5 * seen.x, 0.5 * seen.y, math.pi * (0.25 * seen.diameter) ** 2))
-    return middle_of(worn)
 
 
 def _hue_bins() -> NDArray[np.uint8]:

@@ -126,7 +126,7 @@ class NodeDoor:
         verdict = self.sequence.judge(message.sequence)
         if verdict is not Verdict.FRESH and verdict is not Verdict.LATE:
             return verdict.name.lower()
-        if message.marker_checksum != self._checksum or len(message.markers) != self._count:
+        if message.marker_checksum != self._checksum or message.marker_count != self._count:
             return "marker_set"
         if (message.width, message.height) != self._size:
             self.image_size = (message.width, message.height)
@@ -142,7 +142,8 @@ class NodeDoor:
     def _build(self, message: Observations, t_row0_ns: int, t_send_ns: int, t_receive_ns: int,
                bound_s: float) -> CameraObservations:
         assert isinstance(message.markers, MarkerTable)  # as everything that was decoded
-        pixels, covariances, diameters, qualities, flags = message.markers.columns()
+        pixels, covariances, diameters, qualities, flags = (
+            column[:self._count] for column in message.markers.columns())
         return CameraObservations(
             camera=self._camera, t_row0_master_ns=t_row0_ns, row_time_ns=message.row_time_ns,
             clock_bound_s=bound_s, t_receive_ns=t_receive_ns,
