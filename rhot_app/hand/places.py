@@ -8,6 +8,7 @@ wrist).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,8 @@ ROLES = (*TIP_ROLES, WRIST_ROLE, *KNUCKLE_ROLES, *INNER_ROLES, *BACK_ROLES)
 
 _BACK = {"hand_1": (1, 0.7, 0.8), "hand_2": (4, 0.75, 0.8), "hand_3": (2, 0.3, 0.0)}
 """On the back of the hand: which finger's knuckle, and which parts of the way there, along and across the palm."""
+
+_POSES, _LENGTH_SD = 2000, 0.054
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +68,24 @@ def place_of(marker: Marker, model: HandModel) -> Place:
     said = f"the role {marker.role!r}" if marker.role else "no role"
     raise RigError(f"marker {marker.id!r} has {said}; a hand wears markers at "
                    f"{', '.join(ROLES)}.")
+
+
+def farthest_apart(model: HandModel, places: Sequence[Place]) -> Array:
+    """(P, P) m: how far two places on the hand get from each other in any pose, of a person's hand at most.
+
+    Over random poses within the joints' limits. Hands' lengths have a standard deviation of 5 % (ANSUR II: 193 mm, 10
+    mm, men); three of them are allowed for.
+    """
+    rng, dh = np.random.default_rng(0), model.dh
+    rows, offsets = [place.row for place in places], np.array([place.point for place in places])
+    frames = np.zeros((len(dh.parent) + 1, 3, 4))
+    frames[ROOT] = np.eye(4)[:3]
+    points, found = np.empty((len(dh.point_row), 3)), np.empty((_POSES, len(places), 3))
+    for pose in found:
+        forward_arrays(dh, np.eye(4), rng.uniform(model.limits[:, 0], model.limits[:, 1]), frames[:-1], points)
+        pose[:] = np.einsum("pij,pj->pi", frames[rows, :, :3], offsets) + frames[rows, :, 3]
+    apart = np.linalg.norm(found[:, :, None] - found[:, None], axis=3)
+    return np.asarray((1.0 + 3.0 * _LENGTH_SD) * apart.max(axis=0))
 
 
 def _dorsal(model: HandModel, finger: int, row: int) -> Array:

@@ -10,7 +10,7 @@ from rhot_app.sources.admission import ANYBODY
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.text_frames import TextReader
 from rhot_app.sources.travel_times import TravelTimes
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraObservations, Candidates
 from rhot_node.errors import WireError
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import Observations
@@ -142,10 +142,16 @@ class NodeDoor:
     def _build(self, message: Observations, t_row0_ns: int, t_send_ns: int, t_receive_ns: int,
                bound_s: float) -> CameraObservations:
         assert isinstance(message.markers, MarkerTable)  # as everything that was decoded
-        pixels, covariances, diameters, qualities, flags = (
-            column[:self._count] for column in message.markers.columns())
+        count = self._count
+        columns = message.markers.columns()
+        further = None
+        if len(message.markers) > count:
+            further = Candidates(message.markers.indices()[count:], *(column[count:] for column in columns))
+            columns = tuple(column[:count] for column in columns)
+        pixels, covariances, diameters, qualities, flags = columns
         return CameraObservations(
             camera=self._camera, t_row0_master_ns=t_row0_ns, row_time_ns=message.row_time_ns,
             clock_bound_s=bound_s, t_receive_ns=t_receive_ns,
             detect_s=1e-9 * message.processing_ns, network_s=1e-9 * (t_receive_ns - t_send_ns),
-            pixels=pixels, covariances=covariances, diameters=diameters, qualities=qualities, flags=flags)
+            pixels=pixels, covariances=covariances, diameters=diameters, qualities=qualities, flags=flags,
+            further=further)

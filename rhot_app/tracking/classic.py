@@ -11,6 +11,7 @@ from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.hand.model import build_model
 from rhot_app.project import Rig
 from rhot_app.tracking import stages, trust
+from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.hand_solver import HandSolver, SolvedHand
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
@@ -31,6 +32,7 @@ class ClassicTracker:
         self._rig = compile_rig(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
         self._pairing = Pairing(cameras, markers)
+        self._association = MarkerAssociation(self._rig)
         self._hand = HandSolver(build_model(rig.hand))
         pixel, position = filter_settings(rig)
         self._filtering = rig.filters.enabled
@@ -46,7 +48,9 @@ class ClassicTracker:
         self._hand.reset()
         self._pixel_filter.reset()
         self._position_filter.reset()
+        self._association.reset()
         self._memory = trust.empty_memory(len(self._rig.marker_ids))
+        self._confirmed = np.zeros(len(self._rig.marker_ids), np.bool_)
         self._anchors = np.full((len(self._rig.marker_ids), 3), np.nan)
         self._epoch_ns: int | None = None
         self._last_s = 0.0
@@ -55,7 +59,7 @@ class ClassicTracker:
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; about 10 µs."""
-        self._pairing.ingest(observations)
+        self._pairing.ingest(self._association.select(observations))
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""
@@ -70,6 +74,7 @@ class ClassicTracker:
         t_s = self._seconds(paired.t_ns)
         clock.lap("pair")
         markers = self._locate(t_s, paired, clock)
+        self._association.note(paired.t_ns, markers.raw)
         hand = self._solve_hand(t_s, markers)
         clock.lap("solve")
         return self._state(t_s, paired, markers, hand, clock)
@@ -84,6 +89,7 @@ class ClassicTracker:
             self._pixel_filter.reset()
             self._position_filter.reset()
             self._memory[:] = np.nan
+            self._confirmed[:] = False
             self._measured_s = None
         self._last_s = t_s
         return t_s
@@ -93,8 +99,8 @@ class ClassicTracker:
         rig, shapes = self._rig, self._shapes()
         markers = Sheet(len(rig.cameras), len(rig.marker_ids))
         stages.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
-                          rig.cameras, rig.focal, shapes, rig.law, self._memory, markers.used, markers.doubtful,
-                          markers.believed, markers.restarted, markers.raw, markers.covariances, markers.errors)
+                          rig.cameras, rig.focal, shapes, rig.law, rig.reach, self._memory, self._confirmed,
+                          markers.used, markers.doubtful, markers.believed, markers.restarted, markers.raw, markers.covariances, markers.errors)
         clock.lap("triangulate")
         if not self._filtering:
             markers.positions[:] = markers.raw

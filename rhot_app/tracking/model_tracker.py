@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
+from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.kalman.elbow import bent_backwards, unbend
 from rhot_app.tracking.kalman.estimate import ORDINARY_S, copy_estimate, empty_estimate
@@ -89,6 +90,7 @@ class ModelTracker:
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)
         self._sights = Sights(cameras, markers)
+        self._association = MarkerAssociation(self._rig)
         self._ahead = empty_estimate(cameras, markers)
         subject, self._told_states = subject_of(self._wearing), 0
         self._told, self._told_ahead = (Teller(self._rig, self._sights, subject, estimate)
@@ -100,6 +102,7 @@ class ModelTracker:
         self._pending: list[CameraObservations] = []
         self._starter.reset()
         self._sights.reset()
+        self._association.reset()
         if self._size is not None:
             self._size.reset()
             self._hand.resize(*self._size.known)
@@ -110,6 +113,7 @@ class ModelTracker:
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
+        observations = self._association.select(observations)
         if len(self._pending) < _PENDING:
             self._pending.append(observations)
         else:
@@ -290,5 +294,7 @@ class ModelTracker:
                                 Condition.LOST if self._ever else Condition.SEARCHING,
                                 None if self._size is None else self._size.known, newest, begun)
         state = self._told.tell(self._timeline.t_ns, number, newest, begun)
+        self._association.note(state.t_master_ns, np.where(
+            (state.marker_knowledge <= Knowledge.INFERRED)[:, None], state.marker_positions, np.nan))
         self._compare(state)
         return state

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.silhouette import ball
 from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.model import build_model
+from rhot_app.hand.places import ROLES, farthest_apart, place_of
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
 from rhot_app.project import OneEuroSettings, Rig
 from rhot_app.tracking.estimate import disparity_law
@@ -28,7 +30,8 @@ class RigArrays:
     `shapes` (M, 3, 3) m^2: the markers' bodies as far as known without the hand's pose, zero for flat ones. `tips`
     (5,): marker index of each finger's tip, -1 without one; `wrist`: the same for the wrist. `band_half_axes`
     (3,) m along the palm's x, y, z; None when the wrist wears no band. `law` (7,): how distance follows from
-    disparity (`estimate.disparity_law`), empty when markers are triangulated.
+    disparity (`estimate.disparity_law`), empty when markers are triangulated. `reach` (M, M) m: how far two markers of
+    the hand are from each other at most, infinite where one is none.
     """
 
     camera_names: tuple[str, ...]
@@ -41,6 +44,7 @@ class RigArrays:
     wrist: int
     band_half_axes: Array | None
     law: Array
+    reach: Array
 
 
 def compile_rig(rig: Rig) -> RigArrays:
@@ -60,6 +64,7 @@ def compile_rig(rig: Rig) -> RigArrays:
         wrist=wrist,
         band_half_axes=band_axes(markers[wrist], rig.hand) if wrist >= 0 and markers[wrist].shape == "band" else None,
         law=disparity_law(rig),
+        reach=_reach(rig),
     )
 
 
@@ -68,6 +73,16 @@ def filter_settings(rig: Rig) -> tuple[list[OneEuroSettings], list[OneEuroSettin
     chosen = rig.filters
     return ([chosen.pixel_markers.get(name, chosen.pixel) for name in rig.markers.ids],
             [chosen.position_markers.get(name, chosen.position) for name in rig.markers.ids])
+
+
+def _reach(rig: Rig) -> Array:
+    markers = rig.markers.markers
+    reach = np.full((len(markers), len(markers)), np.inf)
+    own = [m for m, marker in enumerate(markers) if marker.role in ROLES]
+    if own:
+        model = build_model(rig.hand)
+        reach[np.ix_(own, own)] = farthest_apart(model, [place_of(markers[m], model) for m in own])
+    return reach
 
 
 def _shape(marker: Marker) -> Array:

@@ -49,14 +49,17 @@ def turn_band(world_from_palm: Array, half_axes: Array, shape: Array) -> None:
 
 @njit(cache=True)
 def locate_raw(t_s: float, flags: NDArray[np.int64], live: Mask, pixels: Array, covariances: Array, intrinsics: Array,
-               cameras: Array, focal: Array, shapes: Array, law: Array, memory: Array, used: Mask, doubtful: Mask,
-               believed: Mask, restarted: Mask, raw: Array, raw_covariances: Array, errors: Array) -> None:
+               cameras: Array, focal: Array, shapes: Array, law: Array, reach: Array, memory: Array, confirmed: Mask,
+               used: Mask, doubtful: Mask, believed: Mask, restarted: Mask, raw: Array, raw_covariances: Array,
+               errors: Array) -> None:
     """Unfiltered positions decide what to believe. Arrays as in `locate`, `estimate` and `trust`."""
     locate.choose_views(flags, live, used, doubtful)
     _locate(pixels, covariances, used, intrinsics, cameras, focal, shapes, law, raw, raw_covariances, errors)
     trust.judge(t_s, raw, raw_covariances, memory, believed, restarted)
+    trust.keep_within_reach(raw, raw_covariances, reach, memory, believed, restarted, confirmed)
+    trust.confirm(believed, restarted, reach, confirmed)
     for m in range(raw.shape[0]):
-        doubtful[m] |= errors[m] > locate.DOUBT_PX
+        doubtful[m] |= errors[m] > locate.DOUBT_PX or not confirmed[m]
         if not believed[m]:
             raw[m] = math.nan
             used[:, m] = False

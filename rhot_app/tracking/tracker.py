@@ -14,6 +14,28 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
+class Candidates:
+    """K observations, each of which may be the marker it is said to be of. `markers` (K,): indices in the rig; the
+    other columns as in `CameraObservations`."""
+
+    markers: NDArray[np.intp]
+    pixels: Array
+    covariances: Array
+    diameters: Array
+    qualities: Array
+    flags: NDArray[np.uint16]
+
+    def of(self, markers: NDArray[np.intp]) -> Candidates | None:
+        """Those of some markers alone, which are numbered in this order; None without any."""
+        chosen = np.isin(self.markers, markers)
+        if not chosen.any():
+            return None
+        renumbered = np.searchsorted(markers, self.markers[chosen])
+        return Candidates(renumbered, self.pixels[chosen], self.covariances[chosen], self.diameters[chosen],
+                          self.qualities[chosen], self.flags[chosen])
+
+
+@dataclass(frozen=True, slots=True)
 class CameraObservations:
     """One frame of one camera, in master time. M markers in the rig's order.
 
@@ -33,6 +55,7 @@ class CameraObservations:
     diameters: Array  # (M,) px
     qualities: Array  # (M,)
     flags: NDArray[np.uint16]  # (M,) MarkerFlag
+    further: Candidates | None = None  # what else may be one of the markers
 
 
 class Tracker(Protocol):

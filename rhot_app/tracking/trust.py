@@ -29,6 +29,8 @@ PREDICT_S = 0.25
 
 ACCELERATION_SD = 10.0
 VELOCITY_SD = 0.05
+_SIGMAS = 5.0  # of the positions, beyond a hand's reach
+_COMPANIONS = 2
 _VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
 
 # Columns of the memory, one row per marker: time, position, smoothed velocity, last step and its duration, then the
@@ -102,6 +104,61 @@ def judge(t_s: float, positions: Array, covariances: Array, memory: Array, belie
         row[_JUMPS] = 0.0
         believed[m] = True
         restarted[m] = fresh
+
+
+@njit(cache=True)
+def keep_within_reach(positions: Array, covariances: Array, reach: Array, memory: Array, believed: Mask,
+                      restarted: Mask, confirmed: Mask) -> None:
+    """Give up believed markers that are farther from the others than a hand reaches: bones do not stretch.
+
+    `positions` (M, 3) m with `covariances` (M, 3, 3); `reach` (M, M) m. The marker that contradicts most others is
+    given up first; of those that contradict as many, the ones whose track is not `confirmed` (M,) or has just
+    `restarted` (M,), and all of them where that does not tell either. What is given up is forgotten.
+    """
+    count = positions.shape[0]
+    against = np.empty(count, np.int64)
+    while True:
+        most, some_new = 0, False
+        for m in range(count):
+            against[m] = 0
+            for n in range(count):
+                if believed[m] and believed[n]:
+                    against[m] += _beyond_reach(positions, covariances, reach, m, n)
+            if against[m] > most:
+                most, some_new = against[m], False
+            some_new |= against[m] == most and (restarted[m] or not confirmed[m])
+        if most == 0:
+            return
+        for m in range(count):
+            if against[m] == most and not (some_new and confirmed[m] and not restarted[m]):
+                believed[m] = restarted[m] = confirmed[m] = False
+                memory[m] = math.nan
+
+
+@njit(cache=True)
+def _beyond_reach(positions: Array, covariances: Array, reach: Array, m: int, n: int) -> bool:
+    if m == n or not math.isfinite(reach[m, n]):
+        return False
+    margin = 0.0
+    for k in range(3):
+        margin += covariances[m, k, k] + covariances[n, k, k]
+    return _distance(positions[m], positions[n]) > reach[m, n] + _SIGMAS * math.sqrt(max(margin, 0.0))
+
+
+@njit(cache=True)
+def confirm(believed: Mask, restarted: Mask, reach: Array, confirmed: Mask) -> None:
+    """Bring up to date which tracks are confirmed (M,) to be markers of the hand: those that were once seen together
+    with two others, or with all that the hand has. Only colour tells a lone marker from a thing."""
+    for m in range(believed.shape[0]):
+        on_hand = together = 0
+        for n in range(believed.shape[0]):
+            if m != n and math.isfinite(reach[m, n]):
+                on_hand += 1
+                together += believed[n]
+        if restarted[m]:
+            confirmed[m] = False
+        if believed[m] and together >= min(_COMPANIONS, on_hand):
+            confirmed[m] = True
 
 
 @njit(cache=True)

@@ -67,7 +67,9 @@ class TwoHands:
         if last is None or not 0 <= last.t_row0_master_ns - observations.t_row0_master_ns < _JUMP_NS:
             self._newest[observations.camera] = observations
         for tracker, own in zip((self._hand, self._other), self._own, strict=True):
-            tracker.ingest(replace(observations, **{name: getattr(observations, name)[own] for name in _PER_SIGHT}))
+            further = None if observations.further is None else observations.further.of(own)
+            columns = {name: getattr(observations, name)[own] for name in _PER_SIGHT}
+            tracker.ingest(replace(observations, further=further, **columns))
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, of all markers, None before its first."""

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 import pytest
 from grasping_hand import GRASP, INFERRED, MEASURED, REST, RIG, UNKNOWN, seconds, states_of
@@ -108,7 +109,26 @@ def test_one_wrong_camera_of_three_is_given_up():
     assert np.linalg.norm(last.marker_positions[3] - GRASP(np.array([seconds(last)]))[0, 3]) < 2e-3
 
 
+def test_a_marker_beyond_the_hands_reach_is_not_measured() -> None:
+    elsewhere = REST[4] + np.array([-0.3, 0.15, 0.1])
+    models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in RIG.nodes]
+
+    def jump(t, camera, pixels, flags):
+        if t >= 0.5:
+            pixels[4] = models[camera].project(elsewhere)[0]
+            flags[4] = int(MarkerFlag.ACQUIRED) if t < 0.524 else 0
+
+    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, still_trajectory(REST), 2.0, Sight()), jump))
+    assert [s.marker_knowledge[4] for s in states if seconds(s) < 0.45][-1] == MEASURED
+    assert all(s.marker_knowledge[4] != MEASURED for s in states if seconds(s) > 0.55)
+    assert all((s.marker_knowledge[:4] == MEASURED).all() for s in states if seconds(s) > 0.05)
+
+
 def test_an_impossible_jump_waits_for_three_states():
+    """A free point: a hand's marker could not get there at all."""
+    markers = list(RIG.markers.markers)
+    markers[4] = msgspec.structs.replace(markers[4], role=None)
+    rig = msgspec.structs.replace(RIG, markers=msgspec.structs.replace(RIG.markers, markers=tuple(markers)))
     elsewhere = REST[4] + np.array([-0.3, 0.15, 0.1])
     models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in RIG.nodes]
 
@@ -119,7 +139,7 @@ def test_an_impossible_jump_waits_for_three_states():
             flags[4] = int(MarkerFlag.ACQUIRED)
 
     frames = altered(observe(RIG, WIDE, still_trajectory(REST), 1.5, Sight(phases=(0.0, 0.02))), jump)
-    states = run(make_tracker(RIG), frames)
+    states = run(make_tracker(rig), frames)
     for state in states:
         if state.marker_knowledge[4] == MEASURED:
             place = elsewhere if seconds(state) > 1.0 else REST[4]

@@ -22,8 +22,8 @@ def states_without_wrist(since_s: float, until_s: float, tips: int, length_s: fl
     return run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, length_s, SIGHT), hide))
 
 
-def tip_errors_m(state: HandState, tips: int) -> np.ndarray:
-    assert (state.marker_knowledge[:tips] == MEASURED).all()
+def tip_errors_m(state: HandState, tips: int, knowledge: Knowledge = Knowledge.MEASURED) -> np.ndarray:
+    assert (state.marker_knowledge[:tips] == knowledge).all()
     return np.linalg.norm(state.fingertip_positions - GRASP(np.array([seconds(state)]))[0, :5], axis=1)[:tips]
 
 
@@ -47,7 +47,8 @@ def test_the_doubt_about_the_rest_grows() -> None:
 @pytest.mark.parametrize(("tips", "joints"), [(2, Knowledge.UNKNOWN), (5, Knowledge.GUESSED)])
 def test_fingertips_are_told_before_the_wrist_was_ever_seen(tips: int, joints: Knowledge) -> None:
     last = states_without_wrist(0.0, 9.0, tips, 0.5)[-1]
-    assert tip_errors_m(last, tips).max() < 3e-3
+    # Two markers that were never seen with a third may be two things.
+    assert tip_errors_m(last, tips, Knowledge.INFERRED if tips < 3 else MEASURED).max() < 3e-3
     assert np.isfinite(last.fingertip_positions[:, 0]).sum() == (tips if joints == Knowledge.UNKNOWN else 5)
     assert (last.joint_knowledge == joints).all()
 
