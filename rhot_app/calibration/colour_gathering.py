@@ -142,7 +142,7 @@ class ColourGathering:
                 Marker(id=f"m{k}", chroma=learn_chroma_from_colours(one.colours), display_rgb=one.rgb)
                 for k, one in enumerate(samples))))
         found = {}
-        for one, seen in zip(samples, self._scouts[camera].detect(image), strict=True):
+        for one, seen in zip(samples, self._scouts[camera].detect(image), strict=False):
             if one.name in missing and seen.found and not seen.flags & DOUBTFUL:
                 region = _plain_region(image, (seen.x, seen.y))
                 if region is not None and 1.0 / GROWN < region.area / one.area < GROWN:

@@ -64,7 +64,7 @@ def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
             detector.reset()
             for tracked in (False, True):
                 seen = detector.detect(image)
-                for name, mark in zip(names, seen, strict=True):
+                for name, mark in zip(names, seen, strict=False):
                     if name in view.paint:
                         outcome = _outcome(mark, view.paint[name])
                         if outcome is not None:

@@ -140,7 +140,7 @@ class ColourSamples:
             return {}
         detector = self._follower()
         taken = {}
-        for name, seen in zip(self.names, detector.detect(image), strict=True):
+        for name, seen in zip(self.names, detector.detect(image), strict=False):
             if seen.found and not seen.flags & DOUBTFUL and len(self._sights[name]) < FRAMES_MOST:
                 inside = detector.paint_mask(image, seen)
                 if np.count_nonzero(inside) >= SAMPLES_MIN and self._adds(name, _sight(0, image, region_of(inside))):

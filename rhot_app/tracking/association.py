@@ -19,7 +19,7 @@ from scipy.optimize import linear_sum_assignment
 from rhot_app.geometry.camera import project_normalised, undistort_points
 from rhot_app.tracking.locate import GATE_FLOOR_PX
 from rhot_app.tracking.rig_arrays import RigArrays
-from rhot_app.tracking.tracker import CameraObservations, Candidates
+from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trust import ACCELERATION_LIMIT, FORGET_S
 from rhot_node.wire.messages import MarkerFlag
 
@@ -47,6 +47,7 @@ HAND_SPEED = 2.0
 
 _LOST, _AMBIGUOUS, _ACQUIRED = int(MarkerFlag.LOST), int(MarkerFlag.AMBIGUOUS), int(MarkerFlag.ACQUIRED)
 _FORBIDDEN = 1e9
+_COLUMNS = "pixels", "covariances", "diameters", "qualities", "flags"
 
 
 def assign(predicted: Array, predicted_covariances: Array, pixels: Array, covariances: Array,
@@ -97,7 +98,7 @@ class MarkerAssociation:
         self._positions, self._velocities = np.full((markers, 3), np.nan), np.zeros((markers, 3))
         self._seen_ns = np.zeros(markers, dtype=np.int64)
         self._chosen = np.full((cameras, markers, 2), np.nan)  # px, in the newest frame of each camera
-        self._frames: list[tuple[int, _Listed] | None] = [None] * cameras
+        self._frames: list[CameraObservations | None] = [None] * cameras  # as they came
 
     def note(self, t_ns: int, positions: Array) -> None:
         """Remember where the markers were at master time `t_ns`: (M, 3) m, NaN where not known."""
@@ -114,17 +115,16 @@ class MarkerAssociation:
         A candidate as likely as the chosen one makes it ambiguous. One that is not where the chosen one was in the
         frame before is flagged as acquired. Frames without further candidates are returned as they are.
         """
+        self._frames[frame.camera] = frame
         if frame.further is None:
             self._chosen[frame.camera] = frame.pixels
-            self._frames[frame.camera] = None
             return frame
-        listed = _list_candidates(frame, frame.further)
+        listed = _list_candidates(frame)
         predicted, variances = self._predict(frame)
         chosen, ambiguous = self._choose(listed, predicted, variances)
         unknown = np.isnan(predicted[:, 0])
         if unknown.any():
             chosen = np.where(unknown, self._choose_by_rays(frame, listed), chosen)
-        self._frames[frame.camera] = frame.t_row0_master_ns, listed
         return self._selected(frame, listed, chosen, ambiguous)
 
     def _predict(self, frame: CameraObservations) -> tuple[Array, Array]:
@@ -167,20 +167,21 @@ class MarkerAssociation:
             first[listed.markers[row]] = row
         rays = undistort_points(listed.pixels, self._rig.intrinsics[frame.camera])
         best, best_count = first, 1
-        for other, kept in enumerate(self._frames):
-            if kept is None or other == frame.camera or abs(kept[0] - frame.t_row0_master_ns) > TOGETHER_NS:
+        for kept in self._frames:
+            if kept is None or kept.camera == frame.camera or \
+                    abs(kept.t_row0_master_ns - frame.t_row0_master_ns) > TOGETHER_NS:
                 continue
-            rows, points = self._meetings(frame, listed, rays, other, kept)
+            rows, points = self._meetings(frame, listed, rays, kept)
             chosen, count = self._most_together(listed.markers[rows], rows, points, first)
             if count > best_count:
                 best, best_count = chosen, count
         return best
 
-    def _meetings(self, frame: CameraObservations, listed: _Listed, rays: Array, other: int,
-                  kept: tuple[int, _Listed]) -> tuple[Indices, Array]:
-        """Rows of the candidates whose rays meet one of the same marker in another camera, (H,), and the points where
-        they do, (H, 3) m."""
-        rig, t_ns, theirs = self._rig, kept[0], kept[1]
+    def _meetings(self, frame: CameraObservations, listed: _Listed, rays: Array,
+                  kept: CameraObservations) -> tuple[Indices, Array]:
+        """Rows of the candidates whose rays meet one of the same marker in the frame of another camera, (H,), and the
+        points where they do, (H, 3) m."""
+        rig, other, theirs = self._rig, kept.camera, _list_candidates(kept)
         rows, columns = np.nonzero(listed.markers[:, None] == theirs.markers[None])
         their_rays = undistort_points(theirs.pixels, rig.intrinsics[other])[columns]
         cameras = rig.cameras[[frame.camera, other]]
@@ -194,7 +195,8 @@ class MarkerAssociation:
         ahead = (local[..., 2] > 0.0).all(axis=1)
         depth = np.where(local[..., 2] > 0.0, local[..., 2], np.nan)
         missed_px = rig.focal[[frame.camera, other]] * (local[..., :2] / depth[..., None] - seen[..., 0])
-        moved_px = HAND_SPEED * 1e-9 * abs(t_ns - frame.t_row0_master_ns) * rig.focal[frame.camera, 0] / depth[:, 0]
+        moved_m = HAND_SPEED * 1e-9 * abs(kept.t_row0_master_ns - frame.t_row0_master_ns)
+        moved_px = moved_m * rig.focal[frame.camera, 0] / depth[:, 0]
         meet = ahead & (np.abs(missed_px).max(axis=(1, 2)) < GATE_FLOOR_PX + moved_px)
         return rows[meet], points[meet]
 
@@ -202,14 +204,14 @@ class MarkerAssociation:
         """Of points (H, 3) of `markers` (H,) those within reach of one of them, for the one with most markers."""
         if not len(rows):
             return first, 0
-        near = np.linalg.norm(points[:, None] - points[None], axis=2) <= self._rig.reach[markers[:, None], markers[None]]
+        apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+        near = apart <= self._rig.reach[markers[:, None], markers[None]]
         near[np.arange(len(rows)), np.arange(len(rows))] = True
         near &= (markers[:, None] != markers[None]) | np.eye(len(rows), dtype=np.bool_)
         counts = np.array([len(set(markers[row].tolist())) for row in near])
         anchor = int(np.argmax(counts))
         chosen = first.copy()
-        distance = np.where(near[anchor], np.linalg.norm(points - points[anchor], axis=1), np.inf)
-        for h in np.argsort(-distance):  # the nearest is written last
+        for h in np.argsort(-apart[anchor]):  # the nearest is written last
             if near[anchor, h]:
                 chosen[markers[h]] = rows[h]
         return chosen, int(counts[anchor])
@@ -234,8 +236,11 @@ class MarkerAssociation:
                        qualities=np.where(found, listed.qualities[rows], 0.0))
 
 
-def _list_candidates(frame: CameraObservations, further: Candidates) -> _Listed:
+def _list_candidates(frame: CameraObservations) -> _Listed:
     found = np.flatnonzero(np.isfinite(frame.pixels[:, 0]) & ((frame.flags & _LOST) == 0))
-    both = [np.concatenate([getattr(frame, name)[found], getattr(further, name)])
-            for name in ("pixels", "covariances", "diameters", "qualities", "flags")]
-    return _Listed(np.concatenate([found, further.markers]), *both)
+    columns = [getattr(frame, name)[found] for name in _COLUMNS]
+    if frame.further is None:
+        return _Listed(found, *columns)
+    further = [getattr(frame.further, name) for name in _COLUMNS]
+    return _Listed(np.concatenate([found, frame.further.markers]),
+                   *(np.concatenate(both) for both in zip(columns, further, strict=True)))

@@ -74,7 +74,7 @@ class ClassicTracker:
         t_s = self._seconds(paired.t_ns)
         clock.lap("pair")
         markers = self._locate(t_s, paired, clock)
-        self._association.note(paired.t_ns, markers.raw)
+        self._association.note(paired.t_ns, np.where(self._confirmed[:, None], markers.raw, np.nan))
         hand = self._solve_hand(t_s, markers)
         clock.lap("solve")
         return self._state(t_s, paired, markers, hand, clock)
@@ -100,7 +100,8 @@ class ClassicTracker:
         markers = Sheet(len(rig.cameras), len(rig.marker_ids))
         stages.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
                           rig.cameras, rig.focal, shapes, rig.law, rig.reach, self._memory, self._confirmed,
-                          markers.used, markers.doubtful, markers.believed, markers.restarted, markers.raw, markers.covariances, markers.errors)
+                          markers.used, markers.doubtful, markers.believed, markers.restarted, markers.raw,
+                          markers.covariances, markers.errors)
         clock.lap("triangulate")
         if not self._filtering:
             markers.positions[:] = markers.raw

@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from rhot_node.detect.find import DOUBTFUL, SEARCH_STEP, Finder
 from rhot_node.detect.gate import Labels
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.light import DEAD_ZONE, SWITCHED, Light
-from rhot_node.detect.light_guess import MARKERS_LEAST, guess_light
+from rhot_node.detect.light import DEAD_ZONE, MARKERS_LEAST, SWITCHED, Light
+from rhot_node.detect.light_guess import guess_light
 from rhot_node.markers import MarkerSet
-from rhot_node.wire.messages import MarkerObservation
+from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
 __all__ = ["DOUBTFUL", "GLANCE", "SEARCH_STEP", "FastDetector"]
 
-SUDDENLY = 2  # markers fewer in plain view than in the last frame: was a lamp switched?
+SUDDENLY = 2  # markers fewer tracked than found in the last frame: was a lamp switched?
 GUESS_EVERY, GUESS_SELDOM = 20, 200
-"""Frames without all markers in plain view until the light is guessed anew; the second while enough are in plain view
-to tell the light."""
+"""Frames without all markers tracked until the light is guessed anew; the second while enough are to tell the light."""
 STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
 GLANCE = 8  # frames between searches, and looks at the light, while all markers are followed in plain view
+_NOT_TRACKED = int(MarkerFlag.LOST | MarkerFlag.ACQUIRED)
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
 
 
@@ -38,7 +38,7 @@ class FastDetector:
         self._light = Light(markers)
         self._fresh = True  # no picture has been seen yet
         self._until_guess = GUESS_EVERY
-        self._plain = 0  # markers in plain view in the last frame
+        self._found = 0  # markers in the last frame
         self._finder = Finder(markers, self._light)
         self._precise = precise
         self._until_glance = 0
@@ -48,7 +48,7 @@ class FastDetector:
         """Forget all tracks and the light: the next frame is searched as a whole."""
         self.lose_all()
         self._light.warmth = 0.0
-        self._fresh = True
+        self._fresh, self._until_guess, self._found = True, GUESS_EVERY, 0
 
     def lose_all(self) -> None:
         """Forget all tracks, but not the light."""
@@ -91,7 +91,8 @@ class FastDetector:
             if self._read_light(seen, steady) >= SWITCHED:  # somebody switched a lamp
                 seen = self._find_in_new_light(image)
         self._until_glance = GLANCE
-        self._fresh, self._plain = False, len(self._finder.plainly(seen))
+        self._fresh = False
+        self._found = sum(mark.found for mark in seen[:len(self._markers)])
         return seen
 
     def _find_at_first(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
@@ -103,29 +104,35 @@ class FastDetector:
         return seen if self._read_light(seen, 0.0) < DEAD_ZONE else self._find_in_new_light(image)
 
     def _light_in_doubt(self, seen: tuple[MarkerObservation, ...]) -> bool:
-        """Whether markers went out of plain view together, or some have not been in plain view for a while."""
-        plain = len(self._finder.plainly(seen))
-        if plain == len(self._markers):
+        """Whether markers were lost together, or some have not been tracked for a while.
+
+        In another light a paint's hue leaves its sector, so that its track ends.
+        """
+        tracked = sum(not mark.flags.value & _NOT_TRACKED for mark in seen[:len(self._markers)])
+        suddenly = self._found - tracked >= SUDDENLY
+        if tracked == len(self._markers):
             self._until_guess = GUESS_EVERY
             return False
         self._until_guess -= 1
-        if self._until_guess > 0 and not (plain < MARKERS_LEAST and self._plain - plain >= SUDDENLY):
+        if self._until_guess > 0 and not suddenly:
             return False
-        self._until_guess = GUESS_EVERY if plain < MARKERS_LEAST else GUESS_SELDOM
+        self._until_guess = GUESS_EVERY if tracked < MARKERS_LEAST else GUESS_SELDOM
         return True
 
     def _find_in_guessed_light(self, image: YuvImage,
                                seen: tuple[MarkerObservation, ...]) -> tuple[MarkerObservation, ...]:
-        """Find the markers in the light in which most are recognised, if enough of them then prove to be paint.
+        """Find the markers in the light in which most are recognised, if more of them are then in plain view and as
+        strong as paint is in that light.
 
         `seen`: what was found by the last known light.
         """
-        known = self._light.warmth
+        known, before = self._light.warmth, len(self._finder.plainly(seen, lone=False))
         if not guess_light(image, self._light, self._finder.gate, self._set):
             return seen if not self._fresh else self._find_in_new_light(image)
         guessed = self._find_in_new_light(image)
-        plain = self._finder.plainly(guessed)
-        if np.count_nonzero(self._light.strong(plain, self._finder.paint[plain])) >= MARKERS_LEAST:
+        plain = self._finder.plainly(guessed, lone=False)
+        strong = np.count_nonzero(self._light.strong(plain, self._finder.paint[plain]))
+        if strong >= MARKERS_LEAST and strong > before:
             return guessed
         self._light.warmth = known
         return self._find_in_new_light(image)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -100,11 +99,13 @@ class Finder:
             if slot == self._best[slot % self._count]:
                 self.paint[slot % self._count] = colour
 
-    def plainly(self, seen: tuple[MarkerObservation, ...]) -> list[int]:
-        """Indices of the markers that are in plain view, so that their paint's colour can be relied on."""
-        pixels = self._paint_pixels.tolist()
+    def plainly(self, seen: tuple[MarkerObservation, ...], *, lone: bool = True) -> list[int]:
+        """Indices of the markers in plain view. Those whose paint's colour can be relied on are `lone`: they have no
+        other candidate."""
+        pixels, rivalled = self._paint_pixels.tolist(), {mark.index for mark in seen[self._count:]} if lone else set()
         return [mark.index for mark in seen[:self._count]
-                if not mark.flags.value & _NOT_PLAIN and pixels[mark.index] >= PAINT_PIXELS_MIN]
+                if not mark.flags.value & _NOT_PLAIN and pixels[mark.index] >= PAINT_PIXELS_MIN
+                and mark.index not in rivalled]
 
     def paint_mask(self, image: YuvImage, seen: MarkerObservation) -> NDArray[np.bool_]:
         """(H/2, W/2) the chroma pixels inside a marker that `detect` has just placed in this very `image`.
@@ -280,7 +281,7 @@ class Finder:
         return out
 
     def _report(self, seen: dict[int, MarkerObservation]) -> tuple[MarkerObservation, ...]:
-        """The observations of one picture as `find` returns them. A marker with several tracks is ambiguous."""
+        """The observations of one picture as `find` returns them."""
         if len(seen) == self._count and all(slot in seen for slot in self._best):
             return tuple([seen[slot] for slot in self._best])
         first, further = [], []
@@ -290,8 +291,6 @@ class Finder:
                 self._best[index] = max(own, key=lambda slot: seen[slot].diameter)
             own.sort(key=lambda slot: slot != self._best[index])
             marks = [seen[slot] for slot in own]
-            if np.count_nonzero(self._states[own, ALIVE]) > 1:
-                marks = [msgspec.structs.replace(mark, flags=mark.flags | MarkerFlag.AMBIGUOUS) for mark in marks]
             if not marks:
                 self._tracks[self._best[index]].lose()
             first.append(marks[0] if marks else lost_observation(index))

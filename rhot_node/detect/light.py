@@ -31,6 +31,7 @@ HUE_SIGMA_DEG = 3.0  # how well a paint's hue is known
 HUE_CAP_DEG = 15.0  # a marker that is further off is not itself, and counts no more than this
 INFORMATION_LEAST = 50.0  # 1 / variance of a warmth that is worth as much as the last known one
 INFORMATION_SURE = 300.0  # the same of a warmth known to 0.06
+MARKERS_LEAST = 3  # fewer may be explained by many a light
 SWITCHED = 0.12  # of warmth in one frame: no lamp drifts so fast
 STRENGTH_LEAST = 0.3  # of the chroma that a paint should show in this light: less is something else, or deep shade
 MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
@@ -96,14 +97,16 @@ class Light:
         """Read the light from the paint of the markers `indices`, (N, 3) Y, Cb, Cr as the camera shows them.
 
         `steady`, 0 to 1: how much the last known light counts; it also counts as far as the colours tell nothing. It
-        does not count when they plainly tell of a lamp that was switched. Returns by how much the warmth changed.
+        does not count when MARKERS_LEAST or more plainly tell of a lamp that was switched. Returns by how much
+        the warmth changed.
         """
         chosen, strong = np.asarray(indices, dtype=np.intp), self.strong(indices, colours)
         if not strong.any():
             return 0.0
         hues = np.degrees(np.arctan2(colours[strong, 2], colours[strong, 1]))
         fitted, information = fit_warmth(hues, self._hues[chosen[strong]], self._grid)
-        if abs(fitted - self.warmth) >= SWITCHED and information >= INFORMATION_SURE:
+        if np.count_nonzero(strong) >= MARKERS_LEAST and abs(fitted - self.warmth) >= SWITCHED \
+                and information >= INFORMATION_SURE:
             steady = 0.0
         change = (1.0 - steady) * information / (information + INFORMATION_LEAST) * (fitted - self.warmth)
         self.warmth += change

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.light import WARMTH_MOST, Light
+from rhot_node.detect.light import MARKERS_LEAST, WARMTH_MOST, Light
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, X_MAX, X_MIN, Y_MAX, Y_MIN
 from rhot_node.markers import MarkerSet
 
@@ -17,7 +17,6 @@ GUESSES = np.arange(-6, 7) * (WARMTH_MOST / 6.5)
 HUE_SIGMA_DEG = 6.0  # what a guess half a step beside the light leaves
 COMPACT = 0.5  # of the bounding box: a marker fills as much
 RECOGNISED = 0.25  # score of a marker
-MARKERS_LEAST = 3  # that must be recognised for another light to be believed
 ADVANTAGE = 1.0  # markers more than in the last known light
 AREA_MIN = 12  # chroma pixels
 ROW_STEP = 4  # chroma rows: every fourth is enough to guess by

@@ -120,13 +120,15 @@ def tally(markers: MarkerSet, frames: list[Frame], stills: bool) -> Tally:
     for frame in frames:
         if stills:
             detector.reset()
-        for seen, part, place, radius in zip(detector.detect(frame.image), frame.visible, frame.places, frame.radii,
-                                             strict=True):
+        candidates = detector.detect(frame.image)
+        for index, (part, place, radius) in enumerate(zip(frame.visible, frame.places, frame.radii, strict=True)):
             if part > SEEN:
-                result.visible[seen.index] += 1
-                result.lost[seen.index] += not seen.found
-                away = math.dist((seen.x, seen.y), place)
-                result.misplaced[seen.index] += seen.found and (away > AWAY * radius or seen.diameter > JOINED * radius)
+                found = [seen for seen in candidates if seen.index == index and seen.found]
+                result.visible[index] += 1
+                result.lost[index] += not found
+                result.misplaced[index] += bool(found) and all(
+                    math.dist((seen.x, seen.y), place) > AWAY * radius or seen.diameter > JOINED * radius
+                    for seen in found)
     return result
 
 

@@ -58,7 +58,8 @@ class CameraEye:
             self._settings = settings
         image = from_bgr(picture.bgr)
         seen = self._detector.detect(image)
-        masks = {self._markers.ids[mark.index]: self._detector.paint_mask(image, mark) for mark in seen if mark.found}
+        masks = {self._markers.ids[mark.index]: self._detector.paint_mask(image, mark)
+                 for mark in seen[:len(self._markers.ids)] if mark.found}
         t_s = 1e-9 * picture.t_node_ns
         problem = ""
         try:
