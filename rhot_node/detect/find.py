@@ -254,7 +254,7 @@ class Finder:
 
     def _measure_rival(self, camera_image: YuvImage, index: int, blob: Blob,
                        seen: dict[int, MarkerObservation]) -> None:
-        """Measure a further candidate of a marker, and follow it when it is in plain view."""
+        """Measure a further candidate of a marker, and track it from now on."""
         slots = range(index, len(self._shapes), self._count)
         slot = next((slot for slot in slots if slot not in seen and slot != self._best[index]), None)
         if slot is None or not self._measure(camera_image, slot, self._request_of(index, blob)) \
@@ -265,8 +265,8 @@ class Finder:
         if slot in self._not_markers(seen):
             del seen[slot]
             self._lose(slot)
-        elif not self._follow(camera_image, slot, seen[slot]):
-            self._lose(slot)  # stated in this picture only
+        else:
+            self._follow(camera_image, slot, seen[slot])
 
     def _request_of(self, index: int, blob: Blob) -> NDArray[np.float64]:
         """The request to measure a blob as marker `index`."""
