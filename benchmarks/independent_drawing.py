@@ -268,7 +268,7 @@ TRIES = 4000
 
 def _compact(rng: np.random.Generator, reach: Array) -> Array:
     """All within a few marker sizes of each other."""
-    room, margin = 2.5 * float(np.mean(reach)), float(reach.max()) + BORDER + SWAY
+    room, margin = 2.5 * float(np.mean(reach)), float(reach.max()) + SWAY + 2 * WOBBLE
     while True:
         within = room + margin
         centre = np.array([rng.uniform(min(within, WIDTH / 2), max(WIDTH - within, WIDTH / 2)),
@@ -310,8 +310,8 @@ def _spread(rng: np.random.Generator, reach: Array) -> Array:
 
 
 def _limits(reach: Array | float) -> tuple[Array, Array]:
-    """Least and greatest places: BORDER px from the frame's border, the outline within the frame in all frames."""
-    away = np.maximum(BORDER, np.atleast_1d(reach) + SWAY + 2 * WOBBLE + 2.0)[:, None]
+    """Least and greatest places: in all frames BORDER px from the frame's border, and the outline within the frame."""
+    away = np.maximum(BORDER, np.atleast_1d(reach) + 2.0)[:, None] + SWAY + 2 * WOBBLE
     low, high = away * np.ones(2), np.array([WIDTH - 1.0, HEIGHT - 1.0]) - away
     return (low, high) if np.ndim(reach) else (low[0], high[0])
 

@@ -1,7 +1,7 @@
 """Are all markers found, and how truly and steadily are they placed, in pictures that nothing of RHOT has drawn?
 
     python benchmarks/independent_scenes.py [--seed N] [--frames N] [--scenes N] [--layout L] [--size S] [--room R]
-                                            [--shapes S] [--part scenes|returns] [--json FILE]
+                                            [--shapes S] [--told shipped|disc] [--part scenes|returns] [--json FILE]
 
 The pictures are those of `independent_drawing`: six discs and capsules of 12 to 40 px, from close together to spread
 to the frame's edge, before five kinds of rooms. Of each layout, size and room:
@@ -27,10 +27,13 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
-from independent_drawing import LAYOUTS, MARKERS, ROOMS, SHAPES, SIZES, Array, Scene, Shape, build_scene
+from independent_drawing import LAYOUTS, MARKERS, ROOMS, SHAPES, SIZES, Scene, Shape, build_scene
+from numpy.typing import NDArray
 
 from rhot_node.detect.fast import FastDetector
+from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerObservation
 
 FOUND_AIM, BIAS_AIM, JITTER_AIM, RETURN_AIM = 0.99, 0.05, 1.15, 5  # share, px, of the bound, frames
@@ -62,9 +65,10 @@ def right(seen: MarkerObservation, shape: Shape) -> bool:
     return seen.found and math.hypot(seen.x - shape.x, seen.y - shape.y) <= shape.radius
 
 
-def judge(scene: Scene, kind: tuple[str, str, str], frames: int, rng: np.random.Generator) -> Scored:
-    """Stills, a sequence and markers that keep their places, of one scene."""
-    detector, count = FastDetector(MARKERS), len(scene.shapes)
+def judge(scene: Scene, kind: tuple[str, str, str], frames: int, rng: np.random.Generator,
+          markers: MarkerSet = MARKERS) -> Scored:
+    """Stills, a sequence and markers that keep their places, of one scene. `markers`: the set told to the detector."""
+    detector, count = FastDetector(markers), len(scene.shapes)
     shares, missed = [], np.zeros(count, dtype=int)
     for length, still in ((STILLS, True), (frames, False)):
         hits = np.zeros((length, count), dtype=bool)
@@ -77,8 +81,8 @@ def judge(scene: Scene, kind: tuple[str, str, str], frames: int, rng: np.random.
             hits[number] = [right(mark, shape) for mark, shape in zip(seen, scene.at(moment), strict=False)]
         shares.append(float(hits.all(axis=1).mean()))
         missed += (~hits).sum(axis=0)
-    out = Scored(*kind, scene.name, *shares, missed={marker.id: int(times) for marker, times in
-                                                     zip(MARKERS.markers, missed, strict=True) if times})
+    out = Scored(*kind, scene.name, shares[0], shares[1],
+                 missed={name: int(times) for name, times in zip(MARKERS.ids, missed, strict=True) if times})
     keep_place(scene, detector, frames, rng, out)
     return out
 
@@ -128,6 +132,8 @@ def written(row: dict[str, float]) -> str:
 
 def scenes(options: argparse.Namespace) -> tuple[list[Scored], dict[str, Any], bool]:
     """Judge scenes of all kinds and print their table."""
+    told = MARKERS if options.told == "shipped" else msgspec.structs.replace(
+        MARKERS, markers=tuple(msgspec.structs.replace(marker, shape="disc") for marker in MARKERS.markers))
     rng = np.random.default_rng(options.seed)
     print(f"{'':31}stills  sequence  bias rms   worst   jitter   bound  ratio\n"
           f"{'layout   size   room':26}{'all found, %':>17}{'px':>10}{'px':>8}{'px':>9}{'px':>8}\n"
@@ -142,7 +148,7 @@ def scenes(options: argparse.Namespace) -> tuple[list[Scored], dict[str, Any], b
                     shapes = options.shapes or SHAPES[len(everything) % len(SHAPES)]
                     seed = 1000 * options.seed + len(everything)
                     scene = build_scene(layout, size, room, seed, shapes)
-                    own.append(judge(scene, (layout, size, room), options.frames, rng))
+                    own.append(judge(scene, (layout, size, room), options.frames, rng, told))
                     everything.append(own[-1])
                 rows.append({"layout": layout, "size": size, "room": room} | figures(own))
                 print(f"{layout:8} {size:6} {room:9} {written(figures(own))}", flush=True)
@@ -180,7 +186,7 @@ def _print_worst(everything: Sequence[Scored]) -> None:
         ids, np.sqrt(np.nanmean(ratio**2, axis=0)), strict=True)))
 
 
-def absences(length: int, count: int, rng: np.random.Generator) -> Array:
+def absences(length: int, count: int, rng: np.random.Generator) -> NDArray[np.bool_]:
     """(F, M) whether a marker is hidden: one by one, or two, for a while."""
     hidden, begin = np.zeros((length, count), dtype=bool), int(rng.integers(*APART))
     while begin < length:
@@ -235,7 +241,7 @@ def returns(options: argparse.Namespace) -> tuple[list[Returned], bool]:
     print(f"\n{'markers vanish and return':40}all found  until found again, frames  stated while hidden,\n"
           f"{'':40}    %      p50  max  never  of      frames\n{'aims':40}{100 * FOUND_AIM:7.1f} {'':6}{RETURN_AIM:6}"
           f" {0:6}", flush=True)
-    everything = []
+    everything: list[Returned] = []
     for layout in options.layout or LAYOUTS:
         for room in options.room or ROOMS:
             for size in options.size or ("12", "16", "mixed"):
@@ -266,6 +272,8 @@ def main() -> int:
     parser.add_argument("--size", action="append", choices=SIZES)
     parser.add_argument("--room", action="append", choices=tuple(ROOMS))
     parser.add_argument("--shapes", choices=SHAPES, help="else each in turn")
+    parser.add_argument("--told", choices=("shipped", "disc"), default="shipped",
+                        help="what shapes the detector takes the markers for: the set's (capsules and a band), or discs")
     parser.add_argument("--part", choices=("scenes", "returns"), help="else both")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
