@@ -273,7 +273,7 @@ def main() -> int:
     parser.add_argument("--room", action="append", choices=tuple(ROOMS))
     parser.add_argument("--shapes", choices=SHAPES, help="else each in turn")
     parser.add_argument("--told", choices=("shipped", "disc"), default="shipped",
-                        help="what shapes the detector takes the markers for: the set's (capsules and a band), or discs")
+                        help="what the detector takes the markers for: the set's shapes (capsules, a band), or discs")
     parser.add_argument("--part", choices=("scenes", "returns"), help="else both")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
