@@ -1,0 +1,295 @@
+"""Are all markers found, and how truly and steadily are they placed, in pictures that nothing of RHOT has drawn?
+
+    python benchmarks/independent_scenes.py [--seed N] [--frames N] [--scenes N] [--layout L] [--size S] [--room R]
+                                            [--shapes S] [--told shipped|disc] [--part scenes|returns] [--json FILE]
+
+The pictures are those of `independent_drawing`: six discs and capsules of 12 to 40 px, from close together to spread
+to the frame's edge, before five kinds of rooms. Of each layout, size and room:
+
+* stills: the detector is reset before each frame; sequence: the markers sway by less than 2 px a frame. The share of
+  frames in which the first listed observation of every marker is within half its width of the truth.
+* bias: the mean error over noise of a marker that keeps its place, px, rms over places and both axes together.
+* jitter against the Cramer-Rao bound of one frame, rms over markers and axes, px.
+
+Then long sequences in which one or two markers vanish for a while and return: the share of frames in which all visible
+markers are found, those of a return's first frames excepted; the frames until a marker is found again; and frames in
+which a marker is stated that is not there. Ends with code 1 when an aim is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from independent_drawing import LAYOUTS, MARKERS, ROOMS, SHAPES, SIZES, Scene, Shape, build_scene
+from numpy.typing import NDArray
+
+from rhot_node.detect.fast import FastDetector
+from rhot_node.markers import MarkerSet
+from rhot_node.wire.messages import MarkerObservation
+
+FOUND_AIM, BIAS_AIM, JITTER_AIM, RETURN_AIM = 0.99, 0.05, 1.15, 5  # share, px, of the bound, frames
+SETTLE = 12  # frames until all is learnt of markers that keep their places
+STILLS = 8  # frames of each scene that are found from nothing; the more the longer the run
+AWAY, APART = (8, 40), (12, 30)  # frames for which a marker is hidden, and between two such times
+BOTH = 0.3  # of the times when a marker is hidden, another is as well
+WORST = 12  # rows of the list of the worst
+
+
+@dataclass
+class Scored:
+    """What was found of one scene. `missed`: by marker, frames in which it was not found, of stills and sequence."""
+
+    layout: str
+    size: str
+    room: str
+    name: str
+    stills: float
+    sequence: float
+    bias: list[float] = field(default_factory=list)
+    variance: list[float] = field(default_factory=list)
+    bound: list[float] = field(default_factory=list)
+    missed: dict[str, int] = field(default_factory=dict)
+
+
+def right(seen: MarkerObservation, shape: Shape) -> bool:
+    """Whether an observation is within half the marker's width of the truth."""
+    return seen.found and math.hypot(seen.x - shape.x, seen.y - shape.y) <= shape.radius
+
+
+def judge(scene: Scene, kind: tuple[str, str, str], frames: int, rng: np.random.Generator,
+          markers: MarkerSet = MARKERS) -> Scored:
+    """Stills, a sequence and markers that keep their places, of one scene. `markers`: the set told to the detector."""
+    detector, count = FastDetector(markers), len(scene.shapes)
+    shares, missed = [], np.zeros(count, dtype=int)
+    for length, still in ((STILLS, True), (frames, False)):
+        hits = np.zeros((length, count), dtype=bool)
+        detector.reset()
+        for number in range(length):
+            moment = 7.3 * number if still else number
+            if still:
+                detector.reset()
+            seen = detector.detect(scene.picture(moment).expose(rng))
+            hits[number] = [right(mark, shape) for mark, shape in zip(seen, scene.at(moment), strict=False)]
+        shares.append(float(hits.all(axis=1).mean()))
+        missed += (~hits).sum(axis=0)
+    out = Scored(*kind, scene.name, shares[0], shares[1],
+                 missed={name: int(times) for name, times in zip(MARKERS.ids, missed, strict=True) if times})
+    keep_place(scene, detector, frames, rng, out)
+    return out
+
+
+def keep_place(scene: Scene, detector: FastDetector, frames: int, rng: np.random.Generator, out: Scored) -> None:
+    """Add each marker's mean error, its variance per axis and the bound of that, where it is found in most frames."""
+    picture = scene.picture()
+    detector.reset()
+    errors = np.full((SETTLE + frames, len(scene.shapes), 2), np.nan)
+    for number in range(len(errors)):
+        for mark, shape in zip(detector.detect(picture.expose(rng)), scene.shapes, strict=False):
+            if right(mark, shape):
+                errors[number, mark.index] = mark.x - shape.x, mark.y - shape.y
+    errors = errors[SETTLE:]
+    for index in range(len(scene.shapes)):
+        own = errors[np.isfinite(errors[:, index, 0]), index]
+        if len(own) > frames // 2:
+            out.bias.append(float(np.hypot(*own.mean(axis=0))))
+            out.variance.append(float(own.var(axis=0, ddof=1).mean()))
+            out.bound.append(float((scene.place_bound(index) ** 2).mean()))
+        else:
+            for figure in (out.bias, out.variance, out.bound):
+                figure.append(math.nan)
+
+
+def figures(scored: Sequence[Scored]) -> dict[str, float]:
+    """Share of stills and of sequences, bias, worst bias, jitter, its bound and their ratio, over scenes."""
+    bias, variance, bound = (np.array([getattr(one, name) for one in scored]).ravel()
+                             for name in ("bias", "variance", "bound"))
+    jitter, least = math.sqrt(np.nanmean(variance)), math.sqrt(np.nanmean(bound))
+    return {"stills": float(np.mean([one.stills for one in scored])),
+            "sequence": float(np.mean([one.sequence for one in scored])),
+            "bias": math.sqrt(np.nanmean(bias**2)), "worst": float(np.nanmax(bias)), "jitter": jitter, "bound": least,
+            "ratio": jitter / least}
+
+
+def meets(row: dict[str, float]) -> bool:
+    """Whether figures meet all aims."""
+    return min(row["stills"], row["sequence"]) >= FOUND_AIM and row["bias"] <= BIAS_AIM and row["ratio"] <= JITTER_AIM
+
+
+def written(row: dict[str, float]) -> str:
+    """Figures as the columns of the table."""
+    return (f"{100 * row['stills']:7.1f} {100 * row['sequence']:9.1f} {row['bias']:8.3f} {row['worst']:7.3f} "
+            f"{row['jitter']:8.4f} {row['bound']:7.4f} {row['ratio']:6.2f}  {'' if meets(row) else 'missed'}")
+
+
+def scenes(options: argparse.Namespace) -> tuple[list[Scored], dict[str, Any], bool]:
+    """Judge scenes of all kinds and print their table."""
+    told = MARKERS if options.told == "shipped" else msgspec.structs.replace(
+        MARKERS, markers=tuple(msgspec.structs.replace(marker, shape="disc") for marker in MARKERS.markers))
+    rng = np.random.default_rng(options.seed)
+    print(f"{'':31}stills  sequence  bias rms   worst   jitter   bound  ratio\n"
+          f"{'layout   size   room':26}{'all found, %':>17}{'px':>10}{'px':>8}{'px':>9}{'px':>8}\n"
+          f"{'aims':26}{100 * FOUND_AIM:12.1f} {100 * FOUND_AIM:9.1f} {BIAS_AIM:8.3f} {JITTER_AIM:32.2f}", flush=True)
+    everything: list[Scored] = []
+    rows = []
+    for layout in options.layout or LAYOUTS:
+        for size in options.size or SIZES:
+            for room in options.room or ROOMS:
+                own = []
+                for _ in range(options.scenes):
+                    shapes = options.shapes or SHAPES[len(everything) % len(SHAPES)]
+                    seed = 1000 * options.seed + len(everything)
+                    scene = build_scene(layout, size, room, seed, shapes)
+                    own.append(judge(scene, (layout, size, room), options.frames, rng, told))
+                    everything.append(own[-1])
+                rows.append({"layout": layout, "size": size, "room": room} | figures(own))
+                print(f"{layout:8} {size:6} {room:9} {written(figures(own))}", flush=True)
+    print()
+    for column in ("layout", "size", "room"):
+        for value in dict.fromkeys(getattr(one, column) for one in everything):
+            print(f"{'all of ' + value:25} "
+                  f"{written(figures([one for one in everything if getattr(one, column) == value]))}")
+    total = figures(everything)
+    print(f"{'all':25} {written(total)}")
+    _print_worst(everything)
+    return everything, {"rows": rows, "all": total}, meets(total)
+
+
+def _print_worst(everything: Sequence[Scored]) -> None:
+    print("\nworst: found")
+    for one in sorted(everything, key=lambda one: min(one.stills, one.sequence))[:WORST]:
+        if one.missed:
+            print(f"  {one.name:36} stills {100 * one.stills:5.1f} sequence {100 * one.sequence:5.1f}  missed "
+                  + ", ".join(f"{name} {times}" for name, times in one.missed.items()))
+    ids, by_marker = MARKERS.ids, np.array([one.bias for one in everything])
+    print("worst: bias")
+    for flat in np.argsort(-np.nan_to_num(by_marker), axis=None)[:WORST]:
+        scene, index = np.unravel_index(flat, by_marker.shape)
+        print(f"  {everything[scene].name:36} {ids[index]:8} {by_marker[scene, index]:6.3f} px")
+    ratio = np.sqrt(np.array([one.variance for one in everything]) / np.array([one.bound for one in everything]))
+    print("worst: jitter")
+    for flat in np.argsort(-np.nan_to_num(ratio), axis=None)[:WORST]:
+        scene, index = np.unravel_index(flat, ratio.shape)
+        jitter = math.sqrt(everything[scene].variance[index])
+        print(f"  {everything[scene].name:36} {ids[index]:8} {jitter:6.4f} px, {ratio[scene, index]:5.2f} of its bound")
+    print("by marker: bias rms px " + ", ".join(f"{name} {value:.3f}" for name, value in zip(
+        ids, np.sqrt(np.nanmean(by_marker**2, axis=0)), strict=True)))
+    print("by marker: jitter / bound " + ", ".join(f"{name} {value:.2f}" for name, value in zip(
+        ids, np.sqrt(np.nanmean(ratio**2, axis=0)), strict=True)))
+
+
+def absences(length: int, count: int, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """(F, M) whether a marker is hidden: one by one, or two, for a while."""
+    hidden, begin = np.zeros((length, count), dtype=bool), int(rng.integers(*APART))
+    while begin < length:
+        end = begin + int(rng.integers(*AWAY))
+        for index in rng.choice(count, 2 if rng.random() < BOTH else 1, replace=False):
+            hidden[begin:end, index] = True
+        begin = end + int(rng.integers(*APART))
+    return hidden
+
+
+@dataclass
+class Returned:
+    """A long sequence. `found`: share of frames; `waits`: frames until each return was seen, 1 when at once, 0 when
+    never; `phantoms`: frames with a marker stated that is hidden; `hidden`: frames with a hidden marker."""
+
+    name: str
+    found: float
+    waits: list[int]
+    phantoms: int
+    hidden: int
+    missed: dict[str, int]
+
+
+def returning(scene: Scene, length: int, rng: np.random.Generator) -> Returned:
+    """Follow a scene in which markers vanish and return."""
+    detector, count = FastDetector(MARKERS), len(scene.shapes)
+    hidden = absences(length, count, rng)
+    hits, stated = np.zeros((length, count), dtype=bool), np.zeros((length, count), dtype=bool)
+    for number in range(length):
+        away = np.flatnonzero(hidden[number]).tolist()
+        seen = detector.detect(scene.picture(number, away).expose(rng))[:count]
+        hits[number] = [right(mark, shape) for mark, shape in zip(seen, scene.at(number), strict=True)]
+        stated[number] = [mark.found for mark in seen]
+    waits, excepted = [], hidden.copy()
+    for index in range(count):
+        for begin in np.flatnonzero(hidden[:-1, index] & ~hidden[1:, index]) + 1:
+            excepted[begin:begin + RETURN_AIM, index] = True
+            again = np.flatnonzero(hidden[begin:, index])
+            stay = int(again[0]) if len(again) else length - begin
+            found = np.flatnonzero(hits[begin:begin + stay, index])
+            if len(found) or stay >= RETURN_AIM:
+                waits.append(int(found[0]) + 1 if len(found) else 0)
+    missed = (~hits & ~excepted).sum(axis=0)
+    return Returned(scene.name, float((hits | excepted).all(axis=1).mean()), waits, int((stated & hidden).sum()),
+                    int(hidden.sum()), {name: int(times) for name, times in zip(MARKERS.ids, missed, strict=True)
+                                        if times})
+
+
+def returns(options: argparse.Namespace) -> tuple[list[Returned], bool]:
+    """Long sequences of every layout and room, of 12 px, 16 px and mixed; prints their table."""
+    rng = np.random.default_rng(options.seed + 1)
+    print(f"\n{'markers vanish and return':40}all found  until found again, frames  stated while hidden,\n"
+          f"{'':40}    %      p50  max  never  of      frames\n{'aims':40}{100 * FOUND_AIM:7.1f} {'':6}{RETURN_AIM:6}"
+          f" {0:6}", flush=True)
+    everything: list[Returned] = []
+    for layout in options.layout or LAYOUTS:
+        for room in options.room or ROOMS:
+            for size in options.size or ("12", "16", "mixed"):
+                scene = build_scene(layout, size, room, 1000 * options.seed + 500 + len(everything),
+                                    options.shapes or SHAPES[len(everything) % len(SHAPES)])
+                one = returning(scene, options.long, rng)
+                everything.append(one)
+                seen = [wait for wait in one.waits if wait] or [0]
+                bad = one.found < FOUND_AIM or max(seen) > RETURN_AIM or 0 in one.waits
+                print(f"{one.name:40}{100 * one.found:7.1f} {np.median(seen):7.0f} {max(seen):4} "
+                      f"{one.waits.count(0):6} {len(one.waits):4} {one.phantoms:6} / {one.hidden}"
+                      f"{f'  missed {one.missed}' if bad else ''}", flush=True)
+    waits = [wait for one in everything for wait in one.waits]
+    found = float(np.mean([one.found for one in everything]))
+    print(f"{'all':40}{100 * found:7.1f} {np.median(waits):7.0f} {max(waits):4} {waits.count(0):6} {len(waits):4} "
+          f"{sum(one.phantoms for one in everything):6} / {sum(one.hidden for one in everything)}")
+    return everything, found >= FOUND_AIM and max(waits) <= RETURN_AIM and 0 not in waits
+
+
+def main() -> int:
+    """Run, print the tables, write the JSON; 1 when an aim is missed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--frames", type=int, default=24, help="of a sequence, and of markers that keep their places")
+    parser.add_argument("--scenes", type=int, default=1, help="of each layout, size and room")
+    parser.add_argument("--long", type=int, default=200, help="frames of a sequence in which markers vanish")
+    parser.add_argument("--layout", action="append", choices=tuple(LAYOUTS))
+    parser.add_argument("--size", action="append", choices=SIZES)
+    parser.add_argument("--room", action="append", choices=tuple(ROOMS))
+    parser.add_argument("--shapes", choices=SHAPES, help="else each in turn")
+    parser.add_argument("--told", choices=("shipped", "disc"), default="shipped",
+                        help="what the detector takes the markers for: the set's shapes (capsules, a band), or discs")
+    parser.add_argument("--part", choices=("scenes", "returns"), help="else both")
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    result: dict[str, Any] = {"seed": options.seed, "frames": options.frames}
+    good = True
+    if options.part != "returns":
+        scored, summary, good = scenes(options)
+        result |= summary | {"scenes": [asdict(one) for one in scored]}
+    if options.part != "scenes":
+        again, returned = returns(options)
+        result["returns"] = [asdict(one) for one in again]
+        good = good and returned
+    if options.json:
+        options.json.write_text(json.dumps(result, indent=2) + "\n")
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
