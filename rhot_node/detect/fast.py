@@ -22,7 +22,7 @@ SUDDENLY = 2  # markers fewer tracked than found in the last frame: was a lamp s
 GUESS_EVERY, GUESS_SELDOM = 20, 200
 """Frames without all markers tracked until the light is guessed anew; the second while enough are to tell the light."""
 STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
-GLANCE = 8  # frames between searches, and looks at the light, while all markers are followed in plain view
+GLANCE = 8  # frames between looks at the light, and between searches while all markers are followed in plain view
 _NOT_TRACKED = int(MarkerFlag.LOST | MarkerFlag.ACQUIRED)
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
 
@@ -79,21 +79,25 @@ class FastDetector:
             seen = self._find_at_first(image)
         else:
             self._finder.followed.follow(image, self._precise)
+            self._until_glance -= 1
             followed = self._finder.report_followed()
-            if followed is not None:
-                self._until_glance -= 1
-                if self._until_glance > 0:
-                    return followed
+            if followed is not None and self._until_glance > 0:
+                return followed
             seen = self._finder.find(image)
             if self._light_in_doubt(seen):
                 seen = self._find_in_guessed_light(image, seen)
-            steady = STEADY if followed is None else STEADY**GLANCE
-            if self._read_light(seen, steady) >= SWITCHED:  # somebody switched a lamp
+            if self._until_glance > 0:
+                self._found = self._count_found(seen)
+                return seen
+            if self._read_light(seen, STEADY**GLANCE) >= SWITCHED:  # somebody switched a lamp
                 seen = self._find_in_new_light(image)
         self._until_glance = GLANCE
         self._fresh = False
-        self._found = sum(mark.found for mark in seen[:len(self._markers)])
+        self._found = self._count_found(seen)
         return seen
+
+    def _count_found(self, seen: tuple[MarkerObservation, ...]) -> int:
+        return sum(mark.found for mark in seen[:len(self._markers)])
 
     def _find_at_first(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """Find the markers in a picture of which nothing is known: by the light of the calibration, if that shows all

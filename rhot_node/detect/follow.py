@@ -21,7 +21,7 @@ from rhot_node.detect import stated as st
 from rhot_node.detect import track as t
 from rhot_node.detect.contour import fit
 from rhot_node.detect.contour_pixels import project
-from rhot_node.detect.followed_band import IS_BAND, LIMB_LEFT, LIMB_TAKEN, READY, SAG, mend_band
+from rhot_node.detect.followed_band import IS_BAND, LIMB_LEFT, LIMB_TAKEN, OFF_AXIS, READY, SAG, mend_band
 
 AREA_LEAST = 22.0  # px^2: a smaller marker has too little inside
 NOISE_MOST = 0.12  # of the contrast
@@ -120,13 +120,17 @@ def _learn_noise_inside(u, v, fitted, noise_variance):
 
 @njit(**c.FAST)
 def _soft(u, v, track, look, soft):
-    """Soft coverage summed over the predicted window; False when it is cut by the frame or not of the expected area."""
+    """Soft coverage summed over the predicted window; False when the frame may cut the outline, or the area is not as
+    expected."""
     speed = math.hypot(track[t.VX], track[t.VY])
     half = 0.6 * track[t.EXTENT] + MARGIN + 0.5 * speed
     px, py = track[t.X] + track[t.VX] + track[t.SAG_X], track[t.Y] + track[t.VY] + track[t.SAG_Y]
-    x0, x1, y0, y1 = int(px - half), int(px + half) + 1, int(py - half), int(py + half) + 1
-    if not speed < SPEED_MOST or x0 < 1 or y0 < 1 or x1 > u.shape[1] - 2 or y1 > u.shape[0] - 2:
+    edge = 0.5 * track[t.EXTENT] + c.BAND + 0.5 * speed
+    height, width = u.shape
+    if not speed < SPEED_MOST or not min(px, py, width - 1.0 - px, height - 1.0 - py) > edge:
         return False
+    x0, x1 = max(int(px - half), 0), min(int(px + half) + 1, width - 1)
+    y0, y1 = max(int(py - half), 0), min(int(py + half) + 1, height - 1)
     ramp = 1.0 / (SOFT_HIGH - SOFT_LOW)
     wu, wv = look[c.W_U] * ramp, look[c.W_V] * ramp
     zero = wu * look[c.AROUND_U] + wv * look[c.AROUND_V] + SOFT_LOW * ramp
@@ -207,6 +211,7 @@ def _state(track, fitted, look, noise, mark, precise, out):
     extent = math.sqrt(6.0 * (fitted[c.M_XX] + fitted[c.M_YY]
                               + math.hypot(fitted[c.M_XX] - fitted[c.M_YY], 2.0 * fitted[c.M_XY])))
     bias = math.hypot(st.hidden_bias(ratio, max(extent, track[t.EXTENT]), area, st.SHARP), st.smear_bias(look[c.BLUR]))
+    bias = math.hypot(bias, mark[OFF_AXIS] * extent)
     level = track[t.LEVEL] * fitted[c.LEVEL]
     varied = (look[c.W_U] ** 2 * look[c.C_UU] + 2.0 * look[c.W_U] * look[c.W_V] * look[c.C_UV]
               + look[c.W_V] ** 2 * look[c.C_VV] - (look[c.GAIN] * noise) ** 2)

@@ -14,9 +14,10 @@ from rhot_node.detect import contour_columns as c
 from rhot_node.detect import position as p
 from rhot_node.detect.begin import start
 from rhot_node.detect.follow import DONE, OUT_COLUMNS, follow, noise_level
-from rhot_node.detect.followed_band import IS_BAND, LIMB_LEFT, LIMB_TAKEN, MARK_COLUMNS, READY, SAG_VARIANCE
+from rhot_node.detect.followed_band import IS_BAND, LIMB_LEFT, LIMB_TAKEN, MARK_COLUMNS, OFF_AXIS, READY, SAG_VARIANCE
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.stated import LIMB_OF_SHAPE
+from rhot_node.detect.stated import LIMB_OF_SHAPE, OFF_AXIS_SD
+from rhot_node.detect.track import FITTED
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import MarkerObservation
 
@@ -34,7 +35,7 @@ class Followed:
         self._looks = np.zeros((count, c.LOOK_COLUMNS))
         self._radii, self._rims = np.zeros((count, c.NODES + 1)), np.zeros((count, 2, c.NODES + 1))
         self._marks = np.zeros((count, MARK_COLUMNS))
-        self._marks[:, IS_BAND] = [shape == "band" for shape in shapes]
+        self._bands = [shape == "band" for shape in shapes]
         self._marks[:, LIMB_TAKEN:LIMB_LEFT + 1] = [LIMB_OF_SHAPE[shape] for shape in shapes]
         self._pixels, self._work = np.zeros((c.PIXELS_MAX, c.PIXEL_COLUMNS)), np.zeros((c.NODES + 1, c.WORK_COLUMNS))
         self._soft, self._fitted = np.zeros(3), np.zeros(c.FIT_COLUMNS)
@@ -65,10 +66,12 @@ class Followed:
 
     def start(self, image: YuvImage, index: int, row: Sequence[float]) -> bool:
         """Follow track `index` from now on, which was measured in plain view, with the result `row` of `measure`; says
-        whether its outline was found."""
-        band = bool(self._marks[index, IS_BAND])
-        if band and not row[p.FIT]:
-            return False
+        whether its outline was found. A band that never showed its rims is followed by its outline alone."""
+        band = self._bands[index] and bool(row[p.FIT])
+        if self._bands[index] and not band and self._tracks[index, FITTED]:
+            return False  # it is a band, and something hides its rims
+        self._marks[index, IS_BAND] = band
+        self._marks[index, OFF_AXIS] = OFF_AXIS_SD if self._bands[index] and not band else 0.0
         self._marks[index, SAG_VARIANCE] = row[p.SAG_VARIANCE]
         start(image.y, image.u, image.v, row[p.X], row[p.Y], row[p.VAR_MAJOR], row[p.VAR_MINOR], row[p.AXIS_X],
               row[p.AXIS_Y], row[p.AREA], noise_level(self._noise_variance), band, row[p.SAG], self._marks[index],

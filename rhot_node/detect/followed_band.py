@@ -22,9 +22,10 @@ GAUSS_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
 GAUSS_WEIGHT = 0.5 * np.polynomial.legendre.leggauss(4)[1]
 
 # Columns of `marks`: how a marker is followed.
-# LIMB_TAKEN, LIMB_LEFT: `stated.LIMB_OF_SHAPE`.
-READY, IS_BAND, SAG, SAG_VARIANCE, SAG_ZERO, SAG_FRAMES, LIMB_TAKEN, LIMB_LEFT = range(8)
-MARK_COLUMNS = 8
+# LIMB_TAKEN, LIMB_LEFT: `stated.LIMB_OF_SHAPE`. IS_BAND: its rims show, so that it is placed on its axis. OFF_AXIS: of
+# a band whose rims do not show, standard deviation of its centroid about its axis, of its extent.
+READY, IS_BAND, SAG, SAG_VARIANCE, SAG_ZERO, SAG_FRAMES, LIMB_TAKEN, LIMB_LEFT, OFF_AXIS = range(9)
+MARK_COLUMNS = 9
 
 
 @njit(**c.FAST)

@@ -10,6 +10,9 @@ from numba import njit
 
 BLUR_VARIANCE = 0.2  # px^2: point spread of about 0.7 luma px and the 2x2 chroma mean
 BAND_HALF_WIDTH_MIN = 3.5  # px; a narrower band shows no curvature
+SQUARE_LEAST = 0.92
+"""Least independence of a band's width and length: 1 for its four corners, 2/3 for an ellipse, at most 0.84 for a
+capsule of any length."""
 
 # Columns of the result row.
 X, Y, AREA, COV_XX, COV_XY, COV_YY, VAR_MAJOR, VAR_MINOR, AXIS_X, AXIS_Y, SAG, SAG_VARIANCE, FIT, SOFT = range(14)
@@ -136,8 +139,30 @@ def band_center(region, coverage, gain, result):
     residual = (moments[3] - explained) / moments[0]
     if not _is_a_band(moments, residual, length, half_width, solution[2]):
         return False
+    if _independence(region, coverage, half_width, solution, result) < SQUARE_LEAST:
+        return False
     _band_result(region, coverage, gain, half_width, inverse, solution, result)
     return True
+
+
+@njit(cache=True)
+def _independence(region, coverage, half_width, solution, result):
+    """E[u^2 w^2] / (E[u^2] E[w^2]) of the coverage across (u) and along (w) the straightened band."""
+    n = uu = ww = uuww = 0.0
+    x0, x1, y0, y1 = region
+    for row in range(y0, y1 + 1):
+        for column in range(x0, x1 + 1):
+            a = coverage[row, column]
+            if a == 0.0:
+                continue
+            across, along = _band_coordinates(column, row, result)
+            u = across / half_width
+            w = along - solution[0] - solution[1] * u - solution[2] * _arc(u, half_width)
+            n += a
+            uu += a * u * u
+            ww += a * w * w
+            uuww += a * u * u * w * w
+    return uuww * n / (uu * ww)
 
 
 @njit(cache=True)

@@ -127,7 +127,8 @@ class Track:
         if self.shape == "band" and not row[p.FIT]:
             x, y = x - self.sag_x, y - self.sag_y
             stale = SAG_STALE if not flags & PARTIAL else SAG_HIDDEN
-            bias = math.hypot(bias, stale * math.hypot(self.sag_x, self.sag_y) if self.fitted else 0.3 * extent)
+            off_axis = stale * math.hypot(self.sag_x, self.sag_y) if self.fitted else st.OFF_AXIS_SD * extent
+            bias = math.hypot(bias, off_axis)
         self._update(row, x, y, extent, ratio, known, flags)
         return _observation(index, row, x, y, bias, noise, floor, ratio, flags)
 
