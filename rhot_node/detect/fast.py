@@ -21,7 +21,7 @@ __all__ = ["DOUBTFUL", "GLANCE", "SEARCH_STEP", "FastDetector"]
 SUDDENLY = 2  # markers fewer tracked than found in the last frame: was a lamp switched?
 GUESS_EVERY, GUESS_SELDOM = 20, 200
 """Frames without all markers tracked until the light is guessed anew; the second while enough are to tell the light."""
-STEADY, STEADY_FEW = 0.7, 0.95  # of the light is that of the last frame; with few markers in plain view
+STEADY, STEADY_FEW = 0.7, 0.95  # per frame, of the light is that of the last one; with few markers in plain view
 GLANCE = 8  # frames between looks at the light, and between searches while all markers are followed in plain view
 _NOT_TRACKED = int(MarkerFlag.LOST | MarkerFlag.ACQUIRED)
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
@@ -89,7 +89,7 @@ class FastDetector:
             if self._until_glance > 0:
                 self._found = self._count_found(seen)
                 return seen
-            if self._read_light(seen, STEADY**GLANCE) >= SWITCHED:  # somebody switched a lamp
+            if self._read_light(seen, anew=False) >= SWITCHED:  # somebody switched a lamp
                 seen = self._find_in_new_light(image)
         self._until_glance = GLANCE
         self._fresh = False
@@ -105,7 +105,7 @@ class FastDetector:
         seen = self._finder.find(image, whole=True)
         if len(self._finder.plainly(seen)) < len(self._markers):
             return self._find_in_guessed_light(image, seen)
-        return seen if self._read_light(seen, 0.0) < DEAD_ZONE else self._find_in_new_light(image)
+        return seen if self._read_light(seen, anew=True) < DEAD_ZONE else self._find_in_new_light(image)
 
     def _light_in_doubt(self, seen: tuple[MarkerObservation, ...]) -> bool:
         """Whether markers were lost together, or some have not been tracked for a while.
@@ -146,16 +146,18 @@ class FastDetector:
         for _ in range(LIGHT_PASSES):
             self._finder.forget()
             seen = self._finder.find(image, whole=True)
-            if self._read_light(seen, 0.0) < DEAD_ZONE:
+            if self._read_light(seen, anew=True) < DEAD_ZONE:
                 break
         return seen
 
-    def _read_light(self, seen: tuple[MarkerObservation, ...], steady: float) -> float:
-        """Take the light from the markers that are plainly seen; returns by how much its warmth changed."""
+    def _read_light(self, seen: tuple[MarkerObservation, ...], *, anew: bool) -> float:
+        """Take the light from the markers that are plainly seen; returns by how much its warmth changed. `anew`: what
+        was known of it before does not count."""
         self._finder.note_paint()
         plain = self._finder.plainly(seen)
-        if len(plain) < MARKERS_LEAST:
-            steady = STEADY_FEW  # things of a marker's colour must not tell the light
+        steady = 0.0 if anew else STEADY**GLANCE
+        if len(plain) < MARKERS_LEAST:  # things of a marker's colour must not tell the light
+            steady = STEADY_FEW if anew else STEADY_FEW**GLANCE
         return self._light.read(plain, self._finder.paint[plain], steady)
 
     def labels(self, image: YuvImage) -> Labels:
