@@ -21,6 +21,7 @@ from rhot_node.detect.colour import SAMPLES_MIN, Box, Colours, box_mask, colours
 from rhot_node.detect.fast import DOUBTFUL, FastDetector
 from rhot_node.detect.image import YuvImage
 from rhot_node.markers import Marker, MarkerSet
+from rhot_node.wire.messages import MarkerFlag
 
 SKIN_HALF_PX = 8  # of the box that a click on skin stands for
 
@@ -142,11 +143,16 @@ class ColourGathering:
                 Marker(id=f"m{k}", chroma=learn_chroma_from_colours(one.colours), display_rgb=one.rgb)
                 for k, one in enumerate(samples))))
         found = {}
-        for one, seen in zip(samples, self._scouts[camera].detect(image), strict=True):
-            if one.name in missing and seen.found and not seen.flags & DOUBTFUL:
-                region = _plain_region(image, (seen.x, seen.y))
-                if region is not None and 1.0 / GROWN < region.area / one.area < GROWN:
-                    found[one.name] = collector.add(one.name, image, (seen.x, seen.y))
+        seen = self._scouts[camera].detect(image)
+        for index, one in enumerate(samples):
+            candidates = [mark for mark in seen if mark.index == index and mark.found]
+            doubtful = DOUBTFUL if len(candidates) < 2 else DOUBTFUL & ~MarkerFlag.AMBIGUOUS
+            places = [(mark.x, mark.y) for mark in candidates if not mark.flags & doubtful]
+            regions = [(place, _plain_region(image, place)) for place in places if one.name in missing]
+            fitting = [place for place, region in regions
+                       if region is not None and 1.0 / GROWN < region.area / one.area < GROWN]
+            if len(fitting) == 1:  # of two of its colour and size, nobody knows which it is
+                found[one.name] = collector.add(one.name, image, fitting[0])
         return found
 
 
