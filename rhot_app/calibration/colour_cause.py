@@ -148,7 +148,7 @@ class Explainer:
                     return self._refusal(code, balanced, index, reached, labels)
             return Cause("hue", f"Nothing in the picture has its hue, {self._hue(index)}.")
         sample = region.sample
-        if np.mean(labels[sample] == own) >= (1.0 if partly else PASSING):
+        if not sample.any() or np.mean(labels[sample] == own) >= (1.0 if partly else PASSING):
             return None
         refused = {"luma": sample & (table == own) & (labels != own), "other": sample & (table != own) & (table > 0),
                    "pale": sample & (sector == own) & (table == 0), "hue": sample & (sector != own) & (table == 0)}
