@@ -90,7 +90,7 @@ class Explainer:
             if colour is not None:
                 return colour
         if blob is None or blob[AREA] < AREA_MIN:
-            return _small(blob, balanced)
+            return _small(blob, region, balanced)
         if blob[AREA] >= LARGEST * image.u.size:
             return Cause("large", f"What has its colour {_at(blob)} is too large for a marker: "
                          f"{100 * blob[AREA] / image.u.size:.0f} % of the picture, less than {100 * LARGEST:.0f} % is "
@@ -206,10 +206,11 @@ class Explainer:
                      f"{_area(other):.0f} px², the marker has {4 * blob[AREA]:.0f} px².{cut}")
 
 
-def _small(blob: Blob | None, image: YuvImage) -> Cause:
+def _small(blob: Blob | None, region: PaintRegion | None, image: YuvImage) -> Cause:
     count = 0.0 if blob is None else float(blob[AREA])
     where = f" {_at(blob)}" if blob is not None else ""
-    if blob is not None and _touches_border(blob, image.u.shape):
+    edges = [] if region is None else [region.whole[0], region.whole[-1], region.whole[:, 0], region.whole[:, -1]]
+    if any(edge.any() for edge in edges) or (blob is not None and _touches_border(blob, image.u.shape)):
         return Cause("border", f"It is cut by the picture's border: {4 * count:.0f} px² are left{where}, "
                      f"{4 * AREA_MIN} px² are needed.")
     return Cause("small", f"It is too small: the largest blob of its colour{where} has {4 * count:.0f} px², "

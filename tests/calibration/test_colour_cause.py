@@ -90,7 +90,7 @@ def test_a_thing_that_is_too_large_is_said_so_with_its_share_of_the_picture() ->
 
 
 def test_a_marker_of_which_the_border_leaves_too_little_is_said_to_be_cut() -> None:
-    cause = why(markers(ring=CYAN), scene((100.0, 243.5, 6.0, CYAN)), ring=region(100.0, 243.5, 6.0))
+    cause = why(markers(ring=CYAN), scene((100.0, 240.5, 3.5, CYAN)), ring=region(100.0, 240.5, 3.5))
     assert cause.code == "border" and "picture's border" in cause.sentence
 
 
