@@ -58,8 +58,10 @@ def _pairs(separability: Separability, remedy: str, identity: Identity) -> Itera
         overlap = f"{first} and {second} overlap by {100 * share:.0f} %"
         if (first, second) in same:
             how = overlap if share else f"{first} and {second} have one colour"
+            kept = [name for name in (first, second) if name not in separability.names]
             yield Finding("same-colour", POOR, f"{how}: their hues are {same[first, second]:.0f}° apart.",
-                          "For the camera they have the same colour.", remedy)
+                          "For the camera they have the same colour.",
+                          f"Pick {kept[0]} too if it has new paint. {remedy}" if kept else remedy)
         elif share >= SAME_COLOUR:
             yield Finding("same-colour", POOR, f"{overlap}.", "For the camera they have the same colour.", remedy)
         elif share >= OVERLAP:
