@@ -31,6 +31,12 @@ class Identity:
     skin: Mapping[str, str]
     taken: tuple[tuple[str, str], ...]
 
+    @property
+    def exchanged(self) -> str:
+        """The colours that were another marker's, in a sentence; empty when none was."""
+        words = "; ".join(f"{name} now has the colour that {other} had" for name, other in self.taken)
+        return f"{words}." if words else ""
+
 
 def hues_apart_deg(first: ChromaModel, second: ChromaModel) -> float:
     """How far two hues are apart, degrees."""

@@ -42,8 +42,9 @@ def judge_report(samples: Sequence[PaintSamples], models: Sequence[ChromaModel],
         "Use fewer markers, or a plainer background: no hue is left free here."
     joined = {one.name for one, lost in zip(samples, rehearsal.lost, strict=True) if lost >= LOST} & runs_on
     findings = [
-        *_skin(separability, free, joined, identity), *_pairs(separability, other_paint, identity), *_taken(identity),
-        *_rivals(samples, room, free), *_lamps(samples, rehearsal, separability, room), *_paints(samples, models),
+        *_skin(separability, free, joined, identity), *_pairs(separability, other_paint, identity),
+        *_exchanged(identity), *_rivals(samples, room, free), *_lamps(samples, rehearsal, separability, room),
+        *_paints(samples, models),
     ]
     worst = separability.sentences[0] if separability.sentences else "no two colours overlap"
     names = ", ".join(_with_paint(one.name, model) for one, model in zip(samples, models, strict=True))
@@ -89,11 +90,11 @@ def _skin(separability: Separability, free: Sequence[str], joined: set[str], ide
                           "What surrounds the marker has nearly its colour.", f"{border}, or {paint}")
 
 
-def _taken(identity: Identity) -> Iterator[Finding]:
-    for name, other in identity.taken:
-        yield Finding("taken", FAIR, f"{name} now has the colour that {other} had.",
+def _exchanged(identity: Identity) -> Iterator[Finding]:
+    if identity.exchanged:
+        yield Finding("exchanged", FAIR, identity.exchanged,
                       "The paints were exchanged, or clicked in another order than they are on the hand.",
-                      f"If {name} does not wear that paint, go back and pick both again.")
+                      "If the hand does not wear them so, pick these markers again.")
 
 
 def _rivals(samples: Sequence[PaintSamples], room: RoomReport, free: Sequence[str]) -> Iterator[Finding]:

@@ -136,7 +136,7 @@ def test_the_mask_is_what_the_detector_takes(hands, scene):
     step = hands.window.step
     hands.until(lambda: all(mark.found for mark in step._sights["left"].seen))
     layer, *marks = step.view().overlays["left"]
-    assert isinstance(layer, Layer) and {mark.text for mark in marks if isinstance(mark, Tag)} == set(PAINTS)
+    assert isinstance(layer, Layer) and {mark.text for mark in marks if isinstance(mark, Tag)} >= set(PAINTS)
     labels = step._sights["left"].labels
     assert layer.rgba.shape == (120, 160, 4)
     assert np.array_equal(layer.rgba[..., 3] == 255, labels > 0)
@@ -244,19 +244,17 @@ def said(hands):
 
 
 def test_the_page_says_which_test_a_camera_that_does_not_find_a_marker_refuses_it_by(hands, scene):
-    click_at(hands, "left", *PaintScene.where("thumb"))
-    hands.until(lambda: hands.window.step._sights and hands.window.step.gathering.pictures("thumb") == 2)
     other = PaintScene({name: rgb for name, rgb in PAINTS.items() if name != "ring"}, background=(60, 62, 66))
     hands.asker.draw = lambda node_id, t_s: (scene if node_id == 1 else other).draw(node_id, t_s)
-    click_at(hands, "right", *on_skin("thumb"), to=on_skin("index"))
+    hands.until(lambda: hands.window.step._sights["right"].image.y[10, 10] < 90)  # grey, no longer wood
     choose(hands, "ring")
     click_at(hands, "left", *PaintScene.where("ring"))
     choose(hands, SKIN)
-    click_at(hands, "left", *on_skin("thumb"))
+    x, y = on_skin("thumb")
+    click_at(hands, "left", x - 4.0, y, to=(x + 4.0, y + 20.0))
     hands.until(lambda: "right has not seen ring: not found. " in hands.window.frame.hint.text())
     hands.next()
     hands.until(lambda: hands.window.step.report is not None, timeout_s=60.0)
-    hands.window.step.chosen = "ring"
     hands.until(lambda: "ring is found by 1 of 2 cameras. right: not found. " in hands.window.frame.hint.text())
 
 

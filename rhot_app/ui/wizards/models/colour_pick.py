@@ -150,10 +150,17 @@ class PickStep(Step):
                     for name, shown in self.identity.skin.items()]
         findings += [Finding("same-colour", Grade.POOR, f"{first} and {second} have one colour: their hues are "
                              f"{apart:.0f}° apart.", "", again) for first, second, apart in self.identity.same]
-        findings += [Finding("taken", Grade.FAIR, f"{name} now has the colour that {other} had.")
-                     for name, other in self.identity.taken]
-        return judge(f"{len(self.gathering.names)} of {len(self.base.ids)} markers are picked.", findings) \
-            if findings else None
+        if self.identity.exchanged:
+            findings.append(Finding("exchanged", Grade.FAIR, self.identity.exchanged, "",
+                                    "If the hand does not wear them so, click these again."))
+        doubtful = [name for name in self.base.ids if self.doubt(name)]
+        return judge(f"look at {', '.join(doubtful)} again.", findings) if findings else None
+
+    @property
+    def _wrong(self) -> str:
+        """The first marker whose colour cannot stay; empty when there is none."""
+        wrong = {*self.identity.skin, *(name for pair in self.identity.same for name in pair[:2])}
+        return next((name for name in self.base.ids if name in wrong), "")
 
     def view(self) -> StepView:
         """Which paint to show next, and how much has been seen of those named."""
@@ -161,7 +168,8 @@ class PickStep(Step):
         seen = sum(gathering.variety(name) for name in names) / len(names) if names else 0.0
         bars = (Bar("picked", len(names) / len(self.base.ids), f"{len(names)} of {len(self.base.ids)} markers"),
                 Bar("seen moving", seen, "places and angles at which the markers were seen so far"))
-        return StepView(self._sentence(), done=gathering.enough and len(names) == len(self.base.ids),
+        return StepView(self._sentence(),
+                        done=gathering.enough and len(names) == len(self.base.ids) and not self._wrong,
                         passable=bool(names), hint=self.problem or self._hint(), bars=bars, verdict=self._verdict(),
                         overlays=self._overlays(), pictures=self.held)
 
@@ -170,6 +178,8 @@ class PickStep(Step):
             return f"Click {self._paint()} in the held picture."
         if len(self.gathering.names) < len(self.base.ids):
             return f"Click {self._paint()}, or drag over it."
+        if self._wrong:
+            return f"Choose {self._wrong} and click its paint."
         if not self.gathering.enough:
             return "Move and turn the hand slowly, near and far."
         return "Enough: press Next."
@@ -178,6 +188,8 @@ class PickStep(Step):
         return "bare skin" if self.chosen == SKIN else f"the paint of {self.chosen}"
 
     def _hint(self) -> str:
+        if self._wrong:
+            return f"{self._wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z."
         if self.gathering.names and not len(self.gathering.skin):
             return "Pick bare skin too: then it is said whether a marker looks like it."
         drift = () if self.gathering.names else drift_of(self._sights)
