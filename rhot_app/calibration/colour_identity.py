@@ -20,6 +20,7 @@ SKIN_MAGNITUDE, SKIN_SATURATION = 50.0, 0.45
 """Chroma, grey levels, and chroma per luma that skin does not exceed. The ten tones of the Monk scale have at most
 0.28, by a warm lamp 0.43; orange, brown and red paints have 0.5 to 1.2. The ratio does not change with the strength of
 the light."""
+VIEWS_MOST = 4  # pictures that are asked: those that show most markers
 BESIDE = 0.1  # of what surrounds a marker: a finger fills more of it
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +86,9 @@ def skin_shown(name: str, colours: Colours, views: Sequence[View]) -> str:
     shown = []
     if has_hue_of_skin(colours):
         shown.append(f"hue {hue:.0f}°, chroma {math.hypot(cb, cr):.0f} and luma {luma:.0f} are those of skin")
-    others = {other for view in views for other in view.paint if other != name}
-    around = beside(name, colours, views) if SKIN_DEG[0] <= hue <= SKIN_HUE_DEG + SKIN_REACH_DEG else ()
+    telling = sorted(views, key=lambda view: -len(view.paint))[:VIEWS_MOST]
+    others = {other for view in telling for other in view.paint if other != name}
+    around = beside(name, colours, telling) if SKIN_DEG[0] <= hue <= SKIN_HUE_DEG + SKIN_REACH_DEG else ()
     if len(around) >= max(2.0, 0.5 * len(others)):
         shown.append(f"the same colour lies beside {', '.join(around)}")
     return "; ".join(shown)
