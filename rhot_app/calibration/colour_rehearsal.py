@@ -78,7 +78,7 @@ def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
                         if outcome is not None:
                             cause = explainer.why_second(seen, index) if outcome == "second" else \
                                 explainer.why_lost(detector, image, seen, index, view.paint)
-                            failures.append(Failure(name, picture, lamp, outcome, tracked, cause))
+                            failures.append(Failure(name, picture, lamp, _as_said(outcome, cause), tracked, cause))
     shown = [sum(name in view.paint for _, view in chosen) for name in names]
     return Rehearsal(tuple(failures), tuple(_lost(name, count, failures)
                                             for name, count in zip(names, shown, strict=True)))
@@ -100,6 +100,13 @@ def _outcome(candidates: Sequence[MarkerObservation], region: PaintRegion) -> Ou
     if None in each:
         return "second" if each[0] is not None else None
     return next((outcome for outcome in each if outcome == "joined"), each[0])
+
+
+def _as_said(outcome: Outcome, cause: Cause) -> Outcome:
+    """The outcome by its cause: a large thing elsewhere may be the marker with its surroundings, or not."""
+    if cause.code == "joined":
+        return "joined"
+    return "elsewhere" if outcome == "joined" else outcome
 
 
 def _outcome_of(seen: MarkerObservation, region: PaintRegion) -> Outcome | None:

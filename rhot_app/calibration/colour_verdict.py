@@ -58,7 +58,7 @@ def _pairs(separability: Separability, remedy: str, identity: Identity) -> Itera
         share = separability.pair(first, second)
         overlap = f"{first} and {second} overlap by {100 * share:.0f} %"
         if (first, second) in same:
-            how = overlap if share else f"{first} and {second} have one colour"
+            how = overlap if share >= 0.005 else f"{first} and {second} have one colour"
             kept = [name for name in (first, second) if name not in separability.names]
             yield Finding("same-colour", POOR, f"{how}: their hues are {same[first, second]:.0f}° apart.",
                           "For the camera they have the same colour.",

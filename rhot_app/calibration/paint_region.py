@@ -87,7 +87,10 @@ def region_in(image: YuvImage, boxes: list[Box]) -> PaintRegion:
     _require_one_paint(image, boxes)
     held, found = int(np.count_nonzero(sample)), _extent(image, sample)
     if found is None:
-        _require_enough(sample, held)
+        if held < SAMPLES_MIN:
+            raise CalibrationError(f"the {held} colour pixels of the samples are almost grey, and {SAMPLES_MIN} are "
+                                   "needed; grey, black and white cannot be told from the room. Use a stronger paint "
+                                   "or more light.")
         return PaintRegion(sample, _grown(sample, RING))
     flooded, runs_on = found
     if held < SEED:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from colour_scenes import PAINTS, RADIUS, SKIN, WOOD, box, picture, place
@@ -122,6 +123,29 @@ def test_a_large_thing_across_the_room_is_a_rival_and_the_marker_is_found_all_th
     second = [failure for failure in report.rehearsal.failures if failure.outcome == "second"]
     assert {failure.marker for failure in second} == {"middle"}
     assert "What is found first is at 29" in second[0].cause.sentence
+
+
+def test_a_marker_behind_four_larger_things_of_its_colour_is_said_to_be_so_and_where_they_are() -> None:
+    clutter = [(x, y, 22.0, PAINTS["ring"]) for x, y in ((270.0, 205.0), (30.0, 205.0), (150.0, 215.0), (290.0, 25.0))]
+    report = calibrate(picture(clutter=clutter, background=(60, 62, 66)))
+    (finding,) = [one for one in report.verdict.findings if one.code == "fails"]
+    assert finding.figure == "ring is found in another place in picture 1 itself."
+    assert finding.cause.startswith("4 other things of its colour are likelier, the first at ")
+    assert "plainer background" in finding.remedy and finding.grade is Grade.POOR
+    (said,) = {(one["cause"], one["sentence"]) for one in report.to_json()["failures"]
+               if one["same_lamp"] and not one["tracked"]}
+    assert said == ("crowded", finding.cause)
+
+
+def test_paint_that_a_bound_refuses_is_not_blamed_on_the_room() -> None:
+    learnt = calibrate(picture(background=(60, 62, 66)))
+    (ring,) = [marker.chroma for marker in learnt.markers.markers if marker.id == "ring"]
+    given = {"ring": msgspec.structs.replace(ring, luma_max=90)}
+    report = calibrate(picture(background=(60, 62, 66)), given=given)
+    (finding,) = [one for one in report.verdict.findings if one.code == "fails"]
+    assert finding.figure == "ring is not found in picture 1 itself."
+    assert "Its paint is too bright: luma 1" in finding.cause and "at most 90 is taken" in finding.cause
+    assert "exposure" in finding.remedy
 
 
 def test_a_dull_thing_of_the_same_hue_is_kept_out_by_the_magnitude() -> None:

@@ -153,7 +153,8 @@ def test_a_box_that_is_too_small_is_enlarged_to_the_paint_round_it_and_the_repor
     assert calibrate("--image", str(shot), "--sample", box_of, "--out", str(tmp_path / "m.json"), "--json") == 0
     report = json.loads(capsys.readouterr().out)
     (note,) = [finding for finding in report["findings"] if finding["code"] == "enlarged"]
-    assert "12 are needed" in note["figure"] and "10 x 8 px" in note["remedy"] and note["grade"] == "good"
+    assert "12 colour pixels are needed" in note["figure"] and "ring in picture 1 from" in note["figure"]
+    assert "10 x 8 px" in note["remedy"] and note["grade"] == "good"
     assert report["markers"][0]["samples"] >= 12
 
 
@@ -197,10 +198,12 @@ def test_one_picture_is_a_hint_and_no_verdict(shot: Path, tmp_path: Path, capsys
     assert said.count("learnt from one picture") == 1
 
 
-def test_grey_paint_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("size", [30, 3])
+def test_grey_paint_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str], size: int) -> None:
     path = tmp_path / "grey.png"
     cv2.imwrite(str(path), np.full((100, 100, 3), 120, np.uint8))
-    assert calibrate("--image", str(path), "--sample", "ring=10,10,30,30", "--out", str(tmp_path / "m.json")) == 2
+    assert calibrate("--image", str(path), "--sample", f"ring=10,10,{size},{size}", "--out",
+                     str(tmp_path / "m.json")) == 2
     assert "almost grey" in capsys.readouterr().err
 
 

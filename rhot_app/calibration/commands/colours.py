@@ -76,11 +76,11 @@ def run(args: argparse.Namespace) -> int:
     base = load_markers(args.markers) if args.markers else None
     images, unreadable = _read_all(args.image)
     collector = ColourSamples()
-    notes = []
+    enlarged = []
     for (name, picture), boxes in _samples(args.sample).items():
         shown, *_ = [_image(box, images, args.image) for box in boxes]
         region = collector.add(name, shown, [_corners(box) for box in boxes])
-        notes += _enlarged(name, picture, shown, [_corners(box) for box in boxes], region)
+        enlarged += _enlarged(f"{name} in picture {picture + 1}", shown, [_corners(box) for box in boxes], region)
     for image in images:
         if image is not None:
             collector.keep_view(image)
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     line = ProgressLine("colours", sys.stderr)
     report = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
     line.finish()
-    verdict, written = judged_anew(report.verdict, [*unreadable, *notes]), ""
+    verdict, written = judged_anew(report.verdict, [*unreadable, *_note_enlarged(enlarged)]), ""
     if report.verdict.acceptable:
         try:
             save_markers(args.out, report.markers)
@@ -129,21 +129,24 @@ def _samples(texts: list[str]) -> dict[tuple[str, int], list[BoxArgument]]:
     return samples
 
 
-def _enlarged(name: str, picture: int, image: YuvImage, boxes: list[tuple[int, int, int, int]],
-              region: PaintRegion) -> list[Finding]:
-    """A note when the boxes were too small to learn from by themselves."""
+def _enlarged(what: str, image: YuvImage, boxes: list[tuple[int, int, int, int]], region: PaintRegion) -> list[str]:
+    """From and to how many colour pixels boxes were enlarged that were too small to learn from by themselves."""
     import numpy as np
 
-    from rhot_app.calibration.paint_region import ENOUGH
-    from rhot_app.calibration.verdict import Finding, Grade
     from rhot_node.detect.colour import SAMPLES_MIN, box_mask
 
     held = int(np.count_nonzero(box_mask(image, boxes)))
-    if held >= SAMPLES_MIN:
-        return []
-    return [Finding("enlarged", Grade.GOOD, f"{name} has boxes of {held} colour pixels in picture {picture + 1}; "
-                    f"{SAMPLES_MIN} are needed, so {int(np.count_nonzero(region.sample))} of the same paint round them "
-                    "were taken.", "", f"{ENOUGH} of paint are enough in one box.")]
+    return [f"{what} from {held} to {np.count_nonzero(region.sample)}"] if held < SAMPLES_MIN else []
+
+
+def _note_enlarged(enlarged: list[str]) -> list[Finding]:
+    from rhot_app.calibration.paint_region import ENOUGH
+    from rhot_app.calibration.verdict import Finding, Grade
+    from rhot_node.detect.colour import SAMPLES_MIN
+
+    return [Finding("enlarged", Grade.GOOD, f"{SAMPLES_MIN} colour pixels are needed, so small boxes were enlarged to "
+                    f"the same paint round them: {', '.join(enlarged)}.", "",
+                    f"{ENOUGH} of paint are enough in one box.")] if enlarged else []
 
 
 def _read_all(paths: list[Path]) -> tuple[list[YuvImage | None], list[Finding]]:
