@@ -104,7 +104,7 @@ class Explainer:
                 "hidden", "Only a part of it is found: the rest is hidden or of another colour.")
         if own:
             return self._rival(own, blob, index, image)
-        return Cause("track", f"The search takes its blob {_at(blob)}, but the window of its track did not hold it.")
+        return Cause("track", f"The search would take its blob {_at(blob)}; no track held it in this picture.")
 
     @staticmethod
     def why_second(seen: Sequence[MarkerObservation], index: int) -> Cause:

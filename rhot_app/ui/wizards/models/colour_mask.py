@@ -56,7 +56,6 @@ class MaskMaker:
         """What every camera's detector finds with `markers`, and why it does not find those that are `asked` for."""
         if markers is not self._markers:
             self._markers, self._detectors, self._drifts, self._explainer = markers, {}, {}, None
-        explainer = self._explainer = self._explainer or Explainer(markers)
         sights = {}
         for name, picture in pictures.items():
             detector = self._detectors.setdefault(name, FastDetector(markers))
@@ -64,13 +63,24 @@ class MaskMaker:
             seen = detector.detect(image)
             drift = self._drifts.setdefault(name, LightDrift(markers, detector))
             drift.update(image, seen)
-            why = {}
-            for index in (markers.ids.index(marker) for marker in asked if marker in markers.ids):
-                why[index] = explainer.doubt(seen, index) if seen[index].found else \
-                    explainer.why_lost(detector, image, seen, index)
-            sights[name] = Sight(image, detector.labels(image), seen, drift.report(),
-                                 {index: cause for index, cause in why.items() if cause is not None})
+            causes = self._causes(detector, image, seen, [marker for marker in asked if marker in markers.ids])
+            sights[name] = Sight(image, detector.labels(image), seen, drift.report(), causes)
         return sights
+
+    def _causes(self, detector: FastDetector, image: YuvImage, seen: tuple[MarkerObservation, ...],
+                asked: Sequence[str]) -> dict[int, Cause]:
+        """Why those of the markers `asked` for that are not in plain view are not, by index."""
+        assert self._markers is not None
+        causes: dict[int, Cause] = {}
+        for index in map(self._markers.ids.index, asked):
+            if seen[index].found:
+                cause = Explainer.doubt(seen, index)
+            else:
+                self._explainer = self._explainer or Explainer(self._markers)
+                cause = self._explainer.why_lost(detector, image, seen, index)
+            if cause is not None:
+                causes[index] = cause
+        return causes
 
 
 def drift_of(sights: Sights) -> tuple[Finding, ...]:
