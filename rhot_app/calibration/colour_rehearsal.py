@@ -19,23 +19,26 @@ from rhot_app.calibration.colour_samples import View
 from rhot_app.calibration.paint_region import PaintRegion
 from rhot_app.progress import Progress, silent
 from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import YuvImage
 from rhot_node.markers import MarkerSet
-from rhot_node.wire.messages import MarkerObservation
+from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
 VIEWS_MOST = 4
 LAMPS_TRIED = (SAME, *(lamp for lamp in LAMPS if lamp.brightness != 1.0))
 CHANCES = chances(LAMPS_TRIED)
 SHRUNK = 0.3  # of the marker's sample: most of it is gone
 
-Outcome = Literal["lost", "elsewhere", "joined", "second"]
+Outcome = Literal["lost", "elsewhere", "joined", "second", "doubtful"]
+FOUND = ("second", "doubtful")
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
     """A marker that the detector did not find where it is: lost, found elsewhere, or joined by its surroundings.
 
-    "second": it was found where it is, after something else of its colour. `tracked`: whether that happened in its
-    tracking window, a frame after it had been found. `cause`: the test of the detector that says so.
+    "second": it was found where it is, after something else of its colour; "doubtful": it was found alone, with a flag
+    of doubt. `tracked`: whether that happened in its tracking window, a frame after it had been found. `cause`: the
+    test of the detector that says so.
     """
 
     marker: str
@@ -49,8 +52,8 @@ class Failure:
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
     """`failures`: everything that failed. `lost`, per marker: in what share of all pictures it is not found where it
-    is, by the lamps that may come, each as often as it may; of searching and tracking the worse one. "second" does not
-    count."""
+    is, by the lamps that may come, each as often as it may; of searching and tracking the worse one. What is FOUND
+    does not count."""
 
     failures: tuple[Failure, ...]
     lost: tuple[float, ...]
@@ -76,8 +79,7 @@ def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
                     if name in view.paint:
                         outcome = _outcome([mark for mark in seen if mark.index == index], view.paint[name])
                         if outcome is not None:
-                            cause = explainer.why_second(seen, index) if outcome == "second" else \
-                                explainer.why_lost(detector, image, seen, index, view.paint)
+                            cause = _cause(outcome, explainer, detector, image, seen, index, view)
                             failures.append(Failure(name, picture, lamp, _as_said(outcome, cause), tracked, cause))
     shown = [sum(name in view.paint for _, view in chosen) for name in names]
     return Rehearsal(tuple(failures), tuple(_lost(name, count, failures)
@@ -89,7 +91,7 @@ def _lost(name: str, shown: int, failures: Sequence[Failure]) -> float:
     worse = 0.0
     for tracked in (False, True):
         own = [LAMPS_TRIED.index(one.lamp) for one in failures if one.marker == name and one.tracked == tracked
-               and one.outcome != "second"]
+               and one.outcome not in FOUND]
         worse = max(worse, float(CHANCES[own].sum()) / max(shown, 1))
     return worse
 
@@ -98,8 +100,18 @@ def _outcome(candidates: Sequence[MarkerObservation], region: PaintRegion) -> Ou
     """What became of a marker; `candidates`: what was found of it, the best first."""
     each = [_outcome_of(mark, region) for mark in candidates]
     if None in each:
-        return "second" if each[0] is not None else None
+        cut = len(each) == 1 and candidates[0].flags & MarkerFlag.EDGE
+        return "second" if each[0] is not None else "doubtful" if cut else None
     return next((outcome for outcome in each if outcome == "joined"), each[0])
+
+
+def _cause(outcome: Outcome, explainer: Explainer, detector: FastDetector, image: YuvImage,
+           seen: Sequence[MarkerObservation], index: int, view: View) -> Cause:
+    doubt = explainer.doubt(seen, index) if outcome == "doubtful" else None
+    if doubt is not None:
+        return doubt
+    return explainer.why_second(seen, index) if outcome == "second" else \
+        explainer.why_lost(detector, image, seen, index, view.paint)
 
 
 def _as_said(outcome: Outcome, cause: Cause) -> Outcome:

@@ -10,7 +10,7 @@ from rhot_app.calibration.colour_identity import Identity
 from rhot_app.calibration.colour_light import SAME, Lamp
 from rhot_app.calibration.colour_model import COVERAGE
 from rhot_app.calibration.colour_names import name_of_hue
-from rhot_app.calibration.colour_rehearsal import Rehearsal
+from rhot_app.calibration.colour_rehearsal import FOUND, Rehearsal
 from rhot_app.calibration.colour_room import RoomReport
 from rhot_app.calibration.colour_samples import PaintSamples
 from rhot_app.calibration.separability import SKIN, Separability
@@ -115,7 +115,8 @@ def _lamps(samples: Sequence[PaintSamples], rehearsal: Rehearsal, separability: 
     for one, lost, coverage, rival in zip(samples, rehearsal.lost, separability.coverage, room.rivals, strict=True):
         own = [failure for failure in rehearsal.failures if failure.marker == one.name]
         now = [failure for failure in own if failure.lamp == SAME]
-        failed = [failure for failure in now if failure.outcome != "second"]
+        failed = [failure for failure in now if failure.outcome not in FOUND]
+        second = [failure for failure in now if failure.outcome == "second"]
         if failed:
             what = {"lost": "not found", "elsewhere": "found in another place", "joined": "found together with what "
                     "surrounds it"}[failed[0].outcome]
@@ -123,16 +124,19 @@ def _lamps(samples: Sequence[PaintSamples], rehearsal: Rehearsal, separability: 
             yield Finding("fails", grade, f"{one.name} is {what} in picture {failed[0].picture + 1} itself.",
                           failed[0].cause.sentence, failed[0].cause.remedy)
         elif lost >= LOST:
-            usual = min((failure for failure in own if failure.outcome != "second"),
+            usual = min((failure for failure in own if failure.outcome not in FOUND),
                         key=lambda failure: abs(failure.lamp.warmth))
             untold = len(samples) < MARKERS_LEAST and usual.cause.code in ("hue", "other")
             cause, remedy = _UNKNOWN_LAMP if untold else ("", f"{usual.cause.remedy} {_KEEP_LAMPS}")
             yield Finding("lamp", FAIR, f"{one.name} would be lost or misplaced in {100 * lost:.0f} % of the pictures "
                           f"when lamps change, such as by {_in_words(usual.lamp)}.",
                           f"{usual.cause.sentence} {cause}".strip(), remedy)
-        elif now and (rival is None or rival.merit < RIVAL):
-            yield Finding("doubtful", FAIR, f"{one.name} is found in picture {now[0].picture + 1}, but another thing "
-                          "of its colour is found first.", now[0].cause.sentence, now[0].cause.remedy)
+        elif second and (rival is None or rival.merit < RIVAL):
+            yield Finding("doubtful", FAIR, f"{one.name} is found in picture {second[0].picture + 1}, but another "
+                          "thing of its colour is found first.", second[0].cause.sentence, second[0].cause.remedy)
+        elif now and not second:
+            yield Finding("doubtful", GOOD, f"{one.name} is found in doubt in picture {now[0].picture + 1}.",
+                          now[0].cause.sentence, now[0].cause.remedy)
         elif coverage < COVERAGE:
             yield Finding("coverage", GOOD, f"{100 * coverage:.1f} % of the paint of {one.name} passes by every lamp.",
                           "Its model had to stay narrow because of what has a similar colour.")

@@ -148,6 +148,17 @@ def test_paint_that_a_bound_refuses_is_not_blamed_on_the_room() -> None:
     assert "exposure" in finding.remedy
 
 
+def test_a_marker_cut_by_the_border_is_said_to_be_found_in_doubt_and_why() -> None:
+    shift = (0.0, -66.0)
+    image, collector = picture(background=(60, 62, 66), shift=shift), ColourSamples()
+    for name in ("thumb", "ring"):
+        collector.add(name, image, box(name, 4, shift))
+    report = solve_colours(collector.samples, collector.views)
+    said = {one.figure: one for one in report.verdict.findings if one.code == "doubtful"}
+    assert set(said) == {"thumb is found in doubt in picture 1.", "ring is found in doubt in picture 1."}
+    assert all("cut by the picture's border" in one.cause and one.grade is Grade.GOOD for one in said.values())
+
+
 def test_a_dull_thing_of_the_same_hue_is_kept_out_by_the_magnitude() -> None:
     dull = (110, 135, 113)
     report = calibrate(picture(clutter=[(291.0, 30.0, 24.0, dull)], background=(60, 62, 66)))
