@@ -84,7 +84,7 @@ class LightDrift:
         """Take in a picture; `seen`: what the given detector found in it."""
         found = self._detector.detect(image) if self._own or seen is None else seen
         colours = self._detector.paint_colours()
-        for mark in found[:len(colours)]:  # the best candidates
+        for mark in found[:len(self._seen)]:  # what follows are other things of the markers' colours
             if mark.found and not mark.flags & DOUBTFUL:
                 self._seen[mark.index].append(colours[mark.index])
         self._warmth.append(self._detector.warmth)

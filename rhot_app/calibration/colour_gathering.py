@@ -20,19 +20,22 @@ from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import SAMPLES_MIN, Box, Colours, box_mask, colours_of, learn_chroma_from_colours
 from rhot_node.detect.fast import DOUBTFUL, FastDetector
 from rhot_node.detect.image import YuvImage
-from rhot_node.markers import Marker, MarkerSet
+from rhot_node.markers import ChromaModel, Marker, MarkerSet
+from rhot_node.wire.messages import MarkerFlag
 
 SKIN_HALF_PX = 8  # of the box that a click on skin stands for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pick:
-    """What a person has said: this is the paint of `name` (or bare skin), at a click or in a box, luma px."""
+    """What a person has said: this is the paint of `name` (or bare skin), at a click or in a box, luma px. `chroma`:
+    what that paint is like."""
 
     name: str
     camera: str
     image: YuvImage
     where: Box | Point
+    chroma: ChromaModel | None = None
 
 
 class ColourGathering:
@@ -51,6 +54,21 @@ class ColourGathering:
     def names(self) -> tuple[str, ...]:
         """Markers that a person has named, in the order in which that was done."""
         return tuple(dict.fromkeys(pick.name for pick in self._picks if pick.name != SKIN))
+
+    @property
+    def earlier(self) -> dict[str, tuple[ChromaModel, ...]]:
+        """What each marker was said to look like before a later pick in the same picture replaced that."""
+        last = {(pick.name, pick.camera): pick for pick in self._picks}
+        return {name: tuple(pick.chroma for pick in self._picks if pick.name == name and pick.chroma is not None
+                            and last[name, pick.camera] is not pick) for name in self.names}
+
+    def last_pick(self, name: str) -> int:
+        """Which of all picks was the last one of a marker, counted from 0."""
+        return max(number for number, pick in enumerate(self._picks) if pick.name == name)
+
+    def unseen_by(self, camera: str) -> tuple[str, ...]:
+        """Markers that a person has named in another camera's picture, and that were not found in this one's."""
+        return tuple(name for name in self.names if name not in self._collectors[camera].names)
 
     @property
     def skin(self) -> Colours:
@@ -92,12 +110,14 @@ class ColourGathering:
         Replaces what was gathered for the marker before. Raises CalibrationError, nothing has changed then, when there
         is no colour, or so much of it that it cannot be a marker.
         """
+        chroma = None
         if name == SKIN:
             if np.count_nonzero(box_mask(image, [_box(where)])) < SAMPLES_MIN:
                 raise CalibrationError("skin: the box is too small; draw it over more of the hand.")
         else:
-            ColourSamples().add(name, image, where)
-        self._picks.append(Pick(name, camera, image, where))
+            region = ColourSamples().add(name, image, where)
+            chroma = learn_chroma_from_colours(colours_of(image, region.sample))
+        self._picks.append(Pick(name, camera, image, where, chroma))
         self._renew(name)
 
     def take_back(self) -> str | None:
@@ -142,11 +162,16 @@ class ColourGathering:
                 Marker(id=f"m{k}", chroma=learn_chroma_from_colours(one.colours), display_rgb=one.rgb)
                 for k, one in enumerate(samples))))
         found = {}
-        for one, seen in zip(samples, self._scouts[camera].detect(image), strict=False):
-            if one.name in missing and seen.found and not seen.flags & DOUBTFUL:
-                region = _plain_region(image, (seen.x, seen.y))
-                if region is not None and 1.0 / GROWN < region.area / one.area < GROWN:
-                    found[one.name] = collector.add(one.name, image, (seen.x, seen.y))
+        seen = self._scouts[camera].detect(image)
+        for index, one in enumerate(samples):
+            candidates = [mark for mark in seen if mark.index == index and mark.found]
+            doubtful = DOUBTFUL if len(candidates) < 2 else DOUBTFUL & ~MarkerFlag.AMBIGUOUS
+            places = [(mark.x, mark.y) for mark in candidates if not mark.flags & doubtful]
+            regions = [(place, _plain_region(image, place)) for place in places if one.name in missing]
+            fitting = [place for place, region in regions
+                       if region is not None and 1.0 / GROWN < region.area / one.area < GROWN]
+            if len(fitting) == 1:  # of two of its colour and size, nobody knows which it is
+                found[one.name] = collector.add(one.name, image, fitting[0])
         return found
 
 

@@ -1,4 +1,8 @@
-"""Rehearse tracking by other lamps: the calibration's own pictures, relit, shown to the real detector."""
+"""Rehearse tracking by other lamps: the calibration's own pictures, relit, shown to the real detector.
+
+The detector reports several candidates of a marker, and the master chooses among them by place. A marker is therefore
+found when any of its candidates is where it is.
+"""
 
 from __future__ import annotations
 
@@ -9,27 +13,32 @@ from typing import Literal
 
 import numpy as np
 
+from rhot_app.calibration.colour_cause import JOINED, Cause, Explainer
 from rhot_app.calibration.colour_light import LAMPS, SAME, Lamp, chances, relit_image
 from rhot_app.calibration.colour_samples import View
 from rhot_app.calibration.paint_region import PaintRegion
 from rhot_app.progress import Progress, silent
 from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import YuvImage
 from rhot_node.markers import MarkerSet
-from rhot_node.wire.messages import MarkerObservation
+from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
 VIEWS_MOST = 4
 LAMPS_TRIED = (SAME, *(lamp for lamp in LAMPS if lamp.brightness != 1.0))
 CHANCES = chances(LAMPS_TRIED)
-GROWN, SHRUNK = 2.2, 0.3  # of the marker's and its sample's area: something else belongs to it, most of it is gone
+SHRUNK = 0.3  # of the marker's sample: most of it is gone
 
-Outcome = Literal["lost", "elsewhere", "joined"]
+Outcome = Literal["lost", "elsewhere", "joined", "second", "doubtful"]
+FOUND = ("second", "doubtful")
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
     """A marker that the detector did not find where it is: lost, found elsewhere, or joined by its surroundings.
 
-    `tracked`: whether that happened in its tracking window, a frame after it had been found.
+    "second": it was found where it is, after something else of its colour; "doubtful": it was found alone, with a flag
+    of doubt. `tracked`: whether that happened in its tracking window, a frame after it had been found. `cause`: the
+    test of the detector that says so.
     """
 
     marker: str
@@ -37,12 +46,14 @@ class Failure:
     lamp: Lamp
     outcome: Outcome
     tracked: bool
+    cause: Cause
 
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
     """`failures`: everything that failed. `lost`, per marker: in what share of all pictures it is not found where it
-    is, by the lamps that may come, each as often as it may; of searching and tracking the worse one."""
+    is, by the lamps that may come, each as often as it may; of searching and tracking the worse one. What is FOUND
+    does not count."""
 
     failures: tuple[Failure, ...]
     lost: tuple[float, ...]
@@ -54,7 +65,7 @@ def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
 
     Only markers that are known in a picture are judged there. `names`: of the markers, in the order of the set.
     """
-    detector = FastDetector(markers)
+    detector, explainer = FastDetector(markers), Explainer(markers)
     failures = []
     chosen = list(enumerate(views))[:VIEWS_MOST]
     for number, (picture, view) in enumerate(chosen):
@@ -64,11 +75,12 @@ def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
             detector.reset()
             for tracked in (False, True):
                 seen = detector.detect(image)
-                for name, mark in zip(names, seen, strict=False):
+                for index, name in enumerate(names):
                     if name in view.paint:
-                        outcome = _outcome(mark, view.paint[name])
+                        outcome = _outcome([mark for mark in seen if mark.index == index], view.paint[name])
                         if outcome is not None:
-                            failures.append(Failure(name, picture, lamp, outcome, tracked))
+                            cause = _cause(outcome, explainer, detector, image, seen, index, view)
+                            failures.append(Failure(name, picture, lamp, _as_said(outcome, cause), tracked, cause))
     shown = [sum(name in view.paint for _, view in chosen) for name in names]
     return Rehearsal(tuple(failures), tuple(_lost(name, count, failures)
                                             for name, count in zip(names, shown, strict=True)))
@@ -78,19 +90,45 @@ def _lost(name: str, shown: int, failures: Sequence[Failure]) -> float:
     """The share of a marker's `shown` pictures, over all lamps, in which it failed."""
     worse = 0.0
     for tracked in (False, True):
-        own = [LAMPS_TRIED.index(one.lamp) for one in failures if one.marker == name and one.tracked == tracked]
+        own = [LAMPS_TRIED.index(one.lamp) for one in failures if one.marker == name and one.tracked == tracked
+               and one.outcome not in FOUND]
         worse = max(worse, float(CHANCES[own].sum()) / max(shown, 1))
     return worse
 
 
-def _outcome(seen: MarkerObservation, region: PaintRegion) -> Outcome | None:
+def _outcome(candidates: Sequence[MarkerObservation], region: PaintRegion) -> Outcome | None:
+    """What became of a marker; `candidates`: what was found of it, the best first."""
+    each = [_outcome_of(mark, region) for mark in candidates]
+    if None in each:
+        cut = len(each) == 1 and candidates[0].flags & MarkerFlag.EDGE
+        return "second" if each[0] is not None else "doubtful" if cut else None
+    return next((outcome for outcome in each if outcome == "joined"), each[0])
+
+
+def _cause(outcome: Outcome, explainer: Explainer, detector: FastDetector, image: YuvImage,
+           seen: Sequence[MarkerObservation], index: int, view: View) -> Cause:
+    doubt = explainer.doubt(seen, index) if outcome == "doubtful" else None
+    if doubt is not None:
+        return doubt
+    return explainer.why_second(seen, index) if outcome == "second" else \
+        explainer.why_lost(detector, image, seen, index, view.paint)
+
+
+def _as_said(outcome: Outcome, cause: Cause) -> Outcome:
+    """The outcome by its cause: a large thing elsewhere may be the marker with its surroundings, or not."""
+    if cause.code == "joined":
+        return "joined"
+    return "elsewhere" if outcome == "joined" else outcome
+
+
+def _outcome_of(seen: MarkerObservation, region: PaintRegion) -> Outcome | None:
     if not seen.found:
         return "lost"
     height, width = region.whole.shape
     column, row = min(max(int(seen.x) // 2, 0), width - 1), min(max(int(seen.y) // 2, 0), height - 1)
     area = math.pi * (0.25 * seen.diameter) ** 2
     if not region.whole[row, column]:
-        return "joined" if area > GROWN * region.area else "elsewhere"
-    if area > GROWN * region.area:
+        return "joined" if area > JOINED * region.area else "elsewhere"
+    if area > JOINED * region.area:
         return "joined"
     return "lost" if area < SHRUNK * np.count_nonzero(region.sample) else None

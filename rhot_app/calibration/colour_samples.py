@@ -7,7 +7,9 @@ and one finger over the marker or a glint in one frame counts for little.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,7 @@ from rhot_node.detect.image import YuvImage
 from rhot_node.detect.light import RGB_FROM_YCC
 from rhot_node.errors import SettingsError
 from rhot_node.markers import Marker, MarkerSet
+from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
 PIXELS_A_FRAME = 300  # of one marker: every frame weighs about the same
 FRAMES_MOST = 60  # of one marker; enough places and angles
@@ -115,14 +118,14 @@ class ColourSamples:
         """0..1: how much of a marker has been seen; 1 from FRAMES_ENOUGH pictures on that each showed something new."""
         return min(1.0, len(self._sights.get(name, [])) / FRAMES_ENOUGH)
 
-    def add(self, name: str, image: YuvImage, where: Box | Point) -> PaintRegion:
-        """Samples of the marker `name` at a click (x, y) or in a box (x0, y0, x1, y1), luma px, upper ends exclusive.
+    def add(self, name: str, image: YuvImage, where: Box | Point | Sequence[Box]) -> PaintRegion:
+        """Samples of the marker `name` at a click (x, y) or in boxes (x0, y0, x1, y1), luma px, upper ends exclusive.
 
-        Returns what is taken for its paint, to be shown. Raises CalibrationError when there is no colour, or so much of
-        it that it cannot be a marker.
+        Returns what is taken for its paint, to be shown. Raises CalibrationError when there is no colour, so much of it
+        that it cannot be a marker, or boxes on different paints.
         """
         try:
-            region = region_at(image, where) if len(where) == 2 else region_in(image, where)
+            region = _region(image, where)
             learn_chroma_from_colours(colours_of(image, region.sample))
         except (SettingsError, CalibrationError) as exc:
             raise CalibrationError(f"{name}: {exc}") from exc
@@ -134,14 +137,16 @@ class ColourSamples:
     def follow(self, image: YuvImage) -> dict[str, PaintRegion]:
         """Find the named markers in a picture of a stream and take samples where they show something new.
 
-        Returns the markers of which samples were taken. Half-hidden and doubtful ones are left out.
+        Returns the markers of which samples were taken. Half-hidden and doubtful ones are left out; that something else
+        has a marker's colour is no doubt where the size tells them apart.
         """
         if not self._sights:
             return {}
         detector = self._follower()
-        taken = {}
-        for name, seen in zip(self.names, detector.detect(image), strict=False):
-            if seen.found and not seen.flags & DOUBTFUL and len(self._sights[name]) < FRAMES_MOST:
+        found, taken = detector.detect(image), {}
+        for index, name in enumerate(self.names):
+            seen = found[index]
+            if seen.found and len(self._sights[name]) < FRAMES_MOST and self._plain(name, index, found):
                 inside = detector.paint_mask(image, seen)
                 if np.count_nonzero(inside) >= SAMPLES_MIN and self._adds(name, _sight(0, image, region_of(inside))):
                     taken[name] = region_of(inside)
@@ -174,6 +179,14 @@ class ColourSamples:
             self._detector.detect(only(named.image, np.any([one.whole for one in named.paint.values()], axis=0)))
         return self._detector
 
+    def _plain(self, name: str, index: int, found: Sequence[MarkerObservation]) -> bool:
+        """Whether the first candidate of a marker is in plain view, and the only one of about its size."""
+        others = [mark for mark in found[len(self.names):] if mark.index == index]
+        expected = self._sights[name][-1].area
+        if any(1.0 / GROWN < math.pi * (0.25 * mark.diameter) ** 2 / expected < GROWN for mark in others):
+            return False
+        return not found[index].flags & (DOUBTFUL & ~MarkerFlag.AMBIGUOUS if others else DOUBTFUL)
+
     def _adds(self, name: str, new: _Sight) -> bool:
         if not 1.0 / GROWN < new.area / self._sights[name][-1].area < GROWN:
             return False  # something else of that colour
@@ -203,6 +216,12 @@ class ColourSamples:
         for view in self._views:
             if view.image is image:
                 view.paint.update(regions)
+
+
+def _region(image: YuvImage, where: Box | Point | Sequence[Box]) -> PaintRegion:
+    if isinstance(where[0], tuple):
+        return region_in(image, [cast(Box, box) for box in where])
+    return region_at(image, cast(Point, where)) if len(where) == 2 else region_in(image, [cast(Box, where)])
 
 
 def _sight(picture: int, image: YuvImage, region: PaintRegion) -> _Sight:

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.colour_identity import identify
 from rhot_app.calibration.colour_light import SAME
 from rhot_app.calibration.colour_model import Obstacles, range_of_samples, solve_models
 from rhot_app.calibration.colour_names import free_paints
@@ -72,6 +73,7 @@ class ColourReport:
                     "merit": round(rival.merit, 3)}
                     for name, rival in zip(self.names, self.room.rivals, strict=True)}},
             "failures": [{"marker": one.marker, "picture": one.picture + 1, "outcome": one.outcome,
+                          "cause": one.cause.code, "sentence": one.cause.sentence,
                           "warmth": one.lamp.warmth, "brightness": one.lamp.brightness, "tracked": one.tracked,
                           "same_lamp": one.lamp == SAME} for one in self.rehearsal.failures],
             "free_paints": list(self.free),
@@ -80,13 +82,15 @@ class ColourReport:
 
 def solve_colours(samples: Sequence[PaintSamples], views: Sequence[View], *, skin: Colours = NO_COLOURS,
                   base: MarkerSet | None = None, given: Mapping[str, ChromaModel] | None = None,
+                  before: Mapping[str, Sequence[ChromaModel]] | None = None,
                   progress: Progress = silent) -> ColourReport:
     """Colour models for all sampled markers, and how well they can be told apart from each other, skin and the room.
 
     `views`: pictures in which the markers that they show are marked, as `ColourSamples` keeps them. `skin` (N, 3): Y,
     Cb, Cr of bare skin. `base`: the set whose markers are learnt anew; without it their roles are guessed from their
-    names. `given`: models that a person has set, by marker; they are judged as the learnt ones are. Raises
-    CalibrationError when there are no samples, or names that `base` has not.
+    names. `given`: models that a person has set, by marker; they are judged as the learnt ones are. `before`: what a
+    person had named each marker's colour earlier, and then replaced. Raises CalibrationError when there are no samples,
+    or names that `base` has not.
     """
     if not samples:
         raise CalibrationError("there are no samples; draw a box over at least one marker.")
@@ -107,7 +111,9 @@ def solve_colours(samples: Sequence[PaintSamples], views: Sequence[View], *, ski
     runs_on = {name for view in views for name, region in view.paint.items() if region.runs_on}
     markers = sampled if base is None else MarkerSet(
         markers=tuple(learnt.get(marker.id, marker) for marker in base.markers), name=base.name)
-    verdict = judge_report(ordered, models, separability, room, rehearsal, free, runs_on)
+    rig = {} if base is None else {marker.id: (marker.chroma,) for marker in base.markers}
+    identity = identify(ordered, views, {marker.id: marker.chroma for marker in markers.markers}, (before or {}, rig))
+    verdict = judge_report(ordered, models, separability, room, rehearsal, free, runs_on, identity)
     return ColourReport(markers, names, tuple(ordered), separability, room, rehearsal, free, verdict)
 
 

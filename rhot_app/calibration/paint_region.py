@@ -24,6 +24,7 @@ SEED_HUE_DEG, SEED_LEVEL = 8.0, (0.65, 1.5)  # ... as far as it is plainly the s
 LEAK = 3.0  # times what is plainly the same: what is only alike is then something else, such as the finger
 GREY = 128  # chroma of grey, bytes
 SOLID = 0.7  # of its convex hull that a marker fills, half hidden ones included
+ENOUGH = "10 x 8 px"  # a box that holds SAMPLES_MIN chroma pixels wherever it lies
 REGION_MOST = 0.2  # of the picture; more is the room, or an arm, and no marker
 
 
@@ -73,26 +74,67 @@ def region_at(image: YuvImage, point: Point) -> PaintRegion:
     return PaintRegion(sample, _grown(flooded, RING), runs_on)
 
 
-def region_in(image: YuvImage, box: Box) -> PaintRegion:
-    """The paint in a box (x0, y0, x1, y1) luma px, upper ends exclusive, and the marker that it belongs to.
+def region_in(image: YuvImage, boxes: list[Box]) -> PaintRegion:
+    """The paint in boxes (x0, y0, x1, y1) luma px, upper ends exclusive, and the marker that it belongs to.
 
-    Raises CalibrationError when the box lies outside the picture.
+    Boxes that hold few pixels only say where the paint is: what is plainly the same round them is taken too. Raises
+    CalibrationError when they lie outside the picture, on different paints, or on less than can be learnt from.
     """
-    sample = box_mask(image, [box])
+    sample = box_mask(image, boxes) | _touched(image, [box for box in boxes if not box_mask(image, [box]).any()])
     if not sample.any():
         width, height = image.size
-        raise CalibrationError(f"the box {box} holds no colour pixel of the picture of {width} x {height} px.")
-    found = _extent(image, sample)
+        raise CalibrationError(f"the box {boxes[0]} holds no colour pixel of the picture of {width} x {height} px.")
+    _require_one_paint(image, boxes)
+    held, found = int(np.count_nonzero(sample)), _extent(image, sample)
     if found is None:
+        if held < SAMPLES_MIN:
+            raise CalibrationError(f"the {held} colour pixels of the samples are almost grey, and {SAMPLES_MIN} are "
+                                   "needed; grey, black and white cannot be told from the room. Use a stronger paint "
+                                   "or more light.")
         return PaintRegion(sample, _grown(sample, RING))
     flooded, runs_on = found
-    if np.count_nonzero(sample) < SEED:
+    if held < SEED:
         alike = _flood(image, sample, SEED_HUE_DEG, SEED_LEVEL)
         if alike is not None and _may_be_a_marker(alike, SEED):
-            sample = sample | _shrunk(alike, 1)
+            inner = _shrunk(alike, 1)
+            sample = sample | (inner if np.count_nonzero(inner | sample) >= SAMPLES_MIN else alike)
+    _require_enough(sample, held)
     if not _may_be_a_marker(flooded, int(np.count_nonzero(sample))):
         return PaintRegion(sample, _grown(sample, RING), True)
     return PaintRegion(sample, _grown(flooded | sample, RING), runs_on)
+
+
+def _touched(image: YuvImage, boxes: list[Box]) -> Mask:
+    """The chroma pixels that boxes touch: a box of 2 x 2 px may hold none wholly."""
+    width, height = image.size
+    return box_mask(image, [(x0 - x0 % 2, y0 - y0 % 2, min(x1 + x1 % 2, width), min(y1 + y1 % 2, height))
+                            for x0, y0, x1, y1 in boxes])
+
+
+def _require_one_paint(image: YuvImage, boxes: list[Box]) -> None:
+    """Raise CalibrationError when the boxes of one marker have different hues."""
+    hues = []
+    for box in boxes if len(boxes) > 1 else []:
+        mask = box_mask(image, [box])
+        _, cb, cr = np.median(colours_of(image, mask if mask.any() else _touched(image, [box])), axis=0)
+        if math.hypot(cb, cr) < MAGNITUDE_LEAST:
+            raise CalibrationError(f"the box {box} is almost grey; draw all boxes on the paint.")
+        hues.append(math.degrees(math.atan2(cr, cb)))
+    apart = max((abs(math.remainder(hue - hues[0], 360.0)) for hue in hues), default=0.0)
+    if apart > HUE_REACH_DEG:
+        raise CalibrationError(f"its boxes in one picture differ in hue by {apart:.0f}°: one of them is on something "
+                               "else. Every marker has a name of its own; draw all its boxes on its paint.")
+
+
+def _require_enough(sample: Mask, held: int) -> None:
+    """Raise CalibrationError that says which size is needed, when there is less than can be learnt from."""
+    count = int(np.count_nonzero(sample))
+    if count < SAMPLES_MIN:
+        around = f", {count} with the paint round them" if count > held else ""
+        raise CalibrationError(f"the samples hold {held} colour {'pixel' if held == 1 else 'pixels'} (2 x 2 px "
+                               f"each){around}; at least {SAMPLES_MIN} are needed, and no more of the paint was found "
+                               f"round them. {ENOUGH} of paint are enough in one box; smaller boxes in a picture add "
+                               "up.")
 
 
 def _extent(image: YuvImage, seed: Mask) -> tuple[Mask, bool] | None:
@@ -128,16 +170,29 @@ def _flood(image: YuvImage, seed: Mask, hue_deg: float = HUE_REACH_DEG,
            levels: tuple[float, float] = LEVEL_REACH) -> Mask | None:
     """What is connected with `seed` and of its colour; None when that is grey."""
     _, cb, cr = (float(c) for c in np.median(colours_of(image, seed), axis=0))
-    level = math.hypot(cb, cr)
-    if level < MAGNITUDE_LEAST:
+    if math.hypot(cb, cr) < MAGNITUDE_LEAST:
         return None
+    same = alike(image, (cb, cr), hue_deg, levels)
+    _, numbers = cv2.connectedComponents(same.astype(np.uint8), connectivity=8)
+    own = np.unique(numbers[seed & same])
+    return np.asarray(np.isin(numbers, own[own > 0]))
+
+
+def alike(image: YuvImage, chroma: tuple[float, float], hue_deg: float = SEED_HUE_DEG,
+          levels: tuple[float, float] = SEED_LEVEL) -> Mask:
+    """(H/2, W/2) the chroma pixels that are plainly of the colour `chroma` (cb, cr): of its hue and about its level."""
+    cb, cr = chroma
+    level = math.hypot(cb, cr)
     u, v = image.u.astype(np.float32) - 128.0, image.v.astype(np.float32) - 128.0
     along, across = (u * cb + v * cr) / level, (v * cb - u * cr) / level
-    alike = ((np.abs(across) <= math.tan(math.radians(hue_deg)) * along)
-             & (along >= levels[0] * level) & (along <= levels[1] * level))
-    _, numbers = cv2.connectedComponents(alike.astype(np.uint8), connectivity=8)
-    own = np.unique(numbers[seed & alike])
-    return np.asarray(np.isin(numbers, own[own > 0]))
+    return np.asarray((np.abs(across) <= math.tan(math.radians(hue_deg)) * along)
+                      & (along >= levels[0] * level) & (along <= levels[1] * level))
+
+
+def surroundings(region: PaintRegion) -> Mask:
+    """(H/2, W/2) what lies round a marker within its own diameter."""
+    by = max(round(math.sqrt(4.0 / math.pi * max(region.area, 1.0))), 2)
+    return _grown(region.whole, by) & ~region.whole
 
 
 def _grown(mask: Mask, by: int) -> Mask:

@@ -100,35 +100,36 @@ def calibrate(scene: HandScene, times_s: np.ndarray, kelvin: float = LEARNT_KELV
 
 @dataclass
 class Tally:
-    """How often each marker was in view, not found, and found elsewhere, (M,)."""
+    """How often each marker was in view, not found, found elsewhere only, and found after something else, (M,)."""
 
     visible: np.ndarray
     lost: np.ndarray
     misplaced: np.ndarray
+    second: np.ndarray
 
     @property
     def failed(self) -> np.ndarray:
-        """(M,) share of the pictures with the marker in view in which it was not found where and as large as
-        it is."""
+        """(M,) share of the pictures with the marker in view in which no candidate was where and as large as it is."""
         return (self.lost + self.misplaced) / np.maximum(self.visible, 1)
 
 
 def tally(markers: MarkerSet, frames: list[Frame], stills: bool) -> Tally:
     """What the detector makes of the frames: as unrelated pictures, or as they follow each other."""
-    result = Tally(*(np.zeros(len(markers.markers), dtype=int) for _ in range(3)))
+    result = Tally(*(np.zeros(len(markers.markers), dtype=int) for _ in range(4)))
     detector = FastDetector(markers)
     for frame in frames:
         if stills:
             detector.reset()
-        candidates = detector.detect(frame.image)
+        seen = detector.detect(frame.image)
         for index, (part, place, radius) in enumerate(zip(frame.visible, frame.places, frame.radii, strict=True)):
+            own = [mark for mark in seen if mark.index == index and mark.found]
             if part > SEEN:
-                found = [seen for seen in candidates if seen.index == index and seen.found]
                 result.visible[index] += 1
-                result.lost[index] += not found
-                result.misplaced[index] += bool(found) and all(
-                    math.dist((seen.x, seen.y), place) > AWAY * radius or seen.diameter > JOINED * radius
-                    for seen in found)
+                result.lost[index] += not own
+                wrong = [math.dist((mark.x, mark.y), place) > AWAY * radius or mark.diameter > JOINED * radius
+                         for mark in own]
+                result.misplaced[index] += bool(own) and all(wrong)
+                result.second[index] += bool(own) and wrong[0] and not all(wrong)
     return result
 
 

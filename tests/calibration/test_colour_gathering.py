@@ -45,6 +45,27 @@ def test_something_of_another_size_is_not_taken_over(gathering) -> None:
     assert gathering.follow({"right": other}) == {}
 
 
+def test_of_two_things_of_its_colour_the_one_of_the_markers_size_is_taken_over_and_of_two_alike_none(gathering) -> None:
+    for name in ("thumb", "middle", "ring"):
+        gathering.pick(name, "left", picture(background=(60, 62, 66)), place(name))
+    twice = {"right": picture(clutter=[(290.0, 200.0, 9.0, PAINTS["ring"])], background=(60, 62, 66))}
+    assert "ring" not in gathering.follow(twice)["right"] and gathering.pictures("ring") == 1
+    larger = {"right": picture(clutter=[(280.0, 200.0, 26.0, PAINTS["ring"])], background=(60, 62, 66))}
+    _, columns = np.nonzero(gathering.follow(larger)["right"]["ring"].sample)
+    assert abs(2 * columns.mean() + 0.5 - place("ring")[0]) < 2.0
+
+
+def test_what_was_said_before_a_pick_and_who_has_not_seen_a_marker_is_known(gathering) -> None:
+    image = picture()
+    gathering.pick("ring", "left", image, place("ring"))
+    assert gathering.unseen_by("right") == ("ring",) and gathering.unseen_by("left") == ()
+    gathering.pick("ring", "right", image, place("ring"))
+    assert gathering.earlier == {"ring": ()} and gathering.unseen_by("right") == ()
+    gathering.pick("ring", "left", image, place("little"))
+    (earlier,) = gathering.earlier["ring"]
+    assert abs(np.degrees(earlier.hue_rad) + 60.0) < 5.0 and gathering.last_pick("ring") == 2
+
+
 def test_a_pick_is_taken_back_and_the_one_before_counts_again(gathering) -> None:
     image = picture()
     gathering.pick("ring", "left", image, box("ring"))

@@ -33,14 +33,14 @@ def test_a_click_on_grey_says_that_there_is_no_colour() -> None:
 
 
 def test_a_tiny_box_says_where_the_paint_is_and_the_paint_round_it_is_taken() -> None:
-    tiny = region_in(picture(), box("middle", 3))
+    tiny = region_in(picture(), [box("middle", 3)])
     assert np.count_nonzero(tiny.sample) > 20
     assert tiny.area == pytest.approx(np.pi * 4.5**2, rel=0.2)
 
 
 def test_paint_without_an_end_is_noticed() -> None:
     skin_paint = {**PAINTS, "thumb": SKIN}
-    region = region_in(picture(skin_paint, background=(205, 156, 130)), box("thumb"))
+    region = region_in(picture(skin_paint, background=(205, 156, 130)), [box("thumb")])
     assert region.runs_on
     assert np.count_nonzero(region.whole) < 200
 

@@ -24,7 +24,7 @@ from rhot_node.detect.image import YuvImage
 from rhot_node.detect.light import gains_of
 from rhot_node.detect.reference import ReferenceDetector
 from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.markers import load_markers
 
 RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 
@@ -41,7 +41,7 @@ def calibrate(image: YuvImage, names: tuple[str, ...] = tuple(PAINTS), skin: boo
 
 def misplaced(report: ColourReport, image: YuvImage, shift: tuple[float, float] = (0.0, 0.0)) -> list[str]:
     wrong = []
-    for name, seen in zip(report.names, FastDetector(report.markers).detect(image), strict=True):
+    for name, seen in zip(report.names, FastDetector(report.markers).detect(image), strict=False):
         x, y = place(name, shift)
         if not seen.found or math.hypot(seen.x - x, seen.y - y) > 0.3 * RADIUS:
             wrong.append(name)
@@ -91,12 +91,13 @@ def test_one_paint_twice_is_not_usable() -> None:
 ORANGE: Rgb = (214, 140, 104)  # nearly skin
 
 
-def test_a_paint_like_skin_is_warned_of_with_the_figure_and_what_to_do() -> None:
+def test_a_paint_like_skin_is_refused_with_what_shows_it_and_what_to_do() -> None:
     report = calibrate(picture({**PAINTS, "thumb": ORANGE}, background=(60, 62, 66)), skin=True)
     (finding,) = [one for one in report.verdict.findings if one.code == "skin"]
     share = round(100 * report.separability.pair("thumb", "skin"))
-    assert finding.figure == f"thumb and skin overlap by {share} %."
-    assert "grey border" in finding.remedy
+    assert finding.grade is Grade.POOR
+    assert finding.figure.startswith(f"thumb has the colour of skin: thumb and skin overlap by {share} %; hue 1")
+    assert "another paint" in finding.remedy
     assert f"thumb and skin overlap by {share} %" in report.separability.sentences
 
 
@@ -113,13 +114,49 @@ def test_a_thing_in_the_room_of_the_same_colour_is_named_with_its_place() -> Non
     assert report.room.hue_px[green - 1:green + 1].sum() == pytest.approx(math.pi * 5.5**2, rel=0.25)
 
 
-def test_a_large_thing_across_the_room_is_no_rival_of_a_worn_marker_and_of_a_free_one_it_is() -> None:
-    image = picture(clutter=[(291.0, 200.0, 30.0, PAINTS["middle"])], background=(60, 62, 66))
-    assert "room" not in calibrate(image).verdict.codes
-    free = MarkerSet(markers=tuple(msgspec.structs.replace(marker, role=None) for marker in RHOT6.markers))
-    report = calibrate(image, base=free)
-    assert "room" in report.verdict.codes
+def test_a_large_thing_across_the_room_is_a_rival_and_the_marker_is_found_all_the_same() -> None:
+    report = calibrate(picture(clutter=[(291.0, 200.0, 30.0, PAINTS["middle"])], background=(60, 62, 66)))
+    (finding,) = [one for one in report.verdict.findings if one.code == "room"]
+    assert "middle" in finding.figure and "finds that first, and the marker after it" in finding.cause
     assert max(rival.merit for rival in report.room.rivals if rival is not None) > 1.0
+    assert not {"fails", "lamp"} & report.verdict.codes and max(report.rehearsal.lost) == 0.0
+    second = [failure for failure in report.rehearsal.failures if failure.outcome == "second"]
+    assert {failure.marker for failure in second} == {"middle"}
+    assert "What is found first is at 29" in second[0].cause.sentence
+
+
+def test_a_marker_behind_four_larger_things_of_its_colour_is_said_to_be_so_and_where_they_are() -> None:
+    clutter = [(x, y, 22.0, PAINTS["ring"]) for x, y in ((270.0, 205.0), (30.0, 205.0), (150.0, 215.0), (290.0, 25.0))]
+    report = calibrate(picture(clutter=clutter, background=(60, 62, 66)))
+    (finding,) = [one for one in report.verdict.findings if one.code == "fails"]
+    assert finding.figure == "ring is found in another place in picture 1 itself."
+    assert finding.cause.startswith("4 other things of its colour are likelier, the first at ")
+    assert "plainer background" in finding.remedy and finding.grade is Grade.POOR
+    (said,) = {(one["cause"], one["sentence"]) for one in report.to_json()["failures"]
+               if one["same_lamp"] and not one["tracked"]}
+    assert said == ("crowded", finding.cause)
+
+
+def test_paint_that_a_bound_refuses_is_not_blamed_on_the_room() -> None:
+    learnt = calibrate(picture(background=(60, 62, 66)))
+    (ring,) = [marker.chroma for marker in learnt.markers.markers if marker.id == "ring"]
+    given = {"ring": msgspec.structs.replace(ring, luma_max=90)}
+    report = calibrate(picture(background=(60, 62, 66)), given=given)
+    (finding,) = [one for one in report.verdict.findings if one.code == "fails"]
+    assert finding.figure == "ring is not found in picture 1 itself."
+    assert "Its paint is too bright: luma 1" in finding.cause and "at most 90 is taken" in finding.cause
+    assert "exposure" in finding.remedy
+
+
+def test_a_marker_cut_by_the_border_is_said_to_be_found_in_doubt_and_why() -> None:
+    shift = (0.0, -66.0)
+    image, collector = picture(background=(60, 62, 66), shift=shift), ColourSamples()
+    for name in ("thumb", "ring"):
+        collector.add(name, image, box(name, 4, shift))
+    report = solve_colours(collector.samples, collector.views)
+    said = {one.figure: one for one in report.verdict.findings if one.code == "doubtful"}
+    assert set(said) == {"thumb is found in doubt in picture 1.", "ring is found in doubt in picture 1."}
+    assert all("cut by the picture's border" in one.cause and one.grade is Grade.GOOD for one in said.values())
 
 
 def test_a_dull_thing_of_the_same_hue_is_kept_out_by_the_magnitude() -> None:

@@ -116,7 +116,8 @@ def test_one_colour_under_two_names_is_not_written(tmp_path: Path, capsys: pytes
     (["--sample", "ring@0=10,10,8,8"], "asks for picture 0"),
     (["--sample", "ring=2,2,2,2"], "at least 12"),
     (["--skin", "5,5,900,900", *sample("ring")], "reaches outside"),
-    ([*sample("ring"), *sample("ring", "little")], "more than one box"),
+    (["--sample", "ring=2,2,2,2"], "10 x 8 px of paint are enough"),
+    ([*sample("ring"), *sample("ring", "little")], "ring: its boxes in one picture differ in hue by"),
     (["--markers", str(resource_path("markers", "rhot6.json")), *sample("toe", "ring")], "no marker 'toe'"),
 ])
 def test_wrong_input_is_a_sentence(shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
@@ -126,6 +127,46 @@ def test_wrong_input_is_a_sentence(shot: Path, tmp_path: Path, capsys: pytest.Ca
     captured = capsys.readouterr()
     assert said in captured.err and captured.out == ""
     assert not out.exists()
+
+
+def test_small_boxes_of_a_marker_in_one_picture_add_up(shot: Path, tmp_path: Path,
+                                                       capsys: pytest.CaptureFixture[str]) -> None:
+    x, y = (round(at) for at in place("ring"))
+    corners = [(x - 6, y - 3), (x + 2, y - 4), (x - 1, y + 2), (x + 1, y + 5)]
+    words = [word for left, top in corners for word in ("--sample", f"ring={left},{top},4,4")]
+    reports = []
+    for samples in (words, sample("ring")):
+        assert calibrate("--image", str(shot), *samples, "--out", str(tmp_path / "m.json"), "--json") == 0
+        reports.append(json.loads(capsys.readouterr().out))
+    (few,), (one,) = (report["markers"] for report in reports)
+    assert few["pictures"] == one["pictures"] == 1 and few["samples"] >= 12
+    assert few["area_px"] == pytest.approx(one["area_px"], rel=0.1)
+    hues = [np.degrees(np.arctan2(marker["chroma"]["cr"], marker["chroma"]["cb"])) for marker in (few, one)]
+    assert abs(hues[0] - hues[1]) < 3.0
+
+
+@pytest.mark.parametrize("size", [(4, 4), (2, 2), (1, 1)])
+def test_a_box_that_is_too_small_is_enlarged_to_the_paint_round_it_and_the_report_says_so(
+        shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], size: tuple[int, int]) -> None:
+    x, y = (round(at) for at in place("ring"))
+    box_of = f"ring={x + 1},{y + 1},{size[0]},{size[1]}"
+    assert calibrate("--image", str(shot), "--sample", box_of, "--out", str(tmp_path / "m.json"), "--json") == 0
+    report = json.loads(capsys.readouterr().out)
+    (note,) = [finding for finding in report["findings"] if finding["code"] == "enlarged"]
+    assert "12 colour pixels are needed" in note["figure"] and "ring in picture 1 from" in note["figure"]
+    assert "10 x 8 px" in note["remedy"] and note["grade"] == "good"
+    assert report["markers"][0]["samples"] >= 12
+
+
+def test_paint_too_small_to_learn_from_is_explained_with_the_size_that_is_needed(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    image = np.full((100, 100, 3), 120, np.uint8)
+    image[40:44, 40:44] = (205, 165, 25)
+    path, out = tmp_path / "small.png", tmp_path / "m.json"
+    cv2.imwrite(str(path), image)
+    assert calibrate("--image", str(path), "--sample", "ring=41,41,2,2", "--out", str(out)) == 2
+    said = capsys.readouterr().err
+    assert "ring: " in said and "at least 12 are needed" in said and "10 x 8 px" in said and not out.exists()
 
 
 def test_a_damaged_picture_among_others_is_left_out_and_named_unless_a_box_is_in_it(
@@ -157,10 +198,12 @@ def test_one_picture_is_a_hint_and_no_verdict(shot: Path, tmp_path: Path, capsys
     assert said.count("learnt from one picture") == 1
 
 
-def test_grey_paint_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("size", [30, 3])
+def test_grey_paint_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str], size: int) -> None:
     path = tmp_path / "grey.png"
     cv2.imwrite(str(path), np.full((100, 100, 3), 120, np.uint8))
-    assert calibrate("--image", str(path), "--sample", "ring=10,10,30,30", "--out", str(tmp_path / "m.json")) == 2
+    assert calibrate("--image", str(path), "--sample", f"ring=10,10,{size},{size}", "--out",
+                     str(tmp_path / "m.json")) == 2
     assert "almost grey" in capsys.readouterr().err
 
 

@@ -17,12 +17,15 @@ if TYPE_CHECKING:
     import numpy as np
 
     from rhot_app.calibration.colours import ColourReport
+    from rhot_app.calibration.paint_region import PaintRegion
     from rhot_app.calibration.verdict import Finding
     from rhot_node.detect.image import YuvImage
 
 EPILOG = """Boxes are x,y,w,h in pixels of the picture, (0, 0) at its top-left corner: nothing but paint inside, and as
-much of it as is plainly visible. Every other name makes another marker; NAME@2 takes the second --image, and adds to
-the samples of NAME. Pictures that show more of the room tell more of what else has the colours.
+much of it as is plainly visible; 10 x 8 px are enough. A marker may have several boxes in a picture, each a --sample
+of its own: they add up. Of a box that is smaller, the paint round it is taken too. Every other name makes another
+marker; NAME@2 takes the second --image, and adds to the samples of NAME. Pictures that show more of the room tell more
+of what else has the colours.
 
 Without --markers every name makes a marker: thumb, index, middle, ring, little and wrist are worn on the hand, others
 are free points. With --markers the named markers of that file get new colours, and nothing else changes.
@@ -73,8 +76,11 @@ def run(args: argparse.Namespace) -> int:
     base = load_markers(args.markers) if args.markers else None
     images, unreadable = _read_all(args.image)
     collector = ColourSamples()
-    for sample in _samples(args.sample):
-        collector.add(sample.name, _image(sample, images, args.image), _corners(sample))
+    enlarged = []
+    for (name, picture), boxes in _samples(args.sample).items():
+        shown, *_ = [_image(box, images, args.image) for box in boxes]
+        region = collector.add(name, shown, [_corners(box) for box in boxes])
+        enlarged += _enlarged(f"{name} in picture {picture + 1}", shown, [_corners(box) for box in boxes], region)
     for image in images:
         if image is not None:
             collector.keep_view(image)
@@ -84,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     line = ProgressLine("colours", sys.stderr)
     report = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
     line.finish()
-    verdict, written = judged_anew(report.verdict, unreadable), ""
+    verdict, written = judged_anew(report.verdict, [*unreadable, *_note_enlarged(enlarged)]), ""
     if report.verdict.acceptable:
         try:
             save_markers(args.out, report.markers)
@@ -115,15 +121,32 @@ def parse_box(text: str, option: str) -> BoxArgument:
     return BoxArgument(text, name, picture, (x, y, width, height))
 
 
-def _samples(texts: list[str]) -> list[BoxArgument]:
-    """All samples; raises CalibrationError when one name has two boxes in a picture: one of them is another marker."""
-    samples = [parse_box(text, "--sample") for text in texts]
-    places = [(sample.name, sample.picture) for sample in samples]
-    for name, picture in places:
-        if places.count((name, picture)) > 1:
-            raise CalibrationError(f"--sample: {name!r} has more than one box in picture {picture + 1}. Every marker "
-                                   "has a name of its own, and one box in each picture.")
+def _samples(texts: list[str]) -> dict[tuple[str, int], list[BoxArgument]]:
+    """All boxes by marker and picture."""
+    samples: dict[tuple[str, int], list[BoxArgument]] = {}
+    for box in (parse_box(text, "--sample") for text in texts):
+        samples.setdefault((box.name, box.picture), []).append(box)
     return samples
+
+
+def _enlarged(what: str, image: YuvImage, boxes: list[tuple[int, int, int, int]], region: PaintRegion) -> list[str]:
+    """From and to how many colour pixels boxes were enlarged that were too small to learn from by themselves."""
+    import numpy as np
+
+    from rhot_node.detect.colour import SAMPLES_MIN, box_mask
+
+    held = int(np.count_nonzero(box_mask(image, boxes)))
+    return [f"{what} from {held} to {np.count_nonzero(region.sample)}"] if held < SAMPLES_MIN else []
+
+
+def _note_enlarged(enlarged: list[str]) -> list[Finding]:
+    from rhot_app.calibration.paint_region import ENOUGH
+    from rhot_app.calibration.verdict import Finding, Grade
+    from rhot_node.detect.colour import SAMPLES_MIN
+
+    return [Finding("enlarged", Grade.GOOD, f"{SAMPLES_MIN} colour pixels are needed, so small boxes were enlarged to "
+                    f"the same paint round them: {', '.join(enlarged)}.", "",
+                    f"{ENOUGH} of paint are enough in one box.")] if enlarged else []
 
 
 def _read_all(paths: list[Path]) -> tuple[list[YuvImage | None], list[Finding]]:

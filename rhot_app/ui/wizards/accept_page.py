@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QPushButto
 
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.theme import app_font
+from rhot_app.ui.wizards.colour_list import swatch
 from rhot_app.ui.wizards.models.accept import AcceptStep
 from rhot_app.ui.wizards.models.proposal import Row
 from rhot_app.ui.wizards.models.step import StepView
@@ -78,4 +79,6 @@ class RowTable(QTableWidget):
                 item = QTableWidgetItem(text)
                 item.setFont(app_font(13.0, bold=c == 2 and row.changed))
                 item.setForeground(QColor(self._scheme.muted if c == 0 else self._scheme.text))
+                if row.swatches is not None and c:
+                    item.setIcon(swatch(row.swatches[c - 1], self._scheme))
                 self.setItem(r, c, item)

@@ -1,17 +1,20 @@
-"""The list of all markers in the colour wizard: ticked when enough was seen, colour chip, name, pictures."""
+"""The list of all markers in the colour wizard: ticked when enough was seen, colours before and now, name, pictures."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QRect, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.shapes import shape_pixmap
 
+Rgb = tuple[int, int, int]
+
 _CHIP = QSize(28, 18)
+_ARROW_PX = 14
 _TICK_PX = 28
 _STATE_PX = 16
 _ROW_PX = 26
@@ -19,12 +22,14 @@ _ROW_PX = 26
 
 @dataclass(frozen=True, slots=True)
 class PaintRow:
-    """One line: `state` is the name of a shape ("tick": all done), `rgb` None for a colour that is not known."""
+    """One line: `state` is the name of a shape ("tick": all done, "cross": wrong), `rgb` None for a colour that is not
+    known. `before`: the rig's colour, shown beside it."""
 
     name: str
-    rgb: tuple[int, int, int] | None
+    rgb: Rgb | None
     state: str
     text: str
+    before: Rgb | None = None
 
 
 class PaintList(QTableWidget):
@@ -45,7 +50,7 @@ class PaintList(QTableWidget):
         self.verticalHeader().setVisible(False)
         self.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.setShowGrid(False)
-        self.setIconSize(_CHIP)
+        self.setIconSize(QSize(2 * _CHIP.width() + _ARROW_PX, _CHIP.height()))
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -65,9 +70,10 @@ class PaintList(QTableWidget):
         self._filling = False
 
     def _fill(self, r: int, row: PaintRow) -> None:
-        tone = self._scheme.good if row.state == "tick" else self._scheme.neutral
+        tone = self._scheme.tone({"tick": "good", "cross": "bad"}.get(row.state, "neutral"))
         state = QTableWidgetItem(_state_icon(row.state, tone, self._scheme.on_accent, self.devicePixelRatioF()), "")
-        name = QTableWidgetItem(_chip(row.rgb, self._scheme), row.name)
+        chip = swatch(row.rgb, self._scheme) if row.before is None else change_of(row.before, row.rgb, self._scheme)
+        name = QTableWidgetItem(chip, row.name)
         for c, item in enumerate((state, name, QTableWidgetItem(row.text))):
             self.setItem(r, c, item)
 
@@ -84,14 +90,29 @@ def _state_icon(shape: str, tone: str, selected: str, ratio: float) -> QIcon:
     return icon
 
 
-def _chip(rgb: tuple[int, int, int] | None, scheme: Scheme) -> QIcon:
+def swatch(rgb: Rgb | None, scheme: Scheme) -> QIcon:
     """A patch of the colour; an empty frame for none."""
-    pixmap = QPixmap(_CHIP)
+    return _patches([rgb], scheme)
+
+
+def change_of(before: Rgb | None, after: Rgb | None, scheme: Scheme) -> QIcon:
+    """The colour before, an arrow, and the colour after it."""
+    return _patches([before, after], scheme)
+
+
+def _patches(colours: list[Rgb | None], scheme: Scheme) -> QIcon:
+    step = _CHIP.width() + _ARROW_PX
+    pixmap = QPixmap(QSize(step * len(colours) - _ARROW_PX, _CHIP.height()))
     pixmap.fill(Qt.GlobalColor.transparent)
     painter = QPainter(pixmap)
-    painter.setPen(QColor(scheme.border))
-    painter.setBrush(QColor(*rgb) if rgb is not None else Qt.BrushStyle.NoBrush)
-    painter.drawRoundedRect(0, 0, _CHIP.width() - 1, _CHIP.height() - 1, 3, 3)
+    for k, rgb in enumerate(colours):
+        painter.setPen(QColor(scheme.border))
+        painter.setBrush(QColor(*rgb) if rgb is not None else Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(k * step, 0, _CHIP.width() - 1, _CHIP.height() - 1, 3, 3)
+        if k:
+            painter.setPen(QColor(scheme.muted))
+            painter.drawText(QRect(k * step - _ARROW_PX, 0, _ARROW_PX, _CHIP.height()), Qt.AlignmentFlag.AlignCenter,
+                             "›")
     painter.end()
     icon = QIcon()
     for mode in (QIcon.Mode.Normal, QIcon.Mode.Selected):

@@ -35,8 +35,10 @@ class PickPage(Page):
         self._picks = step
         self.pickable = True
         self.list = PaintList(scheme, ("marker", "pictures"))
-        self.list.setToolTip("Choose what to click next. A tick: enough places and angles were seen. Ctrl+Z takes the "
-                             "last click back; clicking a marker anew replaces what was gathered for it.")
+        self.list.setToolTip("Choose what to click next. The patches are the rig's colour and the one picked. A tick: "
+                             "enough places and angles were seen; a cross: the colour is another marker's or the "
+                             "skin's. Ctrl+Z takes the last click back; clicking a marker anew replaces what was "
+                             "gathered for it.")
         self.mask_choice = MaskChoice()
         self.hold = _button("Hold the pictures", "Space. Then click at leisure; Space again lets them go on.")
         self.undo_button = _button("Undo", "Ctrl+Z. The last click back.")
@@ -78,11 +80,13 @@ class PickPage(Page):
         if name == SKIN:
             count = len(gathering.skin)
             return PaintRow(name, None, "tick" if count else "ring", "picked" if count else "not picked")
-        marker = self._picks.markers.markers[self._picks.base.ids.index(name)]
+        index = self._picks.base.ids.index(name)
+        before, now = (markers.markers[index].display_rgb for markers in (self._picks.base, self._picks.markers))
         if name not in gathering.names:
-            return PaintRow(name, marker.display_rgb, "ring", "not picked")
-        state = "tick" if gathering.variety(name) >= 1.0 else "half"
-        return PaintRow(name, marker.display_rgb, state, str(gathering.pictures(name)))
+            return PaintRow(name, None, "ring", "not picked", before)
+        doubt = self._picks.doubt(name)
+        state = "cross" if doubt else "tick" if gathering.variety(name) >= 1.0 else "half"
+        return PaintRow(name, now, state, doubt or str(gathering.pictures(name)), before)
 
 
 class BoundsPage(Page):

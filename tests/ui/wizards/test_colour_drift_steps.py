@@ -1,4 +1,5 @@
-"""The colour wizard says when the light is another one than that of the rig's colours, or of those just picked."""
+"""The colour wizard says when the light is another one than that of the rig's colours, or of those just picked; and why
+a marker is not found."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.project import Rig
 from rhot_app.ui.wizards.feed import Picture
 from rhot_app.ui.wizards.models.colour_bounds import BoundsStep
+from rhot_app.ui.wizards.models.colour_mask import MaskMaker
 from rhot_app.ui.wizards.models.colour_pick import PickStep
 from rhot_app.ui.wizards.models.colour_result import ApartStep, propose
 from rhot_node.detect.image import to_bgr
@@ -89,6 +91,23 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
     assert proposal is not None and proposal.verdict == verdict
     look(apart, MOST)
     assert apart.view().verdict == calm
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"ring": (25, 165, 205)}, ""),
+    ({"ring": None}, "ring is found by 0 of 1 cameras. left: not found. "),
+    ({"ring": (110, 121, 125)}, "left: not found. Its paint is too pale or too dark: chroma up to"),
+    ({"little": (25, 165, 205)}, "ring is found by 1 of 1 cameras. left: doubtful. 1 more of its colour is in the"),
+], ids=["seen", "gone", "pale", "twice"])
+def test_the_masks_page_says_why_the_chosen_marker_is_not_found_or_in_doubt(
+        steps: tuple[BoundsStep, ApartStep], change: dict, said: str) -> None:
+    bounds, _ = steps
+    bounds.chosen = "ring"
+    bounds._maker = MaskMaker()
+    paints = {name: rgb for name, rgb in {**PAINTS, **change}.items() if rgb is not None}
+    image = to_bgr(picture(paints, background=(60, 62, 66)))
+    bounds.take(bounds.see({"left": Picture("left", image, 0, 0, 0)}))
+    assert said in bounds.view().hint and ("left: " in bounds.view().hint) == bool(said)
 
 
 def test_markers_that_were_never_seen_say_nothing_of_the_light(rig: Rig) -> None:

@@ -126,7 +126,7 @@ class BoundsStep(Step):
 
     def see(self, pictures: Pictures) -> Sights:
         """The mask."""
-        return self._maker.look(pictures, self.markers)
+        return self._maker.look(pictures, self.markers, (self.chosen,))
 
     def take(self, seen: Sights) -> None:
         """What was seen."""
@@ -140,8 +140,11 @@ class BoundsStep(Step):
         chosen = self.markers.ids.index(self.chosen) if self.show == "chosen" else None
         overlays = {} if self.show == "none" else {
             name: mask_overlay(sight, self.markers, chosen) for name, sight in self._sights.items()}
-        found = [sight.seen[self.markers.ids.index(self.chosen)].found for sight in self._sights.values()]
+        index = self.markers.ids.index(self.chosen)
+        found = [sight.seen[index].found for sight in self._sights.values()]
         hint = f"{self.chosen} is found by {sum(found)} of {len(found)} cameras." if found else ""
+        hint = " ".join([hint, *(f"{name}: {sight.why(index)}" for name, sight in self._sights.items()
+                                 if sight.why(index))])
         drift = drift_of(self._sights)
         if drift:
             hint = f"Since the colours were picked: {drift[0].sentence}"
@@ -152,4 +155,4 @@ def learning(picks: PickStep, given: dict[str, ChromaModel], title: str) -> Task
     """The work of learning and judging; `given`: bounds that a person has set."""
     gathering = picks.gathering
     return Task(title, solve_colours, (gathering.samples, gathering.views),
-                {"skin": gathering.skin, "base": picks.base, "given": given})
+                {"skin": gathering.skin, "base": picks.base, "given": given, "before": gathering.earlier})

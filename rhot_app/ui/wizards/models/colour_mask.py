@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.colour_cause import Cause, Explainer
 from rhot_app.calibration.colour_drift import DriftReport, LightDrift, drift_findings
 from rhot_app.calibration.verdict import Finding
 from rhot_app.ui.wizards.models.drawing import Dots, Layer, Overlay, Tag
@@ -23,12 +25,19 @@ _FAINT = 70  # alpha of a marker's colour where it was not asked for
 @dataclass(frozen=True, slots=True, eq=False)
 class Sight:
     """One camera's picture as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none; `drift`:
-    how the light of the last pictures stands to the one that the marker set was learnt in."""
+    how the light of the last pictures stands to the one that the marker set was learnt in; `causes`: by index, why the
+    markers that were asked for are not found, or found in doubt."""
 
     image: YuvImage
     labels: NDArray[np.uint8]
     seen: tuple[MarkerObservation, ...]
     drift: DriftReport
+    causes: Mapping[int, Cause]
+
+    def why(self, index: int) -> str:
+        """In words, why a marker is not found or in doubt; empty for one in plain view."""
+        cause = self.causes.get(index)
+        return "" if cause is None else f"{'doubtful' if self.seen[index].found else 'not found'}. {cause.sentence}"
 
 
 Sights = dict[str, Sight]
@@ -41,11 +50,12 @@ class MaskMaker:
         self._markers: MarkerSet | None = None
         self._detectors: dict[str, FastDetector] = {}
         self._drifts: dict[str, LightDrift] = {}
+        self._explainer: Explainer | None = None
 
-    def look(self, pictures: Pictures, markers: MarkerSet) -> Sights:
-        """What every camera's detector finds with `markers`."""
+    def look(self, pictures: Pictures, markers: MarkerSet, asked: Sequence[str] = ()) -> Sights:
+        """What every camera's detector finds with `markers`, and why it does not find those that are `asked` for."""
         if markers is not self._markers:
-            self._markers, self._detectors, self._drifts = markers, {}, {}
+            self._markers, self._detectors, self._drifts, self._explainer = markers, {}, {}, None
         sights = {}
         for name, picture in pictures.items():
             detector = self._detectors.setdefault(name, FastDetector(markers))
@@ -53,8 +63,24 @@ class MaskMaker:
             seen = detector.detect(image)
             drift = self._drifts.setdefault(name, LightDrift(markers, detector))
             drift.update(image, seen)
-            sights[name] = Sight(image, detector.labels(image), seen, drift.report())
+            causes = self._causes(detector, image, seen, [marker for marker in asked if marker in markers.ids])
+            sights[name] = Sight(image, detector.labels(image), seen, drift.report(), causes)
         return sights
+
+    def _causes(self, detector: FastDetector, image: YuvImage, seen: tuple[MarkerObservation, ...],
+                asked: Sequence[str]) -> dict[int, Cause]:
+        """Why those of the markers `asked` for that are not in plain view are not, by index."""
+        assert self._markers is not None
+        causes: dict[int, Cause] = {}
+        for index in map(self._markers.ids.index, asked):
+            if seen[index].found:
+                cause = Explainer.doubt(seen, index)
+            else:
+                self._explainer = self._explainer or Explainer(self._markers)
+                cause = self._explainer.why_lost(detector, image, seen, index)
+            if cause is not None:
+                causes[index] = cause
+        return causes
 
 
 def drift_of(sights: Sights) -> tuple[Finding, ...]:
@@ -72,8 +98,9 @@ def mask_overlay(sight: Sight, markers: MarkerSet, chosen: int | None) -> Overla
     for index, marker in enumerate(markers.markers):
         palette[index + 1] = (*marker.display_rgb, 255 if chosen in (None, index) else _FAINT)
     marks: list[Layer | Dots | Tag] = [Layer(palette[sight.labels])]
-    for mark in sight.seen:
+    for number, mark in enumerate(sight.seen):
         if mark.found and chosen in (None, mark.index):
             marks.append(Dots(np.array([[mark.x, mark.y]]), "text", radius=3.0))
-            marks.append(Tag(mark.x + 8.0, mark.y - 4.0, markers.ids[mark.index]))
+            further = "" if number < len(markers.markers) else "?"  # something else of the marker's colour
+            marks.append(Tag(mark.x + 8.0, mark.y - 4.0, markers.ids[mark.index] + further))
     return tuple(marks)

@@ -7,7 +7,9 @@ from typing import Literal
 import msgspec
 
 from rhot_app.calibration.colour_gathering import ColourGathering
+from rhot_app.calibration.colour_identity import Identity, identify
 from rhot_app.calibration.separability import SKIN
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.feed import Picture
 from rhot_app.ui.wizards.models.colour_mask import MaskMaker, Sights, drift_of, mask_overlay
@@ -40,7 +42,8 @@ class PickStep(Step):
         self._sights: Sights = {}
         self._maker = MaskMaker()
         self._markers = markers
-        self._learnt: dict[str, int] = {}
+        self._learnt: dict[str, tuple[int, int]] = {}
+        self.identity = Identity((), {}, ())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -59,7 +62,7 @@ class PickStep(Step):
 
     def see(self, pictures: Pictures) -> tuple[Pictures, Sights]:
         """The mask; the detectors are the looker's own."""
-        return pictures, self._maker.look(self.held or pictures, self._markers)
+        return pictures, self._maker.look(self.held or pictures, self._markers, tuple(self._learnt))
 
     def take(self, seen: tuple[Pictures, Sights]) -> None:
         """Gather where markers show something new."""
@@ -87,6 +90,7 @@ class PickStep(Step):
             return False
         self.problem = ""
         self._learn()
+        self._identify()
         self._choose_next()
         return True
 
@@ -97,6 +101,7 @@ class PickStep(Step):
             return False
         self.chosen, self.problem = name, ""
         self._learn()
+        self._identify()
         return True
 
     @property
@@ -105,15 +110,13 @@ class PickStep(Step):
         return bool(self.gathering.names) or bool(len(self.gathering.skin))
 
     def _choose_next(self) -> None:
-        missing = [name for name in self.base.ids if name not in self.gathering.names]
-        if missing:
-            self.chosen = missing[0]
-        elif not len(self.gathering.skin):
-            self.chosen = SKIN
+        """The next line, whether or not it was picked already: who clicks on in order goes on in order."""
+        self.chosen = self.names[min(self.names.index(self.chosen) + 1, len(self.names) - 1)]
 
     def _learn(self) -> None:
         """A quick model of every marker, renewed as samples come."""
-        parts = {name: 1 + int(_PARTS * self.gathering.variety(name)) for name in self.gathering.names}
+        parts = {name: (self.gathering.last_pick(name), int(_PARTS * self.gathering.variety(name)))
+                 for name in self.gathering.names}
         if parts == self._learnt:
             return
         self._learnt = parts
@@ -124,21 +127,59 @@ class PickStep(Step):
                 display_rgb=samples[marker.id].rgb)
             for marker in self.base.markers))
 
+    def _identify(self) -> None:
+        """Whose colour is whose, among the markers picked so far."""
+        gathering = self.gathering
+        models = {marker.id: marker.chroma for marker in self._markers.markers if marker.id in gathering.names}
+        rig = {marker.id: (marker.chroma,) for marker in self.base.markers}
+        self.identity = identify(gathering.samples, gathering.views, models, (gathering.earlier, rig))
+
+    def doubt(self, name: str) -> str:
+        """In a few words, what is wrong with a marker's colour; empty when nothing is."""
+        if name in self.identity.skin:
+            return "as skin"
+        same = [pair for pair in self.identity.same if name in pair[:2]]
+        if same:
+            return f"as {same[0][1] if same[0][0] == name else same[0][0]}"
+        return next((f"was {other}'s" for marker, other in self.identity.taken if marker == name), "")
+
+    def _verdict(self) -> Verdict | None:
+        """What is wrong with the colours picked so far; None when nothing is."""
+        again = "Click the right paint; Ctrl+Z takes the last click back."
+        findings = [Finding("skin", Grade.POOR, f"{name} has the colour of skin: {shown}.", "", again)
+                    for name, shown in self.identity.skin.items()]
+        findings += [Finding("same-colour", Grade.POOR, f"{first} and {second} have one colour: their hues are "
+                             f"{apart:.0f}° apart.", "", again) for first, second, apart in self.identity.same]
+        if self.identity.exchanged:
+            findings.append(Finding("exchanged", Grade.FAIR, self.identity.exchanged, "",
+                                    "If the hand does not wear them so, click these again."))
+        doubtful = [name for name in self.base.ids if self.doubt(name)]
+        return judge(f"look at {', '.join(doubtful)} again.", findings) if findings else None
+
+    @property
+    def _wrong(self) -> str:
+        """The first marker whose colour cannot stay; empty when there is none."""
+        wrong = {*self.identity.skin, *(name for pair in self.identity.same for name in pair[:2])}
+        return next((name for name in self.base.ids if name in wrong), "")
+
     def view(self) -> StepView:
         """Which paint to show next, and how much has been seen of those named."""
         names, gathering = self.gathering.names, self.gathering
         seen = sum(gathering.variety(name) for name in names) / len(names) if names else 0.0
         bars = (Bar("picked", len(names) / len(self.base.ids), f"{len(names)} of {len(self.base.ids)} markers"),
                 Bar("seen moving", seen, "places and angles at which the markers were seen so far"))
-        return StepView(self._sentence(), done=gathering.enough and len(names) == len(self.base.ids),
-                        passable=bool(names), hint=self.problem or self._hint(), bars=bars, overlays=self._overlays(),
-                        pictures=self.held)
+        return StepView(self._sentence(),
+                        done=gathering.enough and len(names) == len(self.base.ids) and not self._wrong,
+                        passable=bool(names), hint=self.problem or self._hint(), bars=bars, verdict=self._verdict(),
+                        overlays=self._overlays(), pictures=self.held)
 
     def _sentence(self) -> str:
         if self.held:
             return f"Click {self._paint()} in the held picture."
         if len(self.gathering.names) < len(self.base.ids):
             return f"Click {self._paint()}, or drag over it."
+        if self._wrong:
+            return f"Choose {self._wrong} and click its paint."
         if not self.gathering.enough:
             return "Move and turn the hand slowly, near and far."
         return "Enough: press Next."
@@ -147,6 +188,8 @@ class PickStep(Step):
         return "bare skin" if self.chosen == SKIN else f"the paint of {self.chosen}"
 
     def _hint(self) -> str:
+        if self._wrong:
+            return f"{self._wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z."
         if self.gathering.names and not len(self.gathering.skin):
             return "Pick bare skin too: then it is said whether a marker looks like it."
         drift = () if self.gathering.names else drift_of(self._sights)
@@ -154,6 +197,11 @@ class PickStep(Step):
             return f"By the rig's colours: {drift[0].figure}"
         if not self.gathering.names:
             return "Space holds the pictures, if your hands are full."
+        unseen = [f"{camera} has not seen {name}: {sight.why(self.base.ids.index(name))}"
+                  for camera, sight in self._sights.items() for name in self.gathering.unseen_by(camera)
+                  if sight.why(self.base.ids.index(name))]
+        if unseen:
+            return unseen[0]
         missing = [name for name in self.gathering.names if self.gathering.variety(name) < 1.0]
         return f"Still to be seen in other places: {', '.join(missing)}." if missing else ""
 

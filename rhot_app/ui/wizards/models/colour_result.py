@@ -95,8 +95,9 @@ class ApartStep(ChartedStep):
                             "It did not work out." if self._problem else "One moment.", hint=self._problem)
         apart = judged.separability.sentences
         hint = "; ".join(apart[:3]) + "." if apart else "No two colours overlap."
-        return StepView("Read what may be mistaken for a marker, then go on.", done=True, hint=hint,
-                        verdict=judged.verdict)
+        sentence = "Read what may be mistaken for a marker, then go on." if judged.verdict.acceptable else \
+            "Read what is wrong, then go back."
+        return StepView(sentence, done=True, hint=hint, verdict=judged.verdict)
 
 
 def hue_chart(report: ColourReport) -> Chart:
@@ -135,7 +136,9 @@ def propose(report: ColourReport | None, rig: Rig, path: Path | None,
     after = msgspec.structs.replace(rig, markers=report.markers)
     markers = msgspec.to_builtins(report.markers)
     changes: list[Change] = [RigChange(rig, after, path, REASON)]
-    rows = list(rig_rows(rig, after))
+    shown = {f"{old.id}: colour": (old.display_rgb, new.display_rgb)
+             for old, new in zip(rig.markers.markers, report.markers.markers, strict=True)}
+    rows = [replace(row, swatches=shown.get(row.what)) for row in rig_rows(rig, after)]
     for node in rig.nodes:
         if node.node_id in node_settings:
             before = node_settings[node.node_id]["markers"]

@@ -17,6 +17,8 @@ from rhot_app.project import Rig
 Command = Callable[..., dict[str, Any]]
 """``command(name, **arguments)`` of the engine; raises EngineError."""
 
+Rgb = tuple[int, int, int]
+
 RESTORING = "restoring"
 """First word of the reason of every restore in a rig's history (`rhot_app.rig_history.restore` begins so too)."""
 
@@ -26,11 +28,13 @@ _SET_RIG_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of the last page: what, how it is now, how it would be; units inside the texts."""
+    """One line of the last page: what, how it is now, how it would be; units inside the texts. `swatches`: the colours
+    before and after, RGB 0..255."""
 
     what: str
     before: str
     after: str
+    swatches: tuple[Rgb, Rgb] | None = None
 
     @property
     def changed(self) -> bool:
