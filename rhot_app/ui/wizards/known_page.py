@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
+from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QFormLayout, QPushButton
 
 from rhot_app.ui.wizards.models.known_step import KnownStep
 from rhot_app.ui.wizards.models.step import StepView
@@ -10,7 +10,7 @@ from rhot_app.ui.wizards.page import Page
 
 
 class KnownPage(Page):
-    """Two lengths in mm; 0 says that it was not measured."""
+    """Two lengths in mm; 0 says that it was not measured. With neither, a person must say so."""
 
     def __init__(self, step: KnownStep) -> None:
         super().__init__(step)
@@ -28,13 +28,22 @@ class KnownPage(Page):
         self.hold.setAutoDefault(False)
         self.hold.clicked.connect(self._hold)
         self.column.addLayout(form)
+        self.skip = QCheckBox("Skip: lengths stay unproven")
+        self.skip.setToolTip("If the size of the squares was typed wrong, every length is wrong by the same factor "
+                             "and nothing will tell.")
+        self.skip.toggled.connect(self._skip)
         self.column.addWidget(self.hold)
+        self.column.addWidget(self.skip)
         self.column.addStretch(1)
         for box in (self.baseline, self.ruler):
             box.valueChanged.connect(self._take)
 
     def _take(self) -> None:
         self._known.set_lengths(self.baseline.value(), self.ruler.value())
+        self.changed.emit()
+
+    def _skip(self, on: bool) -> None:
+        self._known.skip(on)
         self.changed.emit()
 
     def _hold(self) -> None:
@@ -46,7 +55,8 @@ class KnownPage(Page):
         self._known.pick(camera, x, y)
 
     def show_view(self, view: StepView) -> None:
-        """The button says what it would do."""
+        """The button says what it would do; there is nothing to skip once a length is known."""
+        self.skip.setEnabled(not view.done)
         self.hold.setEnabled(self.ruler.value() > 0.0)
         self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
 
