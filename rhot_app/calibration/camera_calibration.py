@@ -59,9 +59,18 @@ def calibration_text(rig: Rig) -> str:
     if record.method != "board":
         return "exact, as simulated" if record.method == "exact" else "with a board, before a lens was found anew"
     error = "" if record.error_m is None else f", ± {1e3 * record.error_m:.2f} mm at {record.distance_m:g} m"
-    lengths = {"skipped": "lengths never checked against a ruler", "baseline": "lengths checked by the baseline",
-               "ruler": "lengths checked by a ruler"}[record.lengths]
-    return f"with a board{error}; {lengths}"
+    return f"with a board{error}; lengths {lengths_text(rig)}"
+
+
+def lengths_text(rig: Rig) -> str:
+    """What a second known length said of the board's squares, in a few words."""
+    record = rig.calibration
+    if record is None:
+        return "not recorded"
+    if record.method == "exact":
+        return "exact, as simulated"
+    return {"skipped": "never checked against a ruler", "baseline": "checked by the baseline",
+            "ruler": "checked by a ruler"}[record.lengths]
 
 
 def with_lens(rig: Rig, camera: str, lens: Intrinsics) -> Rig:

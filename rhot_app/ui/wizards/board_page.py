@@ -130,7 +130,7 @@ class BoardPage(Page):
         self.legacy.setChecked(fields.legacy)
         self._filling = False
         last = remembered_fields(self._memory.remembered(MEMORY)).square_mm
-        self.square.setPlaceholderText("measure it" if last is None else f"measure it; last time {last:g}")
+        self.square.setPlaceholderText("measure it" if last is None else f"last time {last:g}")
         self._shown = fields
         self._show_kind(fields)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QFormLayout, QPushButton
+from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
 
 from rhot_app.ui.wizards.models.known_step import KnownStep
 from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.page import Page
+
+SKIP = "Skip: lengths stay unproven"
 
 
 class KnownPage(Page):
@@ -28,10 +30,11 @@ class KnownPage(Page):
         self.hold.setAutoDefault(False)
         self.hold.clicked.connect(self._hold)
         self.column.addLayout(form)
-        self.skip = QCheckBox("Skip: lengths stay unproven")
+        self.skip = QPushButton(SKIP)
         self.skip.setToolTip("If the size of the squares was typed wrong, every length is wrong by the same factor "
                              "and nothing will tell.")
-        self.skip.toggled.connect(self._skip)
+        self.skip.setAutoDefault(False)
+        self.skip.clicked.connect(self._skip)
         self.column.addWidget(self.hold)
         self.column.addWidget(self.skip)
         self.column.addStretch(1)
@@ -42,8 +45,8 @@ class KnownPage(Page):
         self._known.set_lengths(self.baseline.value(), self.ruler.value())
         self.changed.emit()
 
-    def _skip(self, on: bool) -> None:
-        self._known.skip(on)
+    def _skip(self) -> None:
+        self._known.skip(not self._known.skipped)
         self.changed.emit()
 
     def _hold(self) -> None:
@@ -57,6 +60,7 @@ class KnownPage(Page):
     def show_view(self, view: StepView) -> None:
         """The button says what it would do; there is nothing to skip once a length is known."""
         self.skip.setEnabled(not view.done)
+        self.skip.setText("Do not skip" if self._known.skipped and not view.done else SKIP)
         self.hold.setEnabled(self.ruler.value() > 0.0)
         self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
 
