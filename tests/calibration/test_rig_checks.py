@@ -13,6 +13,7 @@ import pytest
 
 from rhot_app.__main__ import main
 from rhot_app.calibration.camera_calibration import calibration_error
+from rhot_app.calibration.camera_calibration import with_lens as with_lens_of
 from rhot_app.calibration.rig_checks import check_rig
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import (
@@ -80,6 +81,13 @@ def test_cameras_that_nobody_put_together_are_not_called_good(rig: Rig) -> None:
     turned = with_right_at(lenses_only, 0.075, 0.0, 0.0, turn=(0.99995, 0.01, 0.0, 0.0))  # type: ignore[arg-type]
     assert not check_rig(turned).verdict.codes, "an older file that records nothing is not blamed"
     assert not calibration_error(turned).known and "does not say how well" in calibration_error(turned).reason
+
+
+def test_a_lens_found_anew_makes_the_places_of_the_cameras_outdated(rig: Rig) -> None:
+    after = with_lens_of(rig, "left", change(LENS, fx=540.0))  # type: ignore[arg-type]
+    assert after.nodes[0].intrinsics.fx == 540.0 and after.nodes[1] == rig.nodes[1]
+    assert check_rig(after).verdict.codes == {"outdated_poses"} and not calibration_error(after).known
+    assert with_lens_of(change(rig, calibration=None), "left", LENS).calibration is None  # type: ignore[arg-type]
 
 
 def test_lengths_that_nobody_checked_are_named(rig: Rig) -> None:

@@ -57,10 +57,17 @@ def place_of_button(bench):
     return at.x(), bench.window.height() - at.y()
 
 
+def settled_place(bench):
+    """Whether the button stays where it is for a while: toolbars lay out a moment after their text."""
+    before = place_of_button(bench)
+    bench.run(0.3)
+    return place_of_button(bench) == before
+
+
 def test_an_uncalibrated_rig_says_so_and_its_button_opens_the_lens_wizard(tracked):
     rig = load_rig(resource_path("rigs", "two_pis.json"))
     bench = tracked(rig)
-    bench.until(lambda: len(bench.window.advice.texts) == 2)
+    bench.until(lambda: len(bench.window.advice.texts) == 2 and len(buttons(bench)) == 1)
     operational, lasting = bench.window.advice.texts
     assert operational == TRACKED and lasting.startswith(HEADLINE)
     assert "Everything is in order." not in bench.window.advice.texts
@@ -75,8 +82,8 @@ def test_an_uncalibrated_rig_says_so_and_its_button_opens_the_lens_wizard(tracke
 
 def test_the_notice_stays_where_it_is_while_other_sentences_come_and_go(tracked):
     bench = tracked(synthetic_rig(calibration=None))
-    bench.until(lambda: len(bench.window.advice.texts) == 2)
-    bench.run(0.2)  # toolbars lay out a moment later
+    bench.until(lambda: len(bench.window.advice.texts) == 2 and len(buttons(bench)) == 1)
+    bench.until(lambda: settled_place(bench))
     place = place_of_button(bench)
     bench.backend.engine.advice = (Advice("error", "Node left does not answer."), Advice("warning", "It is dark."),
                                    Advice("warning", "Camera right has seen no marker for 5 s."))
@@ -98,9 +105,18 @@ def test_what_the_calibration_does_not_know_is_in_what_is_stated(tracked):
     assert all(1.85 < spread < 2.6 for spread in spreads), "1.8 mm by noise, 0.8 to 1 mm by the calibration at 0.55 m"
 
 
+def test_the_notice_is_gone_and_figures_are_back_once_the_rig_is_calibrated(tracked):
+    bench = tracked(synthetic_rig(calibration=None))
+    bench.until(lambda: bench.window.advice.texts[-1].startswith(HEADLINE))
+    bench.backend.engine.rig = calibrated_rig()
+    bench.window.rig_watch.look_soon()
+    bench.until(lambda: bench.window.advice.texts == ["Everything is in order."])
+    bench.until(lambda: any(text not in ("", "?") for text in bench.window.screen_parts.markers.spreads))
+
+
 def test_lengths_that_were_never_checked_are_said_with_the_stereo_wizard(tracked):
     bench = tracked(calibrated_rig("skipped"))
-    bench.until(lambda: len(bench.window.advice.texts) == 2)
+    bench.until(lambda: len(bench.window.advice.texts) == 2 and len(buttons(bench)) == 1)
     assert bench.window.advice.texts[-1].startswith("Lengths were never checked against a ruler.")
     bench.click(buttons(bench)[0])
     bench.until(lambda: bench.window.wizards.wizard is not None)
