@@ -20,7 +20,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.board import STANDARD_BOARD
 from rhot_app.calibration.corners import BoardView
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.stereo import calibrate
@@ -39,7 +39,7 @@ BASELINE_M = 0.075
 
 def shared_views(shots: int) -> SharedViews:
     """A board before two cameras, `shots` times, its corners known but for some noise."""
-    board, random = Chessboard(9, 6, 0.03), np.random.default_rng(1)
+    board, random = STANDARD_BOARD, np.random.default_rng(1)
     points = board.object_points() - board.object_points().mean(axis=0)
     matrix = np.array([[LENS[0], 0, LENS[2]], [0, LENS[1], LENS[3]], [0, 0, 1.0]])
     taken = []

@@ -137,6 +137,21 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     float_scale: bool = False
 
 
+class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the lenses and poses of a rig were found, and how far they may be trusted.
+
+    `method`: `board`, by the stereo calibration; `outdated`, likewise, but a lens was found anew since; `exact`, known
+    without error, as in a simulation. `lengths`: which
+    second known length confirmed the size of the board's squares; without one every length may be wrong by one factor.
+    `error_m`: standard deviation of a place `distance_m` from the cameras by the calibration alone; none when unknown.
+    """
+
+    method: Literal["board", "outdated", "exact"]
+    lengths: Literal["skipped", "baseline", "ruler"] = "skipped"
+    error_m: NotNegative | None = None
+    distance_m: Positive = 0.6
+
+
 class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole rig."""
 
@@ -150,6 +165,7 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     up: Literal["-y", "z"] = "-y"  # which axis of the rig frame points up: the left camera's, or a table's frame
     broadcast: Broadcast = Broadcast()
     other_hand: HandAnatomy | None = None  # a second one at the same time
+    calibration: CameraCalibration | None = None  # of lenses and poses together; none: nothing is recorded
     format: Literal["rhot-rig"] = FORMAT
     version: Literal[1] = VERSION
 

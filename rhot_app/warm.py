@@ -15,7 +15,7 @@ from multiprocessing import get_context
 import msgspec
 import numpy as np
 
-from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.board import STANDARD_BOARD
 from rhot_app.calibration.corners import detect
 from rhot_app.calibration.filter_simulation import OFF, Footage, simulate
 from rhot_app.calibration.hand_bundle_model import POSE, Poses, linearise
@@ -67,7 +67,7 @@ def warm_twin(_rig: Rig) -> None:
 
 def warm_boards(_rig: Rig) -> None:
     """Compile the search for calibration boards, on the plainest picture of one."""
-    board = Chessboard(9, 6, 0.03)
+    board = STANDARD_BOARD
     squares = np.add.outer(np.arange(board.rows + 1), np.arange(board.cols + 1)) % 2 * 200 + 20
     detect(np.pad(np.kron(squares, np.ones((24, 24))).astype(np.uint8), 48, constant_values=230), board, thorough=False)
 

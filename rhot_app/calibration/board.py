@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.standard_board import BOARD, SQUARE_MM
 from rhot_app.errors import CalibrationError
 
 Array = NDArray[np.float64]
@@ -193,3 +194,6 @@ def _check(cols: int, rows: int, square_m: float) -> None:
         raise CalibrationError(f"A square of {square_m * 1e3:g} mm is not possible: measure one side of a square and "
                                f"give it in millimetres, {SMALLEST_M * 1e3:g} to {LARGEST_M * 1e3:g}.")
 
+
+STANDARD_BOARD = Chessboard(*parse_size(BOARD), 1e-3 * SQUARE_MM)
+"""The board of `standard_board`, printed at 100 %."""

@@ -22,8 +22,8 @@ WEAK_QUALITY = 0.45
 
 DOUBLED_PART = 0.3
 
-Mender = Literal["stereo", "time", "bones", "colours"]
-"""The calibration that mends a finding, named as its command."""
+Mender = Literal["lens", "stereo", "time", "bones", "colours"]
+"""The calibration that mends a finding, named as its wizard; `lens` is ``rhot calibrate intrinsics``."""
 
 
 @dataclass(frozen=True, slots=True)

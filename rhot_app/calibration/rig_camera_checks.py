@@ -89,9 +89,6 @@ def lens_findings(node: RigNode, figures: LensFigures) -> list[Finding]:
             "distortion", Grade.POOR if figures.usable < 0.95 else Grade.FAIR,
             f"The distortion of {name} turns over inside the picture: {100 * (1 - figures.usable):.0f} % of it has no "
             "direction.", "The coefficients were fitted to views that do not reach the picture's corners.", _CALIBRATE))
-    if lens.nominal:
-        found.append(Finding("nominal", Grade.FAIR, f"The intrinsics of {name} are nominal: exactly centred, without "
-                             "distortion.", "This camera has not been calibrated.", _CALIBRATE))
     return [each for each in found if each is not None]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rhot_app.calibration.camera_calibration import calibration_finding
 from rhot_app.calibration.rig_camera_checks import (
     LensFigures,
     PairGeometry,
@@ -46,10 +47,12 @@ def check_cameras(rig: Rig) -> list[Finding]:
 
 
 def _camera_findings(rig: Rig, lenses: tuple[LensFigures, ...], pairs: tuple[PairGeometry, ...]) -> list[Finding]:
-    """None where distance comes from disparity alone: no lens and no place is looked at."""
+    """Where distance comes from disparity alone, no lens and no place is looked at, and that is said."""
     by_lens = [finding for node, figures in zip(rig.nodes, lenses, strict=False)
                for finding in lens_findings(node, figures)]
-    return [*by_lens, *(pair_findings(rig, list(pairs)) if lenses else [])]
+    found = calibration_finding(rig)
+    return [*([found.finding] if found is not None else []), *by_lens,
+            *(pair_findings(rig, list(pairs)) if lenses else [])]
 
 
 def _tracker_findings(rig: Rig) -> list[Finding]:
@@ -58,15 +61,10 @@ def _tracker_findings(rig: Rig) -> list[Finding]:
     obstacle = model_tracker_obstacle(rig)
     if obstacle is not None:
         return [Finding("tracker", Grade.POOR, obstacle.why, remedy=obstacle.remedy)]
-    nominal = [node.name for node in rig.nodes if node.intrinsics.nominal]
-    found = [Finding("tracker", Grade.FAIR, "The model tracker takes lenses as exact, and those of "
-                     f"{' and '.join(nominal)} are nominal: it is surer than it may be.",
-                     remedy="Calibrate, or use the classic tracker until then (tracker.kind).")] if nominal else []
     homeless = [marker.id for marker in rig.markers.markers
                 if (marker.role or "").removeprefix(OTHER_HAND) not in ROLES]
-    return [*found, *(Finding("tracker", Grade.POOR, f"The model tracker needs a place on the hand for marker {name}.",
-                              remedy="Give it a role, or use the classic tracker (tracker.kind).")
-                      for name in homeless)]
+    return [Finding("tracker", Grade.POOR, f"The model tracker needs a place on the hand for marker {name}.",
+                    remedy="Give it a role, or use the classic tracker (tracker.kind).") for name in homeless]
 
 
 def _summary(rig: Rig, findings: list[Finding]) -> str:

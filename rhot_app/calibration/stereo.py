@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from rhot_app.calibration.lens_start import LensStart
-from rhot_app.calibration.ruler import RulerReading, baseline_finding, read_ruler, ruler_finding
+from rhot_app.calibration.ruler import RulerReading, baseline_finding, lengths_finding, read_ruler, ruler_finding
 from rhot_app.calibration.stereo_adjust import StereoSolution
 from rhot_app.calibration.stereo_checks import arrangement_findings, dropped_findings, fit_findings
 from rhot_app.calibration.stereo_lens_checks import LensEvidence, lens_evidence, mismatch_finding
@@ -25,6 +26,11 @@ class KnownLengths:
 
     baseline_m: float | None = None
     ruler: RulerReading | None = None
+
+    @property
+    def which(self) -> Literal["skipped", "baseline", "ruler"]:
+        """The better one of those that are there."""
+        return "ruler" if self.ruler is not None else "skipped" if self.baseline_m is None else "baseline"
 
 
 def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool = False,
@@ -48,7 +54,7 @@ def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool =
     progress("measuring what came out", 0.97)
     figures = figures_of(outcome, lenses, [shot.name for shot in views.shots])
     ruler = None if known.ruler is None else read_ruler(known.ruler, figures.state)
-    figures = replace(figures, ruler=ruler)
+    figures = replace(figures, ruler=ruler, lengths=known.which)
     every = (*dropped, *outcome.dropped)
     evidence = lens_evidence(outcome, [own if own.origin == "given" else before for own, before
                                        in zip(lenses, remembered or [None] * len(lenses), strict=True)])
@@ -82,7 +88,7 @@ def _findings(figures: StereoFigures, solution: StereoSolution, lenses: Sequence
     if known.baseline_m is not None:
         pair = figures.pairs[0]
         found.append(baseline_finding(pair.baseline_m, known.baseline_m, square, (pair.first, pair.second)))
-    return found
+    return found if figures.lengths != "skipped" else [*found, lengths_finding()]
 
 
 def _summary(figures: StereoFigures) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +78,8 @@ class StereoFigures:
     """All figures of a solved rig. `distances_px` (M,) of all corners; `error_m` expected in space at
     `WORKING_DISTANCE_M`: by the calibration, and by `MARKER_NOISE_PX` in the pictures. `tilt_rad` the largest angle
     between two boards; `disagreement` of the shots, 1 where independent corner errors explain all: it is in all
-    standard deviations; `board_errors` how far the board is from its drawing, None when the pictures show nothing."""
+    standard deviations; `board_errors` how far the board is from its drawing, None when the pictures show nothing;
+    `lengths` which second known length was held against the board's squares."""
 
     state: BundleState
     board: Board
@@ -92,6 +94,7 @@ class StereoFigures:
     disagreement: float
     board_errors: BoardErrors | None = None
     ruler: RulerResult | None = None
+    lengths: Literal["skipped", "baseline", "ruler"] = "skipped"
 
     @property
     def world_from_camera(self) -> Array:

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.calibration.rig_checks import check_cameras
 from rhot_app.calibration.stereo_report import StereoFigures, StereoReport
@@ -16,7 +17,7 @@ from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.calibration.world_frame import WorldFrame
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import inverse, quaternion_from_rotation, rigid, rotation_from_quaternion
-from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,9 @@ def calibrated_rig(rig: Rig, figures: StereoFigures, frame: WorldFrame | None = 
         else:
             nodes.append(msgspec.structs.replace(node, pose=_pose(new_from_old @ _matrix(node.pose))))
     up: Literal["-y", "z"] = "-y" if frame is None else "z"
-    return msgspec.structs.replace(rig, nodes=tuple(nodes), up=up,
+    error_m = figures.error_m[0]
+    record = CameraCalibration("board", figures.lengths, error_m if np.isfinite(error_m) else None, WORKING_DISTANCE_M)
+    return msgspec.structs.replace(rig, nodes=tuple(nodes), up=up, calibration=record,
                                    depth=msgspec.structs.replace(rig.depth, mode="stereo"))
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from rhot_app.calibration.board import Board, CharucoBoard, Chessboard
 from rhot_app.calibration.target_drawing import Box, Drawing, Text
 from rhot_app.errors import CalibrationError
+from rhot_node.files import write_atomically
 
 PAPERS_MM: dict[str, tuple[float, float]] = {
     "A5": (148.0, 210.0), "A4": (210.0, 297.0), "letter": (215.9, 279.4), "legal": (215.9, 355.6),
@@ -51,6 +53,21 @@ def draw_target(board: Board, paper: str = "A4") -> Drawing:
                   f"Print at 100 % on {paper}, glue it flat, measure the ruler: {RULER_MM:g} mm"),
              *_ruler_numbers(foot)]
     return Drawing(page_width, page_height, boxes + tuple(_ruler_boxes(foot)), tuple(texts), board.text)
+
+
+def write_target(out: Path, board: Board, paper: str = "A4") -> None:
+    """Draw the board and write it, whole or not at all, as PDF or SVG by the file's name.
+
+    Raises CalibrationError as `draw_target` does, for another ending, and when the file cannot be written.
+    """
+    suffix = out.suffix.lower()
+    if suffix not in (".pdf", ".svg"):
+        raise CalibrationError(f"{out}: the file's name must end in .pdf or .svg.")
+    drawing = draw_target(board, paper)
+    try:
+        write_atomically(out, drawing.to_pdf() if suffix == ".pdf" else drawing.to_svg())
+    except OSError as exc:
+        raise CalibrationError(f"{out}: cannot be written ({exc.strerror}).") from exc
 
 
 def _board_size_mm(board: Board) -> tuple[float, float]:

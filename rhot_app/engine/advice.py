@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rhot_app.calibration.camera_calibration import NOT_CALIBRATED, calibration_finding
 from rhot_app.engine.node_meter import Recent
-from rhot_app.engine.status import Advice, NodeStatus
+from rhot_app.engine.status import Advice, Level, NodeStatus
 from rhot_app.project import Rig
 
 UNSEEN_S = 3.0
@@ -170,14 +171,13 @@ def _link_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     return found
 
 
-def tracker_advice(rig: Rig) -> list[Advice]:
-    """What the rig's tracker takes for granted and is not so."""
-    nominal = [node.name for node in rig.nodes if node.intrinsics.nominal]
-    if rig.tracker.kind != "model" or not nominal:
+def calibration_advice(rig: Rig) -> list[Advice]:
+    """One sentence while lenses or poses are not calibrated or no length was checked, as ``rhot check`` words it."""
+    found = calibration_finding(rig)
+    if found is None:
         return []
-    return [Advice("warning", f"Nobody has calibrated the lenses of {' and '.join(nominal)}, and the model tracker "
-                              "takes them as exact: it is surer than it may be. Calibrate them, or choose the classic "
-                              "tracker.")]
+    level: Level = "warning" if found.finding.figure == NOT_CALIBRATED else "info"
+    return [Advice(level, found.finding.sentence, found.mender, lasting=True)]
 
 
 def _sight_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:

@@ -14,16 +14,12 @@ from rhot_app.tracking.tracker import Tracker
 LOOK_NS = 95_000_000  # the status comes every 100 ms
 JUDGE_NS = 2_000_000_000
 
-UNCALIBRATED = Advice("info", "Distances are estimates: the rig finds them from disparity, without a calibration. Put "
-                              "the cameras together with a board (Calibrate menu) for exact ones.", "stereo")
-
 
 class HealthWatch:
     """One rig's health. `advice` is called with every status and mostly returns what it said before."""
 
     def __init__(self, rig: Rig) -> None:
         self._monitor = HealthMonitor(rig)
-        self._always = [UNCALIBRATED] if rig.depth.mode == "disparity" else []
         self._advice: list[Advice] = []
         self._looked_ns = self._judged_ns = 0
         self._sequence = -1
@@ -44,7 +40,7 @@ class HealthWatch:
             self._advice = [Advice("error" if found.finding.grade is Grade.POOR else "warning", found.finding.sentence,
                                    found.mender)
                             for found in self._monitor.findings()]
-        return [*self._advice, *self._always]
+        return self._advice
 
     def _look(self, state: HandState, tracker: Tracker) -> None:
         frames = [frame for frame in tracker.newest_frames() if frame is not None]

@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable
 
-from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice, tracker_advice
+from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
 from rhot_app.engine.health_watch import HealthWatch
 from rhot_app.engine.node_health import most_urgent_first
 from rhot_app.engine.node_meter import NodeMeter
@@ -78,12 +78,11 @@ class Observer:
         marker_ids = self.rig.markers.ids
         found = [advice for one in facts for advice in node_advice(one, marker_ids, running, sight=not nowhere)]
         if running:
-            found += tracker_advice(self.rig)
             found += self._health.advice(self._pipeline.last_state, self._pipeline.work.tracker, now_ns)
         if self._pipeline.failure:
             found.append(Advice("error", self._pipeline.failure))
         notices = [Advice("info", text) for text in self._source.notices()]
-        return [*found, *nowhere, *notices]
+        return [*found, *nowhere, *calibration_advice(self.rig), *notices]
 
     def _facts(self, camera: int, status: NodeStatus, now_ns: int) -> NodeFacts:
         meter = self._meters[camera]

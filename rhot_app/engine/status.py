@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+Level = Literal["info", "warning", "error"]
 NodeWord = Literal["silent", "starting", "ready", "streaming", "fault"]
 
 
@@ -31,11 +32,13 @@ class NodeStatus:
 @dataclass(frozen=True, slots=True)
 class Advice:
     """One sentence for the operator: what is wrong, where, and what to do. `mender` names the calibration that
-    mends it, as of ``rhot calibrate``; empty for none."""
+    mends it, as the app's wizards are named; empty for none. `lasting`: it stays until the rig is calibrated, so less
+    urgent sentences must not hide it."""
 
-    level: Literal["info", "warning", "error"]
+    level: Level
     text: str
     mender: str = ""
+    lasting: bool = False
 
 
 @dataclass(frozen=True, slots=True)

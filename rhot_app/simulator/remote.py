@@ -3,7 +3,7 @@
 For the app's wizards on the simulated rig ("hold up the board") and for tests::
 
     with TwinRemote(directory) as twin:                        # the directory that the live twin was started with
-        twin.show(BoardShow(size="9x6", square_mm=30.0))       # a board is moved about, with pauses
+        twin.show(BoardShow(size="9x6", square_mm=25.0))       # a board is moved about, with pauses
         twin.show(BoardShow(on_table=True))                    # the board lies on the table
         twin.show(MarkerShow(marker="index", distance_m=0.4))  # one marker, held at 0.4 m
         twin.show(MarkerShow(moving=True))                     # one marker that sweeps fast to and fro

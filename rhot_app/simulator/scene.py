@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import RigError, SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
-from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode
 from rhot_app.simulator.controls import Controls
 from rhot_app.simulator.lamp import Lamp
 from rhot_app.simulator.nodes import NodePorts
@@ -200,4 +200,5 @@ def build_rig(scene: Scene, ports: tuple[NodePorts, ...]) -> Rig:
                 preview_port=ports[index].preview_port, pairing_port=ports[index].pairing_port,
                 public_key=ports[index].public_key)
         for index, name in enumerate(scene.names))
-    return Rig(name="simulated", nodes=nodes, markers=scene.markers, hand=scene.hand)
+    return Rig(name="simulated", nodes=nodes, markers=scene.markers, hand=scene.hand,
+               calibration=CameraCalibration("exact", error_m=0.0))

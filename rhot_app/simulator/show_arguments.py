@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from rhot_app.calibration.standard_board import BOARD, CHARUCO, SQUARE_MM
+
 if TYPE_CHECKING:
     from rhot_app.simulator.shows import Show
 
@@ -15,8 +17,10 @@ def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     room.add_argument("--show", default="hand", choices=("hand", "board", "ruler", "marker"),
                       help="what stands before the cameras (default hand)")
     room.add_argument("--board", default=None, metavar="COLSxROWS",
-                      help="inner corners of a chessboard (default 9x6), squares of a ChArUco board (default 8x6)")
-    room.add_argument("--square-mm", type=float, default=30.0, metavar="S", help="side of its squares (default 30)")
+                      help=f"inner corners of a chessboard (default {BOARD}), squares of a ChArUco board (default "
+                      f"{CHARUCO})")
+    room.add_argument("--square-mm", type=float, default=SQUARE_MM, metavar="S",
+                      help=f"side of its squares (default {SQUARE_MM:g})")
     room.add_argument("--charuco", action="store_true", help="a ChArUco board (DICT_4X4_50) instead of a chessboard")
     room.add_argument("--marker-mm", type=float, default=None, metavar="S",
                       help="side of the ChArUco board's markers (default 3/4 of a square)")
@@ -42,7 +46,7 @@ def show_of(args: argparse.Namespace) -> Show:
         fields["motion"] = args.motion
     elif args.show == "board":
         fields |= {"pattern": "charuco" if args.charuco else "chessboard", "square_mm": args.square_mm,
-                   "size": args.board or ("8x6" if args.charuco else "9x6"), "marker_mm": args.marker_mm,
+                   "size": args.board or (CHARUCO if args.charuco else BOARD), "marker_mm": args.marker_mm,
                    "legacy": args.legacy, "on_table": args.on_table}
         if args.dictionary is not None:
             fields["dictionary"] = args.dictionary

@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Meta
 
 from rhot_app.calibration.board import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard, parse_size
+from rhot_app.calibration.standard_board import BOARD, MARKER_SHARE, SQUARE_MM
 
 NEAREST_M: Final = 0.15
 FARTHEST_M: Final = 5.0
@@ -34,8 +35,8 @@ class BoardShow(_Show, frozen=True, tag="board"):
     """
 
     pattern: Literal["chessboard", "charuco"] = "chessboard"
-    size: str = "9x6"
-    square_mm: Millimetres = 30.0
+    size: str = BOARD
+    square_mm: Millimetres = SQUARE_MM
     marker_mm: Millimetres | None = None
     dictionary: str = DEFAULT_DICTIONARY
     legacy: bool = False
@@ -47,7 +48,7 @@ class BoardShow(_Show, frozen=True, tag="board"):
         square_m = 1e-3 * self.square_mm
         if self.pattern == "chessboard":
             return Chessboard(across, down, square_m)
-        marker_m = 0.75 * square_m if self.marker_mm is None else 1e-3 * self.marker_mm
+        marker_m = MARKER_SHARE * square_m if self.marker_mm is None else 1e-3 * self.marker_mm
         return CharucoBoard(across, down, square_m, marker_m, self.dictionary, self.legacy)
 
 

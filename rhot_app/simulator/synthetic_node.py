@@ -19,7 +19,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, FINGERS, HandPose
-from rhot_app.project import Broadcast, CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.project import Broadcast, CameraCalibration, CameraPose, Intrinsics, Rig, RigNode
 from rhot_node.clock import NodeClock
 from rhot_node.errors import WireError
 from rhot_node.files import resource_path
@@ -58,6 +58,7 @@ def synthetic_rig(node_count: int = 2, baseline_m: float = 0.075) -> Rig:
         for k, name in enumerate(names))
     return Rig(name="synthetic", nodes=nodes, markers=load_markers(resource_path("markers", "rhot6.json")),
                hand=load_hand(resource_path("hands", "right.json")),
+               calibration=CameraCalibration("exact", error_m=0.0),
                broadcast=Broadcast("127.255.255.255", _free_port()))  # heard on this machine only
 
 

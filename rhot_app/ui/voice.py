@@ -24,14 +24,16 @@ def look_of(controller: Controller) -> Look:
 
 
 def notices_of(controller: Controller, passing: Sequence[Notice] = ()) -> list[Notice]:
-    """The sentences of the moment: those that pass by, the app's own, then the engine's; a quiet one when there is
-    nothing to say."""
+    """The sentences of the moment: those that pass by, the app's own, then the engine's; a quiet one beside those that
+    last when there is nothing else to say, so that the bar keeps its height."""
     told = {notice.text for notice in passing}
-    notices = [*passing, *(notice for notice in _lasting_notices(controller) if notice.text not in told)]
-    return notices or [Notice("info", _quiet_sentence(controller))]
+    notices = [*passing, *(notice for notice in _notices(controller) if notice.text not in told)]
+    if all(notice.lasting for notice in notices):
+        notices.append(Notice("info", _quiet_sentence(controller, in_order=not notices)))
+    return notices
 
 
-def _lasting_notices(controller: Controller) -> list[Notice]:
+def _notices(controller: Controller) -> list[Notice]:
     notices: list[Notice] = []
     if controller.engine_gone:
         notices.append(_engine_notice(controller))
@@ -55,8 +57,9 @@ def _advice_notice(advice: Advice) -> Notice:
     """The engine's sentence, with the wizard that mends it as a button."""
     wizard = wizard_named(advice.mender)
     if wizard is None:
-        return Notice(advice.level, advice.text)
-    return Notice(advice.level, advice.text, f"{wizard.title} …", f"{OPEN_WIZARD}{wizard.module}")
+        return Notice(advice.level, advice.text, lasting=advice.lasting)
+    action = "Calibrate …" if advice.lasting else f"{wizard.title} …"
+    return Notice(advice.level, advice.text, action, f"{OPEN_WIZARD}{wizard.module}", advice.lasting)
 
 
 def _pace_notice(pace: TwinPace) -> Notice:
@@ -71,7 +74,7 @@ def _engine_notice(controller: Controller) -> Notice:
     return Notice("error", f"The engine stopped and could not be started again.{reason}", "Try again", RESTART_ENGINE)
 
 
-def _quiet_sentence(controller: Controller) -> str:
+def _quiet_sentence(controller: Controller, *, in_order: bool) -> str:
     if controller.opened is None and controller.working:
         return "One moment. Cancel ends what was started."
     if controller.opened is None:
@@ -79,4 +82,4 @@ def _quiet_sentence(controller: Controller) -> str:
     if not controller.running:
         return "Press Start, or the space bar, to begin tracking."
     look = look_of(controller)
-    return "Everything is in order." if look.tone == "good" else look.meaning
+    return "Everything is in order." if look.tone == "good" and in_order else look.meaning

@@ -8,12 +8,16 @@ from pathlib import Path
 from typing import Literal
 
 import msgspec
+import numpy as np
 import pytest
 
 from rhot_app.__main__ import main
+from rhot_app.calibration.camera_calibration import calibration_error
+from rhot_app.calibration.camera_calibration import with_lens as with_lens_of
 from rhot_app.calibration.rig_checks import check_rig
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import (
+    CameraCalibration,
     CameraPose,
     Intrinsics,
     OneEuroSettings,
@@ -37,7 +41,8 @@ def change(struct: object, **fields: object) -> object:
 def rig() -> Rig:
     """A rig as a calibration leaves it."""
     template = load_rig(resource_path("rigs", "two_pis.json"))
-    return with_nodes(template, lambda node: change(node, intrinsics=LENS))
+    calibrated = change(template, calibration=CameraCalibration("board", "ruler", 5e-4))
+    return with_nodes(calibrated, lambda node: change(node, intrinsics=LENS))  # type: ignore[arg-type]
 
 
 def with_nodes(rig: Rig, edit: Callable[[RigNode], object], only: str = "") -> Rig:
@@ -67,7 +72,39 @@ def test_a_rig_that_nobody_calibrated_is_not_called_good() -> None:
     assert report.verdict.codes == {"nominal"}
     assert report.verdict.grade is Grade.FAIR
     trusting = check_rig(with_tracker(load_rig(resource_path("rigs", "two_pis.json")), "model"))
-    assert trusting.verdict.codes == {"nominal", "tracker"}
+    assert trusting.verdict.codes == {"nominal"} and "model tracker" in trusting.verdict.findings[0].sentence
+
+
+def test_cameras_that_nobody_put_together_are_not_called_good(rig: Rig) -> None:
+    lenses_only = change(rig, calibration=None)
+    assert check_rig(lenses_only).verdict.codes == {"nominal_poses"}  # type: ignore[arg-type]
+    turned = with_right_at(lenses_only, 0.075, 0.0, 0.0, turn=(0.99995, 0.01, 0.0, 0.0))  # type: ignore[arg-type]
+    assert not check_rig(turned).verdict.codes, "an older file that records nothing is not blamed"
+    assert not calibration_error(turned).known and "does not say how well" in calibration_error(turned).reason
+
+
+def test_a_lens_found_anew_makes_the_places_of_the_cameras_outdated(rig: Rig) -> None:
+    after = with_lens_of(rig, "left", change(LENS, fx=540.0))  # type: ignore[arg-type]
+    assert after.nodes[0].intrinsics.fx == 540.0 and after.nodes[1] == rig.nodes[1]
+    assert check_rig(after).verdict.codes == {"outdated_poses"} and not calibration_error(after).known
+    assert with_lens_of(change(rig, calibration=None), "left", LENS).calibration is None  # type: ignore[arg-type]
+
+
+def test_lengths_that_nobody_checked_are_named(rig: Rig) -> None:
+    skipped = change(rig, calibration=CameraCalibration("board", error_m=5e-4))
+    verdict = check_rig(skipped).verdict  # type: ignore[arg-type]
+    assert verdict.codes == {"lengths_unproven"} and verdict.grade is Grade.FAIR
+    assert verdict.findings[0].figure == "Lengths were never checked against a ruler."
+
+
+def test_the_error_by_the_calibration_grows_with_the_square_of_the_distance(rig: Rig) -> None:
+    error = calibration_error(rig)
+    places = np.array([[0.0375, 0.0, 0.6], [0.0375, 0.0, 1.2], [np.nan, 0.0, 0.6]])
+    assert error.at(places)[:2] == pytest.approx([5e-4, 2e-3]) and np.isnan(error.at(places)[2])
+    exact = change(rig, calibration=CameraCalibration("exact"))
+    assert calibration_error(exact).at(places)[0] == 0.0  # type: ignore[arg-type]
+    unknown = calibration_error(load_rig(resource_path("rigs", "two_pis.json")))
+    assert not unknown.known and np.isnan(unknown.at(places)).all()
 
 
 LENSES: list[tuple[str, Grade, dict[str, object]]] = [
@@ -128,7 +165,7 @@ def test_markers_hand_filters_and_ports_are_looked_at(rig: Rig) -> None:
 
 def test_a_rig_that_measures_disparity_needs_no_lenses(rig: Rig) -> None:
     blind = with_lens(change(rig, depth=change(rig.depth, mode="disparity")), fx=3.6)  # type: ignore[arg-type]
-    assert check_rig(blind).verdict.grade is Grade.GOOD
+    assert check_rig(blind).verdict.codes == {"disparity"}
 
 
 @pytest.mark.parametrize("kind", ["classic", "model"])
@@ -165,6 +202,7 @@ def test_the_command_says_it_and_ends_with_code_2(rig: Rig, tmp_path: Path, caps
     told = json.loads(capsys.readouterr().out)
     assert told["grade"] == "good"
     assert told["pairs"][0]["baseline_mm"] == 75.0
+    assert told["calibration"] == "with a board, ± 0.50 mm at 0.6 m; lengths checked by a ruler"
     save_rig(path, with_right_at(rig, -0.075, 0.0, 0.0))
     assert main(["check", str(path)]) == 2
     assert "calibrated from mirrored pictures" in capsys.readouterr().out

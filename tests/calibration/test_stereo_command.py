@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import shutil
 from pathlib import Path
@@ -15,6 +16,8 @@ from stereo_pictures import FOLDER, needs_pictures, picture
 
 from rhot_app import rig_history
 from rhot_app.__main__ import main
+from rhot_app.calibration.board import STANDARD_BOARD, CharucoBoard
+from rhot_app.calibration.commands.board_arguments import add_board_arguments, board_of
 from rhot_app.project import load_rig, save_rig
 from rhot_node.files import resource_path
 
@@ -58,7 +61,30 @@ def test_all_pairs_make_a_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     left, right = load_rig(out).nodes
     assert right.pose.translation_m[0] == pytest.approx(0.0998, abs=6e-4)
     assert (left.intrinsics.fx, left.intrinsics.width) == (pytest.approx(answer["cameras"][0]["fx"]), 640)
+    record = load_rig(out).calibration
+    assert record is not None and (record.method, record.lengths) == ("board", "baseline")
+    assert record.error_m == pytest.approx(1e-3 * answer["expected_error_mm"]["by_calibration"])
     assert main(["check", str(out)]) == 0
+
+
+def test_without_a_second_length_the_rig_says_that_none_was_checked(tmp_path: Path,
+                                                                    capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "rig.json"
+    assert stereo(FOLDER, "--out", str(out)) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("Usable, not good") and "Lengths were never checked against a ruler." in printed
+    record = load_rig(out).calibration
+    assert record is not None and record.lengths == "skipped"
+    assert main(["check", str(out)]) == 0
+    assert "Lengths were never checked against a ruler." in capsys.readouterr().out
+
+
+def test_the_board_is_the_one_of_rhot_target_where_nobody_names_another() -> None:
+    parser = argparse.ArgumentParser()
+    add_board_arguments(parser)
+    assert board_of(parser.parse_args([])) == STANDARD_BOARD
+    assert board_of(parser.parse_args(["--square-mm", "24.6"])).square_m == pytest.approx(0.0246)
+    assert board_of(parser.parse_args(["--marker-mm", "20"])) == CharucoBoard(10, 7, 0.025, 0.02)
 
 
 def test_a_rig_that_was_there_is_kept_and_nothing_else_in_it_changes(pictures: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.board import CharucoBoard, Chessboard
+from rhot_app.calibration.board import STANDARD_BOARD, CharucoBoard, Chessboard
 from rhot_app.calibration.corners import detect
 from rhot_app.calibration.target import PAPERS_MM, RULER_MM, draw_target
 from rhot_app.calibration.target_drawing import Drawing
@@ -112,3 +112,9 @@ def test_the_command_writes_and_refuses(tmp_path: Path, capsys: pytest.CaptureFi
         assert main(["target", *arguments]) == 2
         assert sentence in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["board.pdf"]
+
+
+@pytest.mark.parametrize("paper", ["A4", "letter"])
+def test_the_standard_board_goes_on_the_paper_that_people_have(paper: str) -> None:
+    drawing = draw_target(STANDARD_BOARD, paper)
+    assert Chessboard(9, 6, 0.025) == STANDARD_BOARD and drawing.width == PAPERS_MM[paper][1]

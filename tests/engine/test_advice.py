@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import msgspec
 import pytest
 
-from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice, tracker_advice
+from rhot_app.calibration.rig_checks import check_rig
+from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
 from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import NodeStatus
-from rhot_app.project import load_rig, with_tracker
+from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig, with_tracker
 from rhot_node.files import resource_path
 
 IDS = ("thumb", "index", "wrist")
@@ -71,8 +73,25 @@ def test_one_sentence_when_nobody_sees_anything() -> None:
     assert no_marker_advice([blind, WELL], running=True) == []
 
 
-def test_lenses_that_nobody_calibrated_are_no_lenses_to_be_sure_of() -> None:
+def test_lenses_that_nobody_calibrated_are_said_once_and_as_rhot_check_says_it() -> None:
     rig = load_rig(resource_path("rigs", "two_pis.json"))
-    assert tracker_advice(with_tracker(rig, "classic")) == []
-    (advice,) = tracker_advice(with_tracker(rig, "model"))
-    assert "left and right" in advice.text and "Calibrate" in advice.text
+    (advice,) = calibration_advice(rig)
+    assert advice.text.startswith("Not calibrated: millimetres are not reliable. The lenses of left and right")
+    assert (advice.level, advice.mender, advice.lasting) == ("warning", "lens", True)
+    assert [finding.sentence for finding in check_rig(rig).verdict.findings] == [advice.text]
+    (advice,) = calibration_advice(with_tracker(rig, "model"))
+    assert "model tracker" in advice.text
+
+
+def test_a_rig_known_exactly_and_one_that_was_calibrated_need_no_words() -> None:
+    rig = load_rig(resource_path("rigs", "two_pis.json"))
+    for calibration in (CameraCalibration("exact", error_m=0.0), CameraCalibration("board", "ruler", 5e-4)):
+        lens = Intrinsics(640, 480, 533.0, 533.5, 320.1, 238.0, (-0.28, 0.09, 0.001, 0.0, 0.0))
+        turned = CameraPose((0.99995, 0.01, 0.0, 0.0), (0.075, 0.0, 0.0))
+        nodes = tuple(msgspec.structs.replace(node, intrinsics=lens) for node in rig.nodes)
+        nodes = (nodes[0], msgspec.structs.replace(nodes[1], pose=turned))
+        calibrated = msgspec.structs.replace(rig, nodes=nodes, calibration=calibration)
+        assert calibration_advice(calibrated) == [] == list(check_rig(calibrated).verdict.findings)
+    unproven = msgspec.structs.replace(calibrated, calibration=CameraCalibration("board", "skipped", 5e-4))
+    (advice,) = calibration_advice(unproven)
+    assert advice.text.startswith("Lengths were never checked against a ruler.") and advice.mender == "stereo"

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 from patience import eventually
 
@@ -96,6 +97,25 @@ def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
     assert ended.returncode == 0
     assert f"the log is over: {summary['states']} states in" in ended.stdout
     kept_replay_serves_on(log_path, place)
+
+
+def test_an_engine_with_an_uncalibrated_rig_says_so_once_and_tells_its_clients(tmp_path: Path) -> None:
+    rig_path, place = tmp_path / "rig.json", tmp_path / "e"
+    save_rig(rig_path, msgspec.structs.replace(synthetic_rig(), calibration=None))
+    command = [sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path), "--directory", str(place)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as engine:
+        assert engine.stderr is not None
+        while "serves clients" not in engine.stderr.readline():
+            assert engine.poll() is None
+        assert engine.stderr.readline().startswith("rhot: Not calibrated: millimetres are not reliable.")
+        with EngineClient(place) as client:
+            eventually(lambda: client.poll(0.05) is not None and client.status is not None)
+            assert client.status is not None
+            told = [advice for advice in client.status.advice if advice.text.startswith("Not calibrated")]
+            assert len(told) == 1 and told[0].lasting and told[0].mender == "lens"
+        engine.send_signal(signal.SIGTERM)
+        assert engine.wait(10) == 0
+        assert engine.stderr.read() == ""
 
 
 def kept_replay_serves_on(log_path: Path, place: Path) -> None:

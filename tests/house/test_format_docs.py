@@ -18,8 +18,8 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 PAGES: tuple[tuple[str, str, int, tuple[type[msgspec.Struct], ...]], ...] = (
     ("rig.md", project.FORMAT, project.VERSION, (
-        project.Rig, project.RigNode, project.Intrinsics, project.CameraPose, project.Broadcast, project.FilterSettings,
-        project.OneEuroSettings)),
+        project.Rig, project.RigNode, project.Intrinsics, project.CameraPose, project.CameraCalibration,
+        project.Broadcast, project.FilterSettings, project.OneEuroSettings)),
     ("markers.md", markers.FORMAT, markers.VERSION, (
         markers.MarkerSet, markers.Marker, markers.ChromaModel, markers.RangeModel)),
     ("calibration-files.md", intrinsics_file.FORMAT, intrinsics_file.VERSION, (

@@ -8,7 +8,7 @@ import cv2
 import msgspec
 import numpy as np
 
-from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.board import STANDARD_BOARD
 from rhot_app.calibration.corners import detect
 from rhot_app.simulator.pictures import PicturesFile, picture_times, take_pictures
 from rhot_app.simulator.scene import make_scene, twin_defaults
@@ -21,7 +21,7 @@ def test_board_pictures_show_the_board_at_its_true_place(tmp_path: Path) -> None
     shot = make_shot(make_scene(twin_defaults(), 3), BoardShow(), 1.0)
     take_pictures(shot, tmp_path / "take", 2)
     truth, times = load_thing_truth(tmp_path / "take" / "truth.npz"), picture_times(shot, 2)
-    board = Chessboard(9, 6, 0.03)
+    board = STANDARD_BOARD
     for index, name in enumerate(("left", "right")):
         for number, t_s in enumerate(times):
             picture = cv2.imread(str(tmp_path / "take" / name / f"{number:03d}.png"))

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.board import STANDARD_BOARD
 from rhot_app.calibration.corners import detect
 from rhot_app.errors import CalibrationError, SimulatorError
 from rhot_app.simulator.frame_socket import FrameSocket
@@ -81,7 +81,7 @@ def test_a_board_takes_the_hands_place_and_begins_with_a_pause(rig: Rig) -> None
     rig.ask(ShowRequest(BoardShow(on_table=True)))
     picture = rig.frame()[1]
     assert np.abs(picture - hand).mean() > 5.0
-    view = detect(np.ascontiguousarray(picture), Chessboard(9, 6, 0.03))
+    view = detect(np.ascontiguousarray(picture), STANDARD_BOARD)
     assert view is not None and len(view.pixels) == 54
     rig.ask(ShowRequest(MarkerShow(distance_m=0.4)))
     assert rig.stage.perform(StateRequest())["name"] == "marker thumb at 0.4 m"

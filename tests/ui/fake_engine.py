@@ -17,30 +17,32 @@ import cv2
 import msgspec
 import numpy as np
 
+from rhot_app.engine.advice import calibration_advice
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, parse_rig
+from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode, parse_rig
 from rhot_app.rig_history import accept
 from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 from rhot_node.wire.messages import MarkerFlag
 
+EXACT = CameraCalibration("exact", error_m=0.0)
 NOISE_M = np.array([0.0001, 0.0001, 0.0006])
 _STAGE_S = (0.0031, 0.0004, 0.0042, 0.00006, 0.00009, 0.00021, 0.00008, 0.0006)
 
 
-def synthetic_rig(name: str = "test bench") -> Rig:
-    """Two cameras 75 mm apart, the six-colour marker set, an adult right hand."""
+def synthetic_rig(name: str = "test bench", calibration: CameraCalibration | None = EXACT) -> Rig:
+    """Two cameras 75 mm apart, known exactly unless `calibration` says otherwise, six colours, an adult right hand."""
     lens = Intrinsics(width=640, height=480, fx=530.0, fy=530.0, cx=319.5, cy=239.5)
     nodes = (RigNode(node_id=1, name="left", intrinsics=lens),
              RigNode(node_id=2, name="right", intrinsics=lens, pose=CameraPose(translation_m=(0.075, 0.0, 0.0))))
     return Rig(name=name, nodes=nodes, markers=load_markers(resource_path("markers", "rhot6.json")),
-               hand=load_hand(resource_path("hands", "right.json")))
+               hand=load_hand(resource_path("hands", "right.json")), calibration=calibration)
 
 
 def world_from_palm(t_s: float) -> np.ndarray:
@@ -182,7 +184,8 @@ class FakeEngine:
         return EngineStatus(
             t_master_ns=round(t_s * 1e9), pid=4242, session=self.session, running=self.running,
             condition=self.condition().value, rig_name=self.rig.name, rig_path=self.rig_path,
-            state_rate_hz=self.rate_hz if self.running else 0.0, nodes=nodes, advice=self.advice,
+            state_rate_hz=self.rate_hz if self.running else 0.0, nodes=nodes,
+            advice=(*self.advice, *calibration_advice(self.rig)),
             latency={stage: LatencySummary(value, 1.4 * value)
                      for stage, value in zip(LATENCY_STAGES, _STAGE_S, strict=True)},
             log_path=self.log_path, log_bytes=120_000 if self.log_path else 0)

@@ -11,7 +11,7 @@ from screen_pictures import SIZE, UPDATE, check, colours_in, picture_of
 from two_hands_engine import TwoHandsEngine
 
 from rhot_app.engine.status import Advice
-from rhot_app.project import TrackerSettings
+from rhot_app.project import TrackerSettings, load_rig
 from rhot_app.sources.discovery import Search, conflicts, together
 from rhot_app.sources.find_socket import Sighting
 from rhot_app.sources.pairing import Introduction, NodeAddress
@@ -20,6 +20,7 @@ from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.nodes_dialog import NodesDialog
 from rhot_app.ui.pair_dialog import PairDialog
 from rhot_app.ui.rig_dialog import RigDialog
+from rhot_node.files import resource_path
 from rhot_node.presence import Presence
 from rhot_node.wire.messages import NodeState, TrustState
 
@@ -108,6 +109,19 @@ def test_what_is_real(make_bench):
     dialog = bench.window.dialogs.tracker
     bench.until(dialog.size_button.isEnabled)
     check("tracker", dialog.grab().toImage(), 12)
+
+
+def test_not_calibrated(make_bench):
+    rig = load_rig(resource_path("rigs", "two_pis.json"))
+    bench = make_bench(FakeBackend(FakeEngine(rig, running=False)))
+    bench.window.resize(SIZE)
+    bench.until(lambda: bench.window.welcome.twin_button.isVisible())
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.window.toolbar.badge.word == "TRACKING" and len(bench.window.advice.texts) == 2)
+    bench.run(8.0 if UPDATE else 0.5)
+    bench.window.screen_parts.scene.frame_hand()
+    bench.run(0.7)
+    check("not-calibrated", picture_of(bench.window), 80)
 
 
 def test_two_hands(make_bench):

@@ -21,11 +21,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check and report; exit code 2 when the rig cannot be tracked with."""
+    from rhot_app.calibration.camera_calibration import calibration_text
     from rhot_app.calibration.rig_checks import check_rig
     from rhot_app.project import load_rig
 
-    report = check_rig(load_rig(args.rig))
-    tell(_fields(report), _lines(report), report.verdict, as_json=args.json)
+    rig = load_rig(args.rig)
+    report, calibration = check_rig(rig), calibration_text(rig)
+    tell({**_fields(report), "calibration": calibration}, [*_lines(report), f"cameras calibrated: {calibration}"],
+         report.verdict, as_json=args.json)
     return 0 if report.verdict.acceptable else 2
 
 

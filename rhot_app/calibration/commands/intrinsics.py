@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; files are written only when the verdict allows it."""
+    from rhot_app.calibration.camera_calibration import with_lens
     from rhot_app.calibration.intrinsics import solve
     from rhot_app.calibration.intrinsics_file import save_intrinsics
     from rhot_app.calibration.views import matching_files, read_views
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         save_intrinsics(args.out, report)
         written.append(str(args.out))
     if report.verdict.acceptable and rig is not None:
-        accept(args.rig, _with_lens(rig, args, report), f"intrinsics of {args.node}")
+        accept(args.rig, with_lens(rig, args.node, report.intrinsics), f"intrinsics of {args.node}")
         written.append(str(args.rig))
     return show(fields_of(report), lines_of(report), report.verdict, as_json=args.json, written=", ".join(written))
 
@@ -116,14 +117,6 @@ def _rig(args: argparse.Namespace) -> Rig | None:
     if args.node not in names:
         raise CalibrationError(f"{args.rig} has no camera {args.node!r}; its cameras are {', '.join(names)}.")
     return rig
-
-
-def _with_lens(rig: Rig, args: argparse.Namespace, report: IntrinsicsReport) -> Rig:
-    import msgspec
-
-    nodes = tuple(msgspec.structs.replace(node, intrinsics=report.intrinsics) if node.name == args.node else node
-                  for node in rig.nodes)
-    return msgspec.structs.replace(rig, nodes=nodes)
 
 
 def _finite(value: float) -> float | None:

@@ -40,6 +40,7 @@ def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
         "ruler_mm": None if figures.ruler is None else {
             "said": figures.ruler.said_m * 1e3, "measured": figures.ruler.measured_m * 1e3,
             "std": figures.ruler.std_m * 1e3},
+        "lengths": figures.lengths,
         "table": None if frame is None else _table(frame),
     }
 

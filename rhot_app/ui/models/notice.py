@@ -10,9 +10,11 @@ Level = Literal["info", "warning", "error"]
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """One sentence, with the next step as a button when `action` names one (`key` tells which)."""
+    """One sentence, with the next step as a button when `action` names one (`key` tells which). A `lasting` one keeps a
+    line of its own below the others."""
 
     level: Level
     text: str
     action: str = ""
     key: str = ""
+    lasting: bool = False

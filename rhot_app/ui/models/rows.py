@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rhot_app.calibration.camera_calibration import KNOWN_EXACTLY, CalibrationError
 from rhot_app.engine.status import NodeStatus
 from rhot_app.tracking.state import HandState, Knowledge
-from rhot_app.ui.models.spread import sd_number, sd_text, worst_sd
+from rhot_app.ui.models.spread import UNKNOWN, sd_number, sd_text, total_sd, worst_sd
 from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look
 
 DASH = "–"
@@ -66,19 +67,20 @@ class MarkerRow:
     look: Look
     knowledge: Look
     position: str
-    spread: str  # mm, one sigma along the worst axis; "" when it is not known
+    spread: str  # mm, one sigma along the worst axis; "?" for an unknown calibration, "" when not estimated
     detail: str
 
 
-def marker_rows(state: HandState) -> list[MarkerRow]:
+def marker_rows(state: HandState, by_calibration: CalibrationError = KNOWN_EXACTLY) -> list[MarkerRow]:
     """Rows of all markers, in the rig's order."""
     rows = []
-    placed = np.isfinite(state.marker_positions).all(axis=1)
-    spreads = np.where(placed, worst_sd(state.marker_covariances), np.nan)
+    estimated = np.isfinite(state.marker_positions).all(axis=1) & np.isfinite(worst_sd(state.marker_covariances))
+    spreads = total_sd(state.marker_covariances, state.marker_positions, by_calibration)
     for index, name in enumerate(state.marker_ids):
         known = KNOWLEDGE[Knowledge(int(state.marker_knowledge[index]))]
         rows.append(MarkerRow(name, marker_look(state, index), known, position_text(state.marker_positions[index]),
-                              sd_number(float(spreads[index])), marker_detail(state, index)))
+                              (sd_number(float(spreads[index])) or UNKNOWN) if estimated[index] else "",
+                              marker_detail(state, index, by_calibration)))
     return rows
 
 
@@ -89,12 +91,16 @@ def position_text(position: np.ndarray) -> str:
     return ", ".join(f"{value * 1e3:.0f}" for value in position) + " mm"
 
 
-def marker_detail(state: HandState, marker: int) -> str:
+def marker_detail(state: HandState, marker: int, by_calibration: CalibrationError = KNOWN_EXACTLY) -> str:
     """Tooltip of one marker: position, its standard deviation per axis, epipolar error."""
     lines = [f"x, y, z: {position_text(state.marker_positions[marker])}"]
     variances = np.diagonal(state.marker_covariances[marker])
-    if np.isfinite(variances).all() and (variances >= 0).all():
-        lines.append("± " + ", ".join(f"{math.sqrt(v) * 1e3:.2f}" for v in variances) + " mm (one sigma)")
+    if not by_calibration.known:
+        lines.append(by_calibration.reason)
+    elif np.isfinite(variances).all() and (variances >= 0).all():
+        more = float(by_calibration.at(state.marker_positions[marker]))
+        lines.append("± " + ", ".join(f"{math.hypot(math.sqrt(v), more) * 1e3:.2f}" for v in variances)
+                     + " mm (one sigma)" + (f", {1e3 * more:.2f} mm of it by the calibration" if more > 0.0 else ""))
     if np.isfinite(state.epipolar_error_px[marker]):
         lines.append(f"epipolar error {state.epipolar_error_px[marker]:.2f} px")
     return "\n".join(lines)
@@ -108,9 +114,9 @@ def angle_text(angle_rad: float, sd_rad: float = math.nan) -> str:
     return f"{round(math.degrees(angle_rad))}{spread}°"
 
 
-def palm_text(state: HandState) -> str:
-    """How well the palm is known, e.g. "± 0.40 mm, ± 1.2°", worst axes; "" when that is not estimated."""
-    place = sd_text(float(worst_sd(state.palm_covariance[:3, :3])))
+def palm_text(state: HandState, by_calibration: CalibrationError = KNOWN_EXACTLY) -> str:
+    """How well the palm is known, e.g. "± 0.40 mm, ± 1.2°", worst axes; "" when that is not known."""
+    place = sd_text(float(total_sd(state.palm_covariance[:3, :3], state.world_from_palm[:3, 3], by_calibration)))
     turn = math.degrees(float(worst_sd(state.palm_covariance[3:, 3:])))
     return f"{place}, ± {turn:.1f}°" if place and math.isfinite(turn) else ""
 

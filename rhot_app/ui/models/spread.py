@@ -7,6 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.camera_calibration import CalibrationError
+
+UNKNOWN = "?"
+"""Stands for a standard deviation that nobody knows, because nobody knows how good the calibration is."""
+
 Array = NDArray[np.float64]
 
 
@@ -18,6 +23,12 @@ def worst_sd(covariances: Array) -> Array:
     known = np.asarray(np.isfinite(covariances).all(axis=(-2, -1)))
     values = np.linalg.eigvalsh(np.where(known[..., None, None], covariances, 0.0))[..., -1]
     return np.asarray(np.where(known, np.sqrt(np.maximum(values, 0.0)), np.nan))
+
+
+def total_sd(covariances: Array, positions: Array, by_calibration: CalibrationError) -> Array:
+    """Standard deviation (...,) m of places (..., 3) m along the worst axis, the calibration's own included; NaN where
+    either is not known."""
+    return np.asarray(np.hypot(worst_sd(covariances), by_calibration.at(positions)))
 
 
 def sd_number(sd_m: float) -> str:

@@ -51,8 +51,10 @@ def size_settled(state: HandState | None) -> bool:
     return state is not None and size_known(state) and state.hand_scale_sd <= SETTLED_SD
 
 
-def scale_text(state: HandState) -> str:
-    """E.g. "1.03 ± 0.02" with the digits that mean something."""
+def scale_text(state: HandState, *, known: bool = True) -> str:
+    """E.g. "1.03 ± 0.02" with the digits that mean something; not `known` how sure: "1.03"."""
+    if not known:
+        return f"{state.hand_scale:.2f}"
     digits = 2 if state.hand_scale_sd >= 0.005 else 3
     return f"{state.hand_scale:.{digits}f} ± {max(state.hand_scale_sd, 10.0**-digits):.{digits}f}"
 

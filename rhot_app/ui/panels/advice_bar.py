@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QToolBar, QVBoxLayout, QWidget
@@ -17,7 +19,7 @@ _LEAST_PX = 34
 
 
 class AdviceBar(QWidget):
-    """Up to three sentences, the gravest first; a quiet one when there is nothing to say."""
+    """Up to three sentences, the gravest first, below them one that lasts; a quiet one when there is nothing to say."""
 
     acted = Signal(str)
 
@@ -61,8 +63,7 @@ class AdviceBar(QWidget):
 
     def show_notices(self, notices: list[Notice]) -> None:
         """Show these sentences instead of the last ones."""
-        order = {"error": 0, "warning": 1, "info": 2}
-        chosen = sorted(notices, key=lambda notice: order[notice.level])[:SHOWN]
+        chosen = chosen_of(notices)
         if chosen == self._shown:
             return
         self._shown = chosen
@@ -99,6 +100,14 @@ class AdviceBar(QWidget):
     def _act(self, index: int) -> None:
         if self._shown is not None and index < len(self._shown):
             self.acted.emit(self._shown[index].key)
+
+
+def chosen_of(notices: Sequence[Notice]) -> list[Notice]:
+    """Those that are shown. A lasting one keeps the lowest line: the bar grows upwards, so nothing else moves it."""
+    order = {"error": 0, "warning": 1, "info": 2}
+    ordered = sorted(notices, key=lambda notice: order[notice.level])
+    lasting = [notice for notice in ordered if notice.lasting][:1]
+    return [*[notice for notice in ordered if not notice.lasting][:SHOWN - len(lasting)], *lasting]
 
 
 def toolbar_of(advice: AdviceBar, parent: QWidget) -> QToolBar:

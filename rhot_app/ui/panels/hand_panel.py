@@ -8,6 +8,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QPainter
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
+from rhot_app.calibration.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState, Knowledge
@@ -68,6 +69,7 @@ class HandPanel(QWidget):
         self.setProperty("guide", "hand")
         self._scheme = scheme
         self.choice = HandChoice(scheme)
+        self._by_calibration = KNOWN_EXACTLY
         self.cells: list[AngleCell] = []
         self._grid = QGridLayout()
         self._grid.setHorizontalSpacing(2)
@@ -145,17 +147,20 @@ class HandPanel(QWidget):
     def show_rig(self, rig: Rig | None) -> None:
         """Hands of another rig, of which nothing is known yet."""
         self.choice.show_hands(hand_names(rig))
+        self._by_calibration = calibration_error(rig)
+        self.palm.setToolTip("\n".join(filter(None, (tip("palm"), tip("hand size"), self._by_calibration.reason))))
         self.show_state(None)
 
     def show_state(self, state: HandState | None) -> None:
         """The angles of `state`, of its other hand when that is chosen; None shows dashes."""
         self.choice.show_state(state)
         state = self.choice.chosen(state)
+        known = self._by_calibration.known
         for k, cell in enumerate(self.cells):
             if state is None:
                 cell.show_angle(math.nan, math.nan, Knowledge.UNKNOWN)
             else:
-                cell.show_angle(float(state.angles[k]), float(state.angle_sd[k]),
+                cell.show_angle(float(state.angles[k]), float(state.angle_sd[k]) if known else math.nan,
                                 Knowledge(int(state.angle_knowledge[k])))
         self._show_palm(state)
 
@@ -165,9 +170,10 @@ class HandPanel(QWidget):
         if state is None:
             text = DASH
         else:
-            text = ", ".join(part for part in (KNOWLEDGE[knowledge].word, palm_text(state)) if part)
+            text = ", ".join(part for part in (KNOWLEDGE[knowledge].word, palm_text(state, self._by_calibration))
+                             if part)
             if size_known(state):
-                text += f"; size {scale_text(state)}"
+                text += f"; size {scale_text(state, known=self._by_calibration.known)}"
         if text != self.palm.text():
             self.palm.setText(text)
             look = KNOWLEDGE[knowledge]

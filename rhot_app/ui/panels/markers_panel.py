@@ -6,6 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
+from rhot_app.calibration.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.glossary import tip
@@ -52,6 +53,7 @@ class MarkersPanel(QWidget):
         self.setToolTip(tip("marker"))
         self._scheme = scheme
         self._rig: Rig | None = None
+        self._by_calibration = KNOWN_EXACTLY
         self._lines: list[tuple[ShapeMark, QLabel, QLabel]] = []
         self._shown: list[MarkerRow | None] = []
         self.empty = EmptyState("No rig is open.")
@@ -74,16 +76,17 @@ class MarkersPanel(QWidget):
 
     def show_rig(self, rig: Rig | None) -> None:
         """Lines for another marker set."""
-        self._rig = rig
+        self._rig, self._by_calibration = rig, calibration_error(rig)
+        meaning = "\n".join(part for part in (tip("worst axis"), self._by_calibration.reason) if part)
         while (item := self._grid.takeAt(0)) is not None:
             if (widget := item.widget()) is not None:
                 widget.deleteLater()
         self._lines = []
         self.empty.setVisible(rig is None)
         if rig is not None:
-            self._grid.addWidget(_muted("± mm", tip("worst axis")), 0, 2)
+            self._grid.addWidget(_muted("± mm", meaning), 0, 2)
         for row, marker in enumerate(rig.markers.markers if rig is not None else (), start=1):
-            mark, spread, word = ShapeMark(12), _muted("", tip("worst axis")), _muted("", "")
+            mark, spread, word = ShapeMark(12), _muted("", meaning), _muted("", "")
             spread.setMinimumWidth(spread.fontMetrics().horizontalAdvance("0.00"))
             self._grid.addWidget(Swatch(hex_of(marker.display_rgb), self._scheme.muted), row, 0)
             self._grid.addWidget(QLabel(short_name(marker.id)), row, 1)
@@ -98,7 +101,7 @@ class MarkersPanel(QWidget):
         """What is known of each marker; None where there is no state: the nodes are `running` and see nothing, or they
         are not."""
         absent = _UNSEEN if running else _IDLE
-        rows = marker_rows(state) if state is not None else []
+        rows = marker_rows(state, self._by_calibration) if state is not None else []
         for k, (mark, spread, word) in enumerate(self._lines):
             row = rows[k] if k < len(rows) else None
             if row is not None and row == self._shown[k]:

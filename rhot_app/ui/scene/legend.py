@@ -20,12 +20,13 @@ _PAD_PX = 8.0
 _GAP_PX = 8.0
 
 
-def ellipsoid_text(choice: EllipsoidChoice | None, *, cut: bool) -> str:
-    """What an ellipsoid shows, "" when none is drawn."""
+def ellipsoid_text(choice: EllipsoidChoice | None, *, cut: bool, pictures_alone: bool = False) -> str:
+    """What an ellipsoid shows, "" when none is drawn; `pictures_alone`: the calibration's own error is not in it."""
     if choice is None or not choice.any:
         return ""
     size = "true size" if choice.factor == 1 else f"drawn {choice.factor} × larger"
-    return f"{SIGMAS:.0f} sigma, {size}" + (f", cut at {1e3 * LARGEST_M:.0f} mm" if cut else "")
+    sigma = f"{SIGMAS:.0f} sigma of the pictures alone" if pictures_alone else f"{SIGMAS:.0f} sigma"
+    return f"{sigma}, {size}" + (f", cut at {1e3 * LARGEST_M:.0f} mm" if cut else "")
 
 
 class Legend:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.camera_calibration import CalibrationError
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.ui.models.hands import each_hand
 from rhot_app.ui.models.rows import position_text, short_name
-from rhot_app.ui.models.spread import sd_text, worst_sd
+from rhot_app.ui.models.spread import sd_text, total_sd
 from rhot_app.ui.models.words import KNOWLEDGE
 from rhot_app.ui.scene.hand_mesh import TIPS
 
@@ -30,12 +31,12 @@ class Spot:
     place: Array
     covariance: Array
 
-    @property
-    def text(self) -> str:
+    def text(self, by_calibration: CalibrationError) -> str:
         """Its tooltip."""
-        spread = sd_text(float(worst_sd(self.covariance)))
+        spread = sd_text(float(total_sd(self.covariance, self.place, by_calibration)))
+        unknown = by_calibration.reason or "its uncertainty is not estimated"
         lines = [f"{self.name}: {KNOWLEDGE[self.knowledge].word}",
-                 f"{spread} along the worst axis (one sigma)" if spread else "its uncertainty is not estimated",
+                 f"{spread} along the worst axis (one sigma)" if spread else unknown,
                  f"x, y, z: {position_text(self.place)}"]
         return "\n".join(lines)
 

@@ -10,6 +10,7 @@ from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtGui import QHelpEvent, QKeyEvent, QMatrix4x4, QPainter, QResizeEvent, QVector3D
 from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 
+from rhot_app.calibration.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.hands import each_hand, hand_names
@@ -52,6 +53,7 @@ class SceneView(GLViewWidget):
         self.setAccessibleName("Three-dimensional scene of the hand and the cameras")
         self._scheme = scheme
         self._rig: Rig | None = None
+        self._by_calibration = KNOWN_EXACTLY
         self._state: HandState | None = None
         self._in_rig: HandState | None = None
         self._actors: Actors | None = None
@@ -74,7 +76,7 @@ class SceneView(GLViewWidget):
 
     def show_rig(self, rig: Rig | None) -> None:
         """Another rig: other cameras, markers and hands. None shows the empty floor."""
-        self._rig = rig
+        self._rig, self._by_calibration = rig, calibration_error(rig)
         self._state = self._in_rig = None
         self._rebuild()
 
@@ -167,7 +169,7 @@ class SceneView(GLViewWidget):
         places = to_display(camera_like(np.array([spot.place for spot in found]), self._up))
         pixels = pixels_of(places, self._projection(), (self.width(), self.height()))
         number = nearest(pixels, (at.x(), at.y()))
-        return "" if number is None else found[number].text
+        return "" if number is None else found[number].text(self._by_calibration)
 
     def _projection(self) -> QMatrix4x4:
         return self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()
@@ -244,5 +246,6 @@ class SceneView(GLViewWidget):
             self._labels.paint_apart(painter, matrix, size, to_display(self._state.marker_positions),
                                      [short_name(name) for name in self._state.marker_ids], style)
         if self._actors is not None:
-            text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self._actors.cut)
+            text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self._actors.cut,
+                                  pictures_alone=self._by_calibration.sd_m != 0.0)
             self._legend.paint(painter, self.height(), self._scheme, text)

@@ -8,9 +8,11 @@ from rhot_app.ui.wizards.models.known_step import KnownStep
 from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.page import Page
 
+SKIP = "Skip: lengths stay unproven"
+
 
 class KnownPage(Page):
-    """Two lengths in mm; 0 says that it was not measured."""
+    """Two lengths in mm; 0 says that it was not measured. With neither, a person must say so."""
 
     def __init__(self, step: KnownStep) -> None:
         super().__init__(step)
@@ -28,13 +30,23 @@ class KnownPage(Page):
         self.hold.setAutoDefault(False)
         self.hold.clicked.connect(self._hold)
         self.column.addLayout(form)
+        self.skip = QPushButton(SKIP)
+        self.skip.setToolTip("If the size of the squares was typed wrong, every length is wrong by the same factor "
+                             "and nothing will tell.")
+        self.skip.setAutoDefault(False)
+        self.skip.clicked.connect(self._skip)
         self.column.addWidget(self.hold)
+        self.column.addWidget(self.skip)
         self.column.addStretch(1)
         for box in (self.baseline, self.ruler):
             box.valueChanged.connect(self._take)
 
     def _take(self) -> None:
         self._known.set_lengths(self.baseline.value(), self.ruler.value())
+        self.changed.emit()
+
+    def _skip(self) -> None:
+        self._known.skip(not self._known.skipped)
         self.changed.emit()
 
     def _hold(self) -> None:
@@ -46,7 +58,9 @@ class KnownPage(Page):
         self._known.pick(camera, x, y)
 
     def show_view(self, view: StepView) -> None:
-        """The button says what it would do."""
+        """The button says what it would do; there is nothing to skip once a length is known."""
+        self.skip.setEnabled(not view.done)
+        self.skip.setText("Do not skip" if self._known.skipped and not view.done else SKIP)
         self.hold.setEnabled(self.ruler.value() > 0.0)
         self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.board import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.corners import BoardView, detect
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid, rotation_from_quaternion
 from rhot_app.project import Rig
@@ -26,7 +26,7 @@ def board_texture(board: Chessboard) -> np.ndarray:
 
 def compile_search() -> None:
     """The search for boards is compiled at its first use; tests that wait for it would wait too long."""
-    board = Chessboard(9, 6, 0.03)
+    board = STANDARD_BOARD
     detect(cv2.resize(board_texture(board), (320, 240), interpolation=cv2.INTER_AREA), board, thorough=False)
 
 

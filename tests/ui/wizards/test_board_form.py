@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from board_scene import BoardScene, compile_search
 from fake_engine import synthetic_rig
+from msgspec.structs import replace as replace_fields
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QDesktopServices
 from wizard_rig import FakeMemory
 
-from rhot_app.calibration.board import CharucoBoard, Chessboard
+from rhot_app.__main__ import main
+from rhot_app.calibration.board import STANDARD_BOARD, CharucoBoard, Chessboard
 from rhot_app.calibration.board_size_check import Beyond
 from rhot_app.ui.wizards.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.feed import Picture
-from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep, fields_from
+from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep, fields_from, remembered_fields
 from rhot_app.ui.wizards.models.drawing import Dots
+
+MEASURED = BoardFields(square_mm=25.0)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -25,7 +32,7 @@ def compiled():
 
 @pytest.fixture
 def scene():
-    scene = BoardScene(synthetic_rig(), Chessboard(9, 6, 0.03))
+    scene = BoardScene(synthetic_rig(), STANDARD_BOARD)
     scene.place((0.1, -0.2, 0.05), (0.04, 0.0, 0.6))
     return scene
 
@@ -35,14 +42,17 @@ def pictures_of(scene):
 
 
 def test_fields_make_boards():
-    assert BoardFields().board() == Chessboard(9, 6, 0.03)
+    assert BoardFields().board() == STANDARD_BOARD == Chessboard(9, 6, 0.025)
+    assert BoardFields(square_mm=24.6).board() == Chessboard(9, 6, 0.0246)
+    assert BoardFields(square_mm=24.6).to_print() == STANDARD_BOARD
     charuco = BoardFields("charuco", 8, 6, 25.0, 20.0, "DICT_5X5_100", True).board()
     assert charuco == CharucoBoard(8, 6, 0.025, 0.02, "DICT_5X5_100", legacy=True)
 
 
 def test_fields_are_remembered_and_nonsense_is_forgotten():
     fields = BoardFields("charuco", 8, 6, 25.0, 18.0)
-    assert fields_from(fields.to_text()) == fields
+    assert remembered_fields(fields.to_text()) == fields
+    assert fields_from(fields.to_text()) == replace_fields(fields, square_mm=None, marker_mm=None)
     assert fields_from("") == BoardFields() == fields_from("{\"kind\": 3}")
 
 
@@ -52,7 +62,7 @@ def test_an_impossible_board_is_a_sentence():
 
 
 def test_the_board_is_confirmed_by_what_is_seen(scene):
-    step = BoardStep(BoardFields())
+    step = BoardStep(MEASURED)
     assert step.view().done and step.view().sentence.endswith("show it to check.")
     step.take(step.see(pictures_of(scene)))
     view = step.view()
@@ -64,18 +74,18 @@ def test_the_board_is_confirmed_by_what_is_seen(scene):
 
 
 def test_a_smaller_count_is_found_out(scene):
-    step = BoardStep(BoardFields(cols=8))
+    step = BoardStep(BoardFields(cols=8, square_mm=25.0))
     for _ in range(3):
         step.take(step.see(pictures_of(scene)))
     assert "9x6" in step.view().hint
     seen_before = step.see(pictures_of(scene))
-    step.change(BoardFields(cols=9))
+    step.change(BoardFields(cols=9, square_mm=25.0))
     step.take(seen_before)
     assert step.view().hint == "", "what was seen of another board is past"
 
 
 def test_squares_that_go_on_forbid_the_count(scene):
-    step = BoardStep(BoardFields())
+    step = BoardStep(MEASURED)
     sight = step.see(pictures_of(scene))
     for _ in range(3):
         step.take(replace(sight, beyond=(Beyond(column=True, row=False),) * 2))
@@ -84,7 +94,7 @@ def test_squares_that_go_on_forbid_the_count(scene):
 
 
 def test_a_larger_count_is_explained(scene):
-    step = BoardStep(BoardFields(cols=10, rows=7))
+    step = BoardStep(BoardFields(cols=10, rows=7, square_mm=25.0))
     step.take(step.see(pictures_of(scene)))
     assert "seems to have 9x6" in step.view().hint
     scene.world_from_board = None
@@ -96,17 +106,63 @@ def test_a_board_without_a_right_way_up_is_told():
     assert "180°" in BoardStep(BoardFields(cols=8, rows=6)).view().hint
 
 
-def test_the_page_hides_what_a_chessboard_has_not_and_undoes(qtbot, themed):
-    memory = FakeMemory()
+def test_a_board_that_nobody_measured_is_shown_but_not_done(scene):
     step = BoardStep(BoardFields())
-    page = BoardPage(step, memory)
+    step.take(step.see(pictures_of(scene)))
+    view = step.view()
+    assert not view.may_go_on and view.sentence == "Measure the squares and type their size."
+    assert set(view.overlays) == {"left", "right"}, "the person sees that it is the right one"
+
+
+@pytest.fixture
+def page(qtbot, themed):
+    page = BoardPage(BoardStep(fields_from("")), FakeMemory())
     qtbot.addWidget(page)
     page.show()
+    return page
+
+
+def test_the_page_hides_what_a_chessboard_has_not_and_undoes(qtbot, page):
+    step = page.step
     assert not page.marker.isVisible() and not page.legacy.isVisible()
     page.kind.setCurrentIndex(1)
-    page.square.setValue(20.0)
-    assert page.marker.isVisible() and page.marker.value() == 15.0, "the marker went along with its square"
-    assert step.fields.kind == "charuco" and fields_from(memory[MEMORY]) == step.fields
-    assert step.undo()
+    assert (page.cols.value(), page.rows.value()) == (10, 7), "the usual board of that kind is as large"
+    qtbot.keyClicks(page.square, "20")
+    assert page.marker.isVisible() and page.marker.placeholderText() == "15", "the marker goes along with its square"
+    assert step.board == CharucoBoard(10, 7, 0.02, 0.015)
+    assert remembered_fields(page._memory[MEMORY]) == step.fields
+    while step.undo():
+        pass
     page.show_view(step.view())
-    assert page.square.value() == 30.0 and fields_from(memory[MEMORY]).square_mm == 30.0
+    assert page.square.text() == "" and page.kind.currentData() == "chessboard"
+
+
+def test_what_was_measured_last_is_offered_and_not_filled_in(qtbot, page):
+    qtbot.keyClicks(page.square, "x24,6")
+    assert page.square.value == page.step.fields.square_mm == 24.6, "what is no number cannot be typed"
+    again = BoardPage(BoardStep(fields_from(page._memory[MEMORY])), page._memory)
+    qtbot.addWidget(again)
+    assert again.square.text() == "" and "24.6" in again.square.placeholderText()
+    again.cols.setValue(8)
+    assert remembered_fields(page._memory[MEMORY]).square_mm == 24.6, "until something else is measured"
+
+
+def test_the_board_is_printed_as_rhot_target_draws_it(qtbot, page, tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: opened.append(Path(url.toLocalFile())) or True)
+    qtbot.keyClicks(page.square, "24.6")  # what was measured is not what is drawn
+    qtbot.mouseClick(page.print_button, Qt.MouseButton.LeftButton)
+    (path,) = opened
+    assert path.is_relative_to(tmp_path) and str(path) in page.note.text()
+    by_command = tmp_path / "board.pdf"
+    assert main(["target", "chessboard", "--out", str(by_command)]) == 0
+    assert path.read_bytes() == by_command.read_bytes()
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: False)
+    qtbot.mouseClick(page.print_button, Qt.MouseButton.LeftButton)
+    assert "opens no PDF" in page.note.text() and str(path) in page.note.text()
+
+
+def test_a_board_too_large_for_the_paper_is_a_sentence(qtbot, page):
+    page.cols.setValue(20)
+    qtbot.mouseClick(page.print_button, Qt.MouseButton.LeftButton)
+    assert "does not fit on A4" in page.note.text()

@@ -13,7 +13,7 @@ from PySide6.QtCore import Qt
 from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
-from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.board import STANDARD_BOARD
 from rhot_app.project import Intrinsics, load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.lens import LAST, make_plan
@@ -23,14 +23,14 @@ from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.window import WizardWindow
 
 TRUE_F = 530.0
-PLACES = [((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)), ((0.0, 0.0, 0.0), (-0.17, -0.1, 0.5)),
-          ((0.0, 0.0, 0.0), (0.17, -0.1, 0.5)), ((0.0, 0.0, 0.0), (-0.17, 0.1, 0.5)),
-          ((0.0, 0.0, 0.0), (0.17, 0.1, 0.5)), ((0.3, 0.2, 0.0), (0.0, 0.0, 0.34)),
-          ((0.6, 0.0, 0.0), (0.0, 0.05, 0.5)), ((-0.6, 0.0, 0.1), (0.0, -0.05, 0.5)),
-          ((0.0, 0.6, 0.0), (0.08, 0.0, 0.5)), ((0.0, -0.6, 0.0), (-0.08, 0.0, 0.5)),
-          ((0.5, 0.5, 0.3), (-0.1, 0.08, 0.5)), ((-0.5, 0.5, 0.0), (0.1, 0.08, 0.5)),
-          ((0.5, -0.5, 0.0), (-0.1, -0.08, 0.5)), ((-0.5, -0.5, 0.3), (0.1, -0.08, 0.5)),
-          ((0.4, 0.0, 0.6), (-0.1, 0.0, 0.5)), ((0.0, 0.4, -0.4), (0.1, 0.0, 0.5))]
+PLACES = [((0.0, 0.0, 0.0), (0.0, 0.0, 0.417)), ((0.0, 0.0, 0.0), (-0.142, -0.083, 0.417)),
+          ((0.0, 0.0, 0.0), (0.142, -0.083, 0.417)), ((0.0, 0.0, 0.0), (-0.142, 0.083, 0.417)),
+          ((0.0, 0.0, 0.0), (0.142, 0.083, 0.417)), ((0.3, 0.2, 0.0), (0.0, 0.0, 0.283)),
+          ((0.6, 0.0, 0.0), (0.0, 0.042, 0.417)), ((-0.6, 0.0, 0.1), (0.0, -0.042, 0.417)),
+          ((0.0, 0.6, 0.0), (0.067, 0.0, 0.417)), ((0.0, -0.6, 0.0), (-0.067, 0.0, 0.417)),
+          ((0.5, 0.5, 0.3), (-0.083, 0.067, 0.417)), ((-0.5, 0.5, 0.0), (0.083, 0.067, 0.417)),
+          ((0.5, -0.5, 0.0), (-0.083, -0.067, 0.417)), ((-0.5, -0.5, 0.3), (0.083, -0.067, 0.417)),
+          ((0.4, 0.0, 0.6), (-0.083, 0.0, 0.417)), ((0.0, 0.4, -0.4), (0.083, 0.0, 0.417))]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -40,7 +40,7 @@ def compiled():
 
 @pytest.fixture
 def scene():
-    return BoardScene(synthetic_rig(), Chessboard(9, 6, 0.03))
+    return BoardScene(synthetic_rig(), STANDARD_BOARD)
 
 
 @pytest.fixture
@@ -72,6 +72,7 @@ def show(hands, scene, place):
 
 def test_from_the_board_to_a_saved_lens(hands, scene):
     scene.place(*PLACES[0])
+    hands.type(hands.window.page.square, "25")
     hands.until(lambda: hands.sentence == "Seen by left: this is the board.")
     assert not hands.window.frame.wall.views["right"].isVisible(), "one camera at a time, as large as can be"
     hands.next()
@@ -98,6 +99,7 @@ def test_from_the_board_to_a_saved_lens(hands, scene):
 
 
 def test_space_takes_a_view_and_undo_gives_it_back(hands, scene):
+    hands.type(hands.window.page.square, "25")
     hands.next()
     scene.place(*PLACES[0])
     hands.until(lambda: len(hands.window.step.views) == 1)
@@ -110,6 +112,7 @@ def test_space_takes_a_view_and_undo_gives_it_back(hands, scene):
 
 
 def test_another_camera_begins_anew(hands, scene):
+    hands.type(hands.window.page.square, "25")
     hands.next()
     scene.place(*PLACES[0])
     hands.until(lambda: len(hands.window.step.views) == 1)

@@ -6,13 +6,14 @@ import msgspec
 import numpy as np
 import pytest
 from board_scene import BoardScene, compile_search
-from fake_engine import synthetic_rig
+from fake_engine import EXACT, synthetic_rig
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
-from rhot_app.calibration.board import Chessboard
+from rhot_app.calibration.board import STANDARD_BOARD, Chessboard
+from rhot_app.calibration.rig_checks import check_rig
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
@@ -50,7 +51,7 @@ def compiled():
 
 @pytest.fixture
 def scene():
-    return BoardScene(synthetic_rig(), Chessboard(9, 6, 0.03))
+    return BoardScene(synthetic_rig(), STANDARD_BOARD)
 
 
 @pytest.fixture
@@ -81,6 +82,7 @@ def show_all_places(hands, scene, most=99):
 
 def test_from_the_board_to_a_saved_rig(hands, scene):
     scene.place(*PLACES[0])
+    hands.type(hands.window.page.square, "25,0")
     hands.until(lambda: hands.sentence == "Seen by left and right: this is the board.")
     hands.next()
     show_all_places(hands, scene)
@@ -99,6 +101,7 @@ def test_from_the_board_to_a_saved_rig(hands, scene):
     hands.until(lambda: hands.sentence == "The table is known: press Next.")
     hands.next()
     texts = [hands.window.page.table.item(0, column).text() for column in range(3)]
+    assert load_rig(hands.path).calibration == EXACT, "nothing is written yet"
     assert texts[0] == "left to right: distance" and texts[1] == "60.00 mm"
     assert float(texts[2].split(" ± ")[0]) == pytest.approx(75.0, abs=0.2)
     assert np.linalg.norm(hands.asker.rig.nodes[1].pose.translation_m) == pytest.approx(0.06)
@@ -107,12 +110,64 @@ def test_from_the_board_to_a_saved_rig(hands, scene):
     left, right = load_rig(hands.path).nodes
     baseline = np.linalg.norm(np.subtract(right.pose.translation_m, left.pose.translation_m))
     assert baseline == pytest.approx(TRUE_BASELINE_M, abs=0.0003)
+    record = load_rig(hands.path).calibration
+    assert (record.method, record.lengths) == ("board", "baseline") and 0.0 < record.error_m < 2e-3
     assert left.pose.translation_m[2] > 0.1, "the camera stands above the table"
     assert rotation_from_quaternion(left.pose.rotation_wxyz)[2, 2] < 0.0, "and looks down on it"
 
 
+def test_nobody_gets_past_the_board_without_measuring_it(hands, scene):
+    scene.place(*PLACES[0])
+    page, button = hands.window.page, hands.window.frame.next_button
+    assert page.square.text() == "" and "measure" in page.square.placeholderText()
+    hands.until(lambda: len(hands.window.step._views) == 2)
+    assert not button.isEnabled() and hands.sentence == "Measure the squares and type their size."
+    assert "Next waits for the size" in hands.window.frame.hint.text()
+    hands.key(Qt.Key.Key_Return)
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert hands.title == "Your board"
+    hands.type(page.square, "24.6")
+    hands.until(button.isEnabled)
+    hands.next()
+    assert hands.window.step.board == Chessboard(9, 6, 0.0246)
+    hands.click(hands.window.frame.back_button)
+    assert page.square.text() == "24.6", "going back loses nothing"
+    page.square.clear()
+    hands.until(lambda: not button.isEnabled())
+
+
+def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(hands, scene):
+    hands.type(hands.window.page.square, "25")
+    hands.next()
+    show_all_places(hands, scene)
+    hands.next()
+    page, button = hands.window.page, hands.window.frame.next_button
+    hands.run(0.3)
+    assert hands.title == "A known length" and not button.isEnabled() and "Skip" in hands.window.frame.hint.text()
+    hands.click(page.skip)
+    hands.until(button.isEnabled)
+    hands.click(page.skip)
+    hands.until(lambda: not button.isEnabled(), timeout_s=5.0)
+    hands.click(page.skip)
+    hands.until(button.isEnabled)
+    assert hands.sentence == "Lengths stay unproven: press Next."
+    hands.next()
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=30.0)
+    assert hands.window.frame.verdict.verdict.codes >= {"lengths_unproven"}
+    hands.next()
+    hands.next()
+    assert any("never checked against a ruler" in hands.window.page.table.item(row, 2).text()
+               for row in range(hands.window.page.table.rowCount()))
+    hands.next()
+    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    saved = load_rig(hands.path)
+    assert (saved.calibration.method, saved.calibration.lengths) == ("board", "skipped")
+    assert "lengths_unproven" in check_rig(saved).verdict.codes
+
+
 def test_a_wrong_square_size_is_found_by_the_baseline(hands, scene):
-    scene.board = Chessboard(9, 6, 0.027)  # printed too small: the texture's squares are 27 mm, the form says 30
+    scene.board = Chessboard(9, 6, 0.0275)  # printed too large, and not measured
+    hands.type(hands.window.page.square, "25")
     hands.next()
     show_all_places(hands, scene)
     hands.next()
@@ -126,6 +181,7 @@ def test_a_wrong_square_size_is_found_by_the_baseline(hands, scene):
 
 
 def test_undo_forgets_the_last_shot_and_another_board_all(hands, scene):
+    hands.type(hands.window.page.square, "25")
     hands.next()
     scene.place(*PLACES[0])
     hands.until(lambda: len(hands.window.step.views.shots) == 1)
@@ -146,7 +202,7 @@ def frozen_pictures():
 
 def test_a_ruler_needs_both_ends_in_two_pictures():
     step = KnownStep(("left", "right"))
-    assert step.view().passable and step.known.ruler is None
+    assert not step.view().may_go_on and step.known.ruler is None
     step.set_lengths(0.0, 200.0)
     step.take(frozen_pictures())
     assert step.capture() and not step.view().passable
@@ -161,6 +217,7 @@ def test_a_ruler_needs_both_ends_in_two_pictures():
 
 
 def test_the_ruler_is_clicked_in_held_pictures(hands, scene):
+    hands.type(hands.window.page.square, "25")
     hands.next()
     show_all_places(hands, scene, most=5)
     hands.next()

@@ -43,6 +43,12 @@ class Hands:
         QTest.mouseClick(widget, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
                          QPoint(widget.width() // 2, widget.height() // 2))
 
+    def type(self, field, text):
+        """Click into a field and type something instead of what stands there."""
+        self.click(field)
+        field.selectAll()
+        QTest.keyClicks(field, text)
+
     def key(self, key, modifier=Qt.KeyboardModifier.NoModifier):
         QTest.keyClick(self.window, key, modifier)
 

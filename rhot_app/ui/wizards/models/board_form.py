@@ -9,10 +9,11 @@ from typing import Literal
 
 import msgspec
 
-from rhot_app.calibration.board import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard, parse_size
 from rhot_app.calibration.board_size_check import Beyond, look_beyond, size_finding
 from rhot_app.calibration.corners import BoardView, detect, to_gray
 from rhot_app.calibration.missing import why_missing
+from rhot_app.calibration.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.models.board_drawing import board_marks
@@ -22,26 +23,39 @@ DICTIONARIES = (DEFAULT_DICTIONARY, "DICT_4X4_250", "DICT_5X5_100", "DICT_5X5_25
                 "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11")
 _WHY_S = 2.0  # between looks into why no board is seen
 _JUDGED, _JUDGED_LEAST = 30, 4  # views that judge the board's size
-_USUAL_SHARE = 0.75  # of a ChArUco square that its marker fills
+UNMEASURED = "Next waits for the size of a square: every length that is measured later comes from it."
+Kind = Literal["chessboard", "charuco"]
+SIZES: dict[Kind, tuple[int, int]] = {"chessboard": parse_size(BOARD), "charuco": parse_size(CHARUCO)}
+"""Of the boards that are printed where nobody says otherwise."""
 
 
 class BoardFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What stands in the form: `cols` x `rows` are inner corners of a chessboard, squares of a ChArUco board."""
+    """What stands in the form: `cols` x `rows` are inner corners of a chessboard, squares of a ChArUco board.
 
-    kind: Literal["chessboard", "charuco"] = "chessboard"
-    cols: int = 9
-    rows: int = 6
-    square_mm: float = 30.0
-    marker_mm: float = 22.5
+    `square_mm` is None until a person has measured it: a number that stood there already would be believed. Without
+    `marker_mm` a marker is the usual share of its square.
+    """
+
+    kind: Kind = "chessboard"
+    cols: int = SIZES["chessboard"][0]
+    rows: int = SIZES["chessboard"][1]
+    square_mm: float | None = None
+    marker_mm: float | None = None
     dictionary: str = DEFAULT_DICTIONARY
     legacy: bool = False
 
     def board(self) -> Board:
-        """The board described; raises CalibrationError for one that cannot be."""
+        """The board described, of the usual size as long as it is not measured; raises CalibrationError for one that
+        cannot be."""
+        square_mm = SQUARE_MM if self.square_mm is None else self.square_mm
         if self.kind == "chessboard":
-            return Chessboard(self.cols, self.rows, 1e-3 * self.square_mm)
-        return CharucoBoard(self.cols, self.rows, 1e-3 * self.square_mm, 1e-3 * self.marker_mm, self.dictionary,
-                            self.legacy)
+            return Chessboard(self.cols, self.rows, 1e-3 * square_mm)
+        marker_mm = usual_marker_mm(square_mm) if self.marker_mm is None else self.marker_mm
+        return CharucoBoard(self.cols, self.rows, 1e-3 * square_mm, 1e-3 * marker_mm, self.dictionary, self.legacy)
+
+    def to_print(self) -> Board:
+        """The same board as it is drawn: with squares of the usual size, whatever came out of the printer."""
+        return msgspec.structs.replace(self, square_mm=None, marker_mm=None).board()
 
     def to_text(self) -> str:
         """For the app's memory."""
@@ -49,7 +63,12 @@ class BoardFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def fields_from(text: str) -> BoardFields:
-    """Fields that were remembered; the usual ones when there are none or they cannot be read."""
+    """The board that was remembered, without its measures; the usual one when there is none or it cannot be read."""
+    return msgspec.structs.replace(remembered_fields(text), square_mm=None, marker_mm=None)
+
+
+def remembered_fields(text: str) -> BoardFields:
+    """All that was remembered, the measures included."""
     try:
         return msgspec.json.decode(text, type=BoardFields)
     except msgspec.MsgspecError:
@@ -157,6 +176,9 @@ class BoardStep(Step):
         wrong = self.size_finding
         if wrong is not None:
             return StepView("Count the corners again.", hint=f"{wrong.figure} {wrong.cause}", overlays=overlays)
+        if self._fields.square_mm is None:
+            hint = " ".join(filter(None, (UNMEASURED, self._hint(len(overlays)))))
+            return StepView("Measure the squares and type their size.", hint=hint, overlays=overlays)
         return StepView(self._sentence(len(overlays)), done=True, hint=self._hint(len(overlays)), overlays=overlays)
 
     def _sentence(self, found: int) -> str:
@@ -176,4 +198,4 @@ class BoardStep(Step):
 
 def usual_marker_mm(square_mm: float) -> float:
     """The marker size that usually goes with a square."""
-    return round(_USUAL_SHARE * square_mm, 1)
+    return round(MARKER_SHARE * square_mm, 2)

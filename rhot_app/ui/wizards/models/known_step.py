@@ -11,10 +11,14 @@ from rhot_app.ui.wizards.models.drawing import Dots, Line, Overlay
 from rhot_app.ui.wizards.models.step import Pictures, Step, StepView
 
 ENDS = 2
+NEEDED = ("The scale comes from the board's squares alone; a second length finds a wrong number. Next waits for one, "
+          "or for Skip below.")
+SKIPPED = "The rig file will say that no length was checked, and so will the app."
 
 
 class KnownStep(Step):
-    """Both are optional. The ruler's ends are clicked in pictures that stand still; lengths in mm, 0 for none."""
+    """One of them is needed, or a person who knows what it means to skip it. The ruler's ends are clicked in pictures
+    that stand still; lengths in mm, 0 for none."""
 
     title = "A known length"
     watches = captures = True
@@ -27,6 +31,7 @@ class KnownStep(Step):
         self.frozen: dict[str, Picture] = {}
         self._clicks: list[tuple[str, float, float]] = []
         self._known = KnownLengths()
+        self.skipped = False
 
     @property
     def known(self) -> KnownLengths:
@@ -38,6 +43,10 @@ class KnownStep(Step):
         if (baseline_mm, ruler_mm) != (self._baseline_mm, self._ruler_mm):
             self._baseline_mm, self._ruler_mm = baseline_mm, ruler_mm
             self._renew()
+
+    def skip(self, on: bool) -> None:
+        """The person leaves the lengths unproven, or not after all."""
+        self.skipped = on
 
     def see(self, pictures: Pictures) -> Pictures:
         """Nothing to look for: a person marks the ends."""
@@ -90,10 +99,9 @@ class KnownStep(Step):
         """What to do for the ruler, if there is one."""
         overlays = {name: self._overlay(name) for name in self.cameras or ()}
         known = self._known.ruler is not None or self._known.baseline_m is not None
-        hint = ("The scale comes from the board's squares alone; a second length finds a wrong number." if not known
-                else "")
+        hint = "" if known else SKIPPED if self.skipped else NEEDED
         return StepView(self._sentence(known), done=known, hint=hint, overlays=overlays, pictures=self.frozen,
-                        passable=not self.frozen or self._known.ruler is not None, kept=int(bool(self.frozen)))
+                        passable=self.skipped and not self.frozen, kept=int(bool(self.frozen)))
 
     def _sentence(self, known: bool) -> str:
         if self.frozen and self._known.ruler is None:
@@ -102,7 +110,7 @@ class KnownStep(Step):
             return "Hold the ruler where both cameras see it, and press Space."
         if known:
             return "The scale will be checked: press Next."
-        return "Measure a second length, or press Next."
+        return "Lengths stay unproven: press Next." if self.skipped else "Measure a second length."
 
     def _overlay(self, name: str) -> Overlay:
         ends = np.array(self._ends(name)).reshape(-1, 2)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import msgspec
 import numpy as np
 
+from rhot_app.calibration.camera_calibration import with_lens
 from rhot_app.calibration.intrinsics import IntrinsicsReport, solve
 from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M
 from rhot_app.project import Intrinsics, Rig
@@ -115,9 +115,7 @@ def residual_marks(report: IntrinsicsReport) -> Overlay:
 
 def lens_proposal(rig: Rig, path: Path | None, camera: str, report: IntrinsicsReport) -> Proposal:
     """The rig with the new lens, and its figures beside the old ones."""
-    nodes = tuple(msgspec.structs.replace(node, intrinsics=report.intrinsics) if node.name == camera else node
-                  for node in rig.nodes)
-    after = msgspec.structs.replace(rig, nodes=nodes)
+    after = with_lens(rig, camera, report.intrinsics)
     reason = f"{REASON} {camera}"
     afterwards = ("Calibrate the other cameras' lenses, then put the cameras together: their places were found with "
                   "the old lens.") if len(rig.nodes) > 1 else ""

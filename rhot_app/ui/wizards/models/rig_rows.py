@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rhot_app.calibration.camera_calibration import calibration_text
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode
 from rhot_app.ui.models.tracker_words import settings_text
@@ -50,6 +51,7 @@ def _cameras(rig: Rig) -> Iterator[tuple[str, str]]:
         yield from place_figures(node).items()
         yield f"{node.name}: time offset", f"{1e3 * node.time_offset_s:.2f} ms"
         yield f"{node.name}: address", f"{node.address}:{node.control_port}"
+    yield "cameras calibrated", calibration_text(rig)
 
 
 def _markers(rig: Rig) -> Iterator[tuple[str, str]]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rhot_app.calibration.camera_calibration import lengths_text
 from rhot_app.calibration.stereo_report import WORKING_DISTANCE_M, PairFigures, StereoFigures, StereoReport
 from rhot_app.calibration.stereo_rig import calibrated_rig, rig_findings
 from rhot_app.calibration.verdict import judge
@@ -39,6 +40,7 @@ def _rows(before: Rig, after: Rig, figures: StereoFigures) -> tuple[Row, ...]:
     rows.append(Row("corners, rms", "", f"{figures.rms_px:.2f} px"))
     rows.append(Row("squares, measured", f"{1e3 * figures.board.square_m:.2f} mm by ruler",
                     f"{1e3 * figures.squares.mean_m:.2f} mm"))
+    rows.append(Row("lengths", lengths_text(before), lengths_text(after)))
     by_calibration, by_noise = (1e3 * error for error in figures.error_m)
     rows.append(Row(f"error expected at {WORKING_DISTANCE_M:g} m", "", f"{by_calibration:.2f} mm by the calibration, "
                     f"{by_noise:.2f} mm by noise"))
