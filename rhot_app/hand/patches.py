@@ -73,8 +73,11 @@ _LENGTHS_MM: dict[Patch, float] = {"nail": NAIL_LENGTH_MM, "pulp": DOT_MM, "ring
 def paint_middle(marker: Marker, model: HandModel, finger: int) -> tuple[float, float]:
     """The marker's place on a finger's last segment, m: along the bone from its end, and out of the back of the finger.
 
-    Of paint all round it lies on the bone's axis. Of a nail or a dot it is the middle of the patch as seen from
-    straight before it: on the skin, and a little under its highest point, because skin is round.
+    Of paint all round it lies on the bone's axis. Of a nail or a dot it lies in the plane of the patch's rim, under the
+    skin, which bulges: the image of a patch is the area within the image of its rim, so that its centroid is that of
+    the rim's plane from whichever side the whole patch is seen. With the height z of the skin over the patch and a
+    line of sight (v, 0, 1), the centroid is at mean((x - v z) (1 - v z_x)) / mean(1 - v z_x): at mean(x), and going
+    with v as a point at the height mean(z) + cov(x, z_x) does. The skin's two directions are averaged.
     """
     along, half_axis = segment_axis(model, finger)
     patch = patch_of(marker, model, finger)
@@ -82,13 +85,14 @@ def paint_middle(marker: Marker, model: HandModel, finger: int) -> tuple[float, 
         return along, 0.0
     steps = np.linspace(-1.0, 1.0, _GRID)
     x, y = np.meshgrid(patch.middle + patch.half * steps, patch.half_across * steps, indexing="ij")
-    inside = (np.abs(steps[:, None]) ** patch.corners + np.abs(steps) ** patch.corners) <= 1.0
-    beyond = np.maximum(np.abs(x - along) - half_axis, 0.0)  # of the capsule's straight part
+    beyond = np.sign(x - along) * np.maximum(np.abs(x - along) - half_axis, 0.0)  # the capsule's straight part
     height2 = float(model.radii[finger, 2]) ** 2 - beyond**2 - y**2
-    on_skin = inside & (height2 > 0.0)
-    if not on_skin.any():
-        return along, patch.side * float(model.radii[finger, 2])
-    return float(x[on_skin].mean()), patch.side * float(np.sqrt(height2[on_skin]).mean())
+    inside = (np.abs(steps[:, None]) ** patch.corners + np.abs(steps) ** patch.corners <= 1.0) & (height2 > 0.0)
+    if not inside.any():  # a patch that lies beyond the segment altogether
+        return along, 0.0
+    x, y, beyond, z = x[inside], y[inside], beyond[inside], np.sqrt(height2[inside])
+    bulge = 0.5 * (np.mean((x - x.mean()) * beyond / z) + np.mean((y - y.mean()) * y / z))
+    return float(x.mean()), patch.side * float(z.mean() - bulge)
 
 
 def gap_middle(marker: Marker, mirror: float) -> float:

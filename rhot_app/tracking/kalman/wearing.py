@@ -21,7 +21,7 @@ from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
 from rhot_app.tracking.kalman.forgetting import WIDEST
 from rhot_app.tracking.kalman.habits import Habits
-from rhot_app.tracking.kalman.markers import Cameras, Outfit, Worn, outfit_of
+from rhot_app.tracking.kalman.markers import ONE_SIDED, Cameras, Outfit, Worn, outfit_of
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.rig_arrays import band_axes
 from rhot_node.markers import FLAT_PATCHES, Marker, MarkerSet
@@ -129,6 +129,8 @@ def _half_axes(marker: Marker, model: HandModel) -> Array:
 
 def _slenderness(marker: Marker, model: HandModel) -> float:
     """As `Worn.slender`. The area of a capsule with ends of radius r, l apart, is pi r^2 + 2 r l sin(angle of view)."""
+    if marker.patch in FLAT_PATCHES or marker.gap_deg > 0.0:
+        return ONE_SIDED
     if marker.role not in TIP_ROLES or marker.shape not in ("capsule", "sphere") or marker.patch != "segment":
         return -1.0
     if marker.shape == "sphere":
