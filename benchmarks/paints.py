@@ -117,7 +117,8 @@ def main() -> int:
     """Film, track, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--motion", default="wave", metavar="M", help="motion of the hand (default wave)")
-    parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="length; the first second is not judged")
+    parser.add_argument("--seconds", type=float, default=5.0, metavar="S",
+                        help="length; the first second is not judged (default 5)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the scene (default 1)")
     parser.add_argument("--only", nargs="+", choices=tuple(PAINTS), default=tuple(PAINTS), metavar="NAME",
                         help=f"which of: {', '.join(PAINTS)}")

@@ -31,7 +31,7 @@ NAIL_CORNERS, DOT_CORNERS = 4.0, 2.0
 DOT_MM, RING_MM = 8.0, 10.0
 """A dot's diameter and a ring's length where the marker set gives none."""
 
-_GRID = 41  # points per axis by which a patch's middle is found: to some micrometres
+_GRID = 40  # points per axis by which a patch's middle is found: to some micrometres
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def paint_middle(marker: Marker, model: HandModel, finger: int) -> tuple[float, 
     patch = patch_of(marker, model, finger)
     if patch is None or marker.patch not in FLAT_PATCHES:
         return along, 0.0
-    steps = np.linspace(-1.0, 1.0, _GRID)
+    steps = (2.0 * np.arange(_GRID) + 1.0) / _GRID - 1.0
     x, y = np.meshgrid(patch.middle + patch.half * steps, patch.half_across * steps, indexing="ij")
     beyond = np.sign(x - along) * np.maximum(np.abs(x - along) - half_axis, 0.0)  # the capsule's straight part
     height2 = float(model.radii[finger, 2]) ** 2 - beyond**2 - y**2

@@ -243,9 +243,9 @@ def _rest(marker: Marker, painted: _Solid) -> _Solid | None:
     if marker.rest_rgb is None:
         return None
     rest = 0.5e-3 * marker.rest_mm
-    length, *widths = painted.size
-    size = ((length - FILM_M, 0.0, 0.0) if painted.kind == CAPSULE
-            else (length + rest, *(width - FILM_M for width in widths)))
+    first, breadth, thickness = painted.size
+    size = ((first - FILM_M, 0.0, 0.0) if painted.kind == CAPSULE
+            else (first + rest, breadth - FILM_M, thickness - FILM_M))
     return replace(painted, group=REST_GROUP, marker=SKIN, size=size, rgb=marker.rest_rgb,
                    ends=painted.ends - np.array([rest, 0.0, 0.0]), bounds=painted.bounds | {GAP: 0.0}
                    if painted.kind == CAPSULE else {})

@@ -60,8 +60,9 @@ class SwayCurve:
 class Motion:
     """A moving hand. World frame is the rig frame, metres; poses are twice continuously differentiable in time.
 
-    `curve` maps (N,) s to (N, VALUES); its rotation vectors turn a hand that stands as `facing` (3, 3) says. A repeating motion starts again after `period_s`; any other stands still
-    before its start and after its end. `centre` (3,) m is where position zero puts the wrist.
+    `curve` maps (N,) s to (N, VALUES); its rotation vectors turn a hand that stands as `facing` (3, 3) says. A
+    repeating motion starts again after `period_s`; any other stands still before its start and after its end.
+    `centre` (3,) m is where position zero puts the wrist.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Which points of a painted surface have paint, and how bright it is there (numba).
 
-A point of a surface has coordinates along the solid's axis (m, from a capsule's end a, a cylinder's middle), across, and
-up, out of the back of the hand, m. `paint` (N, PAINT_FIELDS) are the rows that `body.py` describes.
+A point of a surface has coordinates along the solid's axis (m, from a capsule's end a, a cylinder's middle), across,
+and up, out of the back of the hand, m. `paint` (N, PAINT_FIELDS) are the rows that `body.py` describes.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def paint_level(paint: Array, n: int, along: float, across: float, up: float) ->
 @njit(cache=True)
 def _chance(seed: float, along: float, across: float, up: float) -> float:
     """A number from 0 to 1 that belongs to the chip at a point (a multiply and xor-shift hash)."""
-    i, j, k = int(math.floor(along / CHIP_M)), int(math.floor(across / CHIP_M)), int(math.floor(up / CHIP_M))
+    i, j, k = math.floor(along / CHIP_M), math.floor(across / CHIP_M), math.floor(up / CHIP_M)
     value = (i * 0x9E3779B1 + j * 0x85EBCA6B + k * 0xC2B2AE35 + int(seed) * 0x27D4EB2F) & 0xFFFFFFFFFFFF
     value = ((value ^ (value >> 21)) * 0x2545F491) & 0xFFFFFFFFFFFF
     value = ((value ^ (value >> 17)) * 0x27D4EB2F) & 0xFFFFFFFFFFFF

@@ -130,10 +130,9 @@ class _Eye:
             discs[:, marker, :2] = np.where(np.isfinite(pixels), self._silhouette(places, marker), np.nan)
             depth = self._local(places)[:, 2]
             discs[:, marker, 2], discs[:, marker, 3] = self._radii[marker] / depth, depth
+            discs[:, marker, 4:] = 0.0 if marker in self._patches else _drawn_out(body, placed, marker)
             if marker in self._patches:
                 discs[:, marker] *= _turned(body, placed, self._patches[marker], self._local(places))[:, None]
-            else:
-                discs[:, marker, 4:] = _drawn_out(body, placed, marker)
         return discs
 
     def _local(self, places: Array) -> Array:

@@ -26,8 +26,9 @@ _OPTION_OF = {"distance_m": "distance", "lamp.brightness": "lamp", "lamp.kelvin"
 def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments that choose the scene; shared by every command that simulates."""
     parser.add_argument("--motion", default="grasp", metavar="M",
-                        help="name of a motion (still, rest, wave, grasp, pinch, point, spread, fast, sweep, cross), a "
-                             "motion file (.json), or a recording (Qualisys .tsv, Leap Motion .csv); default grasp")
+                        help="name of a motion (still, rest, wave, grasp, pinch, point, spread, tap, fast, sweep, "
+                             "cross), a motion file (.json), or a recording (Qualisys .tsv, Leap Motion .csv); "
+                             "default grasp")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of all that is random (default 1)")
     parser.add_argument("--preset", default=None, choices=("wide", "fast"),
                         help="camera preset: wide (62.2 degrees, 40 fps) or fast (26.5 degrees, 120 fps)")
@@ -36,7 +37,8 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--background", default=None, choices=("cloth", "clutter"),
                         help="what stands behind the hand (default cloth)")
     parser.add_argument("--markers", "--marker-set", default=None, metavar="SET",
-                        help="which markers the hand wears: rhot6 (default), rhot8, rich, or a marker file (.json)")
+                        help="which markers the hand wears: rhot6 (default), rhot8, rich, nails6, or a marker file "
+                             "(.json)")
     parser.add_argument("--back", action="store_const", const="back", default=None,
                         help="the back of the hand faces the cameras (default: the palm does)")
     parser.add_argument("--worn", type=float, default=None, metavar="P",

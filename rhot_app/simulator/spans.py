@@ -91,7 +91,8 @@ def in_block(active: Indices, actives: int, spans: Indices, y: int, x: int,
 @njit(cache=True)
 def area_outside(coefficients: Array, n: int, kind: int, size: Array, paint: Array, intrinsics: Array, timing: Array,
                  width: int, height: int, limits: Indices) -> float:
-    """Area, px^2, of what is painted of solid `n` beyond the image borders, within `limits` (x0, y0, x1, y1): one ray per pixel."""
+    """Area, px^2, of what is painted of solid `n` beyond the image borders, within `limits` (x0, y0, x1, y1): one
+    ray per pixel."""
     row, prepared, up = np.empty(12), np.empty((1, len(size), PREPARED)), np.empty((1, len(size), 3))
     area, partly = 0.0, paint[n, BOUNDS] != PLAIN
     for y in range(limits[1], limits[3]):

@@ -29,8 +29,9 @@ Image = NDArray[np.float32]
 class Moving(NamedTuple):
     """N solids during one frame, painted ones first.
 
-    `series` (N, 12, NODES): their parameters in the camera's frame. `meta` (N, 3): kind, group, marker. `size` (N, 3),
-    `rgb` (N, 3), `margin` (N,), `paint` (N, PAINT_FIELDS) as in `HandBody`. `sweep` (N, 2): px travelled in x and y during the exposure.
+    `series` (N, 12, NODES): their parameters in the camera's frame. `meta` (N, 3): kind, group, marker. `size` (N,
+    3), `rgb` (N, 3), `margin` (N,), `paint` (N, PAINT_FIELDS) as in `HandBody`. `sweep` (N, 2): px travelled in x
+    and y during the exposure.
     """
 
     series: Array
@@ -262,8 +263,8 @@ def _gather(x: int, y: int, ray: Array, slot: Indices, prepared: Array, meta: In
         cosine = lambert(meta[winner, 0], prepared, slot[k], winner, ray[k, 0], ray[k, 1], depth[k], light)
         shade = 1.0 - shading * (1.0 - cosine)
         if paint[winner, UNEVEN] > 0.0:
-            along, across, above = local_point(meta[winner, 0], prepared, slot[k], winner, ray[k, 0], ray[k, 1], depth[k],
-                                               size, up)
+            along, across, above = local_point(meta[winner, 0], prepared, slot[k], winner, ray[k, 0], ray[k, 1],
+                                               depth[k], size, up)
             shade *= paint_level(paint, winner, along, across, above)
         red += shade * rgb[winner, 0]
         green += shade * rgb[winner, 1]

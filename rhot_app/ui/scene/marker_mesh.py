@@ -28,7 +28,7 @@ def colour_rows(markers: Sequence[Marker], counts: list[int], alpha: int) -> Col
 
 
 def _radius(marker: Marker) -> float:
-    """Of a marker's body, m: a flat patch is half as wide as long, and stands as little out of the skin as that allows."""
+    """Of a marker's body, m: a flat patch is half as wide as long, so that it stands little out of the skin."""
     if marker.patch in FLAT_PATCHES:
         return 0.25e-3 * marker.length_mm if marker.length_mm else _FLAT_RADIUS_M
     return 1e-3 * marker.radius_mm if marker.radius_mm else _DEFAULT_RADIUS_M
@@ -45,7 +45,7 @@ class MarkerMesh:
         self._template = capsule_template(14, 4)
         bodies = [markers.markers[k] for k in self._bodies]
         self._radii = np.array([_radius(marker) for marker in bodies])
-        long = [m.shape == "capsule" and m.patch == "segment" or m.patch in FLAT_PATCHES for m in bodies]
+        long = [(m.shape == "capsule" and m.patch == "segment") or m.patch in FLAT_PATCHES for m in bodies]
         lengths = np.where(long, [m.length_mm or 0.0 for m in bodies], 0.0)
         self._halves = np.maximum(0.5e-3 * lengths - self._radii, 0.0)
         self._tips = np.array([JOINTS.index(m.role) if m.role in TIP_ROLES else -1 for m in bodies], dtype=np.intp)
