@@ -5,8 +5,8 @@
 The twin's hand at 0.6 m, rendered, seen by the nodes' own detector, through the classic and the model tracker. Each
 paint is filmed from the sides of the hand that `PAINTS` names: `palm` or `back` towards the cameras. A table per side:
 
-    in view     share of marker frames that nothing hides from either camera, of the paint there is on that side
-    seen        share of marker frames in which both cameras see any of the paint: 0 is paint on the other side
+    in view     share of marker frames in which both cameras see nine tenths of the paint that faces them
+    tips seen   share of the fingertips' frames in which both cameras see any of their paint
     measured    share of the markers in view that the tracker calls measured
     tips, angles   fingertips called measured and angles of painted fingers, rms; tips are where the paint is
 
@@ -38,6 +38,7 @@ from rhot_node.markers import MarkerSet, load_markers, save_markers
 
 WHITE, BLACK, BLUE_GLOVE, BLACK_GLOVE = (235, 232, 225), (32, 32, 36), (60, 84, 150), (38, 38, 42)
 FLAT: dict[str, Any] = {"shape": "disc", "radius_mm": None}
+RING: dict[str, Any] = {"patch": "ring", "length_mm": 10.0, "shape": "band"}
 BOTH = ("palm", "back")
 
 
@@ -55,8 +56,8 @@ PAINTS = {
     "segment": Paint(sides=BOTH),
     "nail only": Paint(FLAT | {"patch": "nail", "length_mm": 11.0}, sides=("back", "palm")),
     "pulp dot": Paint(FLAT | {"patch": "pulp", "length_mm": 8.0}, sides=BOTH),
-    "ring": Paint({"patch": "ring", "length_mm": 10.0}, sides=BOTH),
-    "tape with gap": Paint({"patch": "ring", "length_mm": 10.0, "gap_deg": 60.0, "rest_rgb": WHITE}, sides=BOTH),
+    "ring": Paint(RING, sides=BOTH),
+    "tape with gap": Paint(RING | {"gap_deg": 60.0, "rest_rgb": WHITE}, sides=BOTH),
     "uneven 20 %": Paint(scene={"uneven_paint": 0.2}),
     "worn 30 %": Paint(scene={"worn_paint": 0.3}),
     "blue glove": Paint(scene={"glove_rgb": BLUE_GLOVE}),
@@ -77,6 +78,7 @@ def painted(paint: Paint) -> MarkerSet:
 def rows(name: str, args: argparse.Namespace, folder: Path) -> list[dict[str, Any]]:
     """A paint's figures from each of its sides."""
     paint, out = PAINTS[name], []
+    tips = [marker.role != WRIST_ROLE for marker in painted(paint).markers]
     markers = folder / f"{name.replace(' ', '-').replace('%', 'percent')}.json"
     save_markers(markers, painted(paint))
     for side in paint.sides:
@@ -88,7 +90,7 @@ def rows(name: str, args: argparse.Namespace, folder: Path) -> list[dict[str, An
         after = film.truth.cameras[0].times_s >= SETTLE_S
         parts = film.truth.visible_at(film.truth.cameras[0].times_s[after])
         out.append({"paint": name, "side": side, "in_view": float((parts >= 0.9).mean()),
-                    "seen": float((parts > 0.0).mean()),
+                    "tips_seen": float((parts[:, tips] > 0.0).mean()),
                     **{tracker: judge(film, TRACKERS[tracker]).figures for tracker in TRACKERS}})
     return out
 
@@ -97,14 +99,14 @@ def table(figures: list[dict[str, Any]]) -> str:
     """The rows of each side, whole segments first."""
     lines = []
     for side in BOTH:
-        lines += [f"{side} towards the cameras".ljust(30) + "in view   seen   measured      tips mm       angles deg",
-                  " " * 30 + "                 classic model classic model classic model"]
+        lines += [f"{side} towards the cameras".ljust(30) + "in view   tips seen   measured      tips mm       angles deg",
+                  " " * 30 + "                      classic model classic model classic model"]
         for row in (row for row in figures if row["side"] == side):
             cells = "  ".join(f"{_cell(row[tracker][key]):>6}"
                               for key in ("measured_share", "tip_measured_mm", "angles_deg")
                               for tracker in TRACKERS)
-            note = "   not seen from this side" if row["seen"] < 0.05 else ""
-            lines.append(f"{row['paint']:28}{row['in_view']:9.3f}{row['seen']:7.3f}  {cells}{note}")
+            note = "  the paint is on the other side" if row["tips_seen"] < 0.5 else ""
+            lines.append(f"{row['paint']:28}{row['in_view']:9.3f}{row['tips_seen']:12.3f}  {cells}{note}")
         lines.append("")
     return "\n".join(lines)
 
