@@ -1,6 +1,6 @@
 """Other paint than whole fingertips: what is measured, and how well, beside whole fingertips in the same motion.
 
-    python benchmarks/paints.py [--motion wave] [--seconds 5] [--seed 1] [--only NAME ...] [--logs DIR] [--json FILE]
+    python benchmarks/paints.py [--motion tap] [--seconds 4] [--seed 1] [--only NAME ...] [--logs DIR] [--json FILE]
 
 The twin's hand at 0.6 m, rendered, seen by the nodes' own detector, through the classic and the model tracker. Each
 paint is filmed from the sides of the hand that `PAINTS` names: `palm` or `back` towards the cameras. A table per side:
@@ -98,29 +98,32 @@ def rows(name: str, args: argparse.Namespace, folder: Path) -> list[dict[str, An
 def table(figures: list[dict[str, Any]]) -> str:
     """The rows of each side, whole segments first."""
     lines = []
+    heads = "".join(f"{name:>18}" for name in ("measured", "tips mm", "angles deg"))
+    kinds = "".join(f"{tracker:>9}" for tracker in TRACKERS) * 3
     for side in BOTH:
-        lines += [f"{side} towards the cameras".ljust(30) + "in view   tips seen   measured      tips mm       angles deg",
-                  " " * 30 + "                      classic model classic model classic model"]
-        for row in (row for row in figures if row["side"] == side):
-            cells = "  ".join(f"{_cell(row[tracker][key]):>6}"
-                              for key in ("measured_share", "tip_measured_mm", "angles_deg")
-                              for tracker in TRACKERS)
+        rows = [row for row in figures if row["side"] == side]
+        if rows:
+            lines += [f"{side + ' to the cameras':24}{'in view':>9}{'tips seen':>11}{heads}", f"{'':44}{kinds}"]
+        for row in rows:
+            cells = "".join(f"{_cell(row[tracker][key]):>9}"
+                            for key in ("measured_share", "tip_measured_mm", "angles_deg")
+                            for tracker in TRACKERS)
             note = "  the paint is on the other side" if row["tips_seen"] < 0.5 else ""
-            lines.append(f"{row['paint']:28}{row['in_view']:9.3f}{row['tips_seen']:12.3f}  {cells}{note}")
-        lines.append("")
+            lines.append(f"{row['paint']:24}{row['in_view']:9.3f}{row['tips_seen']:11.3f}{cells}{note}")
+        lines += [""] if rows else []
     return "\n".join(lines)
 
 
 def _cell(value: float | None) -> str:
-    return "-" if value is None or not np.isfinite(value) else f"{value:.3f}" if value < 2.0 else f"{value:.1f}"
+    return "-" if value is None or not np.isfinite(value) else f"{value:.2f}" if value < 10.0 else f"{value:.1f}"
 
 
 def main() -> int:
     """Film, track, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--motion", default="wave", metavar="M", help="motion of the hand (default wave)")
-    parser.add_argument("--seconds", type=float, default=5.0, metavar="S",
-                        help="length; the first second is not judged (default 5)")
+    parser.add_argument("--motion", default="tap", metavar="M", help="motion of the hand (default tap)")
+    parser.add_argument("--seconds", type=float, default=4.0, metavar="S",
+                        help="length; the first second is not judged (default 4)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the scene (default 1)")
     parser.add_argument("--only", nargs="+", choices=tuple(PAINTS), default=tuple(PAINTS), metavar="NAME",
                         help=f"which of: {', '.join(PAINTS)}")
