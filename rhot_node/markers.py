@@ -24,6 +24,11 @@ Positive = Annotated[float, Meta(gt=0)]
 MarkerId = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[A-Za-z0-9_.-]+$")]
 
 Shape = Literal["disc", "sphere", "capsule", "band", "blob"]
+Patch = Literal["segment", "nail", "pulp", "ring"]
+Side = Literal["dorsal", "palmar", "radial", "ulnar"]
+
+FLAT_PATCHES: Final = ("nail", "pulp")
+"""Paint on one side of a fingertip: its centre lies on the skin, not on the bone's axis."""
 
 
 class ChromaModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -63,8 +68,11 @@ class RangeModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     upper: tuple[Byte, Byte, Byte]
 
 
-class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One marker. Sizes are read by the master only; a node works without them."""
+class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """One marker. Sizes and how the paint lies are read by the master only; a node works without them.
+
+    What stands at its default is not written, so that a file without a newer field is read by older programs.
+    """
 
     id: MarkerId
     chroma: ChromaModel
@@ -74,6 +82,26 @@ class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     range: RangeModel | None = None  # for the reference detector; derived from `chroma` when absent
     radius_mm: Positive | None = None
     length_mm: Positive | None = None
+    patch: Patch = "segment"  # the part of a fingertip's last segment that is painted
+    gap_deg: Annotated[float, Meta(ge=0, le=330)] = 0.0  # of a ring or a band: the angle without the marker's colour
+    gap_side: Side = "palmar"  # where the middle of the gap lies
+    rest_rgb: tuple[Byte, Byte, Byte] | None = None  # colour of the tape or band beside the marker's; None: none there
+    rest_mm: Annotated[float, Meta(ge=0, le=200)] = 0.0  # length of the rest towards the elbow
+
+    def __post_init__(self) -> None:
+        tip, wrist = (self.role or "").endswith("_tip"), (self.role or "").removeprefix("other_") == "wrist"
+        for fault, rule in (
+                (self.patch != "segment" and not tip, f'patch "{self.patch}" is of fingertips; its role is none'),
+                (self.patch in FLAT_PATCHES and self.shape not in ("disc", "blob"),
+                 f'patch "{self.patch}" is flat; give it the shape "disc"'),
+                (self.gap_deg > 0.0 and self.patch != "ring" and not wrist,
+                 'gap_deg is of a wrist\'s band or of the patch "ring"'),
+                (self.rest_mm > 0.0 and not wrist, "rest_mm is of a wrist's band"),
+                (self.rest_mm > 0.0 and self.rest_rgb is None, "rest_mm needs rest_rgb, the rest's colour"),
+                (self.rest_rgb is not None and self.gap_deg == 0.0 and self.rest_mm == 0.0,
+                 "rest_rgb needs gap_deg or rest_mm, which say where that colour is")):
+            if fault:
+                raise ValueError(f"marker {self.id!r}: {rule}")
 
 
 class MarkerSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

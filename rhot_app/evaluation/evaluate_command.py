@@ -15,7 +15,7 @@ from rhot_node.compiled import announce_compilation
 
 _OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs")
 _JUDGED_S = 0.1  # shorter is no run
-_OF_PICTURES = ("background", "lamp", "kelvin", "mains")
+_OF_PICTURES = ("background", "worn", "uneven", "glove", "lamp", "kelvin", "mains")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

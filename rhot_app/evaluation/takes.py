@@ -39,8 +39,8 @@ Told = Callable[[str], Progress | None]
 """Says how the filming of a take goes: given what is filmed, who is told of its frames."""
 
 _SHOWN = "body", "motion", "node_log", "raycast", "recorded", "scene"
-_SEEN = (*_SHOWN, "background", "controls", "edges", "lamp", "moments", "rays", "render", "sensor", "solids_painter",
-         "spans", "trace")
+_SEEN = (*_SHOWN, "background", "controls", "edges", "lamp", "moments", "paint", "rays", "render", "sensor",
+         "solids_painter", "spans", "trace")
 _SKETCHED = (*_SHOWN, "hidden_parts", "marker_rows", "sights")
 """Modules of the twin that a take depends on besides its order: what moves, makes pictures or does without, and sends
 what was found in them."""

@@ -75,19 +75,20 @@ def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_an
     """
     local = np.empty(3)
     to_finger(world_from_palm, model.mirror, model.base[finger], model.base_rotation[finger], target, local)
-    angles = np.array(start_angles, dtype=np.float64)
+    angles, bend = np.array(start_angles, dtype=np.float64), float(model.chain_bend[finger])
     rows = ANGLE_SLICES[finger]
     mean, information = model.natural.mean[rows], model.natural.information[rows, rows]
-    residual, iterations, status = solve_arrays(angles, model.chain[finger], model.limits[rows], local, mean,
-                                                information, tolerance, max_iterations, 0.0)
-    points = np.empty((4, 3))
-    chain_points(angles, model.chain[finger], points, np.empty((3, len(angles))))
-    scale = model.bones[finger, 2] / model.marker[finger]
-    points = np.vstack([points, points[2] + scale * (points[3] - points[2])])
+    residual, iterations, status = solve_bent(angles, model.chain[finger], bend, model.limits[rows], local, mean,
+                                              information, tolerance, max_iterations, 0.0)
+    points, end, unused = np.empty((4, 3)), np.empty((4, 3)), np.empty((3, len(angles)))
+    chain_points(angles, model.bones[finger], points, unused)
+    bent = angles.copy()
+    bent[-1] += bend
+    chain_points(bent, model.chain[finger], end, unused)
+    points = np.vstack([points, end[3:]])
     palm = (model.base[finger] + points @ model.base_rotation[finger].T) * [1.0, model.mirror, 1.0]
     world = palm @ world_from_palm[:3, :3].T + world_from_palm[:3, 3]
-    return FingerSolution(angles, world[[0, 1, 2, 4]], world[3], residual, iterations, residual <= tolerance,
-                          Status(status))
+    return FingerSolution(angles, world[:4], world[4], residual, iterations, residual <= tolerance, Status(status))
 
 
 def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: float = TOLERANCE,
@@ -101,8 +102,9 @@ def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: f
     angles, residuals = np.array(pose.angles), np.empty(5)
     iterations, statuses = np.empty(5, dtype=np.int64), np.empty(5, dtype=np.uint8)
     solve_fingers_arrays(angles, pose.world_from_palm, model.mirror, model.base, model.base_rotation,
-                         model.chain, model.limits, targets, model.natural.mean, model.natural.information,
-                         tolerance, max_iterations, target_sd, residuals, iterations, statuses)
+                         model.chain, model.chain_bend, model.limits, targets, model.natural.mean,
+                         model.natural.information, tolerance, max_iterations, target_sd, residuals, iterations,
+                         statuses)
     return FingersSolution(angles, residuals, iterations, residuals <= tolerance, statuses)
 
 
@@ -123,10 +125,11 @@ def to_finger(world_from_palm: Array, mirror: float, base: Array, base_rotation:
 
 @njit(cache=True)
 def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, base: Array, base_rotation: Array,
-                         lengths: Array, limits: Array, targets: Array, mean: Array, information: Array,
-                         tolerance: float, max_iterations: int, target_sd: float, residuals: Array,
-                         iterations: NDArray[np.int64], statuses: NDArray[np.uint8]) -> None:
-    """`solve_fingers` on arrays, in place on `angles`, `residuals`, `iterations` and `statuses`."""
+                         lengths: Array, bends: Array, limits: Array, targets: Array, mean: Array,
+                         information: Array, tolerance: float, max_iterations: int, target_sd: float,
+                         residuals: Array, iterations: NDArray[np.int64], statuses: NDArray[np.uint8]) -> None:
+    """`solve_fingers` on arrays, in place on `angles`, `residuals`, `iterations` and `statuses`; `lengths` (5, 3) and
+    `bends` (5,) are the model's `chain` and `chain_bend`."""
     local = np.empty(3)
     for finger in range(5):
         residuals[finger], iterations[finger], statuses[finger] = np.nan, 0, MISSING
@@ -135,9 +138,25 @@ def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, b
         to_finger(world_from_palm, mirror, base[finger], base_rotation[finger], targets[finger], local)
         low = 0 if finger == 0 else 1 + 4 * finger
         high = 5 + 4 * finger
-        residuals[finger], iterations[finger], statuses[finger] = solve_arrays(
-            angles[low:high], lengths[finger], limits[low:high], local, mean[low:high],
+        residuals[finger], iterations[finger], statuses[finger] = solve_bent(
+            angles[low:high], lengths[finger], bends[finger], limits[low:high], local, mean[low:high],
             information[low:high, low:high], tolerance, max_iterations, target_sd)
+
+
+@njit(cache=True)
+def solve_bent(angles: Array, lengths: Array, bend: float, limits: Array, target: Array, mean: Array,
+               information: Array, tolerance: float, max_iterations: int, target_sd: float) -> tuple[float, int, int]:
+    """`solve_arrays` for a marker beside the bone, in the finger's plane: the last link is `bend` rad more bent than
+    the bone that carries it, and so are its limits and its natural angle."""
+    last = angles.shape[0] - 1
+    shifted, usual = limits.copy(), mean.copy()
+    shifted[last, 0] += bend
+    shifted[last, 1] += bend
+    usual[last] += bend
+    angles[last] += bend
+    result = solve_arrays(angles, lengths, shifted, target, usual, information, tolerance, max_iterations, target_sd)
+    angles[last] -= bend
+    return result
 
 
 @njit(cache=True)

@@ -37,6 +37,7 @@ class HandModel:
     radii: Array  # (5, 3) m
     marker: Array  # (5,) m, from the last joint along the distal bone
     chain: Array  # (5, 3) m, the bones, the last one only as far as its marker's centre
+    chain_bend: Array  # (5,) rad, how much more the way to the marker's centre bends than the bone: < 0 for a nail
     natural: NaturalPose  # of the angles, what to believe without evidence
 
 
@@ -58,6 +59,7 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
         radii=1e-3 * np.array([finger.radii_mm for finger in fingers], dtype=np.float64),
         marker=marker,
         chain=np.column_stack([bones[:, :2], marker]),
+        chain_bend=np.zeros(5),
         natural=natural_pose(),
     )
 

@@ -1,15 +1,16 @@
 """Where on the hand a marker sits, by its role: the place rides on one row of the hand's kinematic table.
 
-Roles: the five ``<finger>_tip`` (the whole last bone, painted), ``wrist`` (a band), ``palm_<finger>`` (a painted
-knuckle, which moves with the palm), ``<finger>_<bone>`` for the inner bones (a ball glued to the back of the finger,
-half-way), and ``hand_1`` to ``hand_3`` (balls on the back of the hand: below index and little knuckle, and near the
-wrist).
+Roles: the five ``<finger>_tip`` (the last segment, painted as the marker's `patch` says), ``wrist`` (a band),
+``palm_<finger>`` (a painted knuckle, which moves with the palm), ``<finger>_<bone>`` for the inner bones (a ball
+glued to the back of the finger, half-way), and ``hand_1`` to ``hand_3`` (balls on the back of the hand: below index
+and little knuckle, and near the wrist).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,9 @@ from rhot_app.errors import RigError
 from rhot_app.hand.dh import ROOT
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
+from rhot_app.hand.patches import paint_middle
 from rhot_app.hand.skeleton import ANGLES, BONES, FINGERS, JOINTS, TIP_ROLES, WRIST_ROLE
-from rhot_node.markers import Marker
+from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]
 
@@ -53,7 +55,11 @@ def place_of(marker: Marker, model: HandModel) -> Place:
     if role in TIP_ROLES:
         finger = TIP_ROLES.index(role)
         row = int(dh.point_row[len(JOINTS) + finger])
-        return Place(row, dh.point_offset[len(JOINTS) + finger].copy(), finger)
+        along, out = paint_middle(marker, model, finger)
+        point = dh.point_offset[len(JOINTS) + finger].copy()
+        if out:
+            point = np.array([along, 0.0, 0.0]) + out * dorsal(model, finger, row)
+        return Place(row, point, finger)
     if role in KNUCKLE_ROLES:
         return Place(ROOT, mirrored * model.base[KNUCKLE_ROLES.index(role)], -1)
     if role in BACK_ROLES:
@@ -63,7 +69,7 @@ def place_of(marker: Marker, model: HandModel) -> Place:
     if role in INNER_ROLES:
         finger, bone = divmod(INNER_ROLES.index(role), 2)
         row = int(dh.point_row[1 + 4 * finger + bone + 1])
-        skin = model.radii[finger, bone] * _dorsal(model, finger, row)
+        skin = model.radii[finger, bone] * dorsal(model, finger, row)
         return Place(row, np.array([-0.5 * model.bones[finger, bone], 0.0, 0.0]) + skin, finger)
     said = f"the role {marker.role!r}" if marker.role else "no role"
     raise RigError(f"marker {marker.id!r} has {said}; a hand wears markers at "
@@ -88,7 +94,23 @@ def farthest_apart(model: HandModel, places: Sequence[Place]) -> Array:
     return np.asarray((1.0 + 3.0 * _LENGTH_SD) * apart.max(axis=0))
 
 
-def _dorsal(model: HandModel, finger: int, row: int) -> Array:
+def with_markers(model: HandModel, markers: MarkerSet) -> HandModel:
+    """The model whose five marker centres, and the chains that solvers bring there, are where the fingertips of
+    `markers` are painted; fingers without paint keep theirs."""
+    offsets, chain, bend = model.dh.point_offset.copy(), model.chain.copy(), model.chain_bend.copy()
+    for marker in markers.markers:
+        if marker.role not in TIP_ROLES:
+            continue
+        finger = TIP_ROLES.index(marker.role)
+        along, out = paint_middle(marker, model, finger)
+        offsets[len(JOINTS) + finger] = place_of(marker, model).point
+        if out:
+            reach = float(model.bones[finger, 2]) + along
+            chain[finger, 2], bend[finger] = math.hypot(reach, out), -math.atan2(out, reach)
+    return replace(model, dh=model.dh._replace(point_offset=offsets), chain=chain, chain_bend=bend)
+
+
+def dorsal(model: HandModel, finger: int, row: int) -> Array:
     """(3,) unit vector out of the back of a finger, in the frame of one of its rows."""
     frames = np.empty((len(model.dh.parent), 3, 4))
     points = np.empty((len(model.dh.point_row), 3))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import build_model
 from rhot_app.simulator.board_places import board_places, held_place, table_place
-from rhot_app.simulator.body import HandBody, build_body
+from rhot_app.simulator.body import HandBody, Look, build_body
 from rhot_app.simulator.marker_path import MarkerPath, swing_reach
-from rhot_app.simulator.motion import load_motion
+from rhot_app.simulator.motion import BACK_FACING, load_motion
 from rhot_app.simulator.painter import Image, Painter, PoseSource
 from rhot_app.simulator.prop import BALL_RADIUS_M, Prop, ball_on_stick
 from rhot_app.simulator.scene import Scene
@@ -47,8 +47,11 @@ def make_act(show: Show, scene: Scene, hidden: frozenset[str] = frozenset()) -> 
     match show:
         case HandShow():
             model = build_model(scene.hand)
-            motion = load_motion(show.motion, model, scene.centre, scene.seed)
-            return Act(motion.name, build_body(model, scene.markers, hidden), motion)
+            motion, settings = load_motion(show.motion, model, scene.centre, scene.seed), scene.settings
+            if settings.facing == "back":
+                motion = replace(motion, facing=BACK_FACING)
+            look = Look(settings.worn_paint, settings.uneven_paint, settings.glove_rgb, scene.seed)
+            return Act(motion.name, build_body(model, scene.markers, hidden, look), motion)
         case BoardShow():
             return _board_act(show, scene)
         case RulerShow():

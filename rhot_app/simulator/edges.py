@@ -8,13 +8,24 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.simulator.body import REST_GROUP
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 SKIN_ID, PAINT_ID = 1, 20
-"""What a pixel shows: 0 background, then skin of the hand and of the forearm (its far end sweeps far), then markers."""
+"""What a pixel shows: 0 background, then skin of the hand and of the forearm (its far end sweeps far), tape and bands
+in other colours than a marker's, then markers."""
 
 STILL_PX = 0.02  # what moves less while exposed is taken to stand still
+
+
+@njit(cache=True, inline="always")
+def id_of(meta: Indices, n: int) -> int:
+    """What a pixel shows where solid `n` is: `meta` (N, 3) kind, group, marker."""
+    if meta[n, 2] >= 0:
+        return PAINT_ID + meta[n, 2]
+    return SKIN_ID + meta[n, 0] + (2 if meta[n, 1] == REST_GROUP else 0)
 
 
 @njit(cache=True)
@@ -22,7 +33,7 @@ def reach_by_id(meta: Indices, sweep: Array) -> Indices:
     """(128, 2) px around a change of id, by id, that the exposure may sweep."""
     reach = np.zeros((128, 2), np.int64)
     for n in range(len(meta)):
-        code = SKIN_ID + meta[n, 0] if meta[n, 2] < 0 else PAINT_ID + meta[n, 2]
+        code = id_of(meta, n)
         for axis in range(2):
             pixels = math.ceil(0.5 * sweep[n, axis]) if sweep[n, axis] > STILL_PX else 0
             reach[code, axis] = max(reach[code, axis], pixels)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 FACING = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Rotation world_from_palm of a hand that shows its palm to the cameras, fingers up (x right, y down, z away)."""
+
+BACK_FACING = np.diag([-1.0, 1.0, -1.0]) @ FACING
+"""The same of a hand that shows its back, fingers up."""
 
 WRIST_BELOW_CENTRE_M = 0.085
 """The middle of an open hand is this far from the wrist; it is what stands before the cameras at position zero."""
@@ -57,8 +60,9 @@ class SwayCurve:
 class Motion:
     """A moving hand. World frame is the rig frame, metres; poses are twice continuously differentiable in time.
 
-    `curve` maps (N,) s to (N, VALUES). A repeating motion starts again after `period_s`; any other stands still
-    before its start and after its end. `centre` (3,) m is where position zero puts the wrist.
+    `curve` maps (N,) s to (N, VALUES); its rotation vectors turn a hand that stands as `facing` (3, 3) says. A
+    repeating motion starts again after `period_s`; any other stands still before its start and after its end.
+    `centre` (3,) m is where position zero puts the wrist.
     """
 
     name: str
@@ -68,6 +72,7 @@ class Motion:
     centre: Array
     limits: Array
     sway: SwayCurve
+    facing: Array = field(default_factory=FACING.copy)
 
     def sample(self, times_s: Array) -> tuple[Array, Array]:
         """(N, 4, 4) world_from_palm and (N, 21) angles rad at scene times (N,), s; angles within their limits."""
@@ -75,7 +80,7 @@ class Motion:
         inside = np.mod(times_s, self.period_s) if self.repeats else np.clip(times_s, 0.0, self.period_s)
         values = self.curve(inside) + self.sway(times_s)
         transforms = np.tile(np.eye(4), (len(values), 1, 1))
-        transforms[:, :3, :3] = Rotation.from_rotvec(values[:, 3:6]).as_matrix() @ FACING
+        transforms[:, :3, :3] = Rotation.from_rotvec(values[:, 3:6]).as_matrix() @ self.facing
         transforms[:, :3, 3] = self.centre + values[:, :3]
         return transforms, np.clip(values[:, 6:], self.limits[:, 0], self.limits[:, 1])
 

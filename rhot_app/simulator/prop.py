@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.simulator.body import CAPSULE, PALM_GROUP, PARAMETERS, POINT_M, SKIN
+from rhot_app.simulator.body import CAPSULE, PAINT_FIELDS, PALM_GROUP, PARAMETERS, POINT_M, SKIN
 from rhot_node.markers import MarkerSet
 
 Array = NDArray[np.float64]
@@ -41,6 +41,11 @@ class Prop:
     def margin(self) -> Array:
         """(N,) m: nothing hides its own paint."""
         return np.zeros(len(self.group))
+
+    @property
+    def paint(self) -> Array:
+        """(N, PAINT_FIELDS): all of every surface."""
+        return np.zeros((len(self.group), PAINT_FIELDS))
 
     @property
     def marker_count(self) -> int:

@@ -32,6 +32,7 @@ VERSION: Final = 1
 
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
+Level = Annotated[int, Meta(ge=0, le=255)]
 Background = Literal["cloth", "clutter"]
 
 
@@ -47,7 +48,11 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Everything about the simulated rig that is not the motion. Noise: sigma of a colour channel, grey levels."""
+    """Everything about the simulated rig that is not the motion. Noise: sigma of a colour channel, grey levels.
+
+    `facing`: the side of the hand towards the cameras. `worn_paint`: share of the paint that has come off;
+    `uneven_paint`: share by which its brightness varies. `glove_rgb`: colour of the hand's skin in a glove.
+    """
 
     preset: str
     presets: dict[str, Preset]
@@ -64,6 +69,10 @@ class TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     clock_drift_ppm: Annotated[float, Meta(ge=0, le=1000)]
     hand: str
     markers: str
+    facing: Literal["palm", "back"] = "palm"
+    worn_paint: Annotated[float, Meta(ge=0, le=0.9)] = 0.0
+    uneven_paint: Annotated[float, Meta(ge=0, le=0.9)] = 0.0
+    glove_rgb: tuple[Level, Level, Level] | None = None
     lamp: Lamp = Lamp()
     controls: Controls = Controls()
     format: Literal["rhot-twin"] = FORMAT

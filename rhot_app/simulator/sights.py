@@ -2,7 +2,8 @@
 
 Each marker's silhouette is where it was at its own row's time; what other fingers and the palm hide is left out of it.
 White noise and a bias that varies slowly, mostly alike in all cameras as limb shading makes it, are added; the stated
-covariance is larger than either, as the detector's (`benchmarks/sight_errors.py`). Colours are never mixed up.
+covariance is larger than either, as the detector's (`benchmarks/sight_errors.py`). Colours are never mixed up. Paint
+on one side of a finger is a disc that is lost when it is turned away; gaps, wear and gloves are not sketched.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from scipy.interpolate import CubicSpline
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import project_normalised
 from rhot_app.hand.skeleton import WRIST_ROLE
-from rhot_app.simulator.body import CAPSULE, HandBody
+from rhot_app.simulator.body import ACROSS, BOUNDS, CAPSULE, HALF, ON_ONE_SIDE, PALM_GROUP, SIDE, HandBody
 from rhot_app.simulator.hidden_parts import spots, visible_parts
 from rhot_app.simulator.marker_rows import at_own_rows
 from rhot_app.simulator.shot import Shot, camera_seed
@@ -33,6 +34,7 @@ _WHOLE, _ENOUGH = 0.9, 0.4  # visible parts: above the first a marker is in plai
 _BIAS_GRID_S = 0.05
 _STEP, _TICK_S = 1e-4, 1e-4  # normalised, and s, of derivatives
 _RADIUS_M = 8e-3  # where the marker set gives none
+_FACES = 0.2  # cosine to the line of sight from which on a patch on one side of a finger shows
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +73,10 @@ class _Eye:
         self._rng = np.random.default_rng([scene.seed, index, 0x516])
         self._radii = np.array([1e-3 * marker.radius_mm if marker.radius_mm else _RADIUS_M
                                 for marker in scene.markers.markers])
+        self._patches = {int(body.marker[solid]): int(solid)
+                         for solid in np.flatnonzero((body.marker >= 0) & (body.paint[:, BOUNDS] == ON_ONE_SIDE))}
+        for marker, solid in self._patches.items():
+            self._radii[marker] = math.sqrt(body.paint[solid, HALF] * body.paint[solid, ACROSS])
         row_time_s = 1e-9 * scene.row_time_ns
         middle_s = self.times_s + 0.5 * self._camera.height * row_time_s
         transforms, angles = shot.act.source.sample(middle_s)
@@ -82,7 +88,9 @@ class _Eye:
         discs = self._discs(shot, body, placed, row_time_s)
         self.seen = np.empty((len(discs), body.marker_count, 3))
         groups = np.array([body.group[list(body.marker).index(marker)] for marker in range(body.marker_count)])
-        visible_parts(np.stack([body.kind, body.group], axis=1), body.size, placed, groups, discs, spots(), self.seen)
+        hides = body.group <= PALM_GROUP  # what lies under paint does not hide it
+        visible_parts(np.stack([body.kind, body.group], axis=1)[hides], body.size[hides],
+                      np.ascontiguousarray(placed[:, hides]), groups, discs, spots(), self.seen)
         self._diameters = self._sizes(discs)
         self._places = self._middles(discs) + self._biases(shot, camera_seed(scene, index))
 
@@ -101,6 +109,8 @@ class _Eye:
 
     def _shape(self, body: HandBody, marker: int, role: str | None, local: Array) -> Array:
         """(F, 3, 3) or (3, 3) m^2: the marker's ellipsoid in the camera's axes."""
+        if marker in self._patches:
+            return np.zeros((3, 3))
         if role != WRIST_ROLE:
             return self._radii[marker] ** 2 * np.eye(3)
         half_axes = body.size[list(body.marker).index(marker)]
@@ -120,7 +130,9 @@ class _Eye:
             discs[:, marker, :2] = np.where(np.isfinite(pixels), self._silhouette(places, marker), np.nan)
             depth = self._local(places)[:, 2]
             discs[:, marker, 2], discs[:, marker, 3] = self._radii[marker] / depth, depth
-            discs[:, marker, 4:] = _drawn_out(body, placed, marker)
+            discs[:, marker, 4:] = 0.0 if marker in self._patches else _drawn_out(body, placed, marker)
+            if marker in self._patches:
+                discs[:, marker] *= _turned(body, placed, self._patches[marker], self._local(places))[:, None]
         return discs
 
     def _local(self, places: Array) -> Array:
@@ -182,6 +194,14 @@ def _drawn_out(body: HandBody, placed: Array, marker: int) -> Array:
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     across = half - middle * (half[:, 2:] / middle[:, 2:])
     return np.asarray(across[:, :2] / middle[:, 2:])
+
+
+def _turned(body: HandBody, placed: Array, solid: int, places: Array) -> Array:
+    """(F,) 1 in frames in which a patch on one side of a finger, `places` (F, 3) m in the camera's frame, shows; NaN
+    where it is turned away."""
+    out = body.paint[solid, SIDE] * placed[:, solid, 6:9]
+    facing = -np.einsum("fi,fi->f", out, places) / np.linalg.norm(places, axis=1)
+    return np.where(facing > _FACES, 1.0, np.nan)
 
 
 def _slow(shot: Shot, count: int, seed: int, slow_s: float, times_s: Array) -> Array:

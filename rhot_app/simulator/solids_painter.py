@@ -26,7 +26,7 @@ class SolidsPainter:
         """`shading`: share of the brightness that depends on how a surface faces the lamp."""
         self._body, self._camera, self._shading, self._seed = body, camera, shading, seed
         self._meta = np.stack([body.kind, body.group, body.marker], axis=1)
-        self._rgb = body.rgb
+        self._rgb, self._paint = body.rgb, body.paint
         self._rays = ray_table(camera)
         self._light = light_direction(camera)
         self._canvas = canvas(background, len(body.kind), body.marker_count)
@@ -46,7 +46,8 @@ class SolidsPainter:
         body, camera = self._body, self._camera
         series = self._series(source, time)
         timing = time.timing
-        moving = Moving(series, self._meta, body.size, self._rgb, body.margin, self._sweep(series, timing[2]))
+        moving = Moving(series, self._meta, body.size, self._rgb, body.margin, self._paint,
+                        self._sweep(series, timing[2]))
         view = View(self._rays, camera.intrinsics, timing, self._light, self._shading)
         box = trace(moving, view, self._canvas, self._seed * 1_000_003 + number)
         whole = self._canvas.whole + self._outside(series, timing)
@@ -93,6 +94,6 @@ class SolidsPainter:
                 continue
             limits = np.array([max(x0 - 2, -_OUTSIDE), max(y0 - 2, -_OUTSIDE), min(x1 + 3, width + _OUTSIDE),
                                min(y1 + 3, height + _OUTSIDE)]).astype(np.int64)
-            outside[body.marker[n]] = area_outside(series, n, body.kind[n], body.size, intrinsics, timing, width,
-                                                   height, limits)
+            outside[body.marker[n]] = area_outside(series, n, body.kind[n], body.size, self._paint, intrinsics,
+                                                   timing, width, height, limits)
         return outside

@@ -9,8 +9,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import distort, undistort_point
-from rhot_app.simulator.body import CAPSULE
+from rhot_app.simulator.body import BOUNDS, CAPSULE, PLAIN
 from rhot_app.simulator.moments import evaluate
+from rhot_app.simulator.paint import is_painted, local_point
 from rhot_app.simulator.raycast import NO_HIT, PREPARED, hit, prepare
 from rhot_app.simulator.rays import SAMPLES
 
@@ -88,19 +89,28 @@ def in_block(active: Indices, actives: int, spans: Indices, y: int, x: int,
 
 
 @njit(cache=True)
-def area_outside(coefficients: Array, n: int, kind: int, size: Array, intrinsics: Array, timing: Array, width: int,
-                 height: int, limits: Indices) -> float:
-    """Area, px^2, of solid `n` beyond the image borders, within `limits` (x0, y0, x1, y1): one ray per pixel."""
-    row, prepared = np.empty(12), np.empty((1, len(size), PREPARED))
-    area = 0.0
+def area_outside(coefficients: Array, n: int, kind: int, size: Array, paint: Array, intrinsics: Array, timing: Array,
+                 width: int, height: int, limits: Indices) -> float:
+    """Area, px^2, of what is painted of solid `n` beyond the image borders, within `limits` (x0, y0, x1, y1): one
+    ray per pixel."""
+    row, prepared, up = np.empty(12), np.empty((1, len(size), PREPARED)), np.empty((1, len(size), 3))
+    area, partly = 0.0, paint[n, BOUNDS] != PLAIN
     for y in range(limits[1], limits[3]):
         tau = min(max(timing[0] + y * timing[1], -1.2), 1.2)
-        evaluate(coefficients, n, tau, parameters_of(kind), row)
+        evaluate(coefficients, n, tau, 12 if partly else parameters_of(kind), row)
         prepare(kind, row, size, prepared, 0, n)
+        up[0, n, 0], up[0, n, 1], up[0, n, 2] = row[6], row[7], row[8]
         for x in range(limits[0], limits[2]):
             if 0 <= x < width and 0 <= y < height:
                 continue
             rx, ry, _, _, _, _ = undistort_point(float(x), float(y), intrinsics)
-            if not math.isnan(rx) and hit(kind, prepared, 0, n, rx, ry) < NO_HIT:
+            if math.isnan(rx):
+                continue
+            t = hit(kind, prepared, 0, n, rx, ry)
+            if t < NO_HIT:
+                if partly:
+                    along, across, above = local_point(kind, prepared, 0, n, rx, ry, t, size, up)
+                    if not is_painted(paint, n, along, across, above):
+                        continue
                 area += 1.0
     return area

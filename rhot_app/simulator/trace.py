@@ -13,9 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.simulator.body import PALM_GROUP
-from rhot_app.simulator.edges import PAINT_ID, SKIN_ID, STILL_PX, mark_edges, reach_by_id
+from rhot_app.simulator.body import BOUNDS, PLAIN, REST_GROUP, UNEVEN
+from rhot_app.simulator.edges import PAINT_ID, STILL_PX, id_of, mark_edges, reach_by_id
 from rhot_app.simulator.moments import evaluate
+from rhot_app.simulator.paint import is_painted, local_point, paint_level
 from rhot_app.simulator.raycast import NO_HIT, PREPARED, hit, lambert, prepare
 from rhot_app.simulator.rays import SAMPLES, scatter
 from rhot_app.simulator.spans import in_block, parameters_of, span
@@ -28,8 +29,9 @@ Image = NDArray[np.float32]
 class Moving(NamedTuple):
     """N solids during one frame, painted ones first.
 
-    `series` (N, 12, NODES): their parameters in the camera's frame. `meta` (N, 3): kind, group, marker. `size` (N, 3),
-    `rgb` (N, 3), `margin` (N,) as in `HandBody`. `sweep` (N, 2): px travelled in x and y during the exposure.
+    `series` (N, 12, NODES): their parameters in the camera's frame. `meta` (N, 3): kind, group, marker. `size` (N,
+    3), `rgb` (N, 3), `margin` (N,), `paint` (N, PAINT_FIELDS) as in `HandBody`. `sweep` (N, 2): px travelled in x
+    and y during the exposure.
     """
 
     series: Array
@@ -37,6 +39,7 @@ class Moving(NamedTuple):
     size: Array
     rgb: Array
     margin: Array
+    paint: Array
     sweep: Array
 
 
@@ -108,22 +111,24 @@ def trace(moving: Moving, view: View, canvas: Canvas, seed: int) -> tuple[int, i
 @njit(cache=True, fastmath=True)
 def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int]:
     """First pass: one ray per pixel. Returns the range of rows that the hand may touch."""
-    series, meta, size, rgb, margin, sweep = moving
+    series, meta, size, rgb, margin, paint, sweep = moving
     rays, intrinsics, timing, light, shading = view
     background, image, ids, masks, _, spans, rows, _, _ = canvas
     height, width = ids.shape
-    row, prepared = np.empty(12), np.empty((1, len(meta), PREPARED))
+    row, prepared, up = np.empty(12), np.empty((1, len(meta), PREPARED)), np.zeros((1, len(meta), 3))
     active, near = np.empty(len(meta), np.int64), np.empty(len(meta), np.int64)
     ray, slot, met, depth, tied = _ray_batch()
     top, bottom = height, 0
     for y in range(height):
         left, right, actives = width, 0, 0
         for n in range(len(meta)):
-            evaluate(series, n, timing[0] + y * timing[1], parameters_of(meta[n, 0]), row)
+            evaluate(series, n, timing[0] + y * timing[1], _parameters(meta, paint, n), row)
             x0, x1 = span(meta[n, 0], row, size, sweep, n, intrinsics, y, width)
             spans[y, n, 0], spans[y, n, 1] = x0, x1
             if x0 < x1:
                 prepare(meta[n, 0], row, size, prepared, 0, n)
+                if paint[n, BOUNDS] != PLAIN:
+                    up[0, n, 0], up[0, n, 1], up[0, n, 2] = row[6], row[7], row[8]
                 active[actives] = n
                 actives += 1
                 left, right = min(left, x0), max(right, x1)
@@ -135,7 +140,7 @@ def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int
             nears = in_block(active, actives, spans, y, start, near)
             for i in range(pixels):
                 ray[i, 0], ray[i, 1] = rays[y + 1, start + i + 1, 0], rays[y + 1, start + i + 1, 1]
-            _cast(pixels, ray, slot, near, nears, prepared, meta, margin, tied, met, depth)
+            _cast(pixels, ray, slot, near, nears, prepared, meta, size, margin, paint, up, tied, met, depth)
             for i in range(pixels):
                 x, winner = start + i, met[i, 0]
                 masks[y, x] = met[i, 1]
@@ -143,9 +148,13 @@ def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int
                     for c in range(3):
                         image[c, y, x] = background[c, y, x]
                     continue
-                ids[y, x] = SKIN_ID + meta[winner, 0] if meta[winner, 2] < 0 else PAINT_ID + meta[winner, 2]
+                ids[y, x] = id_of(meta, winner)
                 cosine = lambert(meta[winner, 0], prepared, 0, winner, ray[i, 0], ray[i, 1], depth[i], light)
                 shade = 1.0 - shading * (1.0 - cosine)
+                if paint[winner, UNEVEN] > 0.0:
+                    along, across, above = local_point(meta[winner, 0], prepared, 0, winner, ray[i, 0], ray[i, 1],
+                                                       depth[i], size, up)
+                    shade *= paint_level(paint, winner, along, across, above)
                 for c in range(3):
                     image[c, y, x] = shade * rgb[winner, c]
     return top, bottom
@@ -154,11 +163,11 @@ def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int
 @njit(cache=True, fastmath=True)
 def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: int, seed: int) -> None:
     """Second pass: the marked pixels again, by 16 rays over area and exposure; and the markers' areas."""
-    series, meta, size, rgb, margin, sweep = moving
+    series, meta, size, rgb, margin, paint, sweep = moving
     rays, _, timing, light, shading = view
     background, image, ids, masks, edges, spans, rows, visible, whole = canvas
     slots = SAMPLES if np.max(sweep) > STILL_PX else 1
-    row, prepared = np.empty(12), np.empty((slots, len(meta), PREPARED))
+    row, prepared, up = np.empty(12), np.empty((slots, len(meta), PREPARED)), np.zeros((slots, len(meta), 3))
     active, near = np.empty(len(meta), np.int64), np.empty(len(meta), np.int64)
     ray, slot, met, depth, tied = _ray_batch()
     for y in range(top, bottom):
@@ -169,8 +178,10 @@ def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: i
                 actives += 1
                 for k in range(slots):
                     offset = ((k + 0.5) / slots - 0.5) * timing[2]
-                    evaluate(series, n, timing[0] + y * timing[1] + offset, parameters_of(meta[n, 0]), row)
+                    evaluate(series, n, timing[0] + y * timing[1] + offset, _parameters(meta, paint, n), row)
                     prepare(meta[n, 0], row, size, prepared, k, n)
+                    if paint[n, BOUNDS] != PLAIN:
+                        up[k, n, 0], up[k, n, 1], up[k, n, 2] = row[6], row[7], row[8]
         for x in range(rows[y, 0], rows[y, 1]):
             if not edges[y, x]:
                 if ids[y, x] >= PAINT_ID:
@@ -182,20 +193,27 @@ def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: i
                 block = x // SAMPLES
                 nears = in_block(active, actives, spans, y, block * SAMPLES, near)
             scatter(x, y, slots, seed, rays, ray, slot)
-            _cast(SAMPLES, ray, slot, near, nears, prepared, meta, margin, tied, met, depth)
-            _gather(x, y, ray, slot, prepared, meta, rgb, met, depth, light, shading, background, image, visible, whole)
+            _cast(SAMPLES, ray, slot, near, nears, prepared, meta, size, margin, paint, up, tied, met, depth)
+            _gather(x, y, ray, slot, prepared, meta, size, rgb, paint, up, met, depth, light, shading, background,
+                    image, visible, whole)
+
+
+@njit(cache=True, inline="always")
+def _parameters(meta: Indices, paint: Array, n: int) -> int:
+    """How many numbers of a solid's row count: all of them where its paint has to know which way is up."""
+    return 12 if paint[n, BOUNDS] != PLAIN else parameters_of(meta[n, 0])
 
 
 @njit(cache=True)
 def _ray_batch() -> tuple[Array, Indices, Indices, Array, Array]:
     """Room for SAMPLES rays: directions, moments, what they meet, at what depth; and the margins of paint by group."""
     return (np.empty((SAMPLES, 2)), np.zeros(SAMPLES, np.int64), np.zeros((SAMPLES, 2), np.int64), np.zeros(SAMPLES),
-            np.zeros(PALM_GROUP + 1))
+            np.zeros(REST_GROUP + 1))
 
 
 @njit(cache=True, fastmath=True)
 def _cast(rays: int, ray: Array, slot: Indices, near: Indices, nears: int, prepared: Array, meta: Indices,
-          margin: Array, tied: Array, met: Indices, depth: Array) -> None:
+          size: Array, margin: Array, paint: Array, up: Array, tied: Array, met: Indices, depth: Array) -> None:
     """What each of the first `rays` rays (x, y) meets: `met` (solid or -1, bit mask of all markers on the ray, hidden
     or not) and the depth. Many rays in one call, because every call counts references of all its arrays.
     """
@@ -206,6 +224,10 @@ def _cast(rays: int, ray: Array, slot: Indices, near: Indices, nears: int, prepa
             t = hit(meta[n, 0], prepared, slot[i], n, ray[i, 0], ray[i, 1])
             if t == NO_HIT:
                 continue
+            if paint[n, BOUNDS] != PLAIN:
+                along, across, above = local_point(meta[n, 0], prepared, slot[i], n, ray[i, 0], ray[i, 1], t, size, up)
+                if not is_painted(paint, n, along, across, above):
+                    continue
             rank = t
             if meta[n, 2] >= 0:  # markers come first among the solids
                 mask |= 1 << meta[n, 2]
@@ -217,14 +239,14 @@ def _cast(rays: int, ray: Array, slot: Indices, near: Indices, nears: int, prepa
                 depth[i] = t
         met[i, 0], met[i, 1] = winner, mask
         if mask:
-            for part in range(PALM_GROUP + 1):
+            for part in range(REST_GROUP + 1):
                 tied[part] = 0.0
 
 
 @njit(cache=True, fastmath=True)
-def _gather(x: int, y: int, ray: Array, slot: Indices, prepared: Array, meta: Indices, rgb: Array, met: Indices,
-            depth: Array, light: Array, shading: float, background: Image, image: Image, visible: Array,
-            whole: Array) -> None:
+def _gather(x: int, y: int, ray: Array, slot: Indices, prepared: Array, meta: Indices, size: Array, rgb: Array,
+            paint: Array, up: Array, met: Indices, depth: Array, light: Array, shading: float, background: Image,
+            image: Image, visible: Array, whole: Array) -> None:
     """The mean colour of the pixel's 16 rays, and its share in the markers' areas."""
     red, green, blue = 0.0, 0.0, 0.0
     for k in range(SAMPLES):
@@ -240,6 +262,10 @@ def _gather(x: int, y: int, ray: Array, slot: Indices, prepared: Array, meta: In
             visible[meta[winner, 2]] += 1.0 / SAMPLES
         cosine = lambert(meta[winner, 0], prepared, slot[k], winner, ray[k, 0], ray[k, 1], depth[k], light)
         shade = 1.0 - shading * (1.0 - cosine)
+        if paint[winner, UNEVEN] > 0.0:
+            along, across, above = local_point(meta[winner, 0], prepared, slot[k], winner, ray[k, 0], ray[k, 1],
+                                               depth[k], size, up)
+            shade *= paint_level(paint, winner, along, across, above)
         red += shade * rgb[winner, 0]
         green += shade * rgb[winner, 1]
         blue += shade * rgb[winner, 2]

@@ -143,15 +143,14 @@ class NodeDoor:
                bound_s: float) -> CameraObservations:
         assert isinstance(message.markers, MarkerTable)  # as everything that was decoded
         count = self._count
-        columns = message.markers.columns()
+        pixels, covariances, diameters, qualities, flags = message.markers.columns()
         further = None
         if len(message.markers) > count:
-            further = Candidates(message.markers.indices()[count:], *(column[count:] for column in columns))
-            columns = tuple(column[:count] for column in columns)
-        pixels, covariances, diameters, qualities, flags = columns
+            further = Candidates(message.markers.indices()[count:], pixels[count:], covariances[count:],
+                                 diameters[count:], qualities[count:], flags[count:])
         return CameraObservations(
             camera=self._camera, t_row0_master_ns=t_row0_ns, row_time_ns=message.row_time_ns,
             clock_bound_s=bound_s, t_receive_ns=t_receive_ns,
             detect_s=1e-9 * message.processing_ns, network_s=1e-9 * (t_receive_ns - t_send_ns),
-            pixels=pixels, covariances=covariances, diameters=diameters, qualities=qualities, flags=flags,
-            further=further)
+            pixels=pixels[:count], covariances=covariances[:count], diameters=diameters[:count],
+            qualities=qualities[:count], flags=flags[:count], further=further)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.hand.model import build_model
+from rhot_app.hand.places import with_markers
 from rhot_app.project import Rig
 from rhot_app.tracking import stages, trust
 from rhot_app.tracking.association import MarkerAssociation
@@ -33,7 +34,7 @@ class ClassicTracker:
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
         self._pairing = Pairing(cameras, markers)
         self._association = MarkerAssociation(self._rig)
-        self._hand = HandSolver(build_model(rig.hand))
+        self._hand = HandSolver(with_markers(build_model(rig.hand), rig.markers))
         pixel, position = filter_settings(rig)
         self._filtering = rig.filters.enabled
         self._pixel_filter = OneEuroFilter.from_settings([s for _ in range(cameras) for s in pixel for _ in range(2)])

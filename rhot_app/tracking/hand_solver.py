@@ -52,7 +52,9 @@ def no_hand(tips: Array) -> SolvedHand:
 
 
 class HandSolver:
-    """Keeps the last pose: the next one starts from it, and what the markers leave open stays as it was."""
+    """Keeps the last pose: the next one starts from it, and what the markers leave open stays as it was.
+
+    The model's marker centres are those of the fingertips' paint (`rhot_app.hand.places.with_markers`)."""
 
     def __init__(self, model: HandModel) -> None:
         self._model = model
@@ -93,8 +95,9 @@ class HandSolver:
         points = np.empty((len(JOINTS) + 5, 3))
         joints, known = np.empty(len(JOINTS), np.uint8), np.empty(len(ANGLES), np.uint8)
         solved = follow(model.dh, model.limits, natural.mean, natural.information, model.mirror, model.base,
-                        model.base_rotation, model.chain, wrist, tips, wrist_knowledge, tip_knowledge, dt_s,
-                        self.pose is not None, placed, palm_world, palm_angles, world, angles, points, joints, known)
+                        model.base_rotation, model.chain, model.chain_bend, wrist, tips, wrist_knowledge, tip_knowledge,
+                        dt_s, self.pose is not None, placed, palm_world, palm_angles, world, angles, points, joints,
+                        known)
         if solved:
             self._palm, self.pose, self._solved_s = HandPose(palm_world, palm_angles), HandPose(world, angles), t_s
         return SolvedHand(points[:len(JOINTS)], joints, points[len(JOINTS):], angles, known, world, Knowledge.GUESSED)
@@ -102,9 +105,9 @@ class HandSolver:
 
 @njit(cache=True)
 def follow(dh: DhArrays, limits: Array, mean: Array, information: Array, mirror: float, base: Array,
-           base_rotation: Array, chain: Array, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes,
-           dt_s: float, warm: bool, placed: bool, palm_world: Array, palm_angles: Array, world: Array, angles: Array,
-           points: Array, joint_knowledge: Codes, angle_knowledge: Codes) -> bool:
+           base_rotation: Array, chain: Array, bends: Array, wrist: Array, tips: Array, wrist_knowledge: int,
+           tip_knowledge: Codes, dt_s: float, warm: bool, placed: bool, palm_world: Array, palm_angles: Array,
+           world: Array, angles: Array, points: Array, joint_knowledge: Codes, angle_knowledge: Codes) -> bool:
     """Palm fit, fingers, forward kinematics and knowledge of the next hand; returns whether it was solved.
 
     `palm_world` (4, 4) and `palm_angles` (21,): the palm fit `dt_s` seconds ago when `warm`, else this instant's,
@@ -118,9 +121,9 @@ def follow(dh: DhArrays, limits: Array, mean: Array, information: Array, mirror:
         solved = True
     if solved:
         world[:], angles[:] = palm_world, palm_angles
-        solve_fingers_arrays(angles, world, mirror, base, base_rotation, chain, limits, tips, mean, information,
-                             TOLERANCE, FABRIK_ITERATIONS, TARGET_SD_M, np.empty(5), np.empty(5, np.int64),
-                             np.empty(5, np.uint8))
+        solve_fingers_arrays(angles, world, mirror, base, base_rotation, chain, bends, limits, tips, mean,
+                             information, TOLERANCE, FABRIK_ITERATIONS, TARGET_SD_M, np.empty(5),
+                             np.empty(5, np.int64), np.empty(5, np.uint8))
     forward_arrays(dh, world, angles, np.empty((dh.parent.shape[0], 3, 4)), points)
     _know(wrist_knowledge, tip_knowledge, solved and placed, joint_knowledge, angle_knowledge)
     return solved

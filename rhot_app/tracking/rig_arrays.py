@@ -15,7 +15,7 @@ from rhot_app.hand.places import ROLES, farthest_apart, place_of
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
 from rhot_app.project import OneEuroSettings, Rig
 from rhot_app.tracking.estimate import disparity_law
-from rhot_node.markers import Marker
+from rhot_node.markers import FLAT_PATCHES, Marker
 
 Array = NDArray[np.float64]
 
@@ -86,8 +86,8 @@ def _reach(rig: Rig) -> Array:
 
 
 def _shape(marker: Marker) -> Array:
-    radius = 1e-3 * marker.radius_mm if marker.radius_mm and marker.shape in _ROUND else 0.0
-    return ball(radius)
+    flat = marker.shape not in _ROUND or marker.patch in FLAT_PATCHES  # a patch is seen where it is
+    return ball(1e-3 * marker.radius_mm if marker.radius_mm and not flat else 0.0)
 
 
 def band_axes(marker: Marker, hand: HandAnatomy) -> Array:

@@ -192,7 +192,7 @@ class Finder:
     def _apart(self, slot: int, other: int) -> float:
         """Distance of two tracks, in lengths of the longer one."""
         one, two = self._states[slot], self._states[other]
-        return math.hypot(one[TRACK_X] - two[TRACK_X], one[TRACK_Y] - two[TRACK_Y]) / max(one[EXTENT], two[EXTENT])
+        return math.hypot(one[TRACK_X] - two[TRACK_X], one[TRACK_Y] - two[TRACK_Y]) / max(one[EXTENT], two[EXTENT], 1.0)
 
     def _is_pale(self, slot: int, level: float) -> bool:
         """Whether a level of chroma is too low for the marker's paint."""

@@ -26,7 +26,7 @@ def model() -> HandModel:
 
 
 def test_the_named_motions_are_there() -> None:
-    expected = {"still", "rest", "wave", "grasp", "pinch", "point", "spread", "fast", "sweep", "cross"}
+    expected = {"still", "rest", "wave", "grasp", "pinch", "point", "spread", "fast", "sweep", "cross", "tap"}
     assert expected <= set(motion_names())
 
 

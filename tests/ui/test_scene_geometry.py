@@ -24,6 +24,8 @@ from rhot_app.ui.scene.frames import (
 from rhot_app.ui.scene.hand_mesh import HandMesh, SkeletonMesh, palm_hull
 from rhot_app.ui.scene.marker_mesh import MarkerMesh
 from rhot_app.ui.scene.meshes import capsule_template, elliptic_band, pose_capsules, sphere
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
 
 
 @pytest.fixture(scope="module")
@@ -128,6 +130,15 @@ def test_markers_lie_where_they_were_measured_in_their_own_colours(engine):
     thumb = (mesh.colours[:, :3] == engine.rig.markers.markers[0].display_rgb).all(axis=1)
     middle = 0.5 * (posed.vertices[thumb].min(axis=0) + posed.vertices[thumb].max(axis=0))
     assert middle == pytest.approx(to_display(state.marker_positions[0]), abs=1e-3)
+
+
+def test_a_nail_is_drawn_flat_where_it_is_painted(engine):
+    state = engine.state(2.0)
+    nails = MarkerMesh(load_markers(resource_path("markers", "nails6.json")), engine.rig.hand)
+    drawn = nails.pose(state).vertices[(nails.colours[:, :3] == engine.rig.markers.markers[1].display_rgb).all(axis=1)]
+    off = np.linalg.norm(drawn - to_display(state.marker_positions[1]), axis=1)
+    assert off.max() == pytest.approx(0.0055, abs=0.0015), "half of the nail's length"
+    assert off.min() < 0.005, "and narrower"
 
 
 def spans(mesh, state, choice):

@@ -45,6 +45,10 @@ NEAREST_M = 0.02
 _REACH_M, _FINGER_M = 0.12, 0.05  # mean levers of palm rotation and of a finger's angles
 
 
+ONE_SIDED = -2.0
+"""`Worn.slender` of paint on one side of a finger: how much of it a camera sees depends on where the camera stands."""
+
+
 class Cameras(NamedTuple):
     """C cameras: `pose` (C, 3, 4) camera_from_world m and `intrinsics` (C, 9) as in `CameraModel`."""
 
@@ -59,7 +63,7 @@ class Worn(NamedTuple):
     (M, 3) m: their bodies' along the palm's axes (a ball has three equal ones), zero for flat ones. `palmar` (M,):
     paint of no known shape on the inner side of the palm, which closing fingers cover (`covering.py`). `slender` (M,):
     how much more of a fingertip is seen from its side than from its end, as a part of the latter; 0 for balls on
-    fingertips, negative for other markers (`hiding.py`).
+    fingertips, negative for other markers (`hiding.py`), ONE_SIDED for paint that does not go round its finger.
     """
 
     dh: DhArrays

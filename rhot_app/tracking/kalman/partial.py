@@ -27,7 +27,15 @@ from rhot_app.tracking.kalman.estimate import (
     VELOCITY,
     Estimate,
 )
-from rhot_app.tracking.kalman.markers import Cameras, Frame, Places, Worn, project_marker, straying
+from rhot_app.tracking.kalman.markers import (
+    ONE_SIDED,
+    Cameras,
+    Frame,
+    Places,
+    Worn,
+    project_marker,
+    straying,
+)
 from rhot_app.tracking.kalman.motion import liveliness
 from rhot_app.tracking.kalman.sighted import FRESH_S, line_of_sight
 from rhot_app.tracking.locate import EXACT_PX2
@@ -82,7 +90,7 @@ def doubt_partial(worn: Worn, cameras: Cameras, frame: Frame, estimate: Estimate
             alike = False
             continue
         m, width = frame.label[sight], frame.sizes[sight]
-        rival = _widest_other(cameras, estimate, camera, m, places.points[m])
+        rival = -1 if worn.slender[m] == ONE_SIDED else _widest_other(cameras, estimate, camera, m, places.points[m])
         missing = 1.0 - (width / max(width, estimate.looks[rival, m, LOOK_WIDTH])) ** 2 if rival >= 0 else 0.0
         if missing > AGREE:
             shift = SHIFT if worn.half_axes[m, 0] == worn.half_axes[m, 1] else BAND_SHIFT

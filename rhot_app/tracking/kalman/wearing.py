@@ -14,17 +14,17 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import NaturalPose
 from rhot_app.hand.model import HandModel, build_model
-from rhot_app.hand.places import KNUCKLE_ROLES, Place, place_of
-from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, TIP_ROLES
+from rhot_app.hand.places import KNUCKLE_ROLES, Place, place_of, with_markers
+from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, TIP_ROLES, WRIST_ROLE
 from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.kalman.estimate import ANGLES, POSE
 from rhot_app.tracking.kalman.forgetting import WIDEST
 from rhot_app.tracking.kalman.habits import Habits
-from rhot_app.tracking.kalman.markers import Cameras, Outfit, Worn, outfit_of
+from rhot_app.tracking.kalman.markers import ONE_SIDED, Cameras, Outfit, Worn, outfit_of
 from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.rig_arrays import band_axes
-from rhot_node.markers import Marker, MarkerSet
+from rhot_node.markers import FLAT_PATCHES, Marker, MarkerSet
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def compile_wearing(rig: Rig) -> Wearing:
             raise RigError(f"markers {worn_by[marker.role]!r} and {marker.id!r} both have the role {marker.role!r}; "
                            "give each a place of its own.")
         worn_by[marker.role] = marker.id
-    model = build_model(rig.hand)
+    model = with_markers(build_model(rig.hand), rig.markers)
     natural = natural_of(model, rig.tracker.variant)
     places = tuple(place_of(marker, model) for marker in rig.markers.markers)
     models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
@@ -120,15 +120,18 @@ def half_axes_of(markers: MarkerSet, model: HandModel) -> Array:
 
 
 def _half_axes(marker: Marker, model: HandModel) -> Array:
-    if marker.shape == "band":
+    if marker.shape == "band" and marker.role == WRIST_ROLE:
         return band_axes(marker, model.anatomy)
-    radius = 1e-3 * marker.radius_mm if marker.radius_mm and marker.shape in ("sphere", "capsule") else 0.0
+    flat = marker.shape not in ("sphere", "capsule", "band") or marker.patch in FLAT_PATCHES
+    radius = 1e-3 * marker.radius_mm if marker.radius_mm and not flat else 0.0
     return np.full(3, radius)
 
 
 def _slenderness(marker: Marker, model: HandModel) -> float:
     """As `Worn.slender`. The area of a capsule with ends of radius r, l apart, is pi r^2 + 2 r l sin(angle of view)."""
-    if marker.role not in TIP_ROLES or marker.shape not in ("capsule", "sphere"):
+    if marker.patch in FLAT_PATCHES or marker.gap_deg > 0.0:
+        return ONE_SIDED
+    if marker.role not in TIP_ROLES or marker.shape not in ("capsule", "sphere") or marker.patch != "segment":
         return -1.0
     if marker.shape == "sphere":
         return 0.0

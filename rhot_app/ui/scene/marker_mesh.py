@@ -13,12 +13,12 @@ from rhot_app.tracking.state import HandState
 from rhot_app.ui.scene.frames import to_display
 from rhot_app.ui.scene.hand_mesh import PosedMesh
 from rhot_app.ui.scene.meshes import Faces, capsule_template, elliptic_band, pose_capsules, repeat_faces
-from rhot_node.markers import Marker, MarkerSet
+from rhot_node.markers import FLAT_PATCHES, Marker, MarkerSet
 
 Array = NDArray[np.float64]
 Colours = NDArray[np.uint8]
 
-_DEFAULT_RADIUS_M = 0.008
+_DEFAULT_RADIUS_M, _FLAT_RADIUS_M = 0.008, 0.003
 _PROUD_M = 0.001  # markers stand this far out of the skin, so that the two surfaces do not flicker
 
 
@@ -27,17 +27,27 @@ def colour_rows(markers: Sequence[Marker], counts: list[int], alpha: int) -> Col
     return np.repeat(np.array([(*marker.display_rgb, alpha) for marker in markers], dtype=np.uint8), counts, axis=0)
 
 
+def _radius(marker: Marker) -> float:
+    """Of a marker's body, m: a flat patch is half as wide as long, so that it stands little out of the skin."""
+    if marker.patch in FLAT_PATCHES:
+        return 0.25e-3 * marker.length_mm if marker.length_mm else _FLAT_RADIUS_M
+    return 1e-3 * marker.radius_mm if marker.radius_mm else _DEFAULT_RADIUS_M
+
+
 class MarkerMesh:
-    """Painted fingertips are capsules along the last bone, bands lie about the wrist, everything else is a ball."""
+    """Painted fingertips are capsules along the last bone, nails and dots short flat ones where the paint is, bands lie
+    about the wrist, everything else is a ball: also a ring about a finger, of which the ball stands out all round."""
 
     def __init__(self, markers: MarkerSet, anatomy: HandAnatomy) -> None:
-        self._bodies = [k for k, marker in enumerate(markers.markers) if marker.shape != "band"]
-        self._bands = [k for k, marker in enumerate(markers.markers) if marker.shape == "band"]
+        self._bands = [k for k, marker in enumerate(markers.markers)
+                       if marker.shape == "band" and marker.role not in TIP_ROLES]
+        self._bodies = [k for k in range(len(markers.markers)) if k not in self._bands]
         self._template = capsule_template(14, 4)
         bodies = [markers.markers[k] for k in self._bodies]
-        self._radii = np.array([1e-3 * m.radius_mm if m.radius_mm else _DEFAULT_RADIUS_M for m in bodies])
-        self._halves = np.maximum([0.5e-3 * (m.length_mm or 0.0) if m.shape == "capsule" else 0.0 for m in bodies]
-                                  - self._radii, 0.0)
+        self._radii = np.array([_radius(marker) for marker in bodies])
+        long = [(m.shape == "capsule" and m.patch == "segment") or m.patch in FLAT_PATCHES for m in bodies]
+        lengths = np.where(long, [m.length_mm or 0.0 for m in bodies], 0.0)
+        self._halves = np.maximum(0.5e-3 * lengths - self._radii, 0.0)
         self._tips = np.array([JOINTS.index(m.role) if m.role in TIP_ROLES else -1 for m in bodies], dtype=np.intp)
         width = next((m.length_mm for m in markers.markers if m.shape == "band" and m.length_mm), 14.0)
         self._band = elliptic_band(0.5e-3 * anatomy.wrist_breadth_mm + 0.002,
