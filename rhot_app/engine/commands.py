@@ -46,8 +46,9 @@ class Commands:
         self._preview = preview
         self._table: dict[str, Callable[[Arguments], Answer]] = {
             "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
-            "record": self._record, "record_stop": self._record_stop, "rig": self._rig, "set_rig": self._set_rig,
-            "save_rig": self._save_rig, "preview": self._set_preview, "predict": self._predict, "quit": self._end,
+            "record": self._record, "record_stop": self._record_stop, "bookmark": self._bookmark, "rig": self._rig,
+            "set_rig": self._set_rig, "save_rig": self._save_rig, "preview": self._set_preview,
+            "predict": self._predict, "quit": self._end,
         }
 
     @property
@@ -94,6 +95,13 @@ class Commands:
         path = self._engine.record_stop()
         return {"path": "" if path is None else str(path)}
 
+    def _bookmark(self, arguments: Arguments) -> Answer:
+        text = arguments.get("text")
+        if not isinstance(text, str) or not text:
+            raise EngineError('bookmark needs a "text": one line about this moment.')
+        t_ns = _time_ns(arguments, "bookmark") if "t_master_ns" in arguments else None
+        return {"t_master_ns": self._engine.bookmark(text, t_ns)}
+
     def _rig(self, arguments: Arguments) -> Answer:
         return {"document": msgspec.to_builtins(self._engine.rig), "path": str(self._engine.rig_path or "")}
 
@@ -115,15 +123,19 @@ class Commands:
         return {}
 
     def _predict(self, arguments: Arguments) -> Answer:
-        t_ns = arguments.get("t_master_ns")
-        if not isinstance(t_ns, int) or isinstance(t_ns, bool) or not 0 <= t_ns < 1 << 63:
-            raise EngineError('predict needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
-        state = self._engine.state_at(t_ns)
+        state = self._engine.state_at(_time_ns(arguments, "predict"))
         return {} if state is None else {"attachment": "state", "state": encode(state)}
 
     def _end(self, arguments: Arguments) -> Answer:
         self._quit()
         return {}
+
+
+def _time_ns(arguments: Arguments, command: str) -> int:
+    t_ns = arguments.get("t_master_ns")
+    if not isinstance(t_ns, int) or isinstance(t_ns, bool) or not 0 <= t_ns < 1 << 63:
+        raise EngineError(f'{command} needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
+    return t_ns
 
 
 def _path(arguments: Arguments) -> Path | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import struct
 import threading
 import time
@@ -33,6 +34,7 @@ class Recorder:
         self._ending = threading.Event()
         try:
             self._file = path.open("xb", buffering=0)
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody appends to it meanwhile
             self._write(encode_header(rig, about or {}))
         except FileExistsError as exc:
             raise RecordingError(f"{path}: exists already; a log is never written over. Choose another name.") from exc

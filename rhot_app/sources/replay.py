@@ -158,6 +158,8 @@ class LogReplay:
         first_ns: int | None = None
         begun_ns = time.monotonic_ns()
         for record in records:
+            if record.kind is RecordKind.BOOKMARK:  # it may stand anywhere, with any time
+                continue
             if first_ns is None and record.kind is RecordKind.DATAGRAM:
                 first_ns, begun_ns = record.t_master_ns, time.monotonic_ns()
             elapsed_ns = record.t_master_ns - first_ns if first_ns is not None else 0

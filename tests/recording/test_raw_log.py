@@ -1,13 +1,17 @@
-"""The raw log: every record comes back, a torn end is tolerated, anything else broken is named."""
+"""The raw log: every record comes back, a torn end is tolerated, damage costs what is damaged and is named."""
 
+import json
 import time
+import zlib
 from pathlib import Path
 
+import msgspec
+import numpy as np
 import pytest
 from patience import eventually
 
 from rhot_app.errors import RecordingError, RhotError
-from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
+from rhot_app.recording.raw_log import LogReader, Losses, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
 from rhot_app.simulator.synthetic_node import synthetic_rig
 
@@ -40,28 +44,112 @@ def test_torn_end_is_tolerated_and_reported(tmp_path: Path, cut: int) -> None:
     assert reader.torn_bytes == 25 - cut
 
 
-def test_broken_last_record_counts_as_torn(tmp_path: Path) -> None:
-    path = tmp_path / "a.log"
-    data = write_log(path)
-    path.write_bytes(data[:-2] + b"\0\0")
-    reader = LogReader(path)
-    assert len(list(reader)) == 3
-    assert reader.torn_bytes == 25
+def damaged(data: bytes, at: int, patch: bytes) -> bytes:
+    at %= len(data)
+    return data[:at] + patch + data[at + len(patch):]
 
 
-def test_broken_middle_is_an_error_with_its_place(tmp_path: Path) -> None:
-    path = tmp_path / "a.log"
-    data = bytearray(write_log(path))
-    data[-100] ^= 1
+def read(path: Path, data: bytes) -> tuple[list[Record], Losses]:
     path.write_bytes(data)
     reader = LogReader(path)
-    with pytest.raises(RecordingError, match=r"a\.log: the record at byte \d+ is broken"):
-        list(reader)
+    records = list(reader)
+    reader.close()
+    return records, reader.losses
+
+
+LAST_TWO = len(encode_record(RECORDS[2])) + len(encode_record(RECORDS[3]))
+
+
+@pytest.mark.parametrize("patch", [b"\x07\x01\0\0", b"\xff\xff\xff\xff", b"\0\0\1\0", b"\0\0\0\0"])
+def test_a_damaged_length_costs_one_record(tmp_path: Path, patch: bytes) -> None:
+    data = write_log(tmp_path / "a.log")
+    records, losses = read(tmp_path / "a.log", damaged(data, 13 - LAST_TWO, patch))
+    assert records == [RECORDS[0], RECORDS[1], RECORDS[3]]
+    assert (losses.places, losses.torn_bytes) == (1, 0)
+    assert losses.skipped_bytes == len(encode_record(RECORDS[2]))
+    assert "1 damaged place was skipped (60021 bytes, at least 1 record)" in losses.damage
+
+
+def test_a_damaged_last_record_is_a_loss_and_no_torn_end(tmp_path: Path) -> None:
+    records, losses = read(tmp_path / "a.log", write_log(tmp_path / "a.log")[:-2] + b"\0\0")
+    assert records == RECORDS[:3]
+    assert (losses.places, losses.skipped_bytes, losses.torn_bytes) == (1, 25, 0)
+
+
+@pytest.mark.parametrize("tail", [bytes(5000), b"\0", bytes(3)])
+def test_zeros_at_the_end_cost_no_record(tmp_path: Path, tail: bytes) -> None:
+    records, losses = read(tmp_path / "a.log", write_log(tmp_path / "a.log") + tail)
+    assert records == RECORDS
+    assert (losses.places, losses.skipped_bytes) == (1, len(tail))
+
+
+def test_zeros_and_noise_in_the_middle_cost_no_record_around_them(tmp_path: Path) -> None:
+    data = write_log(tmp_path / "a.log")
+    noise = np.random.default_rng(1).integers(0, 256, 300_000, np.uint8).tobytes()
+    records, losses = read(tmp_path / "a.log", data[:-LAST_TWO] + noise + bytes(3_000_000) + data[-LAST_TWO:])
+    assert records == RECORDS
+    assert (losses.places, losses.skipped_bytes) == (1, 3_300_000)
+
+
+def test_a_flipped_byte_costs_one_record(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    header = encode_header(synthetic_rig(), {})
+    records = [Record(RecordKind.DATAGRAM, 1, k, rng.bytes(int(rng.integers(0, 400)))) for k in range(300)]
+    data = header + b"".join(encode_record(record) for record in records)
+    for at in rng.integers(len(header), len(data), 60).tolist():
+        found, losses = read(tmp_path / "a.log", damaged(data, at, bytes([data[at] ^ int(rng.integers(1, 256))])))
+        assert set(found) <= set(records)
+        assert len(found) >= len(records) - 1
+        assert losses.damage or losses.torn_bytes, "a record is missing and nothing says so"
+
+
+def test_a_header_damaged_in_one_copy_is_read_from_the_other(tmp_path: Path) -> None:
+    data = write_log(tmp_path / "a.log")
+    size = len(encode_header(synthetic_rig(), {"created": "today"})) // 2
+    assert size % 4096 == 0, "one bad block of a disk must not destroy both copies"
+    for at in (0, 8, 12, 200, size - 1, size, size + 9, 2 * size - 1):
+        records, losses = read(tmp_path / "a.log", damaged(data, at, bytes([data[at] ^ 0x55])))
+        assert records == RECORDS
+        assert (losses.places, losses.skipped_bytes) == (1, size)
+    records, _ = read(tmp_path / "a.log", bytes(4096) + data[4096:])
+    assert records == RECORDS
+
+
+def test_logs_of_version_1_are_read(tmp_path: Path) -> None:
+    document = json.dumps({"created": "long ago", "rig": json.loads(msgspec.json.encode(synthetic_rig()))}).encode()
+    data = (b"RHOTLOG\0\1\0\0\0" + len(document).to_bytes(4, "little") + document
+            + zlib.crc32(document).to_bytes(4, "little") + b"".join(encode_record(record) for record in RECORDS))
+    (tmp_path / "a.log").write_bytes(data)
+    reader = LogReader(tmp_path / "a.log")
+    assert list(reader) == RECORDS
+    assert reader.about == {"created": "long ago"}
+    assert not reader.losses.damage
+
+
+def test_a_log_without_any_sound_record_is_an_error(tmp_path: Path) -> None:
+    header = encode_header(synthetic_rig(), {})
+    with pytest.raises(RecordingError, match=r"a\.log: no record in it can be read"):
+        read(tmp_path / "a.log", header + bytes(500))
+
+
+def test_a_rig_takes_the_place_of_a_lost_header(tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    path.write_bytes(write_log(path)[-LAST_TWO - 70:])
+    with pytest.raises(RecordingError, match="not a raw log"):
+        LogReader(path)
+    reader = LogReader(path, synthetic_rig())
+    assert list(reader) == RECORDS
+    assert reader.losses.damage
+
+
+def test_a_record_that_no_reader_takes_is_not_written() -> None:
+    with pytest.raises(RecordingError, match="65536 bytes"):
+        encode_record(Record(RecordKind.DATAGRAM, 1, 1, bytes(65536)))
 
 
 @pytest.mark.parametrize("data", [
-    b"", b"RHOT", b"{}", b"RHOTLOG\0\x02\0\0\0\0\0\0\0", b"RHOTLOG\0\x01\0\0\0\xff\xff\xff\xff{}",
-    encode_header(synthetic_rig(), {})[:-1], encode_header(synthetic_rig(), {"rig": 1})[:60],
+    b"", b"RHOT", b"{}", b"RHOTLOG\0\x03\0\0\0\0\0\0\0", b"RHOTLOG\0\x01\0\0\0\xff\xff\xff\xff{}",
+    encode_header(synthetic_rig(), {})[:4095], encode_header(synthetic_rig(), {"rig": 1})[:60],
 ])
 def test_foreign_files_are_refused(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "a.log"
