@@ -1,6 +1,13 @@
 """Every error a node raises on purpose. A message says what was wrong, where, and what to do next."""
 
 
+def printable(text: str, limit: int = 400) -> str:
+    """What somebody else wrote, safe for a terminal and a log: one line, control characters as escapes, cut off at
+    `limit` characters."""
+    cut = text if len(text) <= limit else f"{text[:limit]}..."
+    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in cut)
+
+
 class NodeError(Exception):
     """Root of all errors of this package; commands print it and exit with code 2."""
 
