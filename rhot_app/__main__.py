@@ -57,6 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
+    arguments = _command_first(arguments)
     name = next((argument for argument in arguments if not argument.startswith("-")), None)
     chosen = SUBCOMMANDS.get(name or "")
     parser = argparse.ArgumentParser(
@@ -77,6 +78,19 @@ def _run(arguments: list[str]) -> int:
         asked = rooms["" if chosen is None or name is None else name]
         asked.error(f"there is no {strange[0]!r} here{_meant(strange[0], asked)}")
     return int(module.run(parsed))
+
+
+def _command_first(arguments: list[str]) -> list[str]:
+    """The arguments with the subcommand before its options: the app's own may stand before it, with their values."""
+    if not arguments or arguments[0] in SUBCOMMANDS or SUBCOMMANDS.keys().isdisjoint(arguments):
+        return arguments
+    before = argparse.ArgumentParser(add_help=False)
+    _load(APP).add_arguments(before)
+    before.add_argument("rest", nargs=argparse.REMAINDER)
+    rest = before.parse_known_args(arguments)[0].rest
+    if not rest or rest[0] not in SUBCOMMANDS:
+        return arguments
+    return [rest[0], *arguments[:len(arguments) - len(rest)], *rest[1:]]
 
 
 def _meant(strange: str, parser: argparse.ArgumentParser) -> str:

@@ -28,6 +28,9 @@ JSON_BYTES_MAX: Final = 16 << 20
 JSON_DEPTH_MAX: Final = 64
 """Objects and lists within each other; the deepest of our documents has nine."""
 
+PRINTABLE: Final = r"\A[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]*\Z"
+"""Pattern of a field that people read: no control characters, also not those that turn the direction of writing."""
+
 _STRING = re.compile(rb'"(?:[^"\\]++|\\.)*+"', re.DOTALL)
 _BRACKETS = re.compile(rb"[\[\]{}]")
 _OTHER_FILES = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"),
@@ -97,12 +100,15 @@ def decode_json(data: bytes, where: str, error: type[Exception], format_name: st
         raise error(f"{where}: not valid JSON ({reason}).") from exc
 
 
-def decode_message(data: bytes, kind: type[T]) -> T:
-    """A JSON message of another program as the msgspec type `kind`. Raises msgspec.DecodeError whatever is wrong."""
+def decode_message(data: bytes, kind: type[T] | msgspec.json.Decoder[T]) -> T:
+    """A JSON message of another program as the msgspec type `kind`. Raises msgspec.DecodeError whatever is wrong: also
+    when it is longer or nested deeper than a document may be."""
+    if len(data) > JSON_BYTES_MAX or _depth(data) > JSON_DEPTH_MAX:
+        raise msgspec.DecodeError("JSON is too long or nested too deeply")
     try:
-        return msgspec.json.decode(data, type=kind)
+        return kind.decode(data) if isinstance(kind, msgspec.json.Decoder) else msgspec.json.decode(data, type=kind)
     except RecursionError as exc:
-        raise msgspec.DecodeError("JSON is nested too deeply") from exc
+        raise msgspec.DecodeError("JSON is too long or nested too deeply") from exc
 
 
 class _NotFiniteError(ValueError):

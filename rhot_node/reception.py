@@ -13,6 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from rhot_node.errors import NodeError, TrustError
+from rhot_node.files import decode_message
 from rhot_node.keys import HexKey, Name
 from rhot_node.pairing import NONCE_LENGTH, Transcript, proof, proves
 from rhot_node.pairing_offer import OfferFile
@@ -34,7 +35,7 @@ class PairRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 
     master_key: HexKey
     master_name: Name
-    master_nonce: Annotated[str, Meta(pattern=f"^[0-9a-f]{{{2 * NONCE_LENGTH}}}$")]
+    master_nonce: Annotated[str, Meta(pattern=rf"\A[0-9a-f]{{{2 * NONCE_LENGTH}}}\Z")]
     proof: HexKey
 
 
@@ -53,7 +54,7 @@ class Reception:
     def answer(self, data: bytes) -> bytes:
         """The answer to one request. Never raises."""
         try:
-            request = _decoder.decode(data)
+            request = decode_message(data, _decoder)
             reply = self._hello() if isinstance(request, HelloRequest) else self._pair(request)
         except (msgspec.DecodeError, NodeError) as exc:
             reply = {"ok": False, "error": str(exc)}

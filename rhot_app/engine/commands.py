@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable
 from importlib.metadata import version
@@ -14,20 +15,25 @@ from rhot_app.engine.codec import encode
 from rhot_app.engine.core import Engine
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import parse_rig
-from rhot_node.errors import NodeError
+from rhot_node.errors import NodeError, printable
+from rhot_node.files import decode_message
+
+log = logging.getLogger(__name__)
 
 Arguments = dict[str, Any]
 Answer = dict[str, Any]
+
+NAME_MAX = 64  # characters of a command's name
 
 
 def parse(data: bytes) -> tuple[str, Arguments]:
     """Name and arguments of a command; raises EngineError when the bytes are none."""
     try:
-        arguments = msgspec.json.decode(data, type=dict[str, Any])
+        arguments = decode_message(data, dict[str, Any])
     except msgspec.MsgspecError as exc:
         raise EngineError(f"a command is a JSON object; this is not one ({exc}).") from exc
     name = arguments.pop("command", None)
-    if not isinstance(name, str):
+    if not isinstance(name, str) or len(name) > NAME_MAX:
         raise EngineError('a command needs a "command" field with its name.')
     return name, arguments
 
@@ -66,6 +72,9 @@ class Commands:
             done = action(arguments)
         except (RhotError, NodeError) as exc:
             return refusal(exc), None
+        except Exception as exc:  # a command must never end the engine; the log has the whole story
+            log.exception("the command %r failed", name)
+            return refusal(EngineError(f"the engine could not do that: {printable(repr(exc))}. See its log.")), None
         attached = done.pop(done["attachment"]) if "attachment" in done else None
         return {"ok": True, **done}, attached
 
@@ -143,6 +152,6 @@ def _path(arguments: Arguments) -> Path | None:
     path = arguments.get("path")
     if path is None:
         return None
-    if not isinstance(path, str) or not path.startswith("/"):
+    if not isinstance(path, str) or not path.startswith("/") or "\0" in path:
         raise EngineError(f'"path" must be an absolute path, not {path!r}.')
     return Path(path)

@@ -20,6 +20,7 @@ import numpy as np
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig, parse_rig
+from rhot_node.files import decode_json, open_input
 
 MAGIC: Final = b"RHOTLOG\0"
 VERSION: Final = 2
@@ -112,7 +113,7 @@ class LogReader:
         self.path = path
         self.losses = Losses()
         try:
-            self._file: BinaryIO = path.open("rb", buffering=1 << 16)
+            self._file: BinaryIO = open_input(path)
         except OSError as exc:
             raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
         try:
@@ -263,7 +264,7 @@ def _parse_header(file: BinaryIO, at: int) -> tuple[int, int, dict[str, Any]] | 
     covered = document if version == 1 else head + document
     if len(document) != length or crc != _CRC.pack(zlib.crc32(covered)):
         return None
-    about = json.loads(document)
+    about = decode_json(document, "the log's header", RecordingError)
     return (version, len(head) + length + _CRC.size, about) if isinstance(about, dict) else None
 
 

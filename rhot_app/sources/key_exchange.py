@@ -14,6 +14,7 @@ from zmq.utils.monitor import recv_monitor_message
 from rhot_app.errors import SourceError
 from rhot_app.project import RigNode
 from rhot_app.sources.node_link import NodeLink
+from rhot_node.files import decode_message
 from rhot_node.keys import HexKey, KeyPair, connect_with
 
 ASK_NS = 250_000_000
@@ -107,7 +108,7 @@ class KeyExchange:
     @staticmethod
     def _take(link: NodeLink, data: bytes) -> None:
         try:
-            granted = msgspec.json.decode(data, type=_Granted)
+            granted = decode_message(data, _Granted)
         except msgspec.MsgspecError as exc:
             log.warning("node %s gave no key but something that cannot be read (%s)", link.node.name, exc)
             return
