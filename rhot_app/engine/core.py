@@ -96,7 +96,7 @@ class Engine:
             try:
                 self._source.record_to(recorder)
             except BaseException:
-                recorder.close()
+                recorder.discard()
                 raise
             self.recorder = recorder
 

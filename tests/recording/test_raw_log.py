@@ -1,8 +1,13 @@
 """The raw log: every record comes back, a torn end is tolerated, damage costs what is damaged and is named."""
 
+import contextlib
 import json
+import multiprocessing
+import resource
+import threading
 import time
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
@@ -17,6 +22,7 @@ from rhot_app.simulator.synthetic_node import synthetic_rig
 
 RECORDS = [Record(RecordKind.START, 0, 1, b"start"), Record(RecordKind.DATAGRAM, 1, -5, b""),
            Record(RecordKind.CLOCK_REQUEST, 2, 10**18, b"x" * 60000), Record(RecordKind.GAP, 0, 7, b"\1\0\0\0")]
+HEADER_SIZE = len(encode_header(synthetic_rig(), {}))
 
 
 def write_log(path: Path) -> bytes:
@@ -177,21 +183,76 @@ def test_recorder_writes_everything_and_nothing_over(tmp_path: Path) -> None:
         Recorder(tmp_path / "no" / "a.log", synthetic_rig())
 
 
-def test_full_disk_ends_the_recording_with_a_sentence() -> None:
-    if not Path("/dev/full").exists():
-        pytest.skip("needs /dev/full")
+@contextlib.contextmanager
+def small_disk(size: int) -> Iterator[None]:
+    """No file of this process may grow beyond `size` bytes, as on a disk that is full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
-    class FullDisk(Recorder):
-        def __init__(self, path: Path) -> None:
-            super().__init__(path, synthetic_rig())
-            self._file.close()
-            self._file = Path("/dev/full").open("wb", buffering=0)  # noqa: SIM115
 
-    path = Path(f"/tmp/rhot-full-{time.monotonic_ns()}.log")
-    recorder = FullDisk(path)
-    recorder.put(RecordKind.DATAGRAM, 1, 1, b"datagram")
-    eventually(lambda: not recorder.recording)
-    assert "No space left" in recorder.failure
-    recorder.put(RecordKind.DATAGRAM, 1, 2, b"datagram")  # taken no more, and nothing raises
+def test_a_full_disk_ends_the_recording_with_a_sentence_and_a_log_that_opens(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.log", synthetic_rig())
+    with small_disk(100_000):
+        for k in range(10_000):
+            recorder.put(RecordKind.DATAGRAM, 1, k, b"x" * 79)
+        eventually(lambda: not recorder.recording)
+        recorder.put(RecordKind.DATAGRAM, 1, 2, b"datagram")  # taken no more, and nothing raises
+        recorder.close()
+    assert "File too large. Tracking goes on." in recorder.failure
+    reader = LogReader(tmp_path / "a.log")
+    assert [record.t_master_ns for record in reader] == list(range((100_000 - HEADER_SIZE) // 100))
+    assert reader.torn_bytes
+    assert not reader.losses.damage
+
+
+def test_no_file_is_left_where_no_header_can_be_written(tmp_path: Path) -> None:
+    with small_disk(100), pytest.raises(RecordingError, match=r"a\.log: cannot be written"):
+        Recorder(tmp_path / "a.log", synthetic_rig())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_datagram_that_does_not_fit_is_a_gap_and_recording_goes_on(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.log", synthetic_rig())
+    recorder.put(RecordKind.DATAGRAM, 1, 1, bytes(65536))
+    recorder.put(RecordKind.DATAGRAM, 1, 2, b"datagram")
     recorder.close()
-    path.unlink()
+    assert sorted(record.kind for record in LogReader(recorder.path)) == [RecordKind.DATAGRAM, RecordKind.GAP]
+
+
+def test_the_log_reaches_the_disk_within_a_second_and_not_in_the_thread_that_tracks(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    threads: list[str] = []
+    monkeypatch.setattr("os.fsync", lambda handle: threads.append(threading.current_thread().name))
+    recorder = Recorder(tmp_path / "a.log", synthetic_rig())
+    recorder.put(RecordKind.DATAGRAM, 1, 1, b"datagram")
+    eventually(lambda: threads)
+    recorder.put(RecordKind.DATAGRAM, 1, 2, b"datagram")
+    recorder.close()
+    assert len(threads) >= 2, "once while recording, and at the end"
+    assert threading.current_thread().name not in threads
+
+
+def test_a_killed_recording_opens_and_misses_at_most_a_second(tmp_path: Path) -> None:
+    for k in range(3):
+        path = tmp_path / f"{k}.log"
+        child = multiprocessing.get_context("fork").Process(target=record_for_ever, args=(path,))
+        child.start()
+        eventually(lambda path=path, least=HEADER_SIZE + 1000 * k: path.exists() and path.stat().st_size > least)
+        child.kill()
+        killed_ns = time.monotonic_ns()
+        child.join()
+        reader = LogReader(path)
+        times = [record.t_master_ns for record in reader]
+        assert killed_ns - times[-1] < 1_000_000_000
+        assert not reader.losses.damage
+
+
+def record_for_ever(path: Path) -> None:
+    recorder = Recorder(path, synthetic_rig())
+    while True:
+        recorder.put(RecordKind.DATAGRAM, 1, time.monotonic_ns(), b"x" * 200)
+        time.sleep(0.001)
