@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from types import ModuleType
 
-from rhot_app.errors import RhotError
+from rhot_app.errors import RhotError, take_losses
 from rhot_node.errors import NodeError
 
 
@@ -29,6 +29,7 @@ SUBCOMMANDS = {
     "demo": Subcommand("rhot_app.ui.demo_command", "open the app on the simulated rig"),
     "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
+    "recover": Subcommand("rhot_app.recording.recover_command", "write the sound records of a damaged log to a clean one"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
     "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),
@@ -42,10 +43,16 @@ SUBCOMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 2 for a mistake that has a sentence, 130 when interrupted."""
+    """Run one command; returns its exit code: 2 for a mistake that has a sentence, 3 for work done on a log that could
+    be read in part only, 130 when interrupted."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    take_losses()
     try:
-        return _run(arguments)
+        code = _run(arguments)
+        losses = take_losses()
+        for sentence in losses:
+            print(f"rhot: {sentence}", file=sys.stderr)
+        return 3 if losses and code == 0 else code
     except (RhotError, NodeError) as exc:
         print(f"rhot: {exc}", file=sys.stderr)
         return 2
