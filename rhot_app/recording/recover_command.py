@@ -37,5 +37,5 @@ def run(args: argparse.Namespace) -> int:
             raise RecordingError(f"{args.out}: cannot be written ({exc.strerror}); nothing was.") from exc
     losses = reader.losses
     torn = f" A torn record of {losses.torn_bytes} bytes at the end was left out." if losses.torn_bytes else ""
-    print(f"{args.out}: {count} record{"" if count == 1 else "s"}.{torn}")
+    print(f"{args.out}: {count} record{'' if count == 1 else 's'}.{torn}")
     return 0
