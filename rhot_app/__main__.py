@@ -13,7 +13,7 @@ from importlib.metadata import version
 from types import ModuleType
 
 from rhot_app.errors import RhotError, take_losses
-from rhot_node.errors import NodeError
+from rhot_node.errors import NodeError, printable_lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +51,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _run(arguments)
         losses = take_losses()
         for sentence in losses:
-            print(f"rhot: {sentence}", file=sys.stderr)
+            print(f"rhot: {printable_lines(sentence)}", file=sys.stderr)
         return 3 if losses and code == 0 else code
     except (RhotError, NodeError) as exc:
-        print(f"rhot: {exc}", file=sys.stderr)
+        print(f"rhot: {printable_lines(str(exc))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
