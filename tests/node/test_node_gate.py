@@ -40,8 +40,9 @@ def test_a_stranger_who_knows_the_nodes_key_is_not_let_in(node: TrustedNode) -> 
 
 def test_a_stranger_who_knocks_for_ever_fills_no_log(node: TrustedNode, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO")
+    strangers = []
     for count in range(4):
-        node.connect(node.server.control_port, new_key_pair())
+        strangers.append(node.connect(node.server.control_port, new_key_pair()))
         eventually(lambda count=count: node.server.refused > count)
     assert sum("was not let in" in line for line in caplog.messages) == 1
 
