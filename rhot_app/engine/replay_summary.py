@@ -42,6 +42,7 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker) -> dict[str, Any]:
     return {
         "log": str(reader.path), "duration_s": times.duration_s, "torn_bytes": reader.torn_bytes,
         "damaged_places": reader.losses.places, "skipped_bytes": reader.losses.skipped_bytes,
+        "damaged_header_bytes": reader.losses.header_bytes,
         "missed_records": door.gaps, "unknown_node_records": door.unknown_nodes,
         "states": len(states), "state_rate_hz": (len(states) - 1) / duration_s if duration_s else 0.0,
         "nodes": {link.node.name: {

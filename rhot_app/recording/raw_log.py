@@ -68,17 +68,21 @@ class Losses:
 
     places: int = 0
     skipped_bytes: int = 0
+    header_bytes: int = 0  # of the copy of the header that is damaged
     torn_bytes: int = 0  # at the end, of the record that was being written when the program died
     unknown_records: int = 0  # sound, of a kind that a later version writes
 
     @property
     def damage(self) -> str:
         """What was skipped, as a clause; empty when nothing was."""
+        header = (f"one of the two copies of its header is damaged ({self.header_bytes} bytes)" if self.header_bytes
+                  else "")
         if not self.places:
-            return ""
+            return header
         places = "1 damaged place was" if self.places == 1 else f"{self.places} damaged places were"
         records = "1 record" if self.places == 1 else f"{self.places} records"
-        return f"{places} skipped ({self.skipped_bytes} bytes, at least {records})"
+        skipped = f"{places} skipped ({self.skipped_bytes} bytes, at least {records})"
+        return f"{header}; {skipped}" if header else skipped
 
 
 def encode_header(rig: Rig, about: dict[str, Any]) -> bytes:
@@ -157,7 +161,7 @@ class LogReader:
     def _sound(self) -> Iterator[tuple[int, int, int, bytes]]:
         """Kind, node, time and data of every sound record; `losses` counts what lies between them."""
         file, at, sound = self._file, self._records_at, 0
-        self.losses = losses = Losses(places=int(self._header_losses > 0), skipped_bytes=self._header_losses)
+        self.losses = losses = Losses(header_bytes=self._header_losses)
         file.seek(at)
         while head := file.read(_RECORD.size):
             found = _read_record(file, head)
@@ -176,7 +180,7 @@ class LogReader:
             if following is None:
                 break
             at = file.seek(following)
-        if losses.damage and not sound:
+        if losses.places and not sound:
             raise RecordingError(f"{self.path}: no record in it can be read; {losses.damage}.")
         if losses.damage:
             note_loss(str(self.path), f"{self.path}: {losses.damage}.")
@@ -279,7 +283,10 @@ def _parse_header(file: BinaryIO, at: int) -> tuple[int, int, dict[str, Any]] | 
     covered = document if version == 1 else head + document
     if len(document) != length or crc != _CRC.pack(zlib.crc32(covered)):
         return None
-    about = decode_json(document, "the log's header", RecordingError)
+    try:
+        about = decode_json(document, "the header", RecordingError)
+    except RecordingError:
+        return None
     return (version, len(head) + length + _CRC.size, about) if isinstance(about, dict) else None
 
 
