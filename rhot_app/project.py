@@ -13,7 +13,7 @@ from msgspec import Meta
 
 from rhot_app.errors import RigError
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_node.files import decode_document, read_document, write_document
+from rhot_node.files import PRINTABLE, decode_document, read_document, write_document
 from rhot_node.markers import MarkerSet
 
 FORMAT: Final = "rhot-rig"
@@ -22,12 +22,18 @@ VERSION: Final = 1
 OTHER_HAND: Final = "other_"
 """Begins the role of a marker that sits on the rig's `other_hand`: ``other_index_tip``."""
 
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
+Hertz = Annotated[float, Meta(gt=0, le=1e6)]
+Beta = Annotated[float, Meta(ge=0, le=1e9)]
 Port = Annotated[int, Meta(ge=0, le=65535)]
 Pixels = Annotated[int, Meta(ge=16, le=16384)]
-Name = Annotated[str, Meta(min_length=1, max_length=64)]
-PublicKey = Annotated[str, Meta(pattern=r"^([0-9a-f]{64})?$")]
+Focal = Annotated[float, Meta(gt=0, le=1e6)]
+Pixel = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Coefficient = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Metres = Annotated[float, Meta(ge=-1000, le=1000)]
+Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=PRINTABLE)]
+Address = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9._:%-]{1,253}\Z")]
+"""Of a machine: its name, IPv4 or IPv6 address."""
+PublicKey = Annotated[str, Meta(pattern=r"\A([0-9a-f]{64})?\Z")]
 
 
 class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -35,11 +41,11 @@ class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     width: Pixels
     height: Pixels
-    fx: Positive
-    fy: Positive
-    cx: float
-    cy: float
-    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    fx: Focal
+    fy: Focal
+    cx: Pixel
+    cy: Pixel
+    distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient] = (0.0, 0.0, 0.0, 0.0, 0.0)
 
     @property
     def nominal(self) -> bool:
@@ -51,7 +57,7 @@ class CameraPose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """world_from_camera: unit quaternion wxyz and translation in metres (the camera's centre in the rig frame)."""
 
     rotation_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    translation_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    translation_m: tuple[Metres, Metres, Metres] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         norm = sum(q * q for q in self.rotation_wxyz)
@@ -66,13 +72,13 @@ class RigNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: Name
     intrinsics: Intrinsics
     pose: CameraPose = CameraPose()
-    address: str = "127.0.0.1"
+    address: Address = "127.0.0.1"
     udp_port: Port = 47800  # the node's: start, stop, clock
     control_port: Port = 47801  # the node's: settings, state, stills
     preview_port: Port = 47802  # the node's: preview stream
     data_port: Port = 0  # the master's: observations; 0 takes any free port and tells the node
     text_datagrams: bool = False  # accept the thesis's text datagrams on data_port (untrusted)
-    time_offset_s: float = 0.0  # calibrated correction added to this camera's times
+    time_offset_s: Annotated[float, Meta(ge=-10, le=10)] = 0.0  # calibrated correction added to this camera's times
     pairing_port: Port = 47803  # the node's: who it is, pairing
     public_key: PublicKey = ""  # the node's; empty: the node is not paired, and what it says is untrusted
 
@@ -85,16 +91,16 @@ class RigNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Broadcast(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where start and stop are broadcast, besides being sent to every node's own address."""
 
-    address: str = "255.255.255.255"
+    address: Address = "255.255.255.255"
     port: Port = 47799
 
 
 class OneEuroSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """1-euro filter (Casiez 2012): min cutoff Hz, beta in Hz per (unit/s), derivative cutoff Hz."""
 
-    min_cutoff_hz: Positive
-    beta: NotNegative
-    derivative_cutoff_hz: Positive = 1.0
+    min_cutoff_hz: Hertz
+    beta: Beta
+    derivative_cutoff_hz: Hertz = 1.0
 
 
 class FilterSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -112,9 +118,9 @@ class DepthSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parallel and equal, by RHOT eq. 6.12 or, with `k` (metres) and `z`, by the power law D = k |x|^z of eq. 7.4."""
 
     mode: Literal["stereo", "disparity"] = "stereo"
-    baseline_m: Positive = 0.075
+    baseline_m: Annotated[float, Meta(gt=0, le=1000)] = 0.075
     view_angle_deg: Annotated[float, Meta(gt=1, lt=170)] = 62.2  # horizontal
-    k: Positive | None = None
+    k: Annotated[float, Meta(gt=0, le=1e9)] | None = None
     z: Annotated[float, Meta(ge=-2, lt=0)] | None = None
 
     def __post_init__(self) -> None:

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from rhot_node.clock import NodeClock
 from rhot_node.errors import SettingsError
-from rhot_node.files import decode_document, read_document, write_document
+from rhot_node.files import PRINTABLE, decode_document, read_document, write_document
 from rhot_node.markers import MarkerSet
 
 FORMAT: Final = "rhot-node"
@@ -26,7 +26,7 @@ class CameraSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     width: Pixels = 640
     height: Pixels = 480
-    fps: Annotated[float, Meta(gt=0, le=1000)] = 30.0
+    fps: Annotated[float, Meta(ge=0.1, le=1000)] = 30.0
     exposure_us: Annotated[float, Meta(gt=0, le=1_000_000)] = 4000.0
     gain: Gain | None = None
     saturation: float | None = None
@@ -66,7 +66,7 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Everything a node is told. A port of 0 takes any free one."""
 
     node_id: Annotated[int, Meta(ge=1, le=2**32 - 1)]
-    name: Annotated[str, Meta(min_length=1, max_length=64)]
+    name: Annotated[str, Meta(min_length=1, max_length=64, pattern=PRINTABLE)]
     markers: MarkerSet
     bind_address: str = "0.0.0.0"
     udp_port: Port = 47800
@@ -75,7 +75,7 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     broadcast_port: Annotated[int, Meta(ge=1, le=65535)] | None = 47799
     detector: Literal["fast", "reference"] = "fast"
     camera: CameraSettings = CameraSettings()
-    preview_hz: Annotated[float, Meta(gt=0, le=30)] = 4.0
+    preview_hz: Annotated[float, Meta(ge=0.01, le=30)] = 4.0
     late_frames: Literal["send", "drop"] = "send"  # frames whose processing took longer than the budget (RHOT 7.2)
     budget_ms: Annotated[float, Meta(gt=0, le=10_000)] | None = None  # None: as long as a frame lasts
     clock: ClockSettings = ClockSettings()

@@ -17,6 +17,7 @@ from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_bgr, from_i420
 from rhot_node.detect.reference import ReferenceDetector
 from rhot_node.errors import CameraError
+from rhot_node.files import require_file
 from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
@@ -129,6 +130,7 @@ def _recorded(folder: Path) -> Iterator[NamedImage]:
     header = read_header(folder)
     shape = len(header.times_ns), header.frame_bytes
     try:
+        require_file(folder / FRAMES_NAME)
         frames = np.memmap(folder / FRAMES_NAME, dtype=np.uint8, mode="r", shape=shape)
     except (OSError, ValueError) as exc:
         raise CameraError(f"{folder / FRAMES_NAME}: cannot be read as {shape[0]} frames ({exc}). "

@@ -1,6 +1,18 @@
 """Every error a node raises on purpose. A message says what was wrong, where, and what to do next."""
 
 
+def printable(text: str, limit: int = 400) -> str:
+    """What somebody else wrote, safe for a terminal and a log: one line, control characters as escapes, cut off at
+    `limit` characters."""
+    cut = text if len(text) <= limit else f"{text[:limit]}..."
+    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in cut)
+
+
+def printable_lines(text: str) -> str:
+    """A sentence of our own, safe for a terminal whatever file names and answers it repeats."""
+    return "\n".join(printable(line, 10_000) for line in text.split("\n"))
+
+
 class NodeError(Exception):
     """Root of all errors of this package; commands print it and exit with code 2."""
 

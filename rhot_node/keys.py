@@ -9,8 +9,10 @@ import zmq
 from msgspec import Meta
 from zmq.utils import z85
 
-HexKey = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}$")]
-Name = Annotated[str, Meta(min_length=1, max_length=64)]
+from rhot_node.files import PRINTABLE
+
+HexKey = Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z")]
+Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=PRINTABLE)]
 
 
 class KeyPair(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

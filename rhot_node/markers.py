@@ -14,14 +14,14 @@ import msgspec
 from msgspec import Meta
 
 from rhot_node.errors import SettingsError
-from rhot_node.files import decode_document, read_document, write_document
+from rhot_node.files import PRINTABLE, decode_document, read_document, write_document
 
 FORMAT: Final = "rhot-markers"
 VERSION: Final = 1
 
 Byte = Annotated[int, Meta(ge=0, le=255)]
-Positive = Annotated[float, Meta(gt=0)]
-MarkerId = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[A-Za-z0-9_.-]+$")]
+Millimetres = Annotated[float, Meta(gt=0, le=1000)]
+MarkerId = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"\A[A-Za-z0-9_.-]+\Z")]
 
 Shape = Literal["disc", "sphere", "capsule", "band", "blob"]
 Patch = Literal["segment", "nail", "pulp", "ring"]
@@ -80,8 +80,8 @@ class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
     role: str | None = None  # place on the hand, e.g. "thumb_tip", "wrist"; None: a free point
     shape: Shape = "blob"
     range: RangeModel | None = None  # for the reference detector; derived from `chroma` when absent
-    radius_mm: Positive | None = None
-    length_mm: Positive | None = None
+    radius_mm: Millimetres | None = None
+    length_mm: Millimetres | None = None
     patch: Patch = "segment"  # the part of a fingertip's last segment that is painted
     gap_deg: Annotated[float, Meta(ge=0, le=330)] = 0.0  # of a ring or a band: the angle without the marker's colour
     gap_side: Side = "palmar"  # where the middle of the gap lies
@@ -108,7 +108,7 @@ class MarkerSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """An ordered set of markers; a marker's index in it is its number on the wire."""
 
     markers: Annotated[tuple[Marker, ...], Meta(min_length=1, max_length=64)]
-    name: str = ""
+    name: Annotated[str, Meta(pattern=PRINTABLE)] = ""
     format: Literal["rhot-markers"] = FORMAT
     version: Literal[1] = VERSION
 

@@ -31,8 +31,8 @@ BootClock = Callable[[], tuple[str, int]]
 class Offer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The content of the file."""
 
-    code: Annotated[str, Meta(pattern=f"^[{ALPHABET}]{{{CODE_LENGTH}}}$")]
-    nonce: Annotated[str, Meta(pattern=f"^[0-9a-f]{{{2 * NONCE_LENGTH}}}$")]
+    code: Annotated[str, Meta(pattern=rf"\A[{ALPHABET}]{{{CODE_LENGTH}}}\Z")]
+    nonce: Annotated[str, Meta(pattern=rf"\A[0-9a-f]{{{2 * NONCE_LENGTH}}}\Z")]
     boot_id: str
     expires_ns: int
     tries_left: Annotated[int, Meta(ge=1, le=TRIES)]

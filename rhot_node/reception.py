@@ -5,6 +5,7 @@ Nothing here shows a picture, a setting or a place, and nothing but a proof of t
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Callable
 from typing import Annotated, Any
@@ -13,6 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from rhot_node.errors import NodeError, TrustError
+from rhot_node.files import decode_message
 from rhot_node.keys import HexKey, Name
 from rhot_node.pairing import NONCE_LENGTH, Transcript, proof, proves
 from rhot_node.pairing_offer import OfferFile
@@ -20,6 +22,7 @@ from rhot_node.trust import Master, NodeTrust, trust_state
 
 log = logging.getLogger(__name__)
 
+EXPIRE_S = 1.0
 REQUEST_MAX = 1024  # bytes; a pair request has about 400
 NO_CODE = ("this node offers no code now. Run `rhot-node pair` on it; a code is valid for five minutes, five tries "
            "and one master.")
@@ -34,7 +37,7 @@ class PairRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 
     master_key: HexKey
     master_name: Name
-    master_nonce: Annotated[str, Meta(pattern=f"^[0-9a-f]{{{2 * NONCE_LENGTH}}}$")]
+    master_nonce: Annotated[str, Meta(pattern=rf"\A[0-9a-f]{{{2 * NONCE_LENGTH}}}\Z")]
     proof: HexKey
 
 
@@ -49,11 +52,12 @@ class Reception:
         self._trust = trust
         self._offers = offers
         self._about = about
+        self._expire_s = 0.0
 
     def answer(self, data: bytes) -> bytes:
         """The answer to one request. Never raises."""
         try:
-            request = _decoder.decode(data)
+            request = decode_message(data, _decoder)
             reply = self._hello() if isinstance(request, HelloRequest) else self._pair(request)
         except (msgspec.DecodeError, NodeError) as exc:
             reply = {"ok": False, "error": str(exc)}
@@ -61,6 +65,14 @@ class Reception:
             log.exception("a stranger's request failed")
             reply = {"ok": False, "error": "the node could not do that; see its log."}
         return msgspec.json.encode(reply)
+
+    def expire(self, now_s: float) -> None:
+        """Remove a code that is not valid any more; looks once a second. `now_s`: monotonic, s. Never raises."""
+        if now_s < self._expire_s:
+            return
+        self._expire_s = now_s + EXPIRE_S
+        with contextlib.suppress(NodeError):  # who asks for it hears what is wrong with the file
+            self._offers.current()
 
     def _hello(self) -> dict[str, Any]:
         about = {"ok": True, **self._about(), "trust": trust_state(self._trust).name.lower()}

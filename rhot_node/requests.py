@@ -19,6 +19,7 @@ from msgspec import Meta
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, changed_settings, needs_restart, save_settings
 from rhot_node.errors import NodeError, SettingsError
+from rhot_node.files import decode_message
 from rhot_node.link_keys import LinkKeys
 from rhot_node.pictures import PictureBox, StillFormat, encode_still
 from rhot_node.session import Sessions
@@ -132,7 +133,7 @@ class Responder:
         try:
             if len(parts) != 1:
                 raise NodeError(f"a request is one JSON document in one message part, not {len(parts)} parts.")
-            reply, attachment = self._perform(_decoder.decode(parts[0]), master)
+            reply, attachment = self._perform(decode_message(parts[0], _decoder), master)
         except (msgspec.DecodeError, NodeError) as exc:
             reply, attachment = {"ok": False, "error": str(exc)}, b""
         except OSError as exc:

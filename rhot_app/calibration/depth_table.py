@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from rhot_app.errors import CalibrationError
+from rhot_node.errors import printable
+from rhot_node.files import read_input
 
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
@@ -106,7 +108,7 @@ def read_depth_table(path: Path) -> DepthTable:
         try:
             values = [_number(cells[column], separator) for column in (distance, disparity)]
         except (ValueError, IndexError):
-            table.rejected.append(RejectedRow(f"line {number}", f"{line.strip()!r} holds no two numbers"))
+            table.rejected.append(RejectedRow(f"line {number}", f"{line.strip()[:60]!r} holds no two numbers"))
             continue
         table.take(DepthRow(values[0] * UNITS_M[unit or "cm"], values[1], line=number))
     return table
@@ -114,7 +116,7 @@ def read_depth_table(path: Path) -> DepthTable:
 
 def _text(path: Path) -> str:
     try:
-        data = path.read_bytes()
+        data = read_input(path)
     except OSError as exc:
         raise CalibrationError(f"{path}: the table cannot be read ({exc.strerror}).") from exc
     try:
@@ -127,7 +129,10 @@ def _text(path: Path) -> str:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader(io.StringIO(line), delimiter=separator))]
+    try:
+        return [cell.strip() for cell in next(csv.reader(io.StringIO(line), delimiter=separator))]
+    except csv.Error:  # a cell of more than 131072 characters
+        return []
 
 
 def _column(path: Path, header: Sequence[str], name: str, pattern: re.Pattern[str], what: str) -> tuple[int, str]:
@@ -137,7 +142,7 @@ def _column(path: Path, header: Sequence[str], name: str, pattern: re.Pattern[st
     if names.count(name) == 1:
         found = [(index, match) for index, match in found if names[index] == name]
     if len(found) != 1:
-        listed = ", ".join(header) or "nothing"
+        listed = printable(", ".join(header)) or "nothing"
         problem = f"no column for {what}, {name}" if not found else f"{len(found)} columns that may be {what}"
         raise CalibrationError(f"{path}: {problem}. Its first line names {listed}; it must name real_cm and "
                                "disparity_px once each.")

@@ -19,13 +19,15 @@ from rhot_app.calibration.intrinsics import IntrinsicsReport
 from rhot_app.calibration.lens_fit import PARAMETERS
 from rhot_app.calibration.lens_start import LensStart
 from rhot_app.errors import CalibrationError
-from rhot_app.project import Intrinsics, NotNegative, Pixels, Positive
+from rhot_app.project import Coefficient, Focal, Intrinsics, Pixel, Pixels
 from rhot_node.files import read_document, write_document
 
 FORMAT: Final = "rhot-intrinsics"
 VERSION: Final = 1
 
 Count = Annotated[int, Meta(ge=0)]
+Millimetres = Annotated[float, Meta(gt=0, le=10_000)]
+NotNegative = Annotated[float, Meta(ge=0)]
 
 
 class BoardUsed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,8 +35,8 @@ class BoardUsed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     kind: Literal["chessboard", "charuco"]
     size: tuple[Count, Count]
-    square_mm: Positive
-    marker_mm: Positive | None = None
+    square_mm: Millimetres
+    marker_mm: Millimetres | None = None
     dictionary: str | None = None
     legacy_pattern: bool = False
 
@@ -43,11 +45,11 @@ class IntrinsicsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Pinhole with OpenCV's distortion (k1, k2, p1, p2, k3), px; (0, 0) is the centre of the top-left pixel."""
 
     size: tuple[Pixels, Pixels]
-    fx: Positive
-    fy: Positive
-    cx: float
-    cy: float
-    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    fx: Focal
+    fy: Focal
+    cx: Pixel
+    cy: Pixel
+    distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient] = (0.0, 0.0, 0.0, 0.0, 0.0)
     std: dict[str, NotNegative] = {}
     rms_px: NotNegative | None = None
     views: Count | None = None

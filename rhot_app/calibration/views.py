@@ -19,6 +19,7 @@ from rhot_app.calibration.stereo_views import Dropped
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent
+from rhot_node.files import read_input
 
 MOST_EXPLAINED = 8
 """Pictures of one camera that are searched for the reason why they show no board: that takes a second each."""
@@ -84,7 +85,7 @@ def read_picture(path: Path, board: Board) -> Read:
 def open_picture(path: Path) -> tuple[Gray | None, str]:
     """The picture in grey levels, or None and the reason: missing, no picture, or cut off."""
     try:
-        data = path.read_bytes()
+        data = read_input(path)
     except OSError as exc:
         return None, f"cannot be read ({exc.strerror})"
     if data.startswith(_JPEG_START) and data.rfind(_JPEG_END) < (1.0 - _FORGIVEN) * len(data):

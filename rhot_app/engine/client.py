@@ -19,6 +19,7 @@ from rhot_app.engine.directory import EngineDirectory, default_directory
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import EngineError
 from rhot_app.tracking.state import HandState
+from rhot_node.files import decode_message
 
 VANISHED_S = 1.0
 """An engine publishes its status ten times a second; after this long without one it is gone."""
@@ -128,7 +129,7 @@ class EngineClient:
 def _read_answer(frames: list[bytes]) -> dict[str, Any]:
     """An answer is one JSON frame; bytes (a picture) follow in a second frame and take the name it announces."""
     try:
-        answer: dict[str, Any] = msgspec.json.decode(frames[0], type=dict[str, Any])
+        answer: dict[str, Any] = decode_message(frames[0], dict[str, Any])
     except msgspec.MsgspecError as exc:
         raise EngineError(f"the engine's answer cannot be read ({exc}); restart engine and app.") from exc
     if not answer.pop("ok", False):

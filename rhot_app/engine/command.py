@@ -12,18 +12,37 @@ import logging
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rhot_app.engine.directory import default_directory
+
+if TYPE_CHECKING:
+    from rhot_app.project import Rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot engine``."""
     parser.add_argument("--rig", type=Path, required=True, metavar="FILE", help="the rig file (rhot-rig, JSON)")
     parser.add_argument("--log", type=Path, metavar="FILE", help="write the raw log of all datagrams to this new file")
+    parser.add_argument("--unchecked", action="store_true",
+                        help="serve also a rig that `rhot check` refuses, to calibrate it")
     parser.add_argument("--start", action="store_true", help="tell the nodes to stream at once")
     add_serving_arguments(parser)
     parser.add_argument("--json", action="store_true",
                         help="print one JSON object on standard output when ready: pid, directory, rig")
+
+
+def _require_acceptable(rig: Rig, path: Path) -> None:
+    """Raises RigError when `rhot check` refuses the rig."""
+    from rhot_app.calibration.rig_checks import check_rig
+    from rhot_app.calibration.verdict import Grade
+    from rhot_app.errors import RigError
+
+    verdict = check_rig(rig).verdict
+    if not verdict.acceptable:
+        wrong = " ".join(finding.sentence for finding in verdict.findings if finding.grade is Grade.POOR)
+        raise RigError(f"{path}: cannot be tracked with. {wrong} `rhot check` says more; --unchecked starts all the "
+                       "same, to calibrate the rig.")
 
 
 def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
 
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
     rig = load_rig(args.rig)
+    if not args.unchecked:
+        _require_acceptable(rig, args.rig)
     own = load_master_keys().own
     source = functools.partial(UdpNodes, own=own)
     with serving(rig, args.rig.absolute(), source, args.directory, own) as serve:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable
 from importlib.metadata import version
@@ -14,20 +15,25 @@ from rhot_app.engine.codec import encode
 from rhot_app.engine.core import Engine
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import parse_rig
-from rhot_node.errors import NodeError
+from rhot_node.errors import NodeError, printable
+from rhot_node.files import decode_message
+
+log = logging.getLogger(__name__)
 
 Arguments = dict[str, Any]
 Answer = dict[str, Any]
+
+NAME_MAX = 64  # characters of a command's name
 
 
 def parse(data: bytes) -> tuple[str, Arguments]:
     """Name and arguments of a command; raises EngineError when the bytes are none."""
     try:
-        arguments = msgspec.json.decode(data, type=dict[str, Any])
+        arguments = decode_message(data, dict[str, Any])
     except msgspec.MsgspecError as exc:
         raise EngineError(f"a command is a JSON object; this is not one ({exc}).") from exc
     name = arguments.pop("command", None)
-    if not isinstance(name, str):
+    if not isinstance(name, str) or len(name) > NAME_MAX:
         raise EngineError('a command needs a "command" field with its name.')
     return name, arguments
 
@@ -46,8 +52,9 @@ class Commands:
         self._preview = preview
         self._table: dict[str, Callable[[Arguments], Answer]] = {
             "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
-            "record": self._record, "record_stop": self._record_stop, "rig": self._rig, "set_rig": self._set_rig,
-            "save_rig": self._save_rig, "preview": self._set_preview, "predict": self._predict, "quit": self._end,
+            "record": self._record, "record_stop": self._record_stop, "bookmark": self._bookmark, "rig": self._rig,
+            "set_rig": self._set_rig, "save_rig": self._save_rig, "preview": self._set_preview,
+            "predict": self._predict, "quit": self._end,
         }
 
     @property
@@ -65,6 +72,9 @@ class Commands:
             done = action(arguments)
         except (RhotError, NodeError) as exc:
             return refusal(exc), None
+        except Exception as exc:  # a command must never end the engine; the log has the whole story
+            log.exception("the command %r failed", name)
+            return refusal(EngineError(f"the engine could not do that: {printable(repr(exc))}. See its log.")), None
         attached = done.pop(done["attachment"]) if "attachment" in done else None
         return {"ok": True, **done}, attached
 
@@ -94,6 +104,13 @@ class Commands:
         path = self._engine.record_stop()
         return {"path": "" if path is None else str(path)}
 
+    def _bookmark(self, arguments: Arguments) -> Answer:
+        text = arguments.get("text")
+        if not isinstance(text, str) or not text:
+            raise EngineError('bookmark needs a "text": one line about this moment.')
+        t_ns = _time_ns(arguments, "bookmark") if "t_master_ns" in arguments else None
+        return {"t_master_ns": self._engine.bookmark(text, t_ns)}
+
     def _rig(self, arguments: Arguments) -> Answer:
         return {"document": msgspec.to_builtins(self._engine.rig), "path": str(self._engine.rig_path or "")}
 
@@ -115,10 +132,7 @@ class Commands:
         return {}
 
     def _predict(self, arguments: Arguments) -> Answer:
-        t_ns = arguments.get("t_master_ns")
-        if not isinstance(t_ns, int) or isinstance(t_ns, bool) or not 0 <= t_ns < 1 << 63:
-            raise EngineError('predict needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
-        state = self._engine.state_at(t_ns)
+        state = self._engine.state_at(_time_ns(arguments, "predict"))
         return {} if state is None else {"attachment": "state", "state": encode(state)}
 
     def _end(self, arguments: Arguments) -> Answer:
@@ -126,11 +140,18 @@ class Commands:
         return {}
 
 
+def _time_ns(arguments: Arguments, command: str) -> int:
+    t_ns = arguments.get("t_master_ns")
+    if not isinstance(t_ns, int) or isinstance(t_ns, bool) or not 0 <= t_ns < 1 << 63:
+        raise EngineError(f'{command} needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
+    return t_ns
+
+
 def _path(arguments: Arguments) -> Path | None:
     """The absolute path in a command. The engine's working directory is not the client's, so it must be absolute."""
     path = arguments.get("path")
     if path is None:
         return None
-    if not isinstance(path, str) or not path.startswith("/"):
+    if not isinstance(path, str) or not path.startswith("/") or "\0" in path:
         raise EngineError(f'"path" must be an absolute path, not {path!r}.')
     return Path(path)

@@ -22,6 +22,7 @@ from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig
+from rhot_app.recording.bookmarks import Bookmark, bookmark_record
 from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
@@ -95,7 +96,7 @@ class Engine:
             try:
                 self._source.record_to(recorder)
             except BaseException:
-                recorder.close()
+                recorder.discard()
                 raise
             self.recorder = recorder
 
@@ -109,6 +110,18 @@ class Engine:
             recorder.close()
             self._notice = recorder.failure
             return recorder.path
+
+    def bookmark(self, text: str, t_master_ns: int | None = None) -> int:
+        """Set a bookmark in the log that is being recorded, at `t_master_ns` or now; returns its time, ns.
+
+        Raises RecordingError (the text), EngineError when nothing is recorded.
+        """
+        with self._lock:
+            if self.recorder is None:
+                raise EngineError("nothing is being recorded, so there is no log for the bookmark. Start a recording.")
+            record = bookmark_record(Bookmark(time.monotonic_ns() if t_master_ns is None else t_master_ns, text))
+            self.recorder.put(record.kind, record.node_id, record.t_master_ns, record.data)
+            return record.t_master_ns
 
     def set_rig(self, rig: Rig) -> None:
         """Go on with another rig. Ports and sessions stay when the nodes are reached as before.

@@ -19,6 +19,8 @@ from rhot_app.engine.node_health import health_advice
 from rhot_app.engine.status import Advice, EngineStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
+from rhot_node.errors import printable
+from rhot_node.files import decode_message
 from rhot_node.keys import KeyPair, connect_with
 
 TIMEOUT_S = 2.7
@@ -99,7 +101,8 @@ class NodeControl:
         peer = self._peers.get(node_id) if isinstance(node_id, int) else None
         if peer is None:
             known = ", ".join(f"{peer.node.node_id} ({peer.node.name})" for peer in self._peers.values())
-            raise EngineError(f"there is no node {node_id!r} with a control channel; there is {known or 'none'}.")
+            raise EngineError(f"there is no node {printable(repr(node_id), 80)} with a control channel; there is "
+                              f"{known or 'none'}.")
         request = _still_request(arguments) if command == "still" else arguments.get("request")
         if not isinstance(request, dict):
             raise EngineError('node needs a "request": an object as docs/node.md describes.')
@@ -114,7 +117,7 @@ class NodeControl:
             for asked, answer, attachment in _receive(peer):
                 if asked.client is None:
                     state = answer.get("answer", {})
-                    peer.message = str(state.get("message", ""))
+                    peer.message = printable(str(state.get("message", "")))
                     peer.health = health_advice(peer.node.name, state)
                 else:
                     done.append((asked.client, (answer, attachment)))
@@ -232,11 +235,12 @@ def _receive(peer: _Peer) -> list[tuple[_Asked, Answer, bytes | None]]:
 def _translate(name: str, command: str, parts: list[bytes]) -> tuple[Answer, bytes | None]:
     """A node's reply as the engine's answer to its client."""
     try:
-        reply = msgspec.json.decode(parts[0], type=dict[str, Any])
+        reply = decode_message(parts[0], dict[str, Any])
     except msgspec.MsgspecError as exc:
-        return refusal(EngineError(f"node {name} gave an answer that cannot be read ({exc}).")), None
+        return refusal(EngineError(f"node {name} gave an answer that cannot be read ({printable(str(exc))}).")), None
     if not reply.pop("ok", False):
-        return refusal(EngineError(f"node {name}: {reply.get('error', 'it refused without a reason')}")), None
+        reason = printable(str(reply.get("error", "it refused without a reason")))
+        return refusal(EngineError(f"node {name}: {reason}")), None
     if len(parts) > 1:
         name_of_part = str(reply.get("format", "png")) if command == "still" else "data"
         return {"ok": True, "answer": reply, "attachment": name_of_part}, parts[1]
@@ -251,7 +255,7 @@ def _still_request(arguments: Arguments) -> dict[str, Any]:
 
 def _read_preview(name: str, parts: list[bytes]) -> Preview | None:
     try:
-        header = msgspec.json.decode(parts[0], type=dict[str, Any])
+        header = decode_message(parts[0], dict[str, Any])
         return Preview(name, time.monotonic_ns(), int(header["width"]), int(header["height"]), parts[1])
     except (msgspec.MsgspecError, KeyError, TypeError, ValueError, IndexError):
         return None

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
+from rhot_app.simulator.simulate_command import SECONDS_MAX, add_scene_arguments, scene_of
 from rhot_node.compiled import announce_compilation
 
 _OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs")
@@ -65,9 +64,9 @@ def _evaluate(args: argparse.Namespace) -> int:
     from rhot_app.evaluation.runner import evaluate, evaluate_frames
 
     seconds = 20.0 if args.seconds is None else args.seconds
-    if not SETTLE_S + _JUDGED_S <= seconds < math.inf and args.frames is None:
+    if not SETTLE_S + _JUDGED_S <= seconds <= SECONDS_MAX and args.frames is None:
         raise SimulatorError(f"a run of {seconds:g} s cannot be judged: the first {SETTLE_S:g} s are not, and it must "
-                             "end.")
+                             f"end within {SECONDS_MAX:.0f} s.")
     if not 0.0 <= args.loss < 1.0:
         raise SimulatorError(f"--loss is a probability from 0 to below 1, not {args.loss:g}.")
     with tempfile.TemporaryDirectory(prefix="rhot-") as work:
@@ -120,7 +119,7 @@ def _compare(args: argparse.Namespace) -> int:
         raise SimulatorError(f"--trackers: there is no tracker {unknown[0]!r}; it takes some of {', '.join(TRACKERS)}.")
     seconds = 8.0 if args.seconds is None else args.seconds
     least_s = SETTLE_S + _JUDGED_S
-    for good, rule in ((least_s <= seconds < math.inf, f"--seconds is {least_s:g} or more, and finite"),
+    for good, rule in ((least_s <= seconds <= SECONDS_MAX, f"--seconds is from {least_s:g} to {SECONDS_MAX:.0f}"),
                        (seeds >= 1, "--seeds is 1 or more"),
                        (0.0 <= args.loss < 1.0, "--loss is from 0 to below 1")):
         if not good:

@@ -14,13 +14,15 @@ from msgspec import Meta
 from rhot_app.errors import RigError
 from rhot_app.hand.couplings import THESIS_COUPLINGS, Coupling, coupling_complaints
 from rhot_app.hand.skeleton import ANGLES, FINGERS
-from rhot_node.files import read_document, write_document
+from rhot_node.files import PRINTABLE, read_document, write_document
 
 FORMAT: Final = "rhot-hand"
 VERSION: Final = 1
 
 Millimetres = Annotated[float, Meta(gt=0, le=400)]
-LimitDeg = tuple[float, float]
+Place = Annotated[float, Meta(ge=-400, le=400)]
+Degrees = Annotated[float, Meta(ge=-360, le=360)]
+LimitDeg = tuple[Degrees, Degrees]
 
 
 class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -34,12 +36,12 @@ class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `marker_mm`: distance of the painted marker's centre from the last joint, along the distal bone.
     """
 
-    base_mm: tuple[float, float, float]
+    base_mm: tuple[Place, Place, Place]
     bones_mm: tuple[Millimetres, Millimetres, Millimetres]
     radii_mm: tuple[Millimetres, Millimetres, Millimetres]
     limits_deg: tuple[LimitDeg, ...]
     marker_mm: Millimetres
-    base_rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    base_rotation_deg: tuple[Degrees, Degrees, Degrees] = (0.0, 0.0, 0.0)
 
 
 class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,7 +54,7 @@ class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     wrist_thickness_mm: Millimetres = 40.0
     palm_thickness_mm: Millimetres = 28.0
     couplings: tuple[Coupling, ...] = THESIS_COUPLINGS
-    name: str = ""
+    name: Annotated[str, Meta(pattern=PRINTABLE)] = ""
     format: Literal["rhot-hand"] = FORMAT
     version: Literal[1] = VERSION
 

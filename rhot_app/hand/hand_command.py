@@ -100,15 +100,16 @@ def _name(hand: HandAnatomy | Articulated, args: argparse.Namespace) -> str:
 
 
 def _read(path: Path | None) -> HandAnatomy | Articulated:
+    from rhot_app.errors import RigError
     from rhot_app.hand.anatomy import load_hand
     from rhot_app.hand.articulated import FORMAT, load_articulated
-    from rhot_node.files import resource_path
+    from rhot_node.files import read_json, resource_path
 
     if path is None:
         return load_hand(resource_path("hands", "right.json"))
     try:
-        document = json.loads(path.read_bytes())
-    except (OSError, ValueError):
+        document = read_json(path, RigError)
+    except RigError:
         return load_hand(path)  # which says what is wrong
     rows = isinstance(document, dict) and document.get("format") == FORMAT
     return load_articulated(path) if rows else load_hand(path)

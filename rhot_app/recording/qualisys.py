@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import RecordingError
+from rhot_node.files import read_input
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ class PointTracks:
 def read_qualisys(path: Path) -> PointTracks:
     """Read a TSV export with 3-D data. Raises RecordingError naming the file and what is wrong with it."""
     try:
-        text = path.read_text()
+        text = read_input(path).decode()
     except (OSError, UnicodeDecodeError) as exc:
         raise RecordingError(f"{path}: cannot be read as a recording ({exc}).") from exc
     try:

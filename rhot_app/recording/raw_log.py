@@ -1,6 +1,7 @@
 """The raw log's bytes: every datagram and clock exchange as it came, with its time. docs/log.md, byte by byte.
 
-Reading and writing of files; no sockets, no threads.
+Reading and writing of files; no sockets, no threads. A reader goes on behind damage: with the next record whose
+checksum is right.
 """
 
 from __future__ import annotations
@@ -12,17 +13,22 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Final
 
 import msgspec
+import numpy as np
 
-from rhot_app.errors import RecordingError
+from rhot_app.errors import RecordingError, note_loss
 from rhot_app.project import Rig, parse_rig
+from rhot_node.files import decode_json, open_input
 
-MAGIC = b"RHOTLOG\0"
-VERSION = 1
-HEADER_MAX = 16 << 20
-PAYLOAD_MAX = 65535  # the longest UDP datagram
+MAGIC: Final = b"RHOTLOG\0"
+VERSION: Final = 2
+HEADER_MAX: Final = 16 << 20
+PAYLOAD_MAX: Final = 65535  # the longest UDP datagram
+
+_BLOCK = 4096  # of a disk: what one bad block destroys; each copy of the header fills whole ones
+_SCAN_MAX = 1 << 20  # bytes searched at a time for the next sound record
 
 _PREFIX = struct.Struct("<8sHHI")
 _RECORD = struct.Struct("<BIqI")
@@ -38,9 +44,12 @@ class RecordKind(enum.IntEnum):
     START = 4  # sent to all nodes, as sent
     STOP = 5  # sent to all nodes, as sent
     GAP = 6  # u32: records that could not be kept because the disk was too slow
+    BOOKMARK = 7  # UTF-8 text about a moment (rhot_app.recording.bookmarks)
+    OBJECT_POSE = 8  # reserved
+    LANDMARKS = 9  # reserved
 
 
-_KINDS = frozenset(int(kind) for kind in RecordKind)
+_KINDS = frozenset(int(kind) for kind in RecordKind) - {RecordKind.OBJECT_POSE, RecordKind.LANDMARKS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,85 +62,243 @@ class Record:
     data: bytes
 
 
+@dataclass(slots=True)
+class Losses:
+    """What of a log could not be read. Each place is at least one record."""
+
+    places: int = 0
+    skipped_bytes: int = 0
+    header_bytes: int = 0  # of the copy of the header that is damaged
+    torn_bytes: int = 0  # at the end, of the record that was being written when the program died
+    unknown_records: int = 0  # sound, of a kind that a later version writes
+
+    @property
+    def damage(self) -> str:
+        """What was skipped, as a clause; empty when nothing was."""
+        header = (f"one of the two copies of its header is damaged ({self.header_bytes} bytes)" if self.header_bytes
+                  else "")
+        if not self.places:
+            return header
+        places = "1 damaged place was" if self.places == 1 else f"{self.places} damaged places were"
+        records = "1 record" if self.places == 1 else f"{self.places} records"
+        skipped = f"{places} skipped ({self.skipped_bytes} bytes, at least {records})"
+        return f"{header}; {skipped}" if header else skipped
+
+
 def encode_header(rig: Rig, about: dict[str, Any]) -> bytes:
-    """The bytes that begin a log: magic, version and a JSON document with the rig and free facts `about` it."""
+    """The bytes that begin a log: twice the magic, the version and a JSON document with the rig and facts `about` it.
+
+    Raises RecordingError when the document is too large for a reader.
+    """
     document = json.dumps({**about, "rig": json.loads(msgspec.json.encode(rig))}).encode()
-    return _PREFIX.pack(MAGIC, VERSION, 0, len(document)) + document + _CRC.pack(zlib.crc32(document))
+    document += b" " * (-(_PREFIX.size + len(document) + _CRC.size) % _BLOCK)
+    if len(document) > HEADER_MAX:
+        raise RecordingError(f"the rig {rig.name!r} is too large for a log: {len(document)} bytes of {HEADER_MAX}.")
+    head = _PREFIX.pack(MAGIC, VERSION, 0, len(document)) + document
+    return 2 * (head + _CRC.pack(zlib.crc32(head)))
 
 
 def encode_record(record: Record) -> bytes:
-    """The bytes of one record."""
-    body = _RECORD.pack(record.kind, record.node_id, record.t_master_ns, len(record.data)) + record.data
+    """The bytes of one record. Raises RecordingError when its data are longer than a reader takes."""
+    if len(record.data) > PAYLOAD_MAX:
+        raise RecordingError(f"a record of {len(record.data)} bytes does not fit a log; {PAYLOAD_MAX} do.")
+    return _encode(record.kind, record.node_id, record.t_master_ns, record.data)
+
+
+def _encode(kind: int, node_id: int, t_master_ns: int, data: bytes) -> bytes:
+    body = _RECORD.pack(kind, node_id, t_master_ns, len(data)) + data
     return body + _CRC.pack(zlib.crc32(body))
 
 
 class LogReader:
-    """A log opened for reading. Iterating gives its records; a torn last one ends the iteration and is reported."""
+    """A log opened for reading. Iterating gives its records from the first one on, and `losses` what was left out."""
 
-    def __init__(self, path: Path) -> None:
-        """Open and check the header. Raises RecordingError (no such file, not a log, other version, broken header)."""
+    def __init__(self, path: Path, rig: Rig | None = None) -> None:
+        """Open the file and read its header; `rig` takes the place of a header that cannot be read.
+
+        Raises RecordingError: no such file, not a log, another version, or a header damaged in both copies.
+        """
         self.path = path
-        self.torn_bytes = 0  # at the end, of a record that was being written when the program died
+        self.losses = Losses()
         try:
-            self._file: BinaryIO = path.open("rb")
+            self._file: BinaryIO = open_input(path)
         except OSError as exc:
             raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
         try:
-            self.about = self._read_header()
-            self.rig = parse_rig(json.dumps(self.about.pop("rig", None)).encode(), f"{path}: the rig in its header")
+            header = _read_header(self._file)
+            if header is None and rig is None:
+                raise RecordingError(_why_no_header(self._file, path))
+            self._records_at, self._header_losses = (0, 0) if header is None else (header.end, header.damaged_bytes)
+            self.about = {} if header is None else header.about
+            document = self.about.pop("rig", None)
+            self.rig = rig if header is None and rig is not None else parse_rig(
+                json.dumps(document).encode(), f"{path}: the rig in its header")
         except BaseException:
             self._file.close()
             raise
 
-    def _read_header(self) -> dict[str, Any]:
-        try:
-            magic, version, _, length = _PREFIX.unpack(self._file.read(_PREFIX.size))
-        except struct.error:
-            magic, version, length = b"", 0, 0
-        if magic != MAGIC:
-            raise RecordingError(f"{self.path}: this is not a raw log of this program.")
-        if version != VERSION:
-            raise RecordingError(f"{self.path}: version {version} of the raw log is not supported; "
-                                 f"this program reads version {VERSION}.")
-        document, crc = self._file.read(min(length, HEADER_MAX)), self._file.read(_CRC.size)
-        if len(document) != length or crc != _CRC.pack(zlib.crc32(document)):
-            raise RecordingError(f"{self.path}: the log's header is broken or incomplete; nothing can be replayed.")
-        about = json.loads(document)
-        if not isinstance(about, dict):
-            raise RecordingError(f"{self.path}: the log's header is not an object.")
-        return about
+    @property
+    def torn_bytes(self) -> int:
+        """At the end, of the record that was being written when the program died."""
+        return self.losses.torn_bytes
 
     def __iter__(self) -> Iterator[Record]:
-        """All records in the order written. Raises RecordingError where one is broken in the middle of the file."""
-        while True:
-            offset = self._file.tell()
-            head = self._file.read(_RECORD.size)
-            if not head:
-                return
-            body_length = _RECORD.unpack(head)[3] + _CRC.size if len(head) == _RECORD.size else 0
-            body = self._file.read(min(body_length, PAYLOAD_MAX + _CRC.size))
-            if len(head) == _RECORD.size and body_length <= PAYLOAD_MAX + _CRC.size and len(body) == body_length:
-                record = self._check(head, body, offset)
-                if record is not None:
-                    yield record
-                    continue
-            self.torn_bytes = self._end() - offset
-            return
+        """All records in the order written, without damaged ones and those of unknown kinds.
 
-    def _check(self, head: bytes, body: bytes, offset: int) -> Record | None:
-        """The record, or None when it is the torn end of the file."""
-        kind, node_id, t_master_ns, length = _RECORD.unpack(head)
-        data = body[:length]
-        sound = _CRC.pack(zlib.crc32(data, zlib.crc32(head))) == body[length:]
-        if sound and kind in _KINDS:
-            return Record(RecordKind(kind), node_id, t_master_ns, data)
-        if self._file.tell() == self._end():
-            return None
-        raise RecordingError(f"{self.path}: the record at byte {offset} is broken; what follows cannot be trusted.")
+        Raises RecordingError at the end when there is damage and not one record was sound.
+        """
+        for kind, node_id, t_master_ns, data in self._sound():
+            if kind in _KINDS:
+                yield Record(RecordKind(kind), node_id, t_master_ns, data)
+            else:
+                self.losses.unknown_records += 1
 
-    def _end(self) -> int:
-        return self.path.stat().st_size
+    def sound_records(self) -> Iterator[bytes]:
+        """The bytes of every sound record, of whatever kind. Raises RecordingError as iterating does."""
+        for kind, node_id, t_master_ns, data in self._sound():
+            yield _encode(kind, node_id, t_master_ns, data)
+
+    def _sound(self) -> Iterator[tuple[int, int, int, bytes]]:
+        """Kind, node, time and data of every sound record; `losses` counts what lies between them."""
+        file, at, sound = self._file, self._records_at, 0
+        self.losses = losses = Losses(header_bytes=self._header_losses)
+        file.seek(at)
+        while head := file.read(_RECORD.size):
+            found = _read_record(file, head)
+            if found is not None:
+                at += _RECORD.size + len(found[3]) + _CRC.size
+                sound += 1
+                yield found
+                continue
+            size = file.seek(0, 2) - at
+            following = _next_sound(file, at + 1)
+            if following is None and _is_torn(head, size):
+                losses.torn_bytes = size
+                break
+            losses.places += 1
+            losses.skipped_bytes += size if following is None else following - at
+            if following is None:
+                break
+            at = file.seek(following)
+        if losses.places and not sound:
+            raise RecordingError(f"{self.path}: no record in it can be read; {losses.damage}.")
+        if losses.damage:
+            note_loss(str(self.path), f"{self.path}: {losses.damage}.")
 
     def close(self) -> None:
         """Close the file. May be called twice."""
         self._file.close()
+
+
+def _read_record(file: BinaryIO, head: bytes) -> tuple[int, int, int, bytes] | None:
+    """Kind, node, time and data of the record that begins with `head`; None when it is damaged or torn."""
+    if len(head) < _RECORD.size:
+        return None
+    kind, node_id, t_master_ns, length = _RECORD.unpack(head)
+    if kind == 0 or length > PAYLOAD_MAX:
+        return None
+    body = file.read(length + _CRC.size)
+    data = body[:length]
+    if len(body) < length + _CRC.size or _CRC.pack(zlib.crc32(data, zlib.crc32(head))) != body[length:]:
+        return None
+    return kind, node_id, t_master_ns, data
+
+
+def _is_torn(head: bytes, size: int) -> bool:
+    """Whether the last `size` bytes of a file can be a record of which the end is missing."""
+    if len(head) < _RECORD.size:
+        return head[0] != 0
+    kind, _, _, length = _RECORD.unpack(head)
+    return kind != 0 and length <= PAYLOAD_MAX and size < _RECORD.size + length + _CRC.size
+
+
+def _next_sound(file: BinaryIO, start: int) -> int | None:
+    """Where the first sound record at or behind byte `start` begins; None when there is none."""
+    step, longest = _BLOCK, _RECORD.size + PAYLOAD_MAX + _CRC.size
+    while True:
+        file.seek(start)
+        block = file.read(step + longest)
+        last = len(block) < step + longest
+        found = _first_sound(block, len(block) if last else step)
+        if found is not None:
+            return start + found
+        if last:
+            return None
+        start += step
+        step = min(2 * step, _SCAN_MAX)
+
+
+def _first_sound(block: bytes, limit: int) -> int | None:
+    """Where the first sound record that begins in the first `limit` bytes of `block` does."""
+    count = min(limit, len(block) - _RECORD.size - _CRC.size + 1)
+    if count <= 0:
+        return None
+    values = np.frombuffer(block, np.uint8)
+    length_at = _RECORD.size - 4  # little-endian: a length of at most 65535 ends with two zeros
+    possible = (values[:count] != 0) & (values[length_at + 2:][:count] == 0) & (values[length_at + 3:][:count] == 0)
+    view = memoryview(block)
+    for begin in np.flatnonzero(possible).tolist():
+        end = begin + _RECORD.size + block[begin + length_at] + 256 * block[begin + length_at + 1]
+        if end + _CRC.size <= len(block) and _CRC.unpack_from(block, end)[0] == zlib.crc32(view[begin:end]):
+            return int(begin)
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    about: dict[str, Any]
+    end: int  # where the records begin
+    damaged_bytes: int  # of the other copy, or of what stands before both
+
+
+def _read_header(file: BinaryIO) -> _Header | None:
+    """The header by its first copy that is sound; None when there is none."""
+    first = _parse_header(file, 0)
+    if first is not None:
+        version, size, about = first
+        if version == 1:
+            return _Header(about, size, 0)
+        return _Header(about, 2 * size, 0 if _parse_header(file, size) is not None else size)
+    file.seek(0)
+    start = file.read(2 * HEADER_MAX)
+    at = start.find(MAGIC, 1)
+    while at > 0:
+        found = _parse_header(file, at)
+        if found is not None and found[0] != 1:
+            return _Header(found[2], at + found[1], at)
+        at = start.find(MAGIC, at + 1)
+    return None
+
+
+def _parse_header(file: BinaryIO, at: int) -> tuple[int, int, dict[str, Any]] | None:
+    """Version, length and document of the copy of the header at byte `at`; None when it is damaged."""
+    file.seek(at)
+    head = file.read(_PREFIX.size)
+    if len(head) < _PREFIX.size:
+        return None
+    magic, version, _, length = _PREFIX.unpack(head)
+    if magic != MAGIC or version not in (1, VERSION) or length > HEADER_MAX:
+        return None
+    document, crc = file.read(length), file.read(_CRC.size)
+    covered = document if version == 1 else head + document
+    if len(document) != length or crc != _CRC.pack(zlib.crc32(covered)):
+        return None
+    try:
+        about = decode_json(document, "the header", RecordingError)
+    except RecordingError:
+        return None
+    return (version, len(head) + length + _CRC.size, about) if isinstance(about, dict) else None
+
+
+def _why_no_header(file: BinaryIO, path: Path) -> str:
+    file.seek(0)
+    head = file.read(_PREFIX.size)
+    if not head.startswith(MAGIC):
+        return (f"{path}: this is not a raw log of this program. If it was one, `rhot recover` with --rig may still "
+                "read it.")
+    version = _PREFIX.unpack(head)[1] if len(head) == _PREFIX.size else VERSION
+    if version not in (1, VERSION):
+        return (f"{path}: version {version} of the raw log is not supported; this program reads versions 1 and "
+                f"{VERSION}.")
+    return (f"{path}: the log's header is damaged or incomplete. `rhot recover LOG --rig FILE --out CLEAN` reads it "
+            "with the rig that it was recorded with.")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
+import os
 import struct
 import threading
 import time
@@ -12,10 +14,13 @@ from typing import Any
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
+from rhot_app.recording.raw_log import PAYLOAD_MAX, Record, RecordKind, encode_header, encode_record
 
 QUEUE_LIMIT = 65_536
 """Records that may wait for the disk: six seconds of a 10,000 datagrams/s flood."""
+
+SYNC_S = 1.0
+"""The log is flushed to the disk this often: what a power cut may cost."""
 
 _FLUSH_S = 0.2
 
@@ -24,19 +29,28 @@ class Recorder:
     """One log being written. `put` never blocks and never raises; `failure` says why recording ended early."""
 
     def __init__(self, path: Path, rig: Rig, about: dict[str, Any] | None = None) -> None:
-        """Create the file. Raises RecordingError when it exists already or cannot be written."""
+        """Create the file. Raises RecordingError when it exists already or cannot be written; no file is left then."""
         self.path = path
         self.bytes_written = 0
         self.failure = ""
         self._queue: SimpleQueue[Record] = SimpleQueue()
         self._missed = 0
+        self._synced_bytes = 0
         self._ending = threading.Event()
+        header = encode_header(rig, about or {})
         try:
             self._file = path.open("xb", buffering=0)
-            self._write(encode_header(rig, about or {}))
         except FileExistsError as exc:
             raise RecordingError(f"{path}: exists already; a log is never written over. Choose another name.") from exc
         except OSError as exc:
+            raise RecordingError(f"{path}: cannot be written ({exc.strerror}).") from exc
+        try:
+            with contextlib.suppress(OSError):  # some network file systems have no locks
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody appends to it meanwhile
+            self._write(header)
+        except OSError as exc:
+            self._file.close()
+            path.unlink(missing_ok=True)
             raise RecordingError(f"{path}: cannot be written ({exc.strerror}).") from exc
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
         self._thread.start()
@@ -50,7 +64,7 @@ class Recorder:
         """Take one record; when the disk is too slow it is left out and the gap is recorded."""
         if not self.recording:
             return
-        if self._queue.qsize() >= QUEUE_LIMIT:
+        if self._queue.qsize() >= QUEUE_LIMIT or len(data) > PAYLOAD_MAX:
             self._missed += 1
             return
         self._queue.put(Record(kind, node_id, t_master_ns, data))
@@ -70,14 +84,33 @@ class Recorder:
         try:
             self._write(b"".join(parts))
         except OSError as exc:
-            self.failure = (f"Recording to {self.path} has stopped: {exc.strerror}. Tracking goes on. "
-                            "Make room or choose another disk, then start a new recording.")
+            self._fail(exc)
 
     def close(self) -> None:
-        """Write what waits and close the file. May be called twice."""
+        """Write what waits, flush it to the disk and close the file. May be called twice."""
         self._ending.set()
         self._thread.join()
         self._file.close()
+
+    def discard(self) -> None:
+        """Close the file and remove it: the recording was refused."""
+        self.close()
+        self.path.unlink(missing_ok=True)
+
+    def _fail(self, exc: OSError) -> None:
+        self.failure = (f"Recording to {self.path} has stopped: {exc.strerror}. Tracking goes on. "
+                        "Make room or choose another disk, then start a new recording.")
+
+    def _sync(self) -> None:
+        """Have the disk take what was written; only this thread waits for it."""
+        if self._synced_bytes == self.bytes_written:
+            return
+        self._synced_bytes = self.bytes_written
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as exc:
+            if not self.failure:
+                self._fail(exc)
 
     def _write(self, data: bytes) -> None:
         """Write all bytes; a raw file may take only a part of them at a time."""
@@ -88,8 +121,13 @@ class Recorder:
             view = view[written:]
 
     def _run(self) -> None:
+        due_s = time.monotonic() + SYNC_S
         while not self._ending.is_set() and not self.failure:
             self.step(_FLUSH_S)
+            if time.monotonic() >= due_s:
+                self._sync()
+                due_s = time.monotonic() + SYNC_S
             time.sleep(0.02)  # gather a batch: one write for many records, and the lock of the interpreter left alone
         while not self.failure and self._queue.qsize():
             self.step(0.0)
+        self._sync()

@@ -18,6 +18,7 @@ from rhot_app.errors import RecordingError, SimulatorError
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.recording.qualisys import read_qualisys
+from rhot_node.files import read_input
 
 Array = NDArray[np.float64]
 
@@ -48,10 +49,10 @@ class Landmarks:
 def read_landmarks(path: Path, model: HandModel) -> Landmarks:
     """Landmarks of a recording; `model` tells where along a finger a marker must sit. Raises SimulatorError."""
     try:
-        landmarks = _qualisys(path, model) if path.suffix.lower() == ".tsv" else _leap(path.read_text())
+        landmarks = _qualisys(path, model) if path.suffix.lower() == ".tsv" else _leap(read_input(path).decode())
     except (OSError, UnicodeDecodeError, RecordingError) as exc:
         raise SimulatorError(f"{path}: cannot be read as a recording ({exc}).") from exc
-    except (ValueError, IndexError, KeyError) as exc:
+    except (ValueError, IndexError, KeyError, csv.Error) as exc:
         raise SimulatorError(f"{path}: not a recording this program knows ({exc}). It reads Qualisys .tsv exports with "
                              "finger and hand markers, and Leap Motion .csv exports with joint positions.") from exc
     if len(landmarks.times_s) < 2 or not (np.isfinite(landmarks.points).all(axis=2).sum(axis=1) >= 4).any():

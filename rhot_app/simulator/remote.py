@@ -38,6 +38,7 @@ from rhot_app.simulator.twin_requests import (
     StateRequest,
     door_address,
 )
+from rhot_node.files import decode_message
 
 ANSWER_S = 180.0
 """A show that was never shown on this machine is compiled first."""
@@ -111,7 +112,7 @@ class TwinRemote:
             if not socket.poll(round(1e3 * timeout_s)):
                 raise SimulatorError(f"the simulated rig in {self._directory} gave no answer in {timeout_s:g} s. "
                                      "Open the simulated rig again.")
-            answer: dict[str, Any] = msgspec.json.decode(socket.recv())
+            answer: dict[str, Any] = decode_message(socket.recv(), dict[str, Any])
         finally:
             socket.close()
         if not answer.pop("ok", False):

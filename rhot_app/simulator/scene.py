@@ -43,7 +43,7 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     width: Annotated[int, Meta(ge=16, le=4096, multiple_of=2)]
     height: Annotated[int, Meta(ge=16, le=4096, multiple_of=2)]
     horizontal_fov_deg: Annotated[float, Meta(gt=1, lt=170)]
-    fps: Positive
+    fps: Annotated[float, Meta(ge=0.1, le=1000)]
     row_time_us: NotNegative
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 MOST_PICTURES = 999
 POINT_SIGMA_PX = 0.12
+SECONDS_MAX = 86_400.0
 
 _OPTION_OF = {"distance_m": "distance", "lamp.brightness": "lamp", "lamp.kelvin": "kelvin", "lamp.mains_hz": "mains",
               "worn_paint": "worn", "uneven_paint": "uneven", "glove_rgb": "glove"}
@@ -148,6 +149,8 @@ def run(args: argparse.Namespace) -> int:
 def _check(args: argparse.Namespace) -> None:
     from rhot_app.errors import SimulatorError
 
+    if not 0.0 < args.seconds <= SECONDS_MAX:
+        raise SimulatorError(f"--seconds is a number above 0 and up to {SECONDS_MAX:.0f}, not {args.seconds:g}.")
     if args.pictures is not None and args.points is not None:
         raise SimulatorError("--pictures and --points exclude each other: points are seen without pictures.")
     if args.pictures is not None and not 1 <= args.pictures <= MOST_PICTURES:

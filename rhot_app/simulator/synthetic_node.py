@@ -54,6 +54,7 @@ def synthetic_rig(node_count: int = 2, baseline_m: float = 0.075) -> Rig:
     names = ("left", "right") if node_count == 2 else tuple(f"camera {k + 1}" for k in range(node_count))
     nodes = tuple(
         RigNode(node_id=k + 1, name=name, intrinsics=lens, udp_port=_free_port(),
+                control_port=47801 + 10 * k, preview_port=47802 + 10 * k, pairing_port=47803 + 10 * k,
                 pose=CameraPose(translation_m=(k * baseline_m, 0.0, 0.0)))
         for k, name in enumerate(names))
     return Rig(name="synthetic", nodes=nodes, markers=load_markers(resource_path("markers", "rhot6.json")),

@@ -16,6 +16,7 @@ from rhot_app.errors import SimulatorError
 from rhot_app.simulator.acts import Act
 from rhot_app.simulator.body import HandBody
 from rhot_app.simulator.prop import Prop
+from rhot_node.files import open_input
 
 Array = NDArray[np.float64]
 
@@ -145,7 +146,7 @@ def _cameras(data: Any) -> tuple[FrameTruth, ...]:
 def _opened(path: Path) -> Iterator[Any]:
     """An open truth file; whatever is wrong with it becomes a SimulatorError."""
     try:
-        with np.load(path) as data:
+        with open_input(path) as file, np.load(file) as data:
             yield data
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as exc:
         raise SimulatorError(f"{path}: not a truth file of a simulated run ({exc}). "

@@ -13,6 +13,7 @@ import msgspec
 
 from rhot_app.simulator.lamp import Lamp
 from rhot_app.simulator.shows import Show
+from rhot_node.files import decode_message
 
 DOOR_NAME: Final = "twin.ipc"
 
@@ -64,7 +65,7 @@ _decoder = msgspec.json.Decoder(Request)
 
 def decode_request(data: bytes) -> Request:
     """Read a request; raises msgspec.DecodeError."""
-    return _decoder.decode(data)
+    return decode_message(data, _decoder)
 
 
 def refusal(sentence: str) -> dict[str, Any]:

@@ -17,6 +17,8 @@ from msgspec import Meta
 
 from rhot_app.errors import PairingError
 from rhot_app.keys import KnownNode, MasterKeys, remember_node
+from rhot_node.errors import printable
+from rhot_node.files import PRINTABLE, decode_message
 from rhot_node.keys import Name
 from rhot_node.pairing import NONCE_LENGTH, Transcript, proof, proves, read_code
 from rhot_node.reception import NO_CODE
@@ -55,14 +57,14 @@ class Introduction(msgspec.Struct, frozen=True):
 
     node_id: Annotated[int, Meta(ge=1, le=2**32 - 1)]
     name: Name
-    state: Annotated[str, Meta(max_length=64)]
+    state: Annotated[str, Meta(max_length=64, pattern=PRINTABLE)]
     trust: Literal["open", "unpaired", "paired"]
     udp_port: Port
     control_port: Port
     preview_port: Port
     pairing_port: Port
-    public_key: Annotated[str, Meta(pattern=r"^([0-9a-f]{64})?$")] = ""
-    nonce: Annotated[str, Meta(pattern=r"^([0-9a-f]{32})?$")] = ""  # of the code it offers; empty: it offers none
+    public_key: Annotated[str, Meta(pattern=r"\A([0-9a-f]{64})?\Z")] = ""
+    nonce: Annotated[str, Meta(pattern=r"\A([0-9a-f]{32})?\Z")] = ""  # of the code it offers; empty: it offers none
 
 
 class _Refusal(msgspec.Struct):
@@ -70,7 +72,7 @@ class _Refusal(msgspec.Struct):
 
 
 class _Paired(msgspec.Struct):
-    proof: Annotated[str, Meta(pattern=r"^[0-9a-f]{64}$")]
+    proof: Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z")]
 
 
 def ask_who(addresses: Sequence[NodeAddress], timeout_s: float = TIMEOUT_S) -> list[Introduction | str]:
@@ -158,8 +160,9 @@ def _read(address: NodeAddress, answer: bytes | str | None, kind: type[T], timeo
     if isinstance(answer, str):
         raise PairingError(answer)
     try:
-        if not msgspec.json.decode(answer, type=dict[str, Any]).get("ok"):
-            raise PairingError(f"{address}: {msgspec.json.decode(answer, type=_Refusal).error}")
-        return msgspec.json.decode(answer, type=kind)
+        if not decode_message(answer, dict[str, Any]).get("ok"):
+            raise PairingError(f"{address}: {printable(decode_message(answer, _Refusal).error)}")
+        return decode_message(answer, kind)
     except msgspec.MsgspecError as exc:
-        raise PairingError(f"{address}: something answered that is not a node of this system ({exc}).") from exc
+        raise PairingError(f"{address}: something answered that is not a node of this system "
+                           f"({printable(str(exc))}).") from exc

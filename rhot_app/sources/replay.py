@@ -107,7 +107,7 @@ class LogReplay:
         self._deliver = deliver
 
     def notices(self) -> list[str]:
-        """That the log is over, broken or torn."""
+        """That the log is over, damaged or torn."""
         return [self._notice] if self._notice else []
 
     def configure(self, rig: Rig) -> None:
@@ -146,9 +146,10 @@ class LogReplay:
             with contextlib.closing(LogReader(self._path)) as reader:
                 if not self._play(reader):
                     return
-            torn = reader.torn_bytes
+            torn, damage = reader.losses.torn_bytes, reader.losses.damage
             self._notice = "The log is over; Start replays it again." if not torn else (
                 f"The log is over; its last {torn} bytes are torn (the program died while writing).")
+            self._notice += f" It is damaged: {damage}." if damage else ""
         except RecordingError as exc:
             self._notice = self.failure = str(exc)
         self.over = True
@@ -158,6 +159,8 @@ class LogReplay:
         first_ns: int | None = None
         begun_ns = time.monotonic_ns()
         for record in records:
+            if record.kind is RecordKind.BOOKMARK:  # it may stand anywhere, with any time
+                continue
             if first_ns is None and record.kind is RecordKind.DATAGRAM:
                 first_ns, begun_ns = record.t_master_ns, time.monotonic_ns()
             elapsed_ns = record.t_master_ns - first_ns if first_ns is not None else 0

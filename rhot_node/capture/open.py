@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import stat
 from pathlib import Path
 
 from rhot_node.capture.camera import Camera
@@ -13,6 +15,8 @@ from rhot_node.capture.yuv import YuvRecording
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.errors import CameraError
+
+VIDEO4LINUX_MAJOR = 81  # Linux, Documentation/admin-guide/devices.txt
 
 SPEC_HELP = """camera specs:
   pi, pi:1, ...         the Raspberry Pi's camera, or its second one, through picamera2
@@ -32,7 +36,8 @@ def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera
         return PiCamera(int(match[1] or 0), settings, clock)
     if re.fullmatch(r"\d{1,3}", spec):
         return Webcam(f"/dev/video{spec}", settings, clock)
-    if spec.startswith("/dev/"):
+    if spec.startswith("/dev/") and not Path(spec).is_file():
+        _require_video(Path(spec))
         return Webcam(spec, settings, clock)
     if spec.startswith("stream:"):
         return StreamCamera(Path(spec.removeprefix("stream:")), settings, clock)
@@ -43,6 +48,16 @@ def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera
     if options.get("rate", "max") != "max":
         raise CameraError(f"camera {spec!r}: the only rate is max; without it a file plays at its own.")
     return _files(Path(name), spec, settings, clock, rate_max="rate" in options)
+
+
+def _require_video(path: Path) -> None:
+    """Raises CameraError for a device that is no camera; OpenCV may read one of those for ever."""
+    try:
+        info = path.stat()
+    except OSError:
+        return  # the webcam says which there are
+    if not stat.S_ISCHR(info.st_mode) or os.major(info.st_rdev) != VIDEO4LINUX_MAJOR:
+        raise CameraError(f"{path}: is no camera. A camera is a video4linux device, such as /dev/video0.")
 
 
 def takes_settings(spec: str) -> bool:

@@ -15,6 +15,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_bgr
 from rhot_node.errors import CameraError
+from rhot_node.files import require_file
 
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm", ".webp"})
 
@@ -60,6 +61,7 @@ class ImageFiles:
     def image(self) -> Plane:
         """Decode the current file."""
         path = self._paths[self._index]
+        _require_file(path)
         image = cv2.imread(str(path), cv2.IMREAD_COLOR)
         if image is None:
             raise CameraError(f"{path}: not an image that can be decoded. Remove or replace it.")
@@ -103,6 +105,7 @@ class VideoFile:
         self._capture.release()
 
     def _open(self) -> cv2.VideoCapture:
+        _require_file(self._path)
         capture = cv2.VideoCapture(str(self._path))
         if not capture.isOpened():
             capture.release()
@@ -187,3 +190,10 @@ class PacedCamera:
             exposure_ns=self._exposure_ns,
             row_time_ns=self._row_time_ns,
         )
+
+
+def _require_file(path: Path) -> None:
+    try:
+        require_file(path)
+    except OSError as exc:
+        raise CameraError(f"{path}: cannot be read ({exc.strerror}).") from exc

@@ -23,6 +23,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import from_i420
 from rhot_node.errors import CameraError
+from rhot_node.files import decode_message
 
 MAGIC = b"RYUV"
 SETTINGS_MAGIC = b"RSET"
@@ -94,7 +95,7 @@ def take_settings(received: bytearray) -> CameraSettings | None:
     document = bytes(received[_SETTINGS_HEADER.size:end])
     del received[:end]
     try:
-        return msgspec.json.decode(document, type=CameraSettings)
+        return decode_message(document, CameraSettings)
     except msgspec.DecodeError as exc:
         raise CameraError(f"a node's camera settings cannot be read ({exc}).") from exc
 

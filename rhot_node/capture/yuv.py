@@ -23,7 +23,7 @@ from rhot_node.capture.pace import NS_PER_S, available_delay_ns, sleep_until
 from rhot_node.clock import NodeClock
 from rhot_node.detect.image import Plane, from_i420
 from rhot_node.errors import CameraError
-from rhot_node.files import read_document, write_document
+from rhot_node.files import open_input, read_document, read_input, write_document
 
 FORMAT: Final = "rhot-yuv"
 VERSION: Final = 1
@@ -209,7 +209,7 @@ def read_header(folder: Path) -> YuvHeader:
 def read_start_file(path: Path) -> int | None:
     """Host monotonic ns in a start file, None while it does not exist; write it elsewhere and rename it to `path`."""
     try:
-        text = path.read_text(encoding="ascii", errors="replace").strip()
+        text = read_input(path, 1 << 20).decode("ascii", "replace").strip()
     except FileNotFoundError:
         return None
     except OSError as exc:
@@ -230,7 +230,7 @@ def _map_frames(path: Path, header: YuvHeader) -> mmap.mmap:
         if size != expected:
             raise CameraError(f"{path}: {size} bytes, but {len(header.times_ns)} frames of {header.width} x "
                               f"{header.height} px need {expected}. The recording is incomplete; record it again.")
-        with path.open("rb") as file:
+        with open_input(path) as file:
             frames = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
     except OSError as exc:
         raise CameraError(f"{path}: cannot be opened ({exc.strerror}).") from exc

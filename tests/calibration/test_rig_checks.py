@@ -217,3 +217,42 @@ def test_a_rig_with_what_only_pythons_json_takes_for_a_number_is_refused(rig: Ri
     path.write_text(json.dumps(document))
     assert main(["check", str(path)]) == 2
     assert f"{path}: not valid JSON" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("place", "value"), [
+    ("nodes.0.address", "192.168.1.2\0"), ("nodes.0.address", "192.168.1.2\n"), ("nodes.0.address", ""),
+    ("nodes.0.address", "pi left"), ("nodes.0.address", "x" * 300), ("broadcast.address", "255.255.255.255\n"),
+    ("nodes.0.name", "left\x1b[2J"), ("nodes.0.name", "left\n"), ("name", "\u202etfel"),
+    ("nodes.0.public_key", "0" * 64 + "\n"), ("nodes.0.intrinsics.fx", 1e300), ("nodes.0.intrinsics.cx", -1e300),
+    ("nodes.0.pose.translation_m", [1e300, 0, 0]), ("nodes.0.time_offset_s", 1e12),
+    ("filters.pixel.min_cutoff_hz", 1e300), ("depth.baseline_m", 1e300), ("hand.fingers.thumb.base_mm", [1e300, 0, 0]),
+])
+def test_check_and_engine_refuse_what_cannot_be_with_one_sentence(
+        rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str], place: str, value: object) -> None:
+    path = tmp_path / "rig.json"
+    document = msgspec.to_builtins(rig)
+    *way, field = place.split(".")
+    there = document
+    for step in way:
+        there = there[int(step)] if step.isdecimal() else there[step]
+    there[field] = value
+    path.write_text(json.dumps(document))
+    said = []
+    for command in (["check", str(path)], ["engine", "--rig", str(path), "--directory", str(tmp_path / "e")]):
+        assert main(command) == 2
+        said.append(capsys.readouterr().err)
+    assert said[0] == said[1]
+    assert field in said[0]
+    assert said[0].rstrip("\n").isprintable()
+
+
+def test_the_engine_refuses_what_check_refuses(rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "rig.json"
+    save_rig(path, with_right_at(rig, -0.075, 0.0, 0.0))
+    assert main(["check", str(path)]) == 2
+    capsys.readouterr()
+    assert main(["engine", "--rig", str(path), "--directory", str(tmp_path / "e")]) == 2
+    said = capsys.readouterr().err
+    assert "Right stands 75 mm to the left of left." in said
+    assert "--unchecked" in said
+    assert not (tmp_path / "e").exists()

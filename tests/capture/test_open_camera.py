@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 
@@ -157,6 +158,25 @@ def test_a_broken_image_is_named(tmp_path: Path) -> None:
     camera.read(1.0)
     with pytest.raises(CameraError, match=r"001\.png: not an image"):
         camera.read(1.0)
+
+
+def test_only_files_and_cameras_are_opened(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.avi")
+    write_images(tmp_path / "images", 2)
+    os.mkfifo(tmp_path / "images" / "000.jpg")
+    with YuvWriter(tmp_path / "recording", 32, 16, 0, 0) as writer:
+        writer.append(0, np.zeros(32 * 16 * 3 // 2, np.uint8))
+    os.mkfifo(tmp_path / "start")
+    wrong = {
+        "/dev/null": "is no camera", "/dev/shm": "is no camera", str(tmp_path / "pipe.avi"): "it is a pipe",
+        str(tmp_path / "images"): r"000\.jpg: cannot be read \(it is a pipe",
+    }
+    for spec, sentence in wrong.items():
+        with pytest.raises(CameraError, match=sentence):
+            open_camera(spec, SETTINGS, CLOCK)
+    camera = open_camera(f"yuv:{tmp_path / 'recording'}?start={tmp_path / 'start'}", SETTINGS, CLOCK)
+    with pytest.raises(CameraError, match="it is a pipe"):
+        camera.read(0.1)
 
 
 def test_what_cannot_be_opened_is_named(tmp_path: Path) -> None:

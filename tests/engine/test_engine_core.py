@@ -1,5 +1,6 @@
 """The engine over synthetic nodes: states out, figures, recording and replay, rigs changed while it runs."""
 
+import resource
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from rhot_app.engine.replay_summary import replay_states, summarise
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import EngineError, RecordingError, RhotError, RigError
 from rhot_app.project import OneEuroSettings, Rig, load_rig
-from rhot_app.recording.raw_log import LogReader
+from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.rig_history import versions
 from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.replay import LogDoor, LogReplay
@@ -144,6 +145,21 @@ def test_log_replays_to_the_same_states(tmp_path: Path, rig: Rig, bench: Bench, 
     assert np.mean(nearest < 20_000) > 0.9  # the clock's estimate may step between two records of different threads
 
 
+def test_tracking_goes_on_when_the_disk_is_full(tmp_path: Path, bench: Bench, nodes: list[SyntheticNode]) -> None:
+    bench.engine.start()
+    bench.run_until(lambda: len(bench.published) > 5)
+    bench.engine.record(tmp_path / "a.log")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / "a.log").stat().st_size + 5000, before[1]))
+    try:
+        bench.run_until(lambda: any("has stopped" in advice.text for advice in bench.engine.status().advice))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    bench.until_published(len(bench.published) + 20)
+    assert bench.engine.status().log_path == ""
+    assert any(record.kind is RecordKind.DATAGRAM for record in LogReader(tmp_path / "a.log"))
+
+
 def _decode_state(payload: bytes) -> HandState:
     state = codec.decode(codec.TOPIC_STATE, payload)
     assert isinstance(state, HandState)
@@ -167,6 +183,7 @@ def test_replay_source_serves_like_nodes(tmp_path: Path, rig: Rig, bench: Bench,
         eventually(lambda published=published, count=count: len(published) >= count + 20)
         with pytest.raises(RecordingError):
             engine.record(tmp_path / "c.log")
+        assert not (tmp_path / "c.log").exists(), "a refused recording leaves a file"
         engine.close()
 
 

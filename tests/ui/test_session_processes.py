@@ -54,8 +54,8 @@ def test_an_engine_is_started_found_restarted_and_ended(session, rig_path):
 
 
 def test_an_engine_started_by_hand_is_left_running(session, rig_path):
-    process = subprocess.Popen([sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path), "--directory",
-                                str(session.directory), "--json"], stdout=subprocess.PIPE)
+    process = subprocess.Popen([sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path), "--unchecked",
+                                "--directory", str(session.directory), "--json"], stdout=subprocess.PIPE)
     try:
         assert process.stdout is not None and process.stdout.readline()
         assert not session.attach(quiet).ours

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import pytest
 
 from rhot_app.__main__ import main
@@ -62,3 +65,29 @@ def test_a_directory_that_others_can_read_is_refused(tmp_path, capsys):
     shared.mkdir(mode=0o755)
     assert main(["--directory", str(shared)]) == 2
     assert "open to other users" in capsys.readouterr().err
+
+
+def test_options_may_stand_before_the_subcommand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[tuple[Path | None, object]] = []
+    monkeypatch.setattr("rhot_app.ui.demo_command.open_window",
+                        lambda args, rig, twin: opened.append((args.directory, twin)) or 0)
+    assert main(["--directory", str(tmp_path), "demo", "--seed", "3"]) == 0
+    assert main(["--reset", "--directory", "demo", "demo"]) == 0
+    (place, twin), (second, _) = opened
+    assert place == tmp_path
+    assert isinstance(twin, TwinChoice)
+    assert twin.seed == 3
+    assert second == Path("demo"), "the value of an option is no subcommand"
+
+
+def test_an_option_that_the_subcommand_does_not_have_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--rig", "rig.json", "demo"])
+    assert ended.value.code == 2
+    assert "'--rig'" in capsys.readouterr().err
+
+
+def test_settings_are_kept_in_a_file_and_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(tmp_path / "pipe.ini")
+    assert main(["--settings", str(tmp_path / "pipe.ini"), "--directory", str(tmp_path / "engine")]) == 2
+    assert "pipe.ini: cannot be written (it is a pipe" in capsys.readouterr().err

@@ -173,7 +173,7 @@ def _read(path: Path) -> YuvImage | None:
     from rhot_node.detect.image import from_bgr
 
     if not path.is_file():
-        raise CalibrationError(f"--image {path}: there is no such file.")
+        raise CalibrationError(f"--image {path}: there is no such file (a pipe or a device is none).")
     bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if bgr is None:
         return None

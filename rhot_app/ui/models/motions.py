@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 
-from rhot_node.files import resource_path
+from rhot_app.errors import RigError
+from rhot_node.files import read_json, resource_path
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,8 +21,8 @@ def shipped_motions() -> list[MotionInfo]:
     found = []
     for path in sorted(resource_path("motions").glob("*.json")):
         try:
-            document = json.loads(path.read_text())
-        except (OSError, ValueError):
+            document = read_json(path, RigError)
+        except RigError:
             continue
         found.append(MotionInfo(path.stem, str(document.get("description", ""))))
     return found
