@@ -154,8 +154,8 @@ class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 
     method: Literal["board", "outdated", "exact"]
     lengths: Literal["skipped", "baseline", "ruler"] = "skipped"
-    error_m: NotNegative | None = None
-    distance_m: Positive = 0.6
+    error_m: Annotated[float, Meta(ge=0, le=100)] | None = None
+    distance_m: Annotated[float, Meta(gt=0, le=100)] = 0.6
 
 
 class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
