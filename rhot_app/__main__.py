@@ -29,6 +29,7 @@ SUBCOMMANDS = {
     "demo": Subcommand("rhot_app.ui.demo_command", "open the app on the simulated rig"),
     "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
+    "export": Subcommand("rhot_app.export.export_command", "write a raw log's hand as a file for other programs"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
     "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),

@@ -31,3 +31,7 @@ class EngineError(RhotError):
 
 class CalibrationError(RhotError):
     """A calibration cannot begin or end: its input is missing, unreadable, or does not determine the answer."""
+
+
+class ExportError(RhotError):
+    """A recording cannot be exported as asked: a format, an option, a missing package or the disk stands against it."""
