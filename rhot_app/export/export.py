@@ -79,7 +79,8 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
     """
     options = options or ExportOptions()
     name = format_of(format_name, out)
-    _check(name, options, out, again)
+    check_options(name, options)
+    _check_place(out, again)
     with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98)) as tracked:
         notes = _write(tracked, name, options, out)
         if not tracked.tracked:
@@ -88,15 +89,19 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
         return Exported(out, tracked.count, tuple(tracked.losses), tuple(notes))
 
 
-def _check(name: str, options: ExportOptions, out: Path, again: bool) -> None:
-    """Refuse what cannot be before anything is tracked."""
+def check_options(name: str | None, options: ExportOptions) -> None:
+    """Refuse what no log could be exported with; `name` None is no format. Raises ExportError."""
     if options.smooth:
         raise ExportError("no tracker smooths yet: a state uses what came before it alone. Leave --smooth out.")
     if options.rate_hz is not None:
         checked_rate(options.rate_hz)
-    chosen = FORMATS[name]
-    if options.units is not None and options.units != chosen.units and not chosen.units_free:
+    chosen = None if name is None else FORMATS[name]
+    if chosen is not None and options.units not in (None, chosen.units) and not chosen.units_free:
         raise ExportError(f"{name} files are in {chosen.units}, as their readers expect; leave --units out.")
+
+
+def _check_place(out: Path, again: bool) -> None:
+    """Refuse before anything is tracked."""
     if not out.parent.is_dir():
         raise ExportError(f"{out.parent} is not a folder; create it first.")
     if out.is_dir():

@@ -48,13 +48,13 @@ class TrackedLog:
         try:
             own = self._reader.rig if rig is None else load_rig(rig) if isinstance(rig, Path) else rig
             self.rig = own if tracker is None else with_tracker(own, "model" if tracker == "model" else "classic")
-            self._tracker = make_tracker(self.rig)
+            self.tracker = make_tracker(self.rig)
         except BaseException:
             self._reader.close()
             raise
         self._door = LogDoor(self.rig)
         self._size = max(path.stat().st_size, 1)
-        self._frames = _FrameCount(self._tracker, len(self.rig.nodes))
+        self._frames = _FrameCount(self.tracker, len(self.rig.nodes))
 
     @property
     def created(self) -> str:
