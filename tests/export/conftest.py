@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from tracked_log import states_of_log
+
 from rhot_app.evaluation.takes import LOG_NAME, Order, take
-from rhot_app.export.recording import TrackedLog
-from rhot_app.export.states import HandStates, joined
+from rhot_app.export.states import HandStates
 from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header, encode_record
 from rhot_app.simulator.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene import make_scene, twin_defaults
@@ -33,11 +34,6 @@ def gappy(log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("gappy") / "gappy.rhotlog"
     path.write_bytes(encode_header(reader.rig, reader.about) + b"".join(map(encode_record, kept)))
     return path
-
-
-def states_of_log(path: Path, tracker: str = "classic") -> HandStates:
-    with TrackedLog(path, tracker=tracker) as tracked:
-        return joined(list(tracked.blocks()))
 
 
 @pytest.fixture(scope="session")

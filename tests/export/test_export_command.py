@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import struct
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from rhot_app.__main__ import main
 from rhot_app.errors import ExportError
 from rhot_app.export.export import FORMATS, export_log
 from rhot_app.export.plan import ExportOptions
-from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header, encode_record
+from rhot_app.recording.raw_log import MAGIC, VERSION, LogReader, RecordKind, encode_header, encode_record
 
 
 def left(folder: Path) -> list[str]:
@@ -66,9 +67,8 @@ def test_mistakes_are_sentences(arguments: tuple[str, ...], words: str, log: Pat
 
 
 def test_logs_that_are_none(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    data = bytearray(log.read_bytes())
-    data[8] = 9
-    (tmp_path / "later.rhotlog").write_bytes(bytes(data))
+    later = log.read_bytes().replace(MAGIC + struct.pack("<H", VERSION), MAGIC + struct.pack("<H", 9))
+    (tmp_path / "later.rhotlog").write_bytes(later)
     (tmp_path / "foreign.rhotlog").write_bytes(b"something else")
     reader = LogReader(log)
     (tmp_path / "empty.rhotlog").write_bytes(encode_header(reader.rig, {}))
