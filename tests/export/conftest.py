@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
 from tracked_log import states_of_log
 
 from rhot_app.evaluation.takes import LOG_NAME, Order, take
