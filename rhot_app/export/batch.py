@@ -78,6 +78,9 @@ def jobs_of(logs: Sequence[Path], folder: Path, format_name: str | None, rig: Pa
     if f"{Path(MANIFEST).stem}{ending}" == MANIFEST and Path(MANIFEST).stem in named:
         raise ExportError(f"{named[Path(MANIFEST).stem]} would become {MANIFEST}, which is the list of what was done; "
                           "rename it.")
+    for stem, log in named.items():
+        if log == folder.absolute() / f"{stem}{ending}":
+            raise ExportError(f"{log} is a recording, which is never written over; choose another --out.")
     rig = None if rig is None else rig.absolute()
     return [Job(log, folder.absolute() / f"{stem}{ending}", format_name, rig, options) for stem, log in named.items()]
 

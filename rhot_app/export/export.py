@@ -80,7 +80,7 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
     options = options or ExportOptions()
     name = format_of(format_name, out)
     check_options(name, options)
-    _check_place(out, again)
+    _check_place(log, out, again)
     with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98)) as tracked:
         notes = _write(tracked, name, options, out)
         if not tracked.tracked:
@@ -100,8 +100,10 @@ def check_options(name: str | None, options: ExportOptions) -> None:
         raise ExportError(f"{name} files are in {chosen.units}, as their readers expect; leave --units out.")
 
 
-def _check_place(out: Path, again: bool) -> None:
+def _check_place(log: Path, out: Path, again: bool) -> None:
     """Refuse before anything is tracked."""
+    if out.absolute() == log.absolute() or (out.exists() and log.exists() and out.samefile(log)):
+        raise ExportError(f"{out} is the recording itself, which is never written over; choose another --out.")
     if not out.parent.is_dir():
         raise ExportError(f"{out.parent} is not a folder; create it first.")
     if out.is_dir():

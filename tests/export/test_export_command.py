@@ -115,6 +115,18 @@ def test_an_existing_file_is_written_over_only_when_told(log: Path, tmp_path: Pa
     assert out.read_text().startswith("time_s,")
 
 
+def test_a_recording_is_never_written_over(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_bytes(log.read_bytes())
+    (tmp_path / "same.csv").symlink_to(path)
+    for out in ("mine.csv", "same.csv"):
+        assert main(["export", str(path), "--out", str(tmp_path / out), "--again"]) == 2
+        assert "is the recording itself" in capsys.readouterr().err
+    assert main(["batch", str(path), "--do", "export", "--format", "csv", "--out", str(tmp_path), "--again"]) == 2
+    assert "never written over" in capsys.readouterr().err
+    assert path.read_bytes() == log.read_bytes()
+
+
 @contextmanager
 def small_disk(size: int) -> Iterator[None]:
     """No file may grow beyond `size`: writing fails as on a full disk."""
