@@ -30,6 +30,8 @@ SUBCOMMANDS = {
     "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
     "recover": Subcommand("rhot_app.recording.recover_command", "write a damaged log's sound records to a clean one"),
+    "export": Subcommand("rhot_app.export.export_command", "write a raw log's hand as a file for other programs"),
+    "batch": Subcommand("rhot_app.export.batch_command", "track or export many raw logs"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
     "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),

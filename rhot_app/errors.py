@@ -46,3 +46,7 @@ def take_losses() -> list[str]:
     sentences = list(_losses.values())
     _losses.clear()
     return sentences
+
+
+class ExportError(RhotError):
+    """A recording cannot be exported as asked: a format, an option, a missing package or the disk stands against it."""

@@ -69,11 +69,11 @@ def _frames(reader: LogReader, rig: Rig) -> Iterator[CameraObservations]:
             yield frame
     if not count:
         raise RecordingError(f"{reader.path}: no frame in it can be used with the rig {rig.name!r} "
-                             f"({_why_none(door)}). Give the rig that the log was recorded with, or record again.")
+                             f"({why_none(door)}). Give the rig that the log was recorded with, or record again.")
 
 
-def _why_none(door: LogDoor) -> str:
-    """What became of the log's datagrams, in words."""
+def why_none(door: LogDoor) -> str:
+    """What became of a log's datagrams, in words."""
     reasons = [f"{count} of {link.node.name} refused: {reason}" for link in door.links
                for reason, count in link.door.dropped.items()]
     if door.unknown_nodes:

@@ -10,9 +10,11 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from rhot_app.project import Rig
 from rhot_app.ui.controller import Controller
+from rhot_app.ui.export_dialog import ExportDialog
 from rhot_app.ui.guide import GuideViewer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.nodes_dialog import NodesDialog
+from rhot_app.ui.recordings import recordings_folder
 from rhot_app.ui.rig_dialog import RigDialog
 from rhot_app.ui.tracker_dialog import TrackerDialog
 
@@ -37,6 +39,12 @@ class Dialogs:
         """The rig file written for two nodes that answered; None when there is none."""
         dialog = NodesDialog(scheme, self._parent)
         return dialog.rig_path if dialog.exec() else None
+
+    def export_recording(self, log: Path | None = None) -> None:
+        """What to write of a recording, beside the window; `log` None is asked for."""
+        self.export = ExportDialog(log, recordings_folder(), self._parent)
+        self.export.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.export.open()
 
     def show_rig(self, rig: Rig, page: str) -> None:
         """What the rig says, to read; `page` is "cameras", "markers" or "hand"."""

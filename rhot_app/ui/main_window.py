@@ -108,6 +108,7 @@ class MainWindow(QMainWindow):
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)
         a.nodes.triggered.connect(self.connect_nodes)
+        a.export.triggered.connect(lambda: self.dialogs.export_recording())
         a.save_rig.triggered.connect(lambda: self.rig_watch.save(self.tell))
         a.close_rig.triggered.connect(c.close_rig)
         a.quit.triggered.connect(self.close)

@@ -18,6 +18,11 @@ LOG_SUFFIX = ".rhotlog"
 SHOW_FOLDER = "show the recording's folder"
 
 
+def recordings_folder() -> Path:
+    """Where recordings are made: the folder RHOT of the user's documents."""
+    return user_documents_path() / "RHOT"
+
+
 class Recordings:
     """`tell` takes the sentences that are to be shown for a while."""
 
@@ -32,7 +37,7 @@ class Recordings:
         if self._controller.recording:
             self._controller.stop_recording()
             return
-        folder = user_documents_path() / "RHOT"
+        folder = recordings_folder()
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as exc:

@@ -1,0 +1,1 @@
+"""What users take away: recordings tracked and written as files that other programs read, one by one or in batches."""

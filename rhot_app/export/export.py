@@ -1,0 +1,189 @@
+"""Exports a recording: one pass through the tracker, into a file that appears only when it is whole."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rhot_app.errors import ExportError
+from rhot_app.export.frames import in_frame
+from rhot_app.export.plan import ExportOptions, Plan, Units, Writer
+from rhot_app.export.recording import RATE_AFTER_S, TrackedLog
+from rhot_app.export.resample import Resampler, checked_rate
+from rhot_app.export.states import HandStates
+from rhot_app.progress import Progress, silent, within
+from rhot_app.project import Rig
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format: its writer as module:class, the endings of its files (the first one is given to new ones), the unit of
+    length unless told otherwise, whether another can be chosen, and whether it has a rate instead of times."""
+
+    writer: str
+    endings: tuple[str, ...]
+    units: Units
+    units_free: bool = True
+    uniform: bool = False
+
+
+FORMATS: dict[str, Format] = {
+    "csv": Format("rhot_app.export.tables:CsvWriter", (".csv",), "mm"),
+    "trc": Format("rhot_app.export.points:TrcWriter", (".trc",), "mm", uniform=True),
+    "c3d": Format("rhot_app.export.points:C3dWriter", (".c3d",), "mm", uniform=True),
+    "bvh": Format("rhot_app.export.bvh:BvhWriter", (".bvh",), "m", uniform=True),
+    "gltf": Format("rhot_app.export.gltf:GltfWriter", (".glb", ".gltf"), "m", units_free=False),
+    "npz": Format("rhot_app.export.tables:NpzWriter", (".npz",), "m"),
+    "parquet": Format("rhot_app.export.tables:ParquetWriter", (".parquet",), "mm"),
+    "mcap": Format("rhot_app.export.mcap_file:McapWriter", (".mcap",), "m", units_free=False),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """What came of an export. `losses`: what of the log could not be read; `notes`: what the format could not hold."""
+
+    path: Path
+    states: int
+    losses: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def format_of(name: str | None, out: Path | None) -> str:
+    """The format that is asked for by name, or by the ending of the file to write. Raises ExportError."""
+    if name is not None:
+        if name not in FORMATS:
+            raise ExportError(f"there is no format {name!r}; there are {', '.join(FORMATS)}.")
+        if out is not None and out.suffix.lower() not in FORMATS[name].endings:
+            raise ExportError(f"{out}: a {name} file ends in {' or '.join(FORMATS[name].endings)}.")
+        return name
+    if out is None:
+        raise ExportError(f"say which format to write: --format with one of {', '.join(FORMATS)}.")
+    for found, one in FORMATS.items():
+        if out.suffix.lower() in one.endings:
+            return found
+    raise ExportError(f"{out}: its ending {out.suffix!r} is that of no format; there are {', '.join(FORMATS)}.")
+
+
+def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig | Path | None = None,
+               options: ExportOptions | None = None, again: bool = False, progress: Progress = silent) -> Exported:
+    """Track a raw log and write `out`; `format_name` None goes by its ending.
+
+    Raises ExportError, RecordingError or RigError with a sentence; nothing is written then, and nothing is left of an
+    export that is interrupted. An existing file is only written over `again`.
+    """
+    options = options or ExportOptions()
+    name = format_of(format_name, out)
+    check_options(name, options)
+    _check_place(log, out, again)
+    with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98)) as tracked:
+        notes = _write(tracked, name, options, out)
+        if not tracked.tracked:
+            notes.append(f"the hand is tracked in none of the {tracked.count} states")
+        progress(f"exported {log.name}", 1.0)
+        return Exported(out, tracked.count, tuple(tracked.losses), tuple(notes))
+
+
+def check_options(name: str | None, options: ExportOptions) -> None:
+    """Refuse what no log could be exported with; `name` None is no format. Raises ExportError."""
+    if options.smooth:
+        raise ExportError("no tracker smooths yet: a state uses what came before it alone. Leave --smooth out.")
+    if options.rate_hz is not None:
+        checked_rate(options.rate_hz)
+    chosen = None if name is None else FORMATS[name]
+    if chosen is not None and options.units not in (None, chosen.units) and not chosen.units_free:
+        raise ExportError(f"{name} files are in {chosen.units}, as their readers expect; leave --units out.")
+
+
+def _check_place(log: Path, out: Path, again: bool) -> None:
+    """Refuse before anything is tracked."""
+    if out.absolute() == log.absolute() or (out.exists() and log.exists() and out.samefile(log)):
+        raise ExportError(f"{out} is the recording itself, which is never written over; choose another --out.")
+    if not out.parent.is_dir():
+        raise ExportError(f"{out.parent} is not a folder; create it first.")
+    if out.is_dir():
+        raise ExportError(f"{out} is a folder; name a file in it.")
+    if out.exists() and not again:
+        raise ExportError(f"{out} exists already; choose another --out, or write over it with --again.")
+
+
+def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path) -> list[str]:
+    with _whole_file(out) as path:
+        writer: Writer | None = None
+        try:
+            for plan, states in _prepared(tracked, name, options, path):
+                writer = writer or _writer(name, plan)
+                writer.add(in_frame(states, options.frame))
+            assert writer is not None  # else there were no states, and that is an error
+            writer.finish()
+        finally:
+            if writer is not None:
+                with contextlib.suppress(OSError):  # a full disk has been told of already
+                    writer.close()
+    return writer.notes
+
+
+def _prepared(tracked: TrackedLog, name: str, options: ExportOptions,
+              path: Path) -> Iterator[tuple[Plan, HandStates]]:
+    """The states as the format has them, at their own times or at a rate, each with the plan of the file."""
+    held: list[HandStates] = []  # until the cameras' rate is known
+    resampler: Resampler | None = None
+    plan: Plan | None = None
+    uniform = FORMATS[name].uniform or options.rate_hz is not None
+    for block in _ended(tracked.blocks()):
+        if block is not None:
+            held.append(block)
+        first_ns = int(held[0].t_master_ns[0]) if held else 0
+        if uniform and resampler is None and block is not None and (
+                int(block.t_master_ns[-1]) - first_ns < 1e9 * RATE_AFTER_S):
+            continue
+        if plan is None:
+            camera_hz = tracked.camera_rate_hz or 1.0
+            rate_hz = options.rate_hz or max(float(round(camera_hz)), 1.0)
+            resampler = Resampler(rate_hz, 1.0 / camera_hz) if uniform else None
+            plan = Plan(path, tracked.rig, options.frame, options.units or FORMATS[name].units, options.hand,
+                        rate_hz if uniform else None, tracked.path.name, tracked.created, first_ns)
+        for states in held:
+            given = states if resampler is None else resampler.take(states)
+            if given is not None:
+                yield plan, given
+        held = []
+
+
+def _ended(blocks: Iterator[HandStates]) -> Iterator[HandStates | None]:
+    """The blocks, then None."""
+    yield from blocks
+    yield None
+
+
+def _writer(name: str, plan: Plan) -> Writer:
+    module, _, kind = FORMATS[name].writer.partition(":")
+    made: Writer = getattr(importlib.import_module(module), kind)(plan)
+    return made
+
+
+@contextlib.contextmanager
+def _whole_file(out: Path) -> Iterator[Path]:
+    """A hidden file that becomes `out` when the block ends, or vanishes when it fails. Raises ExportError where the
+    disk refuses."""
+    path: Path | None = None
+    try:
+        handle, hidden = tempfile.mkstemp(dir=out.parent, prefix=f".{out.stem}.", suffix=out.suffix)
+        os.close(handle)
+        path = Path(hidden)
+        yield path
+        with path.open("rb+") as file:
+            os.fsync(file.fileno())
+        path.chmod(0o644)
+        path.replace(out)
+    except OSError as exc:
+        raise ExportError(f"{out}: cannot be written ({exc.strerror or exc}). Nothing was left of it; make room, or "
+                          "choose another place.") from exc
+    finally:
+        if path is not None:
+            path.unlink(missing_ok=True)

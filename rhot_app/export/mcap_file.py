@@ -1,0 +1,143 @@
+"""MCAP, as Foxglove plays it: every state, the hand as a scene, and the frames. Channels: docs/export.md."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.export.frames import quaternions
+from rhot_app.export.mcap_schemas import FRAME_TRANSFORMS, OF_HAND, SCENE_UPDATE, hand_state
+from rhot_app.export.plan import Plan
+from rhot_app.export.requirements import require
+from rhot_app.export.states import HandStates
+from rhot_app.hand.skeleton import FINGERS
+from rhot_app.project import OTHER_HAND
+
+Array = NDArray[np.float64]
+Message = dict[str, Any]
+
+_BONES: Final = [pair for finger in range(len(FINGERS)) for first in (1 + 4 * finger,)
+                 for pair in ((0, first), (first, first + 1), (first + 1, first + 2), (first + 2, first + 3))]
+_ORIGIN: Final[Message] = {"position": {"x": 0.0, "y": 0.0, "z": 0.0},
+                           "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+_JOINT_COLOR, _MARKER_COLOR = (0.85, 0.85, 0.9), (1.0, 0.55, 0.1)
+_OPACITY: Final = (1.0, 0.6, 0.3, 0.0)  # by knowledge, as in the app's scene
+_JOINT_M, _MARKER_M, _LINE_M = 0.008, 0.014, 0.004
+_MATCHING_ID, _LINE_LIST = 0, 2
+
+
+class McapWriter:
+    """Streams messages in compressed chunks; their time is the master's monotonic clock."""
+
+    def __init__(self, plan: Plan) -> None:
+        require("mcap", "an MCAP file")
+        from mcap.writer import Writer
+
+        self.notes: list[str] = []
+        self._plan = plan
+        self._frame_id = "rig" if plan.frame == "rig" else "palm"
+        self._encode = msgspec.json.Encoder().encode
+        self._file = plan.path.open("wb")
+        self._writer = Writer(self._file)
+        self._writer.start(profile="", library="rhot")
+        self._writer.add_metadata("rhot", plan.about())
+        self._channels = {
+            "/tf_static": self._channel("/tf_static", "foxglove.FrameTransforms", FRAME_TRANSFORMS),
+            "/tf": self._channel("/tf", "foxglove.FrameTransforms", FRAME_TRANSFORMS),
+            "/hand/scene": self._channel("/hand/scene", "foxglove.SceneUpdate", SCENE_UPDATE),
+            "/hand/state": self._channel("/hand/state", "rhot.HandState", hand_state(len(plan.rig.markers.ids)))}
+        self._send("/tf_static", plan.first_ns, {"transforms": [
+            _transform(plan.first_ns, f"camera_{node.name}", node.pose.translation_m, node.pose.rotation_wxyz)
+            for node in plan.rig.nodes]})
+
+    def _channel(self, topic: str, name: str, schema: Message) -> int:
+        number = self._writer.register_schema(name=name, encoding="jsonschema", data=self._encode(schema))
+        return int(self._writer.register_channel(topic=topic, message_encoding="json", schema_id=number))
+
+    def add(self, states: HandStates) -> None:
+        """Write the messages of these states."""
+        hands = [("", states)] if states.other is None else [("", states), (OTHER_HAND, states.other)]
+        turns = [quaternions(hand.world_from_palm[:, :3, :3]).tolist() for _, hand in hands]
+        tables = [_rows(states, with_markers=True)] + [_rows(hand) for _, hand in hands[1:]]
+        for number, t_ns in enumerate(states.t_master_ns.tolist()):
+            rows = [{name: column[number] for name, column in table.items()} for table in tables]
+            self._send("/hand/state", t_ns, rows[0] | ({"other": rows[1]} if len(rows) > 1 else {}))
+            shown = [hand.tracked[number] and row["joint_positions"][0][0] == row["joint_positions"][0][0]
+                     for (_, hand), row in zip(hands, rows, strict=True)]
+            names = [f"{prefix}hand" for prefix, _ in hands]
+            self._send("/hand/scene", t_ns, {
+                "deletions": [{"timestamp": _time(t_ns), "type": _MATCHING_ID, "id": name}
+                              for name, there in zip(names, shown, strict=True) if not there],
+                "entities": [_entity(t_ns, name, row, self._frame_id)
+                             for name, row, there in zip(names, rows, shown, strict=True) if there]})
+            frames = [_transform(t_ns, f"{prefix}palm", hand.world_from_palm[number, :3, 3].tolist(), turn[number])
+                      for (prefix, hand), turn, there in zip(hands, turns, shown, strict=True) if there]
+            if frames:
+                self._send("/tf", t_ns, {"transforms": frames})
+
+    def _send(self, topic: str, t_ns: int, message: Message) -> None:
+        self._writer.add_message(channel_id=self._channels[topic], log_time=t_ns, publish_time=t_ns,
+                                 data=self._encode(message))
+
+    def finish(self) -> None:
+        """Write the index."""
+        self._writer.finish()
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def _rows(states: HandStates, *, with_markers: bool = False) -> dict[str, list[Any]]:
+    """The columns of a hand as lists, by the names of the message's fields."""
+    names = OF_HAND
+    table: dict[str, list[Any]] = {"condition": list(states.conditions)}
+    if with_markers:
+        names += ("sequence", "t_master_ns", "marker_positions", "marker_raw_positions", "marker_covariances",
+                  "marker_knowledge", "epipolar_error_px")
+        table["marker_ids"] = [states.marker_ids] * len(states)
+    return table | {name: getattr(states, name).tolist() for name in names}
+
+
+def _entity(t_ns: int, name: str, row: Message, frame_id: str) -> Message:
+    """A hand of joints and bones, and the markers that are seen."""
+    joints = row["joint_positions"]
+    spheres = [_sphere(point, _JOINT_M, _JOINT_COLOR, known)
+               for point, known in zip(joints, row["joint_knowledge"], strict=True)]
+    spheres += [_sphere(point, _MARKER_M, _MARKER_COLOR, known)
+                for point, known in zip(row.get("marker_positions", ()), row.get("marker_knowledge", ()), strict=True)
+                if point[0] == point[0]]
+    bones = {"type": _LINE_LIST, "pose": _ORIGIN, "thickness": _LINE_M, "scale_invariant": False,
+             "points": [_vector(joints[joint]) for bone in _BONES for joint in bone],
+             "color": _color(_JOINT_COLOR, 1.0), "colors": [], "indices": []}
+    return {"timestamp": _time(t_ns), "frame_id": frame_id, "id": name, "lifetime": {"sec": 0, "nsec": 0},
+            "frame_locked": False, "metadata": [{"key": "condition", "value": row["condition"]}], "arrows": [],
+            "cubes": [], "spheres": spheres, "cylinders": [], "lines": [bones], "triangles": [], "texts": [],
+            "models": []}
+
+
+def _sphere(point: list[float], size_m: float, color: tuple[float, float, float], known: int) -> Message:
+    return {"pose": {"position": _vector(point), "orientation": _ORIGIN["orientation"]},
+            "size": {"x": size_m, "y": size_m, "z": size_m}, "color": _color(color, _OPACITY[known])}
+
+
+def _color(color: tuple[float, float, float], opacity: float) -> Message:
+    return {"r": color[0], "g": color[1], "b": color[2], "a": opacity}
+
+
+def _vector(point: list[float]) -> Message:
+    return {"x": point[0], "y": point[1], "z": point[2]}
+
+
+def _time(t_ns: int) -> Message:
+    return {"sec": t_ns // 1_000_000_000, "nsec": t_ns % 1_000_000_000}
+
+
+def _transform(t_ns: int, child: str, place: Any, rotation_wxyz: Any) -> Message:
+    w, x, y, z = rotation_wxyz
+    return {"timestamp": _time(t_ns), "parent_frame_id": "rig", "child_frame_id": child,
+            "translation": _vector(list(place)), "rotation": {"x": x, "y": y, "z": z, "w": w}}

@@ -1,0 +1,136 @@
+"""States at equal intervals: for formats that have a rate instead of times, and for whoever asks for one.
+
+Between two states positions, covariances and angles are interpolated linearly, the palm's rotation along the shorter
+arc; what is known worse of the two decides how it is known. An interval of more than two periods of a camera (one lost
+frame) is a gap: what lies in it is NaN, unknown, LOST.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.errors import ExportError
+from rhot_app.export.states import ARRAYS, CONDITIONS, HandStates, joined
+from rhot_app.tracking.state import Condition, Knowledge
+
+BRIDGED_PERIODS = 2.5
+"""One lost frame makes an interval of two periods; the half is for jitter."""
+
+MOST_HZ = 1000.0
+
+_LOST = CONDITIONS.index(Condition.LOST)
+_SEVERITY = np.array([{Condition.TRACKING: 0, Condition.PARTIAL: 1, Condition.LOST: 2, Condition.SEARCHING: 3,
+                       Condition.IDLE: 4, Condition.FAULT: 5}[one] for one in CONDITIONS])
+_LINEAR = tuple(name for name in ARRAYS if name not in ("sequence", "t_master_ns", "condition", "world_from_palm")
+                and not name.endswith("knowledge"))
+
+
+def checked_rate(rate_hz: float) -> float:
+    """The rate, if it is one. Raises ExportError."""
+    if not (math.isfinite(rate_hz) and 0.0 < rate_hz <= MOST_HZ):
+        raise ExportError(f"a rate of {rate_hz:g} Hz is none to export at; give more than 0 and at most {MOST_HZ:g}.")
+    return rate_hz
+
+
+class Resampler:
+    """Takes blocks of states and gives them at `rate_hz`, the first one at the time of the first state.
+
+    `period_s`: of the camera's frames; longer pauses than `BRIDGED_PERIODS` of it stay gaps.
+    """
+
+    def __init__(self, rate_hz: float, period_s: float) -> None:
+        self.rate_hz = rate_hz
+        self._bridged_ns = round(1e9 * BRIDGED_PERIODS * period_s)
+        self._first_ns: int | None = None
+        self._given = 0  # of the grid
+        self._last: HandStates | None = None
+
+    def take(self, block: HandStates) -> HandStates | None:
+        """What lies between the states so far; None when nothing does."""
+        known = block if self._last is None else joined([self._last, block])
+        known = known.where(_forward(known.t_master_ns))
+        if self._first_ns is None:
+            self._first_ns = int(known.t_master_ns[0])
+        self._last = known.where(slice(-1, None))
+        span_s = 1e-9 * (int(known.t_master_ns[-1]) - self._first_ns)
+        end = math.floor(span_s * self.rate_hz + 1e-6) + 1  # exclusive
+        if end <= self._given:
+            return None
+        numbers = np.arange(self._given, end)
+        self._given = end
+        grid_ns = self._first_ns + np.rint(numbers * (1e9 / self.rate_hz)).astype(np.int64)
+        return self._between(known, grid_ns)
+
+    def _between(self, known: HandStates, grid_ns: NDArray[np.int64]) -> HandStates:
+        times = known.t_master_ns
+        after = np.clip(np.searchsorted(times, grid_ns), 0, len(times) - 1)
+        before = np.where(times[after] > grid_ns, np.maximum(after - 1, 0), after)
+        pause = times[after] - times[before]
+        weight = np.where(pause > 0, (grid_ns - times[before]) / np.maximum(pause, 1), 0.0)
+        found = _mixed(known.where(before), known.where(after), weight)
+        return _stamped(_blanked(found, pause > self._bridged_ns), grid_ns)
+
+
+def _forward(times: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(N,) whether a time lies after all before it: times may stand still where a clock was set."""
+    latest = np.maximum.accumulate(times)
+    return np.concatenate([[True], times[1:] > latest[:-1]])
+
+
+def _mixed(first: HandStates, second: HandStates, weight: NDArray[np.float64]) -> HandStates:
+    """Between two states each; `weight` (N,) 0..1 is the second one's."""
+    changed: dict[str, Any] = {name: _linear(getattr(first, name), getattr(second, name), weight) for name in _LINEAR}
+    for name in ARRAYS:
+        if name.endswith("knowledge"):
+            part = weight.reshape(-1, *[1] * (getattr(first, name).ndim - 1))
+            changed[name] = np.where(part > 0.0, np.maximum(getattr(first, name), getattr(second, name)),
+                                     getattr(first, name))
+    worse = (_SEVERITY[second.condition] > _SEVERITY[first.condition]) & (weight > 0.0)
+    other = None if first.other is None or second.other is None else _mixed(first.other, second.other, weight)
+    return replace(first, **changed, condition=np.where(worse, second.condition, first.condition),
+                   world_from_palm=_moved(first.world_from_palm, second.world_from_palm, weight), other=other)
+
+
+def _linear(first: NDArray[Any], second: NDArray[Any], weight: NDArray[np.float64]) -> NDArray[Any]:
+    part = weight.reshape(-1, *[1] * (first.ndim - 1))
+    return np.where(part > 0.0, first + part * (second - first), first)
+
+
+def _moved(first: NDArray[Any], second: NDArray[Any], weight: NDArray[np.float64]) -> NDArray[Any]:
+    """Rigid transforms (N, 4, 4) between two each: the turn along its own axis, at a part of its angle."""
+    from scipy.spatial.transform import Rotation
+
+    out = _linear(first, second, weight)
+    turning = (weight > 0.0) & np.isfinite(first[:, 0, 0]) & np.isfinite(second[:, 0, 0])
+    if turning.any():
+        begin = Rotation.from_matrix(first[turning, :3, :3])
+        turn = begin.inv() * Rotation.from_matrix(second[turning, :3, :3])
+        part = Rotation.from_rotvec(turn.as_rotvec() * weight[turning, None])
+        out[turning, :3, :3] = (begin * part).as_matrix()
+    return out
+
+
+def _blanked(states: HandStates, gap: NDArray[np.bool_]) -> HandStates:
+    """The states with nothing known where there is a gap (N,)."""
+    if not gap.any():
+        return states
+    changed: dict[str, Any] = {}
+    for name in (*_LINEAR, "world_from_palm"):
+        changed[name] = np.where(gap.reshape(-1, *[1] * (getattr(states, name).ndim - 1)), np.nan,
+                                 getattr(states, name))
+    for name in ARRAYS:
+        if name.endswith("knowledge"):
+            column = getattr(states, name)
+            changed[name] = np.where(gap.reshape(-1, *[1] * (column.ndim - 1)), np.uint8(Knowledge.UNKNOWN), column)
+    other = None if states.other is None else _blanked(states.other, gap)
+    return replace(states, **changed, condition=np.where(gap, np.uint8(_LOST), states.condition), other=other)
+
+
+def _stamped(states: HandStates, grid_ns: NDArray[np.int64]) -> HandStates:
+    other = None if states.other is None else _stamped(states.other, grid_ns)
+    return replace(states, t_master_ns=grid_ns, other=other)

@@ -1,0 +1,249 @@
+"""A recording as a file for other programs: what to write, a look at the first rows, progress, cancel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDialog,
+    QDoubleSpinBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from rhot_app.export.export import FORMATS, Exported
+from rhot_app.export.plan import ExportOptions, Units
+from rhot_app.export.process import export_apart, first_states
+from rhot_app.export.resample import MOST_HZ
+from rhot_app.export.states import HandStates
+from rhot_app.export.tables import columns
+from rhot_app.hand.skeleton import FINGERS
+from rhot_app.ui.job import Job
+
+ROWS = 8
+LOOK_MS = 300  # a choice is looked at when it has stood for a while
+
+_SIZE = (860, 600)
+_FORMATS = {"csv": "CSV: a table", "parquet": "Parquet: a table for analysis", "npz": "NPZ: NumPy's arrays",
+            "trc": "TRC: points, for OpenSim", "c3d": "C3D: points, motion capture", "bvh": "BVH: a moving skeleton",
+            "gltf": "glTF: an animated hand", "mcap": "MCAP: for Foxglove"}
+_TRACKERS = (("as recorded", None), ("classic", "classic"), ("model", "model"))
+_FRAMES = (("rig", "rig"), ("wrist, along the palm's axes", "wrist"))
+_UNITS: tuple[tuple[str, Units], ...] = (("mm", "mm"), ("m", "m"))
+
+
+class ExportDialog(QDialog):
+    """`log` is the recording; None until one is chosen."""
+
+    def __init__(self, log: Path | None, folder: Path, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Export recording")
+        self.setProperty("guide", "recording")
+        self.resize(*_SIZE)
+        self.log = log
+        self._folder = folder
+        self._job: Job | None = None
+        self._look: Job | None = None
+        self.log_label = QLabel()
+        self.log_button = QPushButton("Choose …")
+        self.log_button.setToolTip("Another recording (.rhotlog).")
+        self.format_box = _box(((words, name) for name, words in _FORMATS.items()), "Which programs shall read it.")
+        self.tracker_box = _box(_TRACKERS, "Which tracker makes a hand of the recorded datagrams.")
+        self.frame_box = _box(_FRAMES, "Where positions are told: in the rig frame, or relative to the wrist joint.")
+        self.units_box = _box(_UNITS, "Unit of length, where the format leaves a choice.")
+        self.rate_box = QDoubleSpinBox()
+        self.rate_box.setRange(0.0, MOST_HZ)
+        self.rate_box.setDecimals(1)
+        self.rate_box.setSuffix(" Hz")
+        self.rate_box.setSpecialValueText("none")
+        self.rate_box.setMinimumHeight(30)
+        self.rate_box.setToolTip("States at equal intervals. With none each keeps its own time, and formats that "
+                                 "have a rate get the cameras'.")
+        self.table = QTableWidget(0, 0)
+        self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
+        self.table.setToolTip("The first fingertips as they would be written; the file holds much more.")
+        self.sentence = QLabel()
+        self.sentence.setWordWrap(True)
+        self.bar = QProgressBar()
+        self.bar.setRange(0, 1000)
+        self.bar.hide()
+        self.export_button = QPushButton("Export …")
+        self.export_button.setToolTip("Choose a file; it appears when it is whole.")
+        self.export_button.setDefault(True)
+        self.close_button = QPushButton("Close")
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(LOOK_MS)
+        self._lay_out()
+        self._connect()
+        self._show_format()
+        self.show_log(log)
+
+    def _lay_out(self) -> None:
+        source = QHBoxLayout()
+        source.addWidget(self.log_label, 1)
+        source.addWidget(self.log_button)
+        form = QFormLayout()
+        form.setSpacing(8)
+        for words, part in (("Recording", source), ("Format", self.format_box), ("Tracker", self.tracker_box),
+                            ("Rate", self.rate_box), ("Positions in", self.frame_box), ("Lengths in", self.units_box)):
+            form.addRow(words, part)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.bar, 1)
+        buttons.addStretch(1)
+        buttons.addWidget(self.close_button)
+        buttons.addWidget(self.export_button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(16)
+        layout.addLayout(form)
+        layout.addWidget(self.table, 1)
+        layout.addWidget(self.sentence)
+        layout.addLayout(buttons)
+
+    def _connect(self) -> None:
+        self.log_button.clicked.connect(self._choose_log)
+        self.format_box.currentIndexChanged.connect(self._show_format)
+        for box in (self.format_box, self.tracker_box, self.frame_box, self.units_box):
+            box.currentIndexChanged.connect(self._timer.start)
+        self.rate_box.valueChanged.connect(self._timer.start)
+        self._timer.timeout.connect(self._preview)
+        self.export_button.clicked.connect(self._export_or_cancel)
+        self.close_button.clicked.connect(self.close)
+
+    # -- what is asked for -----------------------------------------------------------------------------------------
+
+    @property
+    def format(self) -> str:
+        """The chosen format."""
+        return str(self.format_box.currentData())
+
+    def options(self) -> ExportOptions:
+        """The other choices."""
+        rate = self.rate_box.value()
+        units: Units | None = self.units_box.currentData() if FORMATS[self.format].units_free else None
+        return ExportOptions(self.tracker_box.currentData(), rate or None, self.frame_box.currentData(), units)
+
+    def show_log(self, log: Path | None) -> None:
+        """Export another recording."""
+        self.log = log
+        self.log_label.setText("Choose a recording." if log is None else str(log))
+        self.export_button.setEnabled(log is not None)
+        if log is not None:
+            self._preview()
+
+    def _choose_log(self) -> None:
+        start = self._folder if self.log is None else self.log.parent
+        name, _ = QFileDialog.getOpenFileName(self, "Choose a recording", str(start),
+                                              "Recordings (*.rhotlog *.log);;All files (*)")
+        if name:
+            self.show_log(Path(name))
+
+    def _show_format(self) -> None:
+        """A new format's unit, and whether another can be chosen."""
+        chosen = FORMATS[self.format]
+        self.units_box.setCurrentIndex(self.units_box.findData(chosen.units))
+        self.units_box.setEnabled(chosen.units_free)
+
+    # -- the first rows --------------------------------------------------------------------------------------------
+
+    def _preview(self) -> None:
+        if self._look is not None:
+            self._look.cancel()
+        log, name, options = self.log, self.format, self.options()
+        if log is None or self._job is not None:
+            return
+        units = options.units or FORMATS[name].units
+
+        def look(progress: Any) -> HandStates:
+            return first_states(log, name, options, ROWS)
+
+        self._look = Job(look, lambda states: self._show_rows(states, units), self._say, None, self).start()
+
+    def _show_rows(self, states: HandStates, units: Units) -> None:
+        """Times, conditions and fingertips."""
+        tips = [f"fingertip_{finger}_{axis}_{units}" for finger in FINGERS for axis in "xyz"]
+        wanted = ("time_s", "condition", *tips)
+        table = dict(columns(states, 1000.0 if units == "mm" else 1.0, None))
+        self.table.setColumnCount(len(wanted))
+        self.table.setRowCount(len(states))
+        self.table.setHorizontalHeaderLabels([name.replace("fingertip_", "") for name in wanted])
+        for column, name in enumerate(wanted):
+            places = 2 if name.endswith("_mm") else 4
+            for row, value in enumerate(table[name].tolist()):
+                text = value if isinstance(value, str) else "" if value != value else f"{value:.{places}f}"
+                self.table.setItem(row, column, QTableWidgetItem(text))
+        self.table.resizeColumnsToContents()
+        self._say("")
+
+    # -- writing ---------------------------------------------------------------------------------------------------
+
+    def _export_or_cancel(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
+            self._end("Cancelled; nothing was written.")
+            return
+        if self.log is None:
+            return
+        ending = FORMATS[self.format].endings[0]
+        name, _ = QFileDialog.getSaveFileName(self, "Export to", str(self.log.with_suffix(ending)),
+                                              f"{self.format} (*{ending});;All files (*)")
+        if name:
+            out = Path(name)
+            self.export(out if out.suffix.lower() in FORMATS[self.format].endings else out.with_name(out.name + ending))
+
+    def export(self, out: Path) -> None:
+        """Write `out`; what stands there is written over, as the person was asked when choosing it."""
+        log, name, options = self.log, self.format, self.options()
+        if log is None:
+            return
+        self._job = Job(lambda progress: export_apart(log, out, name, options, progress.report), self._show_done,
+                        self._end, self._show_progress, self).start()
+        self.export_button.setText("Cancel")
+        self.bar.setValue(0)
+        self.bar.show()
+        self._say(f"Exporting to {out} …")
+
+    def _show_progress(self, text: str, fraction: float) -> None:
+        self.bar.setValue(round(1000 * fraction))
+
+    def _show_done(self, done: Exported) -> None:
+        said = [f"Exported {done.states} states to {done.path}.", *(f"{note}." for note in done.notes)]
+        said += [f"Not all of the recording could be read: {loss.removesuffix('.')}." for loss in done.losses]
+        self._end("\n".join(said))
+
+    def _end(self, sentence: str) -> None:
+        self._job = None
+        self.bar.hide()
+        self.export_button.setText("Export …")
+        self._say(sentence)
+
+    def _say(self, sentence: str) -> None:
+        self.sentence.setText(sentence)
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """An export that is under way ends with the dialog, and leaves nothing."""
+        for job in (self._job, self._look):
+            if job is not None:
+                job.cancel()
+        super().closeEvent(event)
+
+
+def _box(entries: Any, meaning: str) -> QComboBox:
+    box = QComboBox()
+    for words, value in entries:
+        box.addItem(words, value)
+    box.setToolTip(meaning)
+    return box

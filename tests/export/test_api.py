@@ -1,0 +1,127 @@
+"""What a Python program imports, and the programs that docs/api.md and docs/examples show."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stereo_pictures import BOARD, FOLDER, needs_pictures
+
+from rhot_app import api
+from rhot_app.export.states import HandStates
+from rhot_app.recording.raw_log import LogReader
+from rhot_node.files import resource_path
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_a_recording_is_tracked_as_an_engine_would(log: Path, states: HandStates) -> None:
+    recording = api.open_recording(str(log))
+    found = recording.states("classic")
+    assert np.array_equal(found.joint_positions, states.joint_positions, equal_nan=True)
+    assert found.conditions == states.conditions and recording.losses == ()
+    assert recording.rig == LogReader(log).rig
+    with pytest.raises(api.ExportError, match="no tracker smooths yet"):
+        recording.states(smooth=True)
+
+
+def test_states_at_a_rate(log: Path, states: HandStates) -> None:
+    found = api.open_recording(log).states("classic", rate_hz=25.0)
+    assert np.diff(found.t_master_ns) == pytest.approx(4e7)
+    known = found.tracked
+    inner = np.isfinite(states.angles[:, 6])
+    assert found.angles[known, 6] == pytest.approx(
+        np.interp(found.times_s[known], states.times_s[inner], states.angles[inner, 6]), abs=1e-6)
+
+
+def test_another_rig_and_the_losses_of_a_torn_log(log: Path, tmp_path: Path) -> None:
+    torn = tmp_path / "torn.rhotlog"
+    torn.write_bytes(log.read_bytes()[:-1000])
+    api.save_rig(tmp_path / "rig.json", LogReader(log).rig)
+    recording = api.open_recording(torn, tmp_path / "rig.json")
+    frame = recording.to_dataframe("classic", units="m")
+    assert 50 < len(frame) < 72 and frame["joint_wrist_z_m"].max() < 1.0
+    (loss,) = recording.losses
+    assert "torn" in loss
+    done = recording.export(tmp_path / "a.npz", tracker="classic")
+    assert done.losses == (loss,) and done.states == len(frame)
+    with pytest.raises(api.RigError, match="no such file"):
+        api.open_recording(log, tmp_path / "no.json")
+
+
+def test_a_running_engine_is_followed(log: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "rhot_app", "replay", str(log), "--keep", "--directory", str(tmp_path / "e")]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as engine:
+        assert engine.stderr is not None and any("for clients" in line for line in engine.stderr)
+        states = list(itertools.islice(api.live(tmp_path / "e", patience_s=30.0), 20))
+        engine.send_signal(signal.SIGTERM)
+        assert engine.wait(10) == 0
+    assert all(isinstance(state, api.HandState) for state in states)
+    assert np.all(np.diff([state.t_master_ns for state in states]) > 0)
+
+
+def test_no_engine_is_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(api.EngineError, match="no engine is heard"):
+        next(api.live(tmp_path / "nobody", patience_s=0.3))
+
+
+@needs_pictures
+def test_cameras_are_put_together_from_pictures() -> None:
+    pictures = {name: [FOLDER / f"{name}{number:02d}.jpg" for number in range(1, 9)] for name in ("left", "right")}
+    rig = api.load_rig(resource_path("rigs", "two_pis.json"))
+    result = api.calibrate_stereo(pictures, BOARD, rig)
+    assert result.rig is not None and "rms" in result.summary
+    assert result.rig.nodes[1].pose.translation_m[0] == pytest.approx(0.0998, abs=1e-3)
+    with pytest.raises(api.CalibrationError, match="no camera called middle"):
+        api.calibrate_stereo({"left": pictures["left"], "middle": pictures["right"]}, BOARD, rig)
+
+
+PLOT = '''"""Stands in for matplotlib: notes what is drawn."""
+import json
+
+
+def plot(x, y):
+    print(json.dumps([len(x), len(y), max(v for v in y if v == v)]))
+
+
+def xlabel(text): pass
+
+
+def ylabel(text): pass
+
+
+def show(): print("shown")
+'''
+
+
+def run(arguments: list[str], folder: Path) -> str:
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    done = subprocess.run([sys.executable, *arguments], cwd=folder, env=environment, text=True, capture_output=True,
+                          timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_ten_lines_of_the_page(log: Path, tmp_path: Path) -> None:
+    found = re.search(r"```python\n(.*?)```", (DOCS / "api.md").read_text(), re.DOTALL)
+    assert found is not None and len([line for line in found[1].splitlines() if line]) <= 13
+    (tmp_path / "matplotlib").mkdir()
+    (tmp_path / "matplotlib" / "__init__.py").write_text("")
+    (tmp_path / "matplotlib" / "pyplot.py").write_text(PLOT)
+    (tmp_path / "take.rhotlog").write_bytes(log.read_bytes())
+    drawn, shown = run(["-c", found[1]], tmp_path).splitlines()
+    times, values, fastest = map(float, drawn.strip("[]").split(","))
+    assert shown == "shown" and times == values > 100 and 0.02 < fastest < 20.0
+
+
+def test_the_example_file(log: Path, tmp_path: Path) -> None:
+    said = run([str(DOCS / "examples" / "pinch.py"), str(log), str(tmp_path)], tmp_path)
+    assert "both measured in" in said and "fingertip_index_x_mm" in said
+    assert {"pinch.csv", "pinch.glb"} <= {path.name for path in tmp_path.iterdir()}

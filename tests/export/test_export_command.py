@@ -1,0 +1,179 @@
+"""``rhot export`` and what stands against it: one sentence, exit code 2, and no file that is not whole."""
+
+from __future__ import annotations
+
+import os
+import resource
+import struct
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pandas
+import pytest
+
+from rhot_app.__main__ import main
+from rhot_app.errors import ExportError
+from rhot_app.export.export import FORMATS, export_log
+from rhot_app.export.plan import ExportOptions
+from rhot_app.recording.raw_log import MAGIC, VERSION, LogReader, RecordKind, encode_header, encode_record
+
+
+def left(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def ending(name: str) -> str:
+    return FORMATS[name].endings[0]
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_by_its_ending(name: str, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / f"a{ending(name)}"
+    assert main(["export", str(log), "--out", str(out), "--tracker", "classic"]) == 0
+    assert capsys.readouterr().out.strip() == f"{out}: 72 states"
+    assert left(tmp_path) == [out.name] and out.stat().st_size > 10_000
+
+
+def test_the_file_is_named_as_the_log(log: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "grasp.rhotlog"
+    copy.write_bytes(log.read_bytes())
+    assert main(["export", str(copy), "--format", "csv", "--rate", "20"]) == 0
+    assert left(tmp_path) == ["grasp.csv", "grasp.rhotlog"]
+    assert len(pandas.read_csv(tmp_path / "grasp.csv")) == pytest.approx(36, abs=1)
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (("--format", "fbx"), "there is no format 'fbx'; there are csv, trc"),
+    ((), "say which format to write"),
+    (("--out", "a.xlsx"), "its ending '.xlsx' is that of no format"),
+    (("--out", "a.csv", "--format", "trc"), "a trc file ends in .trc"),
+    (("--out", "a.csv", "--rate", "0"), "a rate of 0 Hz is none to export at"),
+    (("--out", "a.csv", "--rate", "nan"), "a rate of nan Hz is none"),
+    (("--out", "a.csv", "--smooth"), "no tracker smooths yet"),
+    (("--out", "a.glb", "--units", "mm"), "gltf files are in m"),
+    (("--out", "a.bvh", "--hand", "other_hand"), "has no other_hand to export"),
+    (("--out", "nowhere/a.csv"), "nowhere is not a folder"),
+    (("--out", "a.csv", "--rig", "no.json"), "no.json: no such file"),
+])
+def test_mistakes_are_sentences(arguments: tuple[str, ...], words: str, log: Path, tmp_path: Path,
+                                monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", str(log), *arguments]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("rhot: ") and words in said
+    assert left(tmp_path) == []
+
+
+def test_logs_that_are_none(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    later = log.read_bytes().replace(MAGIC + struct.pack("<H", VERSION), MAGIC + struct.pack("<H", 9))
+    (tmp_path / "later.rhotlog").write_bytes(later)
+    (tmp_path / "foreign.rhotlog").write_bytes(b"something else")
+    reader = LogReader(log)
+    (tmp_path / "empty.rhotlog").write_bytes(encode_header(reader.rig, {}))
+    before = left(tmp_path)
+    for name, words in (("no", "cannot be read"), ("later", "version 9 of the raw log is not supported"),
+                        ("foreign", "this is not a raw log"), ("empty", "it holds no observations")):
+        arguments = ["export", str(tmp_path / f"{name}.rhotlog"), "--format", "csv", "--tracker", "classic"]
+        assert main(arguments) == 2
+        assert words in capsys.readouterr().err
+        assert left(tmp_path) == before
+
+
+def test_a_log_of_one_camera_has_no_hand(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    reader = LogReader(log)
+    one = [encode_record(record) for record in reader if record.kind is not RecordKind.DATAGRAM or record.node_id == 1]
+    path = tmp_path / "one.rhotlog"
+    path.write_bytes(encode_header(reader.rig, {}) + b"".join(one))
+    assert main(["export", str(path), "--format", "csv", "--tracker", "classic"]) == 0
+    assert "the hand is tracked in none of" in capsys.readouterr().err
+    assert pandas.read_csv(tmp_path / "one.csv")["joint_wrist_x_mm"].isna().all()
+    for name in ("gltf", "bvh"):
+        assert main(["export", str(path), "--format", name, "--tracker", "classic"]) == 2
+        assert "nowhere tracked" in capsys.readouterr().err
+    assert left(tmp_path) == ["one.csv", "one.rhotlog"]
+
+
+def test_a_torn_log_is_exported_as_far_as_it_can_be_read(log: Path, tmp_path: Path,
+                                                         capsys: pytest.CaptureFixture[str]) -> None:
+    whole = log.read_bytes()
+    (tmp_path / "torn.rhotlog").write_bytes(whole[:len(whole) * 2 // 3])
+    assert main(["export", str(tmp_path / "torn.rhotlog"), "--format", "csv"]) == 3
+    said = capsys.readouterr()
+    assert "torn; what could be read was exported" in said.err
+    assert 30 < len(pandas.read_csv(tmp_path / "torn.csv")) < 60
+
+
+def test_an_existing_file_is_written_over_only_when_told(log: Path, tmp_path: Path,
+                                                         capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "a.csv"
+    out.write_text("mine")
+    assert main(["export", str(log), "--out", str(out)]) == 2
+    assert "exists already" in capsys.readouterr().err and out.read_text() == "mine"
+    assert main(["export", str(log), "--out", str(out), "--again"]) == 0
+    assert out.read_text().startswith("time_s,")
+
+
+def test_a_recording_is_never_written_over(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_bytes(log.read_bytes())
+    (tmp_path / "same.csv").symlink_to(path)
+    for out in ("mine.csv", "same.csv"):
+        assert main(["export", str(path), "--out", str(tmp_path / out), "--again"]) == 2
+        assert "is the recording itself" in capsys.readouterr().err
+    assert main(["batch", str(path), "--do", "export", "--format", "csv", "--out", str(tmp_path), "--again"]) == 2
+    assert "never written over" in capsys.readouterr().err
+    assert path.read_bytes() == log.read_bytes()
+
+
+@contextmanager
+def small_disk(size: int) -> Iterator[None]:
+    """No file may grow beyond `size`: writing fails as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_full_disk_leaves_nothing(name: str, log: Path, tmp_path: Path) -> None:
+    out = tmp_path / f"a{ending(name)}"
+    out.write_text("older")
+    with small_disk(8192), pytest.raises(ExportError, match="cannot be written"):
+        export_log(log, out, options=ExportOptions(tracker="classic"), again=True)
+    assert left(tmp_path) == [out.name] and out.read_text() == "older"
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_an_interrupt_at_the_last_moment_leaves_nothing(name: str, log: Path, tmp_path: Path,
+                                                        monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(handle: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        export_log(log, tmp_path / f"a{ending(name)}", options=ExportOptions(tracker="classic"))
+    assert left(tmp_path) == []
+
+
+def test_an_interrupt_on_the_way_leaves_nothing(log: Path, tmp_path: Path) -> None:
+    def interrupted(text: str, fraction: float) -> None:
+        if fraction > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export_log(log, tmp_path / "a.csv", options=ExportOptions(tracker="classic"), progress=interrupted)
+    assert left(tmp_path) == []
+
+
+@pytest.mark.parametrize(("name", "package"), [("c3d", "ezc3d"), ("parquet", "pyarrow"), ("mcap", "mcap"),
+                                               ("gltf", "pygltflib")])
+def test_a_missing_package_is_named_with_its_extra(name: str, package: str, log: Path, tmp_path: Path,
+                                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ExportError, match=rf"needs the package '{package}'.*rhot\[export\]"):
+        export_log(log, tmp_path / f"a{ending(name)}", options=ExportOptions(tracker="classic"))
+    assert left(tmp_path) == []

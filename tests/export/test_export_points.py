@@ -1,0 +1,114 @@
+"""TRC and C3D, read back by pandas, ezc3d and the package c3d: places, axes, units and gaps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import c3d
+import ezc3d
+import msgspec
+import numpy as np
+import pandas
+import pytest
+
+from rhot_app.export.export import export_log
+from rhot_app.export.plan import ExportOptions
+from rhot_app.export.states import HandStates
+from rhot_app.hand.skeleton import ANGLES, JOINTS
+from rhot_app.recording.raw_log import LogReader
+
+CLASSIC = ExportOptions(tracker="classic")
+
+
+def at(states: HandStates, times_s: np.ndarray, joint: str) -> np.ndarray:
+    """(T, 3) m of a joint, between the states."""
+    place = states.joint_positions[:, JOINTS.index(joint)]
+    known = np.isfinite(place[:, 0])
+    return np.column_stack([np.interp(times_s, states.times_s[known], column) for column in place[known].T])
+
+
+def read_trc(path: Path) -> tuple[dict[str, str], list[str], pandas.DataFrame]:
+    """Header, names of points, and the numbers."""
+    lines = path.read_text().split("\n")
+    facts = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=True))
+    names = [name for name in lines[3].split("\t")[2:] if name]
+    assert lines[5] == "", "a blank line before the numbers"
+    return facts, names, pandas.read_csv(path, sep="\t", skiprows=6, header=None)
+
+
+def test_trc_is_y_up_in_millimetres(log: Path, states: HandStates, tmp_path: Path) -> None:
+    facts, names, table = read_trc(export_log(log, tmp_path / "a.trc", options=CLASSIC).path)
+    assert (facts["DataRate"], facts["Units"]) == ("40", "mm")
+    assert int(facts["NumFrames"]) == len(table) and int(facts["NumMarkers"]) == len(names)
+    assert table.shape[1] == 2 + 3 * len(names)
+    times = table[1].to_numpy()
+    assert np.diff(times) == pytest.approx(1.0 / 40.0, abs=1e-5)
+    first = 2 + 3 * names.index("index_tip")
+    found = table[[first, first + 1, first + 2]].to_numpy()
+    expected = 1e3 * at(states, times, "index_tip") * [1.0, -1.0, -1.0]  # the rig's y points down, its z away
+    known = np.isfinite(found[:, 0])
+    assert known.sum() > 60 and found[known] == pytest.approx(expected[known], abs=1e-3)
+
+
+def test_a_gap_of_trc_is_empty(gappy: Path, tmp_path: Path) -> None:
+    path = export_log(gappy, tmp_path / "a.trc", options=CLASSIC).path
+    rows = [line.split("\t") for line in path.read_text().split("\n")[6:] if line]
+    inside = [row for row in rows if 0.8 < float(row[1]) < 1.2]
+    assert len(inside) > 10 and all(cell == "" for row in inside for cell in row[2:])
+
+
+def test_c3d_is_z_up_with_angles_beside(log: Path, states: HandStates, tmp_path: Path) -> None:
+    path = export_log(log, tmp_path / "a.c3d", options=CLASSIC).path
+    file = ezc3d.c3d(str(path))
+    parameters = file["parameters"]
+    assert parameters["POINT"]["UNITS"]["value"] == ["mm"] and parameters["POINT"]["RATE"]["value"] == [40.0]
+    assert parameters["POINT"]["Y_SCREEN"]["value"] == ["+Z"]
+    labels = parameters["POINT"]["LABELS"]["value"]
+    found = file["data"]["points"][:3, labels.index("index_tip")].T
+    times = np.arange(len(found)) / 40.0
+    expected = 1e3 * at(states, times, "index_tip")[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
+    known = np.isfinite(found[:, 0])
+    assert known.sum() > 60 and found[known] == pytest.approx(expected[known], abs=2e-3)
+    assert parameters["ANALOG"]["LABELS"]["value"] == list(ANGLES)
+    bends = file["data"]["analogs"][0, ANGLES.index("index_pip_flexion")]
+    inner = np.isfinite(states.angles[:, 0])
+    assert bends[known] == pytest.approx(np.degrees(np.interp(
+        times[known], states.times_s[inner], states.angles[inner, ANGLES.index("index_pip_flexion")])), abs=1e-2)
+
+
+def test_another_reader_of_c3d_agrees_and_sees_the_gap(gappy: Path, gappy_states: HandStates, tmp_path: Path) -> None:
+    path = export_log(gappy, tmp_path / "a.c3d", options=CLASSIC).path
+    with path.open("rb") as file:
+        reader = c3d.Reader(file)
+        labels = [label.strip() for label in reader.point_labels]
+        frames = np.array([points for _, points, _ in reader.read_frames()])
+        assert reader.point_rate == 40.0
+    wrist = frames[:, labels.index("wrist")]
+    times = np.arange(len(wrist)) / 40.0
+    inside = (times > 0.8) & (times < 1.2)
+    assert (wrist[inside, 3] == -1.0).all()
+    known = wrist[:, 3] >= 0.0
+    expected = 1e3 * at(gappy_states, times, "wrist")[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
+    assert known.sum() > 30 and wrist[known, :3] == pytest.approx(expected[known], abs=2e-3)
+
+
+def test_a_table_frame_is_turned_less(log: Path, states: HandStates, tmp_path: Path) -> None:
+    """Where the rig's z points up, C3D has the rig's own axes and TRC those with z for y."""
+    rig = msgspec.structs.replace(LogReader(log).rig, up="z")
+    file = ezc3d.c3d(str(export_log(log, tmp_path / "a.c3d", rig=rig, options=CLASSIC).path))
+    index = file["parameters"]["POINT"]["LABELS"]["value"].index("wrist")
+    found = file["data"]["points"][:3, index].T
+    times, known = np.arange(len(found)) / 40.0, np.isfinite(found[:, 0])
+    expected = 1e3 * at(states, times, "wrist")
+    assert found[known] == pytest.approx(expected[known], abs=2e-3)
+    _, names, table = read_trc(export_log(log, tmp_path / "a.trc", rig=rig, options=CLASSIC).path)
+    first = 2 + 3 * names.index("wrist")
+    turned = table[[first, first + 1, first + 2]].to_numpy()
+    assert turned[known] == pytest.approx(expected[known][:, [0, 2, 1]] * [1.0, 1.0, -1.0], abs=2e-3)
+
+
+def test_a_points_residual_is_its_standard_deviation(log: Path, tmp_path: Path) -> None:
+    path = export_log(log, tmp_path / "a.c3d", options=ExportOptions(tracker="model")).path
+    residuals = ezc3d.c3d(str(path))["data"]["meta_points"]["residuals"][0]
+    known = residuals[JOINTS.index("index_tip")]
+    assert 0.05 < np.median(known[known > 0.0]) < 10.0

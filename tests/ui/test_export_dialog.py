@@ -1,0 +1,100 @@
+"""Exporting a recording from the window: a look at the first rows, a file, a cancel that leaves nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pandas
+import pytest
+from patience import PATIENCE_MS
+from screen_pictures import check, picture_of
+
+from rhot_app.evaluation.takes import LOG_NAME, Order, take
+from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.ui.export_dialog import ExportDialog
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """1.2 s of grasping."""
+    order = Order(make_scene(twin_defaults(), 1), "grasp", 1.2, sketched=True)
+    return take(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME
+
+
+@pytest.fixture
+def dialog(themed: Any, qtbot: Any, log: Path, tmp_path: Path) -> Iterator[ExportDialog]:
+    """Open, with the first rows."""
+    copy = tmp_path / "grasp.rhotlog"
+    copy.write_bytes(log.read_bytes())
+    dialog = ExportDialog(copy, tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    qtbot.waitUntil(lambda: dialog.table.rowCount() > 0, timeout=PATIENCE_MS)
+    yield dialog
+    dialog.close()
+
+
+def choose(box: Any, value: Any) -> None:
+    box.setCurrentIndex(box.findData(value))
+
+
+def cells(dialog: ExportDialog, name: str) -> list[str]:
+    """A column of the preview."""
+    heads = [dialog.table.horizontalHeaderItem(column).text() for column in range(dialog.table.columnCount())]
+    return [dialog.table.item(row, heads.index(name)).text() for row in range(dialog.table.rowCount())]
+
+
+def test_the_first_rows_follow_the_choices(dialog: ExportDialog, qtbot: Any) -> None:
+    assert cells(dialog, "condition")[0] == "SEARCHING" and 100.0 < float(cells(dialog, "index_z_mm")[-1]) < 1000.0
+    choose(dialog.units_box, "m")
+    dialog.rate_box.setValue(50.0)
+    qtbot.waitUntil(lambda: "index_z_m" in [dialog.table.horizontalHeaderItem(column).text()
+                                            for column in range(dialog.table.columnCount())], timeout=PATIENCE_MS)
+    assert cells(dialog, "time_s")[1] == "0.0200"
+    choose(dialog.format_box, "gltf")
+    assert dialog.units_box.currentData() == "m" and not dialog.units_box.isEnabled()
+    assert dialog.options().units is None
+
+
+def test_a_file_is_written_in_a_process_of_its_own(dialog: ExportDialog, qtbot: Any, tmp_path: Path) -> None:
+    choose(dialog.tracker_box, "classic")
+    dialog.rate_box.setValue(25.0)
+    dialog.export(tmp_path / "a.csv")
+    assert dialog.export_button.text() == "Cancel"
+    qtbot.waitUntil(lambda: "Exported" in dialog.sentence.text(), timeout=PATIENCE_MS)
+    assert dialog.export_button.text() == "Export …" and not dialog.bar.isVisible()
+    assert len(pandas.read_csv(tmp_path / "a.csv")) == pytest.approx(30, abs=1)
+
+
+def test_a_cancelled_export_leaves_nothing(dialog: ExportDialog, qtbot: Any, tmp_path: Path) -> None:
+    dialog.export(tmp_path / "a.csv")
+    job = dialog._job
+    assert job is not None
+    dialog.export_button.click()
+    assert "nothing was written" in dialog.sentence.text()
+    assert job.wait(PATIENCE_MS / 1e3)
+    assert [path.name for path in tmp_path.iterdir()] == ["grasp.rhotlog"]
+
+
+def test_what_stands_against_it_is_a_sentence(dialog: ExportDialog, qtbot: Any, tmp_path: Path) -> None:
+    dialog.export(tmp_path / "nowhere" / "a.csv")
+    qtbot.waitUntil(lambda: "nowhere is not a folder" in dialog.sentence.text(), timeout=PATIENCE_MS)
+    (tmp_path / "other.rhotlog").write_bytes(b"something else")
+    dialog.show_log(tmp_path / "other.rhotlog")
+    qtbot.waitUntil(lambda: "this is not a raw log" in dialog.sentence.text(), timeout=PATIENCE_MS)
+
+
+def test_picture_of_the_export(dialog: ExportDialog, qtbot: Any) -> None:
+    dialog.log_label.setText("/home/me/Documents/RHOT/grasp.rhotlog")
+    check("export", picture_of(dialog), 20)
+
+
+def test_the_menu_opens_it(make_bench: Callable[..., Any]) -> None:
+    bench = make_bench()
+    bench.window.actions_.export.trigger()
+    opened = bench.window.dialogs.export
+    bench.until(opened.isVisible)
+    assert not opened.export_button.isEnabled() and "Choose a recording" in opened.log_label.text()
+    opened.close()
