@@ -31,3 +31,7 @@ class EngineError(RhotError):
 
 class CalibrationError(RhotError):
     """A calibration cannot begin or end: its input is missing, unreadable, or does not determine the answer."""
+
+
+class OutputError(RhotError):
+    """A live stream to another program cannot be what was asked, opened, or written to."""

@@ -9,6 +9,7 @@ import functools
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
 from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import EngineError
+from rhot_app.outputs.outputs import Outputs
 from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
@@ -38,8 +40,9 @@ class Engine:
 
     def __init__(self, rig: Rig, rig_path: Path | None, make_source: MakeSource, make_tracker: MakeTracker,
                  publish: PublishState, node_message: NodeMessage = lambda node_id: "",
-                 after_state: AfterState = lambda: None) -> None:
-        """Open the source and warm the tracker up; raises SourceError when a port is taken.
+                 after_state: AfterState = lambda: None, outputs: Outputs | None = None) -> None:
+        """Open the source and warm the tracker up; raises SourceError when a port is taken, OutputError for an output
+        that cannot be.
 
         `publish` and `after_state` are called in the source's threads, by one at a time.
         """
@@ -54,9 +57,12 @@ class Engine:
         self._notice = ""  # why the last recording ended
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
         self._lock = threading.RLock()
+        self._outputs = outputs or Outputs()
+        self._outputs.check(rig)
         self._source = make_source(rig)
         try:
-            self._pipeline = Pipeline(self._work(rig), publish, after_state)
+            self._pipeline = Pipeline(self._work(rig), publish, after_state, self._outputs.send)
+            self._outputs.configure(rig)
         except BaseException:
             self._source.close()
             raise
@@ -113,9 +119,11 @@ class Engine:
     def set_rig(self, rig: Rig) -> None:
         """Go on with another rig. Ports and sessions stay when the nodes are reached as before.
 
-        Raises SourceError (a port is taken) or what the tracker objects to; the old rig then stays.
+        Raises SourceError (a port is taken), OutputError (an output cannot be) or what the tracker objects to; the old
+        rig then stays.
         """
         with self._lock:
+            self._outputs.check(rig)
             kept = same_network(self.rig, rig)
             if kept:
                 work = self._work(rig)
@@ -127,6 +135,7 @@ class Engine:
             self._pipeline.use(work)
             self._listen()
             self.rig = rig
+            self._outputs.configure(rig)
             self._observer = Observer(rig, self._source, self._pipeline)
             if self.running and not kept:
                 self.start()
@@ -154,8 +163,10 @@ class Engine:
             self._follow_nodes()
             extra = [Advice("error", self._notice)] if self._notice else []
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
-            return self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
-                                         self._node_message, extra)
+            extra += [Advice("warning", text) for text in self._outputs.complaints()]
+            status = self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
+                                           self._node_message, extra)
+            return replace(status, outputs=self._outputs.status())
 
     def close(self) -> None:
         """Stop the nodes, finish the log, close all ports. May be called twice."""
@@ -164,6 +175,7 @@ class Engine:
                 self.stop()
             self.record_stop()
             self._source.close()
+            self._outputs.close()
 
     def _follow_nodes(self) -> None:
         """The rig has every node where the source has found it."""

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.engine.command import add_serving_arguments
+from rhot_app.engine.command import add_serving_arguments, asked_outputs, print_addresses
 from rhot_app.errors import RecordingError
 from rhot_node.compiled import announce_compilation
 
@@ -43,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Replay; with clients to serve, until the log's end, SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.replay_summary import summarise
     from rhot_app.engine.serve import serving
+    from rhot_app.outputs.outputs import Outputs
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogReplay
@@ -65,9 +66,11 @@ def run(args: argparse.Namespace) -> int:
         replays.append(LogReplay(args.path, rig, args.speed))
         return replays[-1]
 
-    with serving(rig, rig_path, replay, args.directory) as serve:
+    outputs = Outputs(asked_outputs(args), follow_rig=False)
+    with serving(rig, rig_path, replay, args.directory, outputs=outputs) as serve:
         print(f"replaying {args.path} for clients (the app, or EngineClient). Ctrl+C ends it. For a summary: --json",
           file=sys.stderr, flush=True)
+        print_addresses(serve)
         serve.engine.start()
         serve.server.run(until=lambda: replays[-1].over)
         if not serve.server.ending:

@@ -17,6 +17,7 @@ from rhot_app.engine.core import Engine, MakeSource
 from rhot_app.engine.directory import EngineDirectory, EngineLock, open_directory
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.server import Server, StatePublisher
+from rhot_app.outputs.outputs import Outputs
 from rhot_app.project import Rig
 from rhot_app.sources.realtime import share_interpreter
 from rhot_app.tracking.make import make_tracker
@@ -37,11 +38,12 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
-            directory: Path | None, own: KeyPair | None = None) -> Iterator[Serving]:
+def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory: Path | None,
+            own: KeyPair | None = None, outputs: Outputs | None = None) -> Iterator[Serving]:
     """An engine in its directory, warmed up, frames passing; the caller runs the server. `own`: the master's keys.
 
-    Raises EngineError when another engine holds the directory, SourceError when a port is taken.
+    Raises EngineError when another engine holds the directory, SourceError when a port is taken, OutputError for an
+    output that cannot be.
     """
     announce_compilation()
     place = open_directory(directory)
@@ -52,7 +54,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
         stack.callback(context.destroy, 0)
         publish = StatePublisher(context, place)
         nodes = NodeControl(context, own)
-        engine = Engine(rig, rig_path, make_source, make_tracker, publish, nodes.message, GarbageMan())
+        engine = Engine(rig, rig_path, make_source, make_tracker, publish, nodes.message, GarbageMan(), outputs)
         stack.callback(engine.close)
         server = Server(context, place, engine, nodes)
         stack.callback(server.close)
