@@ -38,7 +38,7 @@ scene.add(sun);
 // --- looking around
 
 const target = new THREE.Vector3(0, 0, -0.5);
-const front = { azimuth: 0.35, elevation: 0.25, distance: 0.55 };
+const front = { azimuth: 0.35, elevation: 0.25, distance: 0.4 };
 const orbit = { ...front };
 const pointers = new Map();
 let placed = false;

@@ -111,6 +111,8 @@ class WebServer:
             await self._ending.wait()
 
     def _process(self, _connection: ServerConnection, request: Request) -> Response | None:
+        if getattr(request, "method", "GET") != "GET":  # older versions of the library refuse others themselves
+            return text_answer(405, "Nothing can be written here.")
         answer = self._answer(request)
         if answer is None and len(self._clients) >= CLIENTS_MAX:
             return text_answer(503, "There are too many clients.")
@@ -165,7 +167,8 @@ def text_answer(status: int, text: str) -> Response:
 
 def http_answer(status: int, body: bytes, kind: str, headers: tuple[tuple[str, str], ...] = ()) -> Response:
     """An HTTP answer with its length, which nobody keeps or takes for anything else."""
-    reasons = {200: "OK", 403: "Forbidden", 404: "Not Found", 426: "Upgrade Required", 503: "Service Unavailable"}
+    reasons = {200: "OK", 403: "Forbidden", 404: "Not Found", 405: "Method Not Allowed",
+               426: "Upgrade Required", 503: "Service Unavailable"}
     always = (("Content-Type", kind), ("Content-Length", str(len(body))), ("Cache-Control", "no-store"),
               ("X-Content-Type-Options", "nosniff"), ("Connection", "close"))
     return Response(status, reasons[status], Headers([*always, *headers]), body)
