@@ -63,7 +63,7 @@ class PluginDetector:
         if indices[:self._count] != list(range(self._count)):
             raise ValueError("its first observations are not one of each marker, in the order of the set")
         if any(not 0 <= index < self._count or indices.count(index) > CANDIDATES_MAX for index in indices):
-            raise ValueError(f"it gave more than {CANDIDATES_MAX} candidates of a marker, or one of a marker that is not")
+            raise ValueError(f"there are more than {CANDIDATES_MAX} candidates of a marker, or one of no marker")
 
     def _failed(self, what: str, exc: Exception) -> str:
         return f"{about_plugin(GROUP, self._name)} {what} ({type(exc).__name__}: {exc})."

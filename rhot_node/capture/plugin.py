@@ -48,8 +48,8 @@ class PluginCamera:
         except Exception as exc:
             raise self._failed("failed over a frame", exc) from exc
         if frame is not None and (not isinstance(frame, Frame) or frame.image.size != self._size):
-            raise CameraError(f"camera {PREFIX}{self._name}: {about_plugin(GROUP, self._name)} gave something else than "
-                              f"a frame of {self._size[0]} x {self._size[1]} px.")
+            raise CameraError(f"camera {PREFIX}{self._name}: {about_plugin(GROUP, self._name)} gave something else "
+                              f"than a frame of {self._size[0]} x {self._size[1]} px.")
         return frame
 
     def report(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A headless Chromium with a fresh profile, driven over its DevTools socket: no driver program and no package needed."""
+"""A headless Chromium with a fresh profile, driven over its DevTools socket, without a driver program."""
 
 from __future__ import annotations
 

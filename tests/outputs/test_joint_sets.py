@@ -58,8 +58,8 @@ def test_openxr_has_its_own_axes(rig: Rig) -> None:
     sample = JointConverter(rig).sample(state, "openxr")
     assert sample.joints == OPENXR_JOINTS and len(sample.joints) == 26
     np.testing.assert_allclose(joint(sample, "wrist"), (0.04, -0.06, -0.6), atol=1e-12)
-    np.testing.assert_allclose(joint(sample, "index_tip"), (1, -1, -1) * state.joint_positions[JOINTS.index("index_tip")],
-                               atol=1e-9)
+    own = state.joint_positions[JOINTS.index("index_tip")]
+    np.testing.assert_allclose(joint(sample, "index_tip"), (1, -1, -1) * own, atol=1e-9)
     assert joint(sample, "middle_tip")[1] > joint(sample, "middle_proximal")[1] > joint(sample, "wrist")[1]
     assert joint(sample, "thumb_tip")[0] > joint(sample, "index_tip")[0]
     middle = axes_of(sample, "middle_proximal")
