@@ -72,7 +72,9 @@ def run(args: argparse.Namespace) -> int:
     rig = load_rig(args.rig)
     own = load_master_keys().own
     source = functools.partial(UdpNodes, own=own)
-    with serving(rig, args.rig.absolute(), source, args.directory, own, Outputs(asked_outputs(args))) as serve:
+    outputs = Outputs(asked_outputs(args))
+    with serving(rig, args.rig.absolute(), source, args.directory, own, outputs) as serve:
+        outputs.settle()  # so that whoever is told an address finds it open
         if args.log is not None:
             serve.engine.record(args.log.absolute())
         if args.start:

@@ -68,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
 
     outputs = Outputs(asked_outputs(args), follow_rig=False)
     with serving(rig, rig_path, replay, args.directory, outputs=outputs) as serve:
+        outputs.settle()
         print(f"replaying {args.path} for clients (the app, or EngineClient). Ctrl+C ends it. For a summary: --json",
           file=sys.stderr, flush=True)
         print_addresses(serve)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import time
 from collections.abc import Callable, Iterable
 from typing import Final
 
@@ -18,6 +19,7 @@ MakeSink = Callable[[OutputSettings], Sink]
 _KINDS: Final = {"osc": ("osc", "OscSink"), "vmc": ("vmc", "VmcSink"), "ws": ("ws", "WebSocketSink"),
                  "lsl": ("lsl", "LslSink"), "zenoh": ("zenoh", "ZenohSink"), "web": ("web_view", "WebViewSink")}
 _OPENXR_ONLY: Final = ("vmc", "web")  # whatever is asked: their messages are made of these joints
+_SETTLE_S: Final = 2.0
 
 
 def make_sink(settings: OutputSettings) -> Sink:
@@ -74,6 +76,12 @@ class Outputs:
         for output in made.values():
             output.start()
         self._running = tuple((kept | made)[settings] for settings in wanted)
+
+    def settle(self) -> None:
+        """Wait until each has opened or failed to, but not for long."""
+        end_s = time.monotonic() + _SETTLE_S
+        while time.monotonic() < end_s and any(output.status().state == "starting" for output in self._running):
+            time.sleep(0.01)
 
     def send(self, state: HandState) -> None:
         """Hand one state to every output. Never blocks, never raises."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import http.client
+import os
+import shutil
 import ssl
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,6 +21,8 @@ from websockets.sync.client import connect
 
 from rhot_app.outputs.spec import web_settings
 
+needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None and not os.environ.get("CI"),
+                                   reason="openssl is missing: sudo apt-get install openssl")
 FAKE_HEADSET = Path(__file__).with_name("fake_headset.js").read_text()
 
 
@@ -130,6 +134,7 @@ def test_nothing_can_be_written(stream: Callable[..., Stream], method: str) -> N
     assert get(url, method)[0] == 405
 
 
+@needs_openssl
 def test_other_computers_are_served_encrypted(stream: Callable[..., Stream], page: Page) -> None:
     _, url = view_of(stream, "0.0.0.0")
     assert url.startswith("https://")
@@ -139,6 +144,7 @@ def test_other_computers_are_served_encrypted(stream: Callable[..., Stream], pag
     page.until("window.rhot && rhot.received > 5 && isSecureContext")
 
 
+@needs_openssl
 def test_a_certificate_is_used_again(stream: Callable[..., Stream]) -> None:
     seen = set()
     for _ in range(2):
