@@ -64,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
     """Run the engine until SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.serve import serving
     from rhot_app.keys import load_master_keys
-    from rhot_app.outputs.outputs import Outputs
     from rhot_app.project import load_rig
     from rhot_app.sources.udp_nodes import UdpNodes
 
@@ -72,9 +71,7 @@ def run(args: argparse.Namespace) -> int:
     rig = load_rig(args.rig)
     own = load_master_keys().own
     source = functools.partial(UdpNodes, own=own)
-    outputs = Outputs(asked_outputs(args))
-    with serving(rig, args.rig.absolute(), source, args.directory, own, outputs) as serve:
-        outputs.settle()  # so that whoever is told an address finds it open
+    with serving(rig, args.rig.absolute(), source, args.directory, own, asked_outputs(args)) as serve:
         if args.log is not None:
             serve.engine.record(args.log.absolute())
         if args.start:

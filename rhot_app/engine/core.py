@@ -18,11 +18,11 @@ import numpy as np
 
 from rhot_app.engine.advice import hands_advice, moved_advice
 from rhot_app.engine.observer import NodeMessage, Observer
+from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
 from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import EngineError
-from rhot_app.outputs.outputs import Outputs
 from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
@@ -40,7 +40,7 @@ class Engine:
 
     def __init__(self, rig: Rig, rig_path: Path | None, make_source: MakeSource, make_tracker: MakeTracker,
                  publish: PublishState, node_message: NodeMessage = lambda node_id: "",
-                 after_state: AfterState = lambda: None, outputs: Outputs | None = None) -> None:
+                 after_state: AfterState = lambda: None, outputs: OutputProcess | None = None) -> None:
         """Open the source and warm the tracker up; raises SourceError when a port is taken, OutputError for an output
         that cannot be.
 
@@ -57,17 +57,19 @@ class Engine:
         self._notice = ""  # why the last recording ended
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
         self._lock = threading.RLock()
-        self._outputs = outputs or Outputs()
-        self._outputs.check(rig)
+        self._outputs = outputs
+        if outputs is not None:
+            outputs.check(rig)
         self._source = make_source(rig)
         try:
-            self._pipeline = Pipeline(self._work(rig), publish, after_state, self._outputs.send)
-            self._outputs.configure(rig)
+            self._pipeline = Pipeline(self._work(rig), publish, after_state)
         except BaseException:
             self._source.close()
             raise
         self._listen()
         self._observer = Observer(rig, self._source, self._pipeline)
+        if outputs is not None:
+            outputs.configure(rig)
 
     def start(self) -> int:
         """Have the nodes stream in a new session; returns its number. Starting again begins another one."""
@@ -123,7 +125,8 @@ class Engine:
         rig then stays.
         """
         with self._lock:
-            self._outputs.check(rig)
+            if self._outputs is not None:
+                self._outputs.check(rig)
             kept = same_network(self.rig, rig)
             if kept:
                 work = self._work(rig)
@@ -135,7 +138,8 @@ class Engine:
             self._pipeline.use(work)
             self._listen()
             self.rig = rig
-            self._outputs.configure(rig)
+            if self._outputs is not None:
+                self._outputs.configure(rig)
             self._observer = Observer(rig, self._source, self._pipeline)
             if self.running and not kept:
                 self.start()
@@ -163,10 +167,11 @@ class Engine:
             self._follow_nodes()
             extra = [Advice("error", self._notice)] if self._notice else []
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
-            extra += [Advice("warning", text) for text in self._outputs.complaints()]
+            outputs = self._outputs
+            extra += [] if outputs is None else [Advice("warning", text) for text in outputs.complaints()]
             status = self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
                                            self._node_message, extra)
-            return replace(status, outputs=self._outputs.status())
+            return status if outputs is None else replace(status, outputs=outputs.status())
 
     def close(self) -> None:
         """Stop the nodes, finish the log, close all ports. May be called twice."""
@@ -175,7 +180,8 @@ class Engine:
                 self.stop()
             self.record_stop()
             self._source.close()
-            self._outputs.close()
+            if self._outputs is not None:
+                self._outputs.close()
 
     def _follow_nodes(self) -> None:
         """The rig has every node where the source has found it."""

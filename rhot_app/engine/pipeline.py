@@ -20,7 +20,6 @@ from rhot_app.tracking.tracker import CameraObservations, PredictingTracker, Tra
 
 PublishState = Callable[[bytes], None]
 AfterState = Callable[[], None]
-SendState = Callable[[HandState], None]
 
 log = logging.getLogger(__name__)
 
@@ -37,10 +36,8 @@ class Work:
 class Pipeline:
     """Ingests frames, solves once, publishes. `take` may be called by any thread; the meters may be read."""
 
-    def __init__(self, work: Work, publish: PublishState, after_state: AfterState = lambda: None,
-                 send: SendState = lambda state: None) -> None:
-        """`publish` takes a state's bytes, then `send` the state itself; neither may block. `after_state` is called
-        when nobody waits for one."""
+    def __init__(self, work: Work, publish: PublishState, after_state: AfterState = lambda: None) -> None:
+        """`publish` takes a state's bytes and must not block; `after_state` is called when nobody waits for one."""
         self.states = RateMeter()
         self.latency = LatencyMeter()
         self.last_state: HandState | None = None
@@ -49,7 +46,6 @@ class Pipeline:
         self._work = work
         self._publish = publish
         self._after_state = after_state
-        self._send_on = send
         self._changes = work.source.changes
         self._previous: dict[str, float] = {}
         self._lock = threading.Lock()
@@ -140,4 +136,3 @@ class Pipeline:
         self.latency.add(state.latency_s)
         self.states.tick(now_ns)
         self.last_state = state
-        self._send_on(state)

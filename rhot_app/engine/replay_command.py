@@ -43,7 +43,6 @@ def run(args: argparse.Namespace) -> int:
     """Replay; with clients to serve, until the log's end, SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.replay_summary import summarise
     from rhot_app.engine.serve import serving
-    from rhot_app.outputs.outputs import Outputs
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogReplay
@@ -66,9 +65,8 @@ def run(args: argparse.Namespace) -> int:
         replays.append(LogReplay(args.path, rig, args.speed))
         return replays[-1]
 
-    outputs = Outputs(asked_outputs(args), follow_rig=False)
-    with serving(rig, rig_path, replay, args.directory, outputs=outputs) as serve:
-        outputs.settle()
+    outputs = asked_outputs(args)
+    with serving(rig, rig_path, replay, args.directory, outputs=outputs, rig_outputs=False) as serve:
         print(f"replaying {args.path} for clients (the app, or EngineClient). Ctrl+C ends it. For a summary: --json",
           file=sys.stderr, flush=True)
         print_addresses(serve)

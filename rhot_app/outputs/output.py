@@ -1,4 +1,4 @@
-"""The output interface: where samples leave the engine. One file per kind of output; each runs in a thread of its own.
+"""The output interface: where samples leave for other programs. One file per kind; each has a thread of its own.
 
 A sink (`Sink`) only opens, writes and closes. `Output` gives it a queue and a thread, so that one that is slow or stuck
 delays nobody: when its queue is full, the oldest state is dropped.

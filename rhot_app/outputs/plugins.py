@@ -26,13 +26,11 @@ def output_plugins() -> tuple[str, ...]:
 
 
 def plugin_sink(settings: OutputSettings) -> Sink:
-    """The sink that the plug-in makes. Raises OutputError when the plug-in itself refuses the settings with one; one
-    that is broken becomes a sink that says so whenever it is opened."""
+    """The sink that the plug-in makes; one that refuses the settings, or is broken, becomes a sink that says so
+    whenever it is opened."""
     try:
         sink: Sink = load_plugin(GROUP, settings.kind)(settings)
-    except OutputError:
-        raise
-    except PluginError as exc:
+    except (OutputError, PluginError) as exc:
         return _BrokenSink(str(exc))
     except Exception as exc:
         return _BrokenSink(f"{about_plugin(GROUP, settings.kind)} failed to begin ({type(exc).__name__}: {exc}).")

@@ -16,8 +16,10 @@ from fake_tracker import FakeTracker
 from patience import eventually
 from websockets.sync.client import connect
 
+from rhot_app.engine import output_process
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
+from rhot_app.engine.output_process import OutputProcess
 from rhot_app.errors import OutputError
 from rhot_app.project import OutputSettings, save_rig
 from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
@@ -93,5 +95,51 @@ def test_an_engine_that_cannot_have_its_outputs_opens_nothing() -> None:
     rig = msgspec.structs.replace(synthetic_rig(), outputs=(OutputSettings("pager", "x"),))
     opened: list[object] = []
     with pytest.raises(OutputError, match="pager"):
-        Engine(rig, None, lambda rig: opened.append(rig) or UdpNodes(rig), FakeTracker, lambda payload: None)
+        Engine(rig, None, lambda rig: opened.append(rig) or UdpNodes(rig), FakeTracker, lambda payload: None,
+               outputs=OutputProcess("ipc://nowhere"))
     assert opened == []
+
+
+def test_a_crashed_output_process_is_started_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output_process, "RESTART_S", 0.1)
+    rig = msgspec.structs.replace(synthetic_rig(), outputs=(OutputSettings("ws", str(free_port())),))
+    outputs = OutputProcess(f"ipc://{tmp_path}/states.ipc")
+    outputs.configure(rig)
+    try:
+        outputs.settle()
+        assert [status.state for status in outputs.status()] == ["running"]
+        assert outputs._process is not None
+        first = outputs._process.pid
+        os.kill(first, signal.SIGKILL)
+        eventually(lambda: any("ended (code -9)" in text for text in outputs.complaints()))
+        eventually(lambda: outputs.status()[0].state == "running" and outputs.complaints() == [])
+        assert outputs._process.pid != first
+    finally:
+        outputs.close()
+
+
+def test_a_replay_leaves_the_rigs_outputs_out(tmp_path: Path) -> None:
+    rig = msgspec.structs.replace(synthetic_rig(), outputs=(OutputSettings("ws", str(free_port())),))
+    outputs = OutputProcess(f"ipc://{tmp_path}/states.ipc", follow_rig=False)
+    outputs.configure(rig)
+    assert outputs.status() == () and outputs.complaints() == []
+    outputs.close()
+
+
+def test_outputs_end_with_their_engine(tmp_path: Path) -> None:
+    save_rig(tmp_path / "rig.json", synthetic_rig())
+    port = free_port()
+    with engine(tmp_path, "--json", "--output", f"ws:{port}") as process:
+        try:
+            assert process.stdout is not None and process.stdout.readline()
+            with connect(f"ws://127.0.0.1:{port}"):
+                process.kill()
+                eventually(lambda: not listens(port))
+        finally:
+            process.kill()
+
+
+def listens(port: int) -> bool:
+    """Whether somebody listens on a port of this computer."""
+    with socket.socket() as sock:
+        return sock.connect_ex(("127.0.0.1", port)) == 0

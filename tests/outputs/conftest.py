@@ -85,8 +85,9 @@ class Stream:
     """Outputs that get a state `RATE_HZ` times a second, from a thread as an engine's."""
 
     def __init__(self, rig: Rig, *specs: str | OutputSettings) -> None:
-        self.outputs = Outputs([parse_output(spec) if isinstance(spec, str) else spec for spec in specs])
-        self.outputs.configure(rig)
+        self.outputs = Outputs()
+        asked = tuple(parse_output(spec) if isinstance(spec, str) else spec for spec in specs)
+        self.outputs.configure(msgspec.structs.replace(rig, outputs=asked))
         self.sent = 0
         self._state = state_of(rig, neutral_pose(palm_before_cameras()))
         self._ending = threading.Event()

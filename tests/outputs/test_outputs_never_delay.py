@@ -155,9 +155,8 @@ def test_a_port_in_use_is_said_and_had_when_it_is_free(stream: Callable[..., Str
         port = other.getsockname()[1]
         running = stream(f"ws:{port}")
         eventually(lambda: f"port {port} of 127.0.0.1 is in use" in running.outputs.status()[0].message)
-        assert running.outputs.complaints()[0].startswith(f"Output ws:{port}: port {port}")
     eventually(lambda: running.outputs.status()[0].state == "running")
-    assert running.outputs.complaints() == []
+    assert running.outputs.status()[0].message == ""
 
 
 def test_an_unknown_host_and_an_empty_one(stream: Callable[..., Stream]) -> None:
@@ -168,23 +167,23 @@ def test_an_unknown_host_and_an_empty_one(stream: Callable[..., Stream]) -> None
 
 
 def test_a_rigs_outputs_come_and_go_and_others_stay(rig: Rig) -> None:
-    ports = [free_port(), free_port()]
-    outputs = Outputs([OutputSettings("ws", str(ports[0]))])
+    first, second = (OutputSettings("ws", str(free_port())) for _ in range(2))
+    outputs = Outputs()
+
+    def ask(*settings: OutputSettings) -> None:
+        outputs.configure(msgspec.structs.replace(rig, outputs=settings))
     try:
-        outputs.configure(rig)
+        ask(first)
         eventually(lambda: outputs.status()[0].state == "running")
-        with connect(f"ws://127.0.0.1:{ports[0]}") as client:
-            outputs.configure(msgspec.structs.replace(rig, outputs=(OutputSettings("ws", str(ports[1])),)))
+        with connect(f"ws://127.0.0.1:{first.target}") as client:
+            ask(first, second)
             eventually(lambda: [status.state for status in outputs.status()] == ["running", "running"])
             with pytest.raises(OutputError, match="no output 'nothing'"):
-                outputs.configure(msgspec.structs.replace(rig, outputs=(OutputSettings("nothing"),)))
+                ask(OutputSettings("nothing"))
             assert len(outputs.status()) == 2
-            outputs.configure(rig)
+            ask(first)
             assert len(outputs.status()) == 1
             outputs.send(state_of(rig, neutral_pose()))
             assert client.recv(10)  # the connection was never closed
     finally:
         outputs.close()
-    replayed = Outputs(follow_rig=False)
-    replayed.configure(msgspec.structs.replace(rig, outputs=(OutputSettings("ws", str(ports[1])),)))
-    assert replayed.status() == ()
