@@ -10,13 +10,12 @@ import os
 import shutil
 import subprocess
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from patience import PATIENCE_S
+from patience import PATIENCE_S, eventually
 from websockets.sync.client import ClientConnection, connect
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
@@ -62,11 +61,9 @@ class Page:
 
     def until(self, expression: str) -> Any:
         """Wait until the expression is true; returns its value."""
-        end_s = time.monotonic() + PATIENCE_S
-        while not (value := self.evaluate(expression)):
-            assert time.monotonic() < end_s, (expression, self.evaluate("document.body.innerText"))
-            time.sleep(0.05)
-        return value
+        eventually(lambda: self.evaluate(expression),
+                   told=lambda: (expression, self.evaluate("document.body && document.body.innerText")))
+        return self.evaluate(expression)
 
     def screenshot(self) -> bytes:
         """The page as PNG."""
@@ -107,16 +104,13 @@ def _page_address(process: subprocess.Popen[str]) -> str:
 
 
 def _attach(browser: str) -> str:
-    end_s = time.monotonic() + PATIENCE_S
     with connect(browser) as connection:
-        while time.monotonic() < end_s:
+        def pages() -> list[str]:
             connection.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
             targets = json.loads(connection.recv(PATIENCE_S))["result"]["targetInfos"]
-            pages = [target["targetId"] for target in targets if target["type"] == "page"]
-            if pages:
-                return f"{browser.partition('/devtools/')[0]}/devtools/page/{pages[0]}"
-            time.sleep(0.05)
-    raise AssertionError("Chromium opened no page")
+            return [target["targetId"] for target in targets if target["type"] == "page"]
+        eventually(pages)
+        return f"{browser.partition('/devtools/')[0]}/devtools/page/{pages()[0]}"
 
 
 def saved(picture: bytes, name: str) -> None:
