@@ -31,12 +31,13 @@ export class Hand extends THREE.Group {
     });
     this.bones = pairs(joints).map(([from, to]) => {
       // The wrist is thicker than the bones that begin there.
-      const root = Math.min(radii[from], radii[to]);
+      const root = joints[from] === "wrist" ? radii[to] : radii[from];
       const bone = new THREE.Mesh(new THREE.CylinderGeometry(radii[to], root, 1, 24, 1, true), SKIN[3]);
       this.add(bone);
       return { mesh: bone, from, to };
     });
     this.places = radii.map(() => new THREE.Vector3());
+    this.tips = FINGERS.map((finger) => [joints.indexOf(`${finger}_distal`), joints.indexOf(`${finger}_tip`)]);
   }
 
   // Whether the hand still has the size that it was made with.
@@ -49,6 +50,10 @@ export class Hand extends THREE.Group {
       if (place) this.places[row].fromArray(place);
       return place !== null;
     });
+    for (const [distal, tip] of this.tips) { // a tip is the skin's end, so that its ball lies before it
+      const back = this.places[distal].clone().sub(this.places[tip]).setLength(this.radii[tip]);
+      this.places[tip].add(back);
+    }
     this.balls.forEach((ball, row) => {
       ball.position.copy(this.places[row]);
       ball.material = SKIN[hand.knowledge[row]];

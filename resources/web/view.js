@@ -92,17 +92,27 @@ function look() {
 
 let newest = null;
 let heardAt = -Infinity;
+let refusals = 0; // since it was last connected
 
 function connect() {
   const address = new URL("states", location.href);
   address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
   const socket = new WebSocket(address);
+  socket.onopen = () => {
+    if (refusals) element("notice").hidden = true;
+    refusals = 0;
+  };
   socket.onmessage = (event) => {
     newest = JSON.parse(event.data);
     heardAt = performance.now();
     view.received += 1;
   };
-  socket.onclose = () => setTimeout(connect, RETRY_MS);
+  socket.onclose = (event) => {
+    if (event.code === 1006 && ++refusals > 1) {
+      complain("The engine does not answer at this address. If it was started anew, it has printed another one.");
+    }
+    setTimeout(connect, RETRY_MS);
+  };
 }
 
 function show(state) {

@@ -36,10 +36,9 @@ def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of every command that serves states to clients."""
     parser.add_argument("--directory", type=Path, metavar="DIR",
                         help=f"private directory of the engine's sockets (default {default_directory()})")
-    parser.add_argument("--output", type=parse_output, action="append", default=[], dest="outputs", metavar="SPEC",
+    parser.add_argument("--output", action="append", default=[], dest="outputs", metavar="SPEC",
                         help="send every state to other programs, see below; may be given more than once")
-    parser.add_argument("--web", type=web_settings, nargs="?", const=web_settings(""), default=None,
-                        metavar="[HOST:]PORT",
+    parser.add_argument("--web", nargs="?", const="", metavar="[HOST:]PORT",
                         help=f"show the hand in browsers, on this computer's port {WEB_PORT} unless told otherwise; "
                              "the address with its secret is printed")
     parser.add_argument("--verbose", action="store_true", help="log what happens on standard error")
@@ -48,8 +47,8 @@ def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def asked_outputs(args: argparse.Namespace) -> tuple[OutputSettings, ...]:
-    """The outputs of the command line."""
-    return (*args.outputs, *(() if args.web is None else (args.web,)))
+    """The outputs of the command line. Raises OutputError."""
+    return (*map(parse_output, args.outputs), *(() if args.web is None else (web_settings(args.web),)))
 
 
 def print_addresses(serve: Serving) -> None:

@@ -6,6 +6,8 @@ import importlib
 from collections.abc import Callable
 from typing import Final
 
+import msgspec
+
 from rhot_app.errors import OutputError
 from rhot_app.outputs.joints import JointConverter
 from rhot_app.outputs.output import Output, OutputStatus, Sink
@@ -17,6 +19,7 @@ MakeSink = Callable[[OutputSettings], Sink]
 
 _KINDS: Final = {"osc": ("osc", "OscSink"), "vmc": ("vmc", "VmcSink"), "ws": ("ws", "WebSocketSink"),
                  "lsl": ("lsl", "LslSink"), "zenoh": ("zenoh", "ZenohSink"), "web": ("web_view", "WebViewSink")}
+_WEB_RATE_HZ: Final = 60.0  # of most screens
 _OPENXR_ONLY: Final = ("vmc", "web")  # whatever is asked: their messages are made of these joints
 
 
@@ -95,6 +98,6 @@ class Outputs:
 
 def _whole(settings: OutputSettings) -> OutputSettings:
     """The settings as they are meant."""
-    if settings.kind in _OPENXR_ONLY and settings.joints != "openxr":
-        return OutputSettings(settings.kind, settings.target, "openxr", settings.rate_hz)
-    return settings
+    joints = "openxr" if settings.kind in _OPENXR_ONLY else settings.joints
+    rate_hz = _WEB_RATE_HZ if settings.kind == "web" and settings.rate_hz is None else settings.rate_hz
+    return msgspec.structs.replace(settings, joints=joints, rate_hz=rate_hz)

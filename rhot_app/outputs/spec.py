@@ -1,14 +1,19 @@
-"""Output specs, as typed behind ``--output``: ``KIND[:TARGET][?joints=SET&hz=RATE]``. No sockets here."""
+"""Output specs, as typed behind ``--output``: ``KIND[:TARGET][?joints=SET&hz=RATE]``. No sockets here.
+
+What a rig is imported when it is needed, so that ``--help`` is there at once.
+"""
 
 from __future__ import annotations
 
 import re
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
 from rhot_app.errors import OutputError
-from rhot_app.project import OutputSettings
+
+if TYPE_CHECKING:
+    from rhot_app.project import OutputSettings
 
 HELP: Final = """output specs, KIND:TARGET, each with ?joints=own|openxr|mediapipe and &hz=RATE behind it if wanted:
   osc:HOST:PORT      OSC messages by UDP
@@ -27,6 +32,7 @@ _OPTIONS: Final = {"joints": "joints", "hz": "rate_hz"}
 def parse_output(text: str) -> OutputSettings:
     """The settings that a spec means. Raises OutputError saying what is wrong with it; whether there is such a kind is
     asked later."""
+    from rhot_app.project import OutputSettings
     head, _, query = text.partition("?")
     kind, _, target = head.partition(":")
     fields: dict[str, Any] = {"kind": kind, "target": target}
@@ -48,6 +54,7 @@ def parse_output(text: str) -> OutputSettings:
 
 def web_settings(text: str) -> OutputSettings:
     """The settings of the web view on ``[HOST:]PORT``, or on HOST alone; empty: on WEB_PORT of this computer only."""
+    from rhot_app.project import OutputSettings
     target = text if re.search(r"(^|:)\d+$", text) and not text.endswith("]") else f"{text or '127.0.0.1'}:{WEB_PORT}"
     settings = OutputSettings("web", target, "openxr")
     host_and_port(settings, "127.0.0.1")

@@ -89,7 +89,7 @@ class Stream:
         asked = tuple(parse_output(spec) if isinstance(spec, str) else spec for spec in specs)
         self.outputs.configure(msgspec.structs.replace(rig, outputs=asked))
         self.sent = 0
-        self._state = state_of(rig, neutral_pose(palm_before_cameras()))
+        self.state = state_of(rig, neutral_pose(palm_before_cameras()))
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -103,7 +103,7 @@ class Stream:
     def _run(self) -> None:
         due_s = time.monotonic()
         while not self._ending.is_set():
-            self.outputs.send(replace(self._state, sequence=self.sent, t_master_ns=time.monotonic_ns()))
+            self.outputs.send(replace(self.state, sequence=self.sent, t_master_ns=time.monotonic_ns()))
             self.sent += 1
             due_s += 1.0 / RATE_HZ
             self._ending.wait(max(0.0, due_s - time.monotonic()))

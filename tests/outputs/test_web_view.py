@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 from chromium import Page, chromium, saved
-from conftest import Stream, free_port
+from conftest import Stream, free_port, unknown
 from patience import eventually
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -85,12 +85,16 @@ def test_a_headset_is_entered_and_drawn_to(stream: Callable[..., Stream], page: 
     page.until("!rhot.session && document.getElementById('vr').textContent === 'Enter VR'")
 
 
-def test_a_page_connects_again_when_the_engine_is_back(stream: Callable[..., Stream], page: Page) -> None:
+def test_the_page_says_what_is_lost(stream: Callable[..., Stream], page: Page) -> None:
     running, url = view_of(stream)
     page.open(url)
-    page.until("window.rhot && rhot.received > 5")
+    page.until("window.rhot && rhot.received > 5 && rhot.hands.right.visible")
+    running.state = unknown(running.state)
+    page.until("document.getElementById('condition').textContent === 'Lost' && !rhot.hands.right.visible")
     running.outputs.close()
     page.until("document.getElementById('condition').textContent === 'No states come in'")
+    page.until("!document.getElementById('notice').hidden && "
+               "document.getElementById('notice').textContent.startsWith('The engine does not answer')")
 
 
 def test_without_the_secret_there_is_nothing(stream: Callable[..., Stream]) -> None:
