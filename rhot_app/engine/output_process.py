@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import secrets
 import signal
 import subprocess
 import sys
@@ -27,7 +28,7 @@ import zmq
 from rhot_app.engine.codec import TOPIC_STATE, decode
 from rhot_app.errors import OutputError
 from rhot_app.outputs.outputs import Outputs, check_output
-from rhot_app.outputs.status import OutputStatus
+from rhot_app.outputs.status import SECRET_VARIABLE, OutputStatus
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.tracking.state import HandState
 
@@ -59,6 +60,7 @@ class OutputProcess:
         self._failure = ""
         self._ended_s = 0.0
         self._lock = threading.Lock()
+        self._environment = os.environ | {SECRET_VARIABLE: secrets.token_urlsafe(24)}  # one for the engine's life
 
     def check(self, rig: Rig) -> None:
         """Raises OutputError for an output that cannot be."""
@@ -127,7 +129,7 @@ class OutputProcess:
         self._status = self._starting()
         self._ended_s = 0.0
         self._process = subprocess.Popen([sys.executable, "-m", "rhot_app.engine.output_process", self._endpoint],
-                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=self._environment)
         threading.Thread(target=self._read, args=(self._process,), name="output status", daemon=True).start()
         self._tell()
 

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
+
+SECRET_VARIABLE: Final = "RHOT_WEB_SECRET"
+"""Environment variable in which the engine keeps the secret of all its web views, so that a page that is open finds
+them again whenever its outputs are started anew."""
 
 OutputWord = Literal["starting", "running", "failed", "stopped"]
 

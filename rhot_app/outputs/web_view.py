@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import hmac
+import os
 import secrets
 import socket
 from typing import Final
@@ -18,6 +19,7 @@ from rhot_app.outputs.certificate import server_context
 from rhot_app.outputs.joints import Sample
 from rhot_app.outputs.json_message import json_message
 from rhot_app.outputs.spec import WEB_PORT, host_and_port
+from rhot_app.outputs.status import SECRET_VARIABLE
 from rhot_app.outputs.web_server import WebServer, http_answer, text_answer
 from rhot_app.project import OutputSettings
 from rhot_node.addresses import is_loopback, own_interfaces
@@ -44,7 +46,8 @@ class WebViewSink:
     """The page and its stream, on one port."""
 
     def __init__(self, settings: OutputSettings) -> None:
-        """Draws the secret. Raises OutputError when the target is not [HOST:]PORT. Nothing is opened yet."""
+        """Takes the secret of SECRET_VARIABLE, or draws one; opens nothing yet. Raises OutputError when the target is
+        not [HOST:]PORT."""
         if settings.target:
             host, port = host_and_port(settings, "127.0.0.1")
         else:
@@ -52,7 +55,7 @@ class WebViewSink:
         here = host == "localhost" or is_loopback(host)
         names = _names(host)
         tls = None if here else functools.partial(server_context, names)
-        self._secret = secrets.token_urlsafe(24)
+        self._secret = os.environ.get(SECRET_VARIABLE) or secrets.token_urlsafe(24)
         shown = f"[{names[0]}]" if ":" in names[0] else names[0]
         self.url = f"{'http' if here else 'https'}://{shown}:{port}/{self._secret}/"
         self._files: dict[str, tuple[bytes, str]] = {}

@@ -16,8 +16,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from conftest import RATE_HZ, Stream, free_port, palm_before_cameras, state_of, unknown
 from patience import PATIENCE_S, eventually
+from streams import RATE_HZ, Stream, free_port, palm_before_cameras, state_of, unknown
 
 from rhot_app.hand.model import neutral_pose
 from rhot_app.outputs.joints import JointConverter
@@ -115,7 +115,7 @@ def test_lsl_client(stream: Callable[..., Stream], tmp_path: Path, monkeypatch: 
     monkeypatch.setenv("LSLAPICFG", str(settings))
     del pylsl
     name = f"RHOT {os.getpid()}"
-    code = ("import sys, time; sys.path.insert(0, sys.argv[1]); from conftest import Stream; from rhot_app.simulator."
+    code = ("import sys, time; sys.path.insert(0, sys.argv[1]); from streams import Stream; from rhot_app.simulator."
             "synthetic_node import synthetic_rig; Stream(synthetic_rig(), sys.argv[2]); time.sleep(3600)")
     with subprocess.Popen([sys.executable, "-c", code, str(Path(__file__).parent), f"lsl:{name}"]) as sender:
         try:

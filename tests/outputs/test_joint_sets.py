@@ -7,8 +7,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from conftest import palm_before_cameras, state_of, unknown
 from scipy.spatial.transform import Rotation
+from streams import palm_before_cameras, state_of, unknown
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import neutral_pose

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import palm_before_cameras, state_of, unknown
 from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_message import OscMessage
+from streams import palm_before_cameras, state_of, unknown
 
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.openxr import OPENXR_JOINTS

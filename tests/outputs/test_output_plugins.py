@@ -11,8 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import Stream
 from patience import eventually
+from streams import Stream
 
 from rhot_app.errors import OutputError
 from rhot_app.outputs.outputs import make_sink

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import msgspec
 import pytest
-from conftest import Stream, free_port, state_of
 from patience import eventually, quickest, settled
+from streams import Stream, free_port, state_of
 from websockets.sync.client import connect
 
 from rhot_app.errors import OutputError

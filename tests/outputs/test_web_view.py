@@ -11,15 +11,18 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from chromium import Page, chromium, saved
-from conftest import Stream, free_port, unknown
 from patience import eventually
+from streams import Stream, free_port, unknown
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from rhot_app.outputs.spec import web_settings
+from rhot_app.outputs.status import SECRET_VARIABLE
+from rhot_app.project import Rig
 
 needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None and not os.environ.get("CI"),
                                    reason="openssl is missing: sudo apt-get install openssl")
@@ -95,6 +98,20 @@ def test_the_page_says_what_is_lost(stream: Callable[..., Stream], page: Page) -
     page.until("document.getElementById('condition').textContent === 'No states come in'")
     page.until("!document.getElementById('notice').hidden && "
                "document.getElementById('notice').textContent.startsWith('The engine does not answer')")
+
+
+def test_a_page_finds_restarted_outputs_again(rig: Rig, stream: Callable[..., Stream], page: Page,
+                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(SECRET_VARIABLE, "secret-of-the-engine")
+    running, url = view_of(stream)
+    assert "/secret-of-the-engine/" in url
+    page.open(url)
+    page.until("window.rhot && rhot.received > 5")
+    running.outputs.close()
+    page.until("!document.getElementById('notice').hidden")
+    running.outputs.configure(msgspec.structs.replace(rig, outputs=(web_settings(urlsplit(url).netloc),)))
+    page.until("document.getElementById('condition').textContent === 'Tracking' && "
+               "document.getElementById('notice').hidden")
 
 
 def test_without_the_secret_there_is_nothing(stream: Callable[..., Stream]) -> None:
