@@ -34,6 +34,7 @@ from rhot_app.tracking.state import HandState
 
 RESTART_S: Final = 3.0
 SETTLE_S: Final = 15.0  # a process that starts, on a busy computer
+SILENT_S: Final = 60.0  # nothing heard for so long: it hangs, and is ended; its first start may compile for a while
 STATUS_S: Final = 0.2
 NICE: Final = 5  # gives way to the engine, whose own threads hold the interpreter for those that track
 _END_S: Final = 5.0
@@ -44,7 +45,7 @@ log = logging.getLogger(__name__)
 
 
 class OutputProcess:
-    """The engine's side. One thread at a time, but for `status` and `complaints`."""
+    """The engine's side; any thread may call it."""
 
     def __init__(self, states: str, fixed: Iterable[OutputSettings] = (), *, follow_rig: bool = True) -> None:
         """`states`: ZeroMQ endpoint of the hand states. `fixed`: outputs of the command line, which stay whatever the
@@ -59,6 +60,7 @@ class OutputProcess:
         self._status: tuple[OutputStatus, ...] = ()
         self._failure = ""
         self._ended_s = 0.0
+        self._heard_s = 0.0
         self._lock = threading.Lock()
         self._environment = os.environ | {SECRET_VARIABLE: secrets.token_urlsafe(24)}  # one for the engine's life
 
@@ -87,15 +89,20 @@ class OutputProcess:
         """How each goes; the process is started again when it has ended."""
         with self._lock:
             process = self._process
-            if process is not None and process.poll() is not None:
-                if not self._ended_s:
-                    self._ended_s = time.monotonic()
-                    self._failure = (f"The program of the outputs ended (code {process.returncode}) and is started "
-                                     "again. If that goes on, leave out one output after the other.")
-                    self._status = self._starting()
-                    log.warning("rhot: %s Tracking goes on.", self._failure)
-                elif time.monotonic() - self._ended_s > RESTART_S:
-                    self._start()
+            if process is None:
+                return self._status
+            now_s = time.monotonic()
+            if process.poll() is None:
+                if now_s - self._heard_s > SILENT_S:
+                    process.kill()
+            elif not self._ended_s:
+                self._ended_s = now_s
+                self._failure = (f"The program of the outputs ended (code {process.returncode}) and is started again. "
+                                 "If that goes on, leave out one output after the other.")
+                self._status = self._starting()
+                log.warning("rhot: %s Tracking goes on.", self._failure)
+            elif now_s - self._ended_s > RESTART_S:
+                self._start()
             return self._status
 
     def complaints(self) -> list[str]:
@@ -127,7 +134,7 @@ class OutputProcess:
 
     def _start(self) -> None:
         self._status = self._starting()
-        self._ended_s = 0.0
+        self._ended_s, self._heard_s = 0.0, time.monotonic()
         self._process = subprocess.Popen([sys.executable, "-m", "rhot_app.engine.output_process", self._endpoint],
                                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=self._environment)
         threading.Thread(target=self._read, args=(self._process,), name="output status", daemon=True).start()
@@ -147,7 +154,7 @@ class OutputProcess:
                 status = decoder.decode(line)
                 with self._lock:
                     if process is self._process and process.poll() is None:
-                        self._status, self._failure = status, ""
+                        self._status, self._failure, self._heard_s = status, "", time.monotonic()
 
 
 class OutputProgram:

@@ -118,6 +118,24 @@ def test_a_crashed_output_process_is_started_again(tmp_path: Path, monkeypatch: 
         outputs.close()
 
 
+def test_a_hanging_output_process_is_started_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output_process, "RESTART_S", 0.1)
+    rig = msgspec.structs.replace(synthetic_rig(), outputs=(OutputSettings("ws", str(free_port())),))
+    outputs = OutputProcess(f"ipc://{tmp_path}/states.ipc")
+    outputs.configure(rig)
+    try:
+        outputs.settle()
+        assert outputs._process is not None
+        first = outputs._process.pid
+        os.kill(first, signal.SIGSTOP)
+        monkeypatch.setattr(output_process, "SILENT_S", 0.5)
+        eventually(lambda: any("ended (code -9)" in text for text in outputs.complaints()))
+        monkeypatch.setattr(output_process, "SILENT_S", 60.0)
+        eventually(lambda: outputs.status()[0].state == "running" and outputs._process.pid != first)
+    finally:
+        outputs.close()
+
+
 def test_a_replay_leaves_the_rigs_outputs_out(tmp_path: Path) -> None:
     rig = msgspec.structs.replace(synthetic_rig(), outputs=(OutputSettings("ws", str(free_port())),))
     outputs = OutputProcess(f"ipc://{tmp_path}/states.ipc", follow_rig=False)
