@@ -30,8 +30,13 @@ def make_sink(settings: OutputSettings) -> Sink:
     if place is None:
         _check_plugin(settings)
         return plugin_sink(settings)
-    module, name = place  # imported only where it is used
-    make: MakeSink = getattr(importlib.import_module(f"rhot_app.outputs.{module}"), name)
+    module, name = place
+    try:
+        make: MakeSink = getattr(importlib.import_module(f"rhot_app.outputs.{module}"), name)  # only where it is used
+    except ImportError as exc:
+        package = (exc.name or "").partition(".")[0]
+        raise OutputError(f"output {settings.spec!r}: it needs the package {package}, of RHOT's extra app: "
+                          f"`.venv/bin/python -m pip install {package}`.") from exc
     return make(settings)
 
 

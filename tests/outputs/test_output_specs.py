@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import msgspec
 import pytest
 
@@ -54,6 +56,13 @@ def test_a_bad_spec_is_a_sentence(text: str, sentence: str) -> None:
     with pytest.raises(OutputError) as raised:
         make_sink(parse_output(text))
     assert sentence in str(raised.value)
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "rhot_app.outputs.ws", raising=False)
+    monkeypatch.setitem(sys.modules, "websockets.http11", None)
+    with pytest.raises(OutputError, match="needs the package websockets"):
+        make_sink(parse_output("ws:9001"))
 
 
 def test_a_rig_file_lists_outputs(rig: Rig) -> None:
