@@ -20,11 +20,12 @@ import tempfile
 import time
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import StartedProcess, end_processes, ensure_engine, start_ticks, stop_engine
-from rhot_app.project import Rig, load_rig, save_rig
+from rhot_app.project import OutputSettings, Rig, load_rig, save_rig
 from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.tracking.state import LATENCY_STAGES, HandState
 from rhot_node.clock import NodeClock
@@ -44,11 +45,12 @@ def serve_nodes(rig_path: Path, rate_hz: float, ending: multiprocessing.synchron
         node.close()
 
 
-def measure(rate_hz: float, seconds: float, beside: str | None) -> dict[str, object]:
-    """One run; latencies in ms by stage."""
+def measure(rate_hz: float, seconds: float, beside: str | None,
+            outputs: tuple[OutputSettings, ...] = ()) -> dict[str, object]:
+    """One run with these outputs; latencies in ms by stage."""
     with tempfile.TemporaryDirectory(prefix="rhot-latency-") as folder:
         directory, rig_path = Path(folder, "engine"), Path(folder, "rig.json")
-        save_rig(rig_path, synthetic_rig())
+        save_rig(rig_path, msgspec.structs.replace(synthetic_rig(), outputs=outputs))
         spawn = multiprocessing.get_context("spawn")
         ending = spawn.Event()
         nodes = spawn.Process(target=serve_nodes, args=(rig_path, rate_hz, ending))

@@ -50,3 +50,7 @@ def take_losses() -> list[str]:
 
 class ExportError(RhotError):
     """A recording cannot be exported as asked: a format, an option, a missing package or the disk stands against it."""
+
+
+class OutputError(RhotError):
+    """A live stream to another program cannot be what was asked, opened, or written to."""

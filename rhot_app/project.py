@@ -158,6 +158,22 @@ class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     distance_m: Annotated[float, Meta(gt=0, le=100)] = 0.6
 
 
+class OutputSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One live stream to other programs (docs/outputs.md). `rate_hz`: at most so many states/s; None: every one."""
+
+    kind: Annotated[str, Meta(pattern=r"\A[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")]  # osc, vmc, ws, ..., or a plug-in's name
+    target: Annotated[str, Meta(max_length=256)] = ""  # HOST:PORT, or what the kind understands
+    joints: Literal["own", "openxr", "mediapipe"] = "own"
+    rate_hz: Annotated[float, Meta(gt=0, le=1000)] | None = None
+
+    @property
+    def spec(self) -> str:
+        """As it is typed behind ``--output``."""
+        options = [f"joints={self.joints}"] if self.joints != "own" else []
+        options += [] if self.rate_hz is None else [f"hz={self.rate_hz:g}"]
+        return f"{self.kind}{':' if self.target else ''}{self.target}{'?' if options else ''}{'&'.join(options)}"
+
+
 class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole rig."""
 
@@ -172,6 +188,7 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     broadcast: Broadcast = Broadcast()
     other_hand: HandAnatomy | None = None  # a second one at the same time
     calibration: CameraCalibration | None = None  # of lenses and poses together; none: nothing is recorded
+    outputs: tuple[OutputSettings, ...] = ()  # live streams of a live engine
     format: Literal["rhot-rig"] = FORMAT
     version: Literal[1] = VERSION
 

@@ -25,6 +25,7 @@ from rhot_app.engine.warm_up import warm_up as rehearse_tracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import ANGLES
+from rhot_app.outputs.joints import JointConverter
 from rhot_app.project import Rig, TrackerSettings, load_rig
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.simulator.shot import make_renderer, make_shot
@@ -86,9 +87,15 @@ def warm_calibrations(rig: Rig) -> None:
     simulate(footage, np.array([OFF]), np.array([OFF]))
 
 
+def warm_outputs(rig: Rig) -> None:
+    """Compile what turns a hand into the joints of other programs."""
+    JointConverter(rig).rehearse()
+
+
 STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker,
                                            "model tracker": warm_model_tracker, "twin": warm_twin,
-                                           "boards": warm_boards, "calibrations": warm_calibrations}
+                                           "boards": warm_boards, "calibrations": warm_calibrations,
+                                           "outputs": warm_outputs}
 
 
 def warm(name: str) -> str:

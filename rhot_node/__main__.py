@@ -117,6 +117,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     from rhot_node.capture.open import open_camera, takes_settings
     from rhot_node.control import ControlServer
     from rhot_node.daemon import NodeDaemon
+    from rhot_node.detector_plugin import DetectorChoice
     from rhot_node.health.machine import Machine
     from rhot_node.health.monitor import HealthMonitor
     from rhot_node.link import UdpLink
@@ -133,9 +134,10 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     offers = OfferFile(offer_path(options.settings))
     trust = _trust(options.settings, settings)
     keys = None if trust is None else LinkKeys()
-    daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), make_detector,
+    choice, health = DetectorChoice(make_detector), HealthMonitor(Machine())
+    daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), choice.make,
                         camera_takes_settings=takes_settings(options.camera), loop=options.loop,
-                        troubles=HealthMonitor(Machine()).troubles)
+                        troubles=lambda: [*choice.troubles(), *health.troubles()])
     manager = ServiceManager()
     boot_id = secrets.randbits(32)
     with contextlib.ExitStack() as stack:
@@ -192,7 +194,7 @@ def _invite(settings: NodeSettings, offers: OfferFile) -> None:
 
 
 def make_detector(settings: NodeSettings) -> Detector:
-    """The detector that the settings name, compiled and rehearsed."""
+    """The detector that the settings name, no plug-in, compiled and rehearsed."""
     from rhot_node.warm_up import warm_up
     detector: Detector
     if settings.detector == "reference":

@@ -29,6 +29,10 @@ class LinkError(NodeError):
     """A network port cannot be opened or an address is not usable."""
 
 
+class PluginError(NodeError):
+    """A plug-in is missing, cannot be loaded, or does not do what it should."""
+
+
 class TrustError(NodeError):
     """A key file is missing, open to others or broken, or a pairing was refused."""
 

@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.engine.directory import default_directory
+from rhot_app.outputs.spec import HELP, WEB_PORT, parse_output, web_settings
 
 if TYPE_CHECKING:
-    from rhot_app.project import Rig
+    from rhot_app.engine.serve import Serving
+    from rhot_app.project import OutputSettings, Rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +51,27 @@ def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of every command that serves states to clients."""
     parser.add_argument("--directory", type=Path, metavar="DIR",
                         help=f"private directory of the engine's sockets (default {default_directory()})")
+    parser.add_argument("--output", action="append", default=[], dest="outputs", metavar="SPEC",
+                        help="send every state to other programs, see below; may be given more than once")
+    parser.add_argument("--web", nargs="?", const="", metavar="[HOST:]PORT",
+                        help=f"show the hand in browsers, on this computer's port {WEB_PORT} unless told otherwise; "
+                             "the address with its secret is printed")
     parser.add_argument("--verbose", action="store_true", help="log what happens on standard error")
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = HELP
+
+
+def asked_outputs(args: argparse.Namespace) -> tuple[OutputSettings, ...]:
+    """The outputs of the command line. Raises OutputError."""
+    return (*map(parse_output, args.outputs), *(() if args.web is None else (web_settings(args.web),)))
+
+
+def print_addresses(serve: Serving) -> None:
+    """Say on standard error where clients of the outputs connect."""
+    for output in serve.engine.status().outputs:
+        if output.url:
+            what = "the web view" if output.kind == "web" else f"output {output.spec}"
+            print(f"rhot: {what} is at {output.url}", file=sys.stderr, flush=True)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -66,18 +88,21 @@ def run(args: argparse.Namespace) -> int:
         _require_acceptable(rig, args.rig)
     own = load_master_keys().own
     source = functools.partial(UdpNodes, own=own)
-    with serving(rig, args.rig.absolute(), source, args.directory, own) as serve:
+    with serving(rig, args.rig.absolute(), source, args.directory, own, asked_outputs(args)) as serve:
         if args.log is not None:
             serve.engine.record(args.log.absolute())
         if args.start:
             serve.engine.start()
         if args.json:
-            print(json.dumps({"pid": os.getpid(), "directory": str(serve.directory.path), "rig": rig.name}), flush=True)
+            urls = {output.spec: output.url for output in serve.engine.status().outputs if output.url}
+            print(json.dumps({"pid": os.getpid(), "directory": str(serve.directory.path), "rig": rig.name}
+                             | ({"outputs": urls} if urls else {})), flush=True)
         else:
             told = "nodes are told to stream" if args.start else "nodes stream once a client says start"
             print(f"rhot: the engine of {rig.name} serves clients in {serve.directory.path}; {told}. Ctrl+C ends it.",
                   file=sys.stderr, flush=True)
         for advice in calibration_advice(rig):
             print(f"rhot: {advice.text}", file=sys.stderr, flush=True)
+            print_addresses(serve)
         serve.server.run()
     return 0

@@ -9,6 +9,7 @@ import functools
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from rhot_app.engine.advice import hands_advice, moved_advice
 from rhot_app.engine.observer import NodeMessage, Observer
+from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
 from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.engine.warm_up import warm_up
@@ -39,8 +41,9 @@ class Engine:
 
     def __init__(self, rig: Rig, rig_path: Path | None, make_source: MakeSource, make_tracker: MakeTracker,
                  publish: PublishState, node_message: NodeMessage = lambda node_id: "",
-                 after_state: AfterState = lambda: None) -> None:
-        """Open the source and warm the tracker up; raises SourceError when a port is taken.
+                 after_state: AfterState = lambda: None, outputs: OutputProcess | None = None) -> None:
+        """Open the source and warm the tracker up; raises SourceError when a port is taken, OutputError for an output
+        that cannot be.
 
         `publish` and `after_state` are called in the source's threads, by one at a time.
         """
@@ -55,6 +58,9 @@ class Engine:
         self._notice = ""  # why the last recording ended
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
         self._lock = threading.RLock()
+        self._outputs = outputs
+        if outputs is not None:
+            outputs.check(rig)
         self._source = make_source(rig)
         try:
             self._pipeline = Pipeline(self._work(rig), publish, after_state)
@@ -63,6 +69,8 @@ class Engine:
             raise
         self._listen()
         self._observer = Observer(rig, self._source, self._pipeline)
+        if outputs is not None:
+            outputs.configure(rig)
 
     def start(self) -> int:
         """Have the nodes stream in a new session; returns its number. Starting again begins another one."""
@@ -126,9 +134,12 @@ class Engine:
     def set_rig(self, rig: Rig) -> None:
         """Go on with another rig. Ports and sessions stay when the nodes are reached as before.
 
-        Raises SourceError (a port is taken) or what the tracker objects to; the old rig then stays.
+        Raises SourceError (a port is taken), OutputError (an output cannot be) or what the tracker objects to; the old
+        rig then stays.
         """
         with self._lock:
+            if self._outputs is not None:
+                self._outputs.check(rig)
             kept = same_network(self.rig, rig)
             if kept:
                 work = self._work(rig)
@@ -140,6 +151,8 @@ class Engine:
             self._pipeline.use(work)
             self._listen()
             self.rig = rig
+            if self._outputs is not None:
+                self._outputs.configure(rig)
             self._observer = Observer(rig, self._source, self._pipeline)
             if self.running and not kept:
                 self.start()
@@ -167,8 +180,11 @@ class Engine:
             self._follow_nodes()
             extra = [Advice("error", self._notice)] if self._notice else []
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
-            return self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
-                                         self._node_message, extra)
+            outputs = self._outputs
+            extra += [] if outputs is None else [Advice("warning", text) for text in outputs.complaints()]
+            status = self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
+                                           self._node_message, extra)
+            return status if outputs is None else replace(status, outputs=outputs.status())
 
     def close(self) -> None:
         """Stop the nodes, finish the log, close all ports. May be called twice."""
@@ -177,6 +193,8 @@ class Engine:
                 self.stop()
             self.record_stop()
             self._source.close()
+            if self._outputs is not None:
+                self._outputs.close()
 
     def _follow_nodes(self) -> None:
         """The rig has every node where the source has found it."""

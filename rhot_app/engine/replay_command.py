@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.engine.command import add_serving_arguments
+from rhot_app.engine.command import add_serving_arguments, asked_outputs, print_addresses
 from rhot_app.errors import RecordingError
 from rhot_node.compiled import announce_compilation
 
@@ -65,9 +65,11 @@ def run(args: argparse.Namespace) -> int:
         replays.append(LogReplay(args.path, rig, args.speed))
         return replays[-1]
 
-    with serving(rig, rig_path, replay, args.directory) as serve:
+    outputs = asked_outputs(args)
+    with serving(rig, rig_path, replay, args.directory, outputs=outputs, rig_outputs=False) as serve:
         print(f"replaying {args.path} for clients (the app, or EngineClient). Ctrl+C ends it. For a summary: --json",
           file=sys.stderr, flush=True)
+        print_addresses(serve)
         serve.engine.start()
         serve.server.run(until=lambda: replays[-1].over)
         if not serve.server.ending:

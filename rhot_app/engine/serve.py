@@ -7,7 +7,7 @@ import gc
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,8 +16,9 @@ import zmq
 from rhot_app.engine.core import Engine, MakeSource
 from rhot_app.engine.directory import EngineDirectory, EngineLock, open_directory
 from rhot_app.engine.node_control import NodeControl
+from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.server import Server, StatePublisher
-from rhot_app.project import Rig
+from rhot_app.project import OutputSettings, Rig
 from rhot_app.sources.realtime import share_interpreter
 from rhot_app.tracking.make import make_tracker
 from rhot_node.compiled import announce_compilation
@@ -37,11 +38,14 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
-            directory: Path | None, own: KeyPair | None = None) -> Iterator[Serving]:
+def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory: Path | None,
+            own: KeyPair | None = None, outputs: Iterable[OutputSettings] = (),
+            rig_outputs: bool = True) -> Iterator[Serving]:
     """An engine in its directory, warmed up, frames passing; the caller runs the server. `own`: the master's keys.
+    `outputs`: opened besides those of the rig; these are left out without `rig_outputs`.
 
-    Raises EngineError when another engine holds the directory, SourceError when a port is taken.
+    Raises EngineError when another engine holds the directory, SourceError when a port is taken, OutputError for an
+    output that cannot be.
     """
     announce_compilation()
     place = open_directory(directory)
@@ -52,13 +56,16 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource,
         stack.callback(context.destroy, 0)
         publish = StatePublisher(context, place)
         nodes = NodeControl(context, own)
-        engine = Engine(rig, rig_path, make_source, make_tracker, publish, nodes.message, GarbageMan())
+        streams = OutputProcess(place.states, outputs, follow_rig=rig_outputs)
+        stack.callback(streams.close)
+        engine = Engine(rig, rig_path, make_source, make_tracker, publish, nodes.message, GarbageMan(), streams)
         stack.callback(engine.close)
         server = Server(context, place, engine, nodes)
         stack.callback(server.close)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: server.end())
         prepare_process()
+        streams.settle()  # whoever is told an address finds it open
         yield Serving(engine, server, place, publish)
 
 

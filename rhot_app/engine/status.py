@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from rhot_app.outputs.status import OutputStatus
+
 Level = Literal["info", "warning", "error"]
 NodeWord = Literal["silent", "starting", "ready", "streaming", "fault"]
 
@@ -66,6 +68,7 @@ class EngineStatus:
     latency: dict[str, LatencySummary] = field(default_factory=dict)
     log_path: str = ""  # empty when nothing is recorded
     log_bytes: int = 0
+    outputs: tuple[OutputStatus, ...] = ()  # the live streams to other programs
 
 
 @dataclass(frozen=True, slots=True)

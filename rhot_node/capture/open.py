@@ -9,12 +9,14 @@ from pathlib import Path
 
 from rhot_node.capture.camera import Camera
 from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, PacedCamera, VideoFile
+from rhot_node.capture.plugin import open_plugin_camera
 from rhot_node.capture.stream import StreamCamera
 from rhot_node.capture.webcam import Webcam
 from rhot_node.capture.yuv import YuvRecording
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.errors import CameraError
+from rhot_node.plugins import PREFIX
 
 VIDEO4LINUX_MAJOR = 81  # Linux, Documentation/admin-guide/devices.txt
 
@@ -26,7 +28,8 @@ SPEC_HELP = """camera specs:
                         own rate, images at the settings' fps; with ?rate=max behind it, as fast as possible
   yuv:FOLDER            a recording of raw YUV420 frames with their times, played in real time from now on, or, with
                         ?start=FILE behind it, from the instant in FILE (integer ns, monotonic clock) once it exists
-  stream:SOCKET         a live twin that sends frames over this Unix socket"""
+  stream:SOCKET         a live twin that sends frames over this Unix socket
+  plug:NAME:SPEC        the camera plug-in NAME with what it understands (docs/plugins.md)"""
 
 
 def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera:
@@ -41,6 +44,8 @@ def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera
         return Webcam(spec, settings, clock)
     if spec.startswith("stream:"):
         return StreamCamera(Path(spec.removeprefix("stream:")), settings, clock)
+    if spec.startswith(PREFIX):
+        return open_plugin_camera(spec, settings, clock)
     if spec.startswith("yuv:"):
         name, options = _split_options(spec.removeprefix("yuv:"), spec, "start")
         return YuvRecording(Path(name), clock, Path(options["start"]) if "start" in options else None)

@@ -16,7 +16,7 @@ MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
 OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot": ("--version", "demo", "engine", "replay", "simulate", "evaluate"),
     "rhot demo": ("--motion", "--seed"),
-    "rhot engine": ("--rig", "--log"),
+    "rhot engine": ("--rig", "--log", "--output", "--web"),
     "rhot replay": ("LOG", "--rig"),
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot recover": ("LOG", "--out", "--rig"),

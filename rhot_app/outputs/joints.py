@@ -1,0 +1,144 @@
+"""From a hand state to what other programs expect: the joint set, its order and its axes (docs/outputs.md)."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.geometry.transforms import quaternion_from_rotation
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.model import build_model, neutral_pose
+from rhot_app.hand.openxr import OPENXR_JOINTS, OUR_JOINTS, openxr_hand, openxr_map
+from rhot_app.hand.skeleton import JOINTS, HandPose
+from rhot_app.project import Rig
+from rhot_app.tracking.state import Codes, HandState
+
+Array = NDArray[np.float64]
+JointSet = Literal["own", "openxr", "mediapipe"]
+
+MEDIAPIPE_JOINTS: Final = (
+    "WRIST", "THUMB_CMC", "THUMB_MCP", "THUMB_IP", "THUMB_TIP",
+    *(f"{finger}_{joint}" for finger in ("INDEX_FINGER", "MIDDLE_FINGER", "RING_FINGER", "PINKY")
+      for joint in ("MCP", "PIP", "DIP", "TIP")))
+"""MediaPipe's HandLandmark, 0 to 20: the order of `skeleton.JOINTS`."""
+
+JOINT_NAMES: dict[JointSet, tuple[str, ...]] = {"own": JOINTS, "openxr": OPENXR_JOINTS, "mediapipe": MEDIAPIPE_JOINTS}
+
+LIVE_S: Final = 10.0
+"""A state older than this comes from a replayed log, whose clock was another one: it has no age."""
+
+_HALF: Final = math.sqrt(0.5)
+_UPRIGHT: Final = {"-y": (0.0, 1.0, 0.0, 0.0), "z": (_HALF, -_HALF, 0.0, 0.0)}
+"""wxyz, OpenXR's axes (x right, y up, -z forward) from the rig frame, by the rig's `up`: half a turn about x where the
+frame is the left camera's, a quarter turn where z is up."""
+
+_KNOWN_BY: Final = np.array([-1 if name is None else JOINTS.index(name) for name in OUR_JOINTS])
+
+
+@dataclass(frozen=True, slots=True)
+class HandSample:
+    """One hand as an output sends it; unknown values are NaN.
+
+    `name`: left, right, or other_left, other_right for a second hand of the same side. In the rig frame, or with
+    "openxr" in OpenXR's axes: `positions` (N, 3) m; `orientations` (N, 4) xyzw and `radii` (N,) m with "openxr" only;
+    `palm_position` (3,) m and `palm_orientation` (4,) xyzw of the palm frame. `knowledge` (N,) Knowledge.
+    """
+
+    name: str
+    side: Literal["left", "right"]
+    condition: str
+    positions: Array
+    knowledge: Codes
+    palm_position: Array
+    palm_orientation: Array
+    orientations: Array | None = None
+    radii: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One instant as an output sends it. `age_s`: since the instant that it describes; NaN for a replayed log.
+    `joints`: the names of each hand's rows. `state`: where it comes from, for what is not in here."""
+
+    joint_set: JointSet
+    joints: tuple[str, ...]
+    age_s: float
+    hands: tuple[HandSample, ...]
+    state: HandState
+
+
+class JointConverter:
+    """Turns states of one rig into samples. Any thread may call it; it keeps nothing between calls."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._hands = [_Hand(rig.hand, rig.hand.side, rig.up)]
+        if rig.other_hand is not None:
+            side = rig.other_hand.side
+            name = f"other_{side}" if side == rig.hand.side else side
+            self._hands.append(_Hand(rig.other_hand, name, rig.up))
+
+    def sample(self, state: HandState, joint_set: JointSet) -> Sample:
+        """The state's hands with these joints."""
+        age_s = 1e-9 * (time.monotonic_ns() - state.t_master_ns)
+        states = [state] if state.other is None else [state, state.other]
+        hands = tuple(hand.sample(one, joint_set) for hand, one in zip(self._hands, states, strict=False))
+        return Sample(joint_set, JOINT_NAMES[joint_set], age_s if 0.0 <= age_s < LIVE_S else math.nan, hands, state)
+
+    def rehearse(self) -> None:
+        """Compile what the conversion needs, before the first state."""
+        for hand in self._hands:
+            hand.openxr(neutral_pose(), 1.0)
+
+
+class _Hand:
+    """One hand of the rig, with its model."""
+
+    def __init__(self, anatomy: HandAnatomy, name: str, up: Literal["-y", "z"]) -> None:
+        self._model = build_model(anatomy)
+        self._map = openxr_map(self._model)
+        self._name = name
+        self._upright = np.array(_UPRIGHT[up])
+
+    def sample(self, state: HandState, joint_set: JointSet) -> HandSample:
+        palm = state.world_from_palm
+        known = bool(np.isfinite(palm).all())
+        turn = quaternion_from_rotation(palm[:3, :3]) if known else np.full(4, np.nan)
+        sample = HandSample(self._name, self._model.anatomy.side, state.condition.value, state.joint_positions,
+                            state.joint_knowledge, palm[:3, 3], _xyzw(turn))
+        if joint_set != "openxr":
+            return sample
+        knowledge = np.where(_KNOWN_BY < 0, np.uint8(state.palm_knowledge), state.joint_knowledge[_KNOWN_BY])
+        positions, orientations, radii = self.openxr(HandPose(palm, state.angles), state.hand_scale)
+        return replace(sample, positions=positions, orientations=orientations, radii=radii, knowledge=knowledge,
+                       palm_position=_turned(self._upright, palm[:3, 3]),
+                       palm_orientation=_xyzw(_product(self._upright, turn)))
+
+    def openxr(self, pose: HandPose, scale: float) -> tuple[Array, Array, Array]:
+        """Positions (26, 3) m, orientations (26, 4) xyzw and radii (26,) m in OpenXR's axes."""
+        hand = openxr_hand(self._model, self._map, pose)
+        wrist = pose.world_from_palm[:3, 3]
+        positions = _turned(self._upright, wrist + scale * (hand.positions - wrist))
+        return positions, _xyzw(_product(self._upright, hand.orientations)), scale * hand.radii
+
+
+def _xyzw(wxyz: Array) -> Array:
+    return np.roll(wxyz, -1, axis=-1)
+
+
+def _turned(wxyz: Array, points: Array) -> Array:
+    """Points (..., 3) turned about x by the quaternion, whose y and z are zero."""
+    cosine, sine = wxyz[0] ** 2 - wxyz[1] ** 2, 2.0 * wxyz[0] * wxyz[1]
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    return np.stack([x, cosine * y - sine * z, sine * y + cosine * z], axis=-1)
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Quaternions wxyz: (4,) times (..., 4)."""
+    w, x, y, z = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    return np.stack([a[0] * w - a[1] * x - a[2] * y - a[3] * z, a[0] * x + a[1] * w + a[2] * z - a[3] * y,
+                     a[0] * y - a[1] * z + a[2] * w + a[3] * x, a[0] * z + a[1] * y - a[2] * x + a[3] * w], axis=-1)

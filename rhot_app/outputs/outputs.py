@@ -1,0 +1,108 @@
+"""All outputs of a rig: made, changed and asked together."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Final
+
+import msgspec
+
+from rhot_app.errors import OutputError
+from rhot_app.outputs.joints import JointConverter
+from rhot_app.outputs.output import Output, OutputStatus, Sink
+from rhot_app.outputs.plugins import output_plugins, plugin_sink
+from rhot_app.project import OutputSettings, Rig
+from rhot_app.tracking.state import HandState
+
+MakeSink = Callable[[OutputSettings], Sink]
+
+_KINDS: Final = {"osc": ("osc", "OscSink"), "vmc": ("vmc", "VmcSink"), "ws": ("ws", "WebSocketSink"),
+                 "lsl": ("lsl", "LslSink"), "zenoh": ("zenoh", "ZenohSink"), "web": ("web_view", "WebViewSink")}
+_WEB_RATE_HZ: Final = 60.0  # of most screens
+_OPENXR_ONLY: Final = ("vmc", "web")  # whatever is asked: their messages are made of these joints
+
+
+def make_sink(settings: OutputSettings) -> Sink:
+    """The sink of an output's kind; nothing is opened yet. Raises OutputError when there is no such kind or its target
+    makes no sense; a plug-in that is broken becomes a sink that says so."""
+    place = _KINDS.get(settings.kind)
+    if place is None:
+        _check_plugin(settings)
+        return plugin_sink(settings)
+    module, name = place
+    try:
+        make: MakeSink = getattr(importlib.import_module(f"rhot_app.outputs.{module}"), name)  # only where it is used
+    except ImportError as exc:
+        package = (exc.name or "").partition(".")[0]
+        raise OutputError(f"output {settings.spec!r}: it needs the package {package}, of RHOT's extra app: "
+                          f"`.venv/bin/python -m pip install {package}`.") from exc
+    return make(settings)
+
+
+def check_output(settings: OutputSettings) -> None:
+    """Raises OutputError where `make_sink` does. No plug-in's code runs here."""
+    if settings.kind in _KINDS:
+        make_sink(settings)
+    else:
+        _check_plugin(settings)
+
+
+def _check_plugin(settings: OutputSettings) -> None:
+    names = output_plugins()
+    if settings.kind not in names:
+        plugins = f"the plug-ins {', '.join(names)}" if names else "no plug-in is installed"
+        raise OutputError(f"output {settings.spec!r}: there is no output {settings.kind!r}; there are "
+                          f"{', '.join(_KINDS)}, and {plugins}.")
+
+
+class Outputs:
+    """The outputs that run. `send` is for one thread at a time, everything else for another one."""
+
+    def __init__(self) -> None:
+        self._running: tuple[Output, ...] = ()
+
+    def configure(self, rig: Rig) -> None:
+        """Open what the rig asks for and close what it does not; what stays goes on with the rig's hands.
+
+        Raises OutputError for an output that cannot be; everything then stays as it was. One that only fails to open
+        says so in its status.
+        """
+        wanted = tuple(dict.fromkeys(map(_whole, rig.outputs)))
+        if not wanted and not self._running:
+            return
+        converter = JointConverter(rig)
+        kept = {output.settings: output for output in self._running if output.settings in wanted}
+        made = {settings: Output(settings, make_sink(settings), converter)
+                for settings in wanted if settings not in kept}
+        if any(settings.joints == "openxr" for settings in made):
+            converter.rehearse()
+        for output in self._running:  # ports of those that go are free for those that come
+            if output.settings not in kept:
+                output.stop()
+            output.convert_by(converter)
+        for output in made.values():
+            output.start()
+        self._running = tuple((kept | made)[settings] for settings in wanted)
+
+    def send(self, state: HandState) -> None:
+        """Hand one state to every output. Never blocks, never raises."""
+        for output in self._running:
+            output.send(state)
+
+    def status(self) -> tuple[OutputStatus, ...]:
+        """How each goes, now."""
+        return tuple(output.status() for output in self._running)
+
+    def close(self) -> None:
+        """Close all. May be called twice."""
+        running, self._running = self._running, ()
+        for output in running:
+            output.stop()
+
+
+def _whole(settings: OutputSettings) -> OutputSettings:
+    """The settings as they are meant."""
+    joints = "openxr" if settings.kind in _OPENXR_ONLY else settings.joints
+    rate_hz = _WEB_RATE_HZ if settings.kind == "web" and settings.rate_hz is None else settings.rate_hz
+    return msgspec.structs.replace(settings, joints=joints, rate_hz=rate_hz)

@@ -1,0 +1,103 @@
+"""The web view: one page that shows the hand live, in browsers and in headsets (WebXR).
+
+Only who knows the random secret in its address gets anything. Nothing that a client sends is read. Away from this
+computer connections are encrypted, because the secret would be read on the way and WebXR is refused otherwise.
+"""
+
+from __future__ import annotations
+
+import functools
+import hmac
+import os
+import secrets
+import socket
+from typing import Final
+
+from websockets.http11 import Request, Response
+
+from rhot_app.outputs.certificate import server_context
+from rhot_app.outputs.joints import Sample
+from rhot_app.outputs.json_message import json_message
+from rhot_app.outputs.spec import WEB_PORT, host_and_port
+from rhot_app.outputs.status import SECRET_VARIABLE
+from rhot_app.outputs.web_server import WebServer, http_answer, text_answer
+from rhot_app.project import OutputSettings
+from rhot_node.addresses import is_loopback, own_interfaces
+from rhot_node.files import resource_path
+
+STATES: Final = "states"
+"""Below the secret: the WebSocket that every state is sent to, as JSON (docs/outputs.md)."""
+
+_FILES: Final = {
+    "": ("index.html", "text/html; charset=utf-8"), "style.css": ("style.css", "text/css; charset=utf-8"),
+    "icon.svg": ("icon.svg", "image/svg+xml"),
+    **{name: (name, "text/javascript; charset=utf-8")
+       for name in ("view.js", "hand.js", "three.module.min.js", "three.core.min.js")}}
+"""What there is, by its name below the secret. Nothing else is ever read."""
+
+_SECURITY: Final = (
+    ("Content-Security-Policy", "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
+                                "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"),
+    ("Referrer-Policy", "no-referrer"), ("X-Frame-Options", "DENY"), ("Cross-Origin-Opener-Policy", "same-origin"),
+    ("Cross-Origin-Resource-Policy", "same-origin"), ("Permissions-Policy", "xr-spatial-tracking=(self)"))
+
+
+class WebViewSink:
+    """The page and its stream, on one port."""
+
+    def __init__(self, settings: OutputSettings) -> None:
+        """Takes the secret of SECRET_VARIABLE, or draws one; opens nothing yet. Raises OutputError when the target is
+        not [HOST:]PORT."""
+        if settings.target:
+            host, port = host_and_port(settings, "127.0.0.1")
+        else:
+            host, port = "127.0.0.1", WEB_PORT
+        here = host == "localhost" or is_loopback(host)
+        names = _names(host)
+        tls = None if here else functools.partial(server_context, names)
+        self._secret = os.environ.get(SECRET_VARIABLE) or secrets.token_urlsafe(24)
+        shown = f"[{names[0]}]" if ":" in names[0] else names[0]
+        self.url = f"{'http' if here else 'https'}://{shown}:{port}/{self._secret}/"
+        self._files: dict[str, tuple[bytes, str]] = {}
+        self._server = WebServer(host, port, self._answer, tls)
+
+    @property
+    def clients(self) -> int:
+        """How many pages are open."""
+        return self._server.clients
+
+    def open(self) -> None:
+        """Listen; raises OutputError when the port cannot be had or no certificate can be made."""
+        self._files = {name: (resource_path("web", file).read_bytes(), kind) for name, (file, kind) in _FILES.items()}
+        self._server.open()
+
+    def write(self, sample: Sample) -> None:
+        """Send one state to the open pages."""
+        if self._server.clients:
+            self._server.broadcast(json_message(sample))
+
+    def close(self) -> None:
+        """Close all connections and the port."""
+        self._server.close()
+
+    def _answer(self, request: Request) -> Response | None:
+        secret, slash, name = request.path.partition("?")[0].removeprefix("/").partition("/")
+        if not hmac.compare_digest(secret.encode(), self._secret.encode()):
+            return text_answer(403, "This address is not the one that the engine has printed: its secret is missing or "
+                                    "wrong. A new one is drawn whenever the engine starts.")
+        if name == STATES:
+            if request.headers.get("Upgrade", "").lower() == "websocket":
+                return None
+            return text_answer(426, "This is a WebSocket.")
+        found = self._files.get(name) if slash else None
+        if found is None:
+            return text_answer(404, "There is nothing here; the page's address ends with its secret and a slash.")
+        return http_answer(200, *found, _SECURITY)
+
+
+def _names(host: str) -> tuple[str, ...]:
+    """Names and addresses by which a browser reaches this host, the best one first."""
+    if host not in ("0.0.0.0", "::"):
+        return (host,)
+    addresses = [str(interface.ip) for interface in own_interfaces()]
+    return tuple(dict.fromkeys((*addresses, socket.gethostname(), "localhost")))

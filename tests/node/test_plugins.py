@@ -1,0 +1,205 @@
+"""Cameras and detectors from other packages: the example of docs/plugins.md, and what broken ones do."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+import zmq
+
+from rhot_node.capture.camera import Frame
+from rhot_node.capture.open import open_camera
+from rhot_node.capture.plugin import PluginCamera
+from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings, NodeSettings, load_settings, parse_settings, save_settings
+from rhot_node.detect.image import YuvImage
+from rhot_node.detector_plugin import DetectorChoice, PluginDetector
+from rhot_node.errors import CameraError, SettingsError
+from rhot_node.files import resource_path
+from rhot_node.plugins import plugin_names
+from rhot_node.warm_up import rehearsal_image
+from rhot_node.wire.codec import decode
+from rhot_node.wire.messages import MarkerFlag, Observations
+
+PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text()
+SETTINGS = CameraSettings(fps=200.0)
+
+BROKEN = """
+raise_now = None
+
+class Camera:
+    size = 640, 480
+    def __init__(self, spec, settings, clock):
+        if spec == "open":
+            raise KeyError("no such lens")
+        self.spec = spec
+    def read(self, timeout_s):
+        if self.spec == "nonsense":
+            return "a picture"
+        raise ZeroDivisionError("the shutter")
+    def close(self):
+        raise RuntimeError("stuck")
+
+class Detector:
+    def __init__(self, markers):
+        self.count = len(markers.markers)
+    def detect(self, image):
+        return WHAT
+    def reset(self):
+        pass
+"""
+
+
+def install(folder: Path, module: str, code: str, entries: str) -> None:
+    """Lay a package into a folder as pip would: its module, and a dist-info that lists its entry points."""
+    info = folder / f"{module}-1.0.dist-info"
+    info.mkdir(parents=True)
+    (folder / f"{module}.py").write_text(code)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module.replace('_', '-')}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(entries)
+
+
+@pytest.fixture
+def example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The page's package on the path."""
+    code = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    entries = re.findall(r'^\[project\.entry-points\."(.*?)"\]\n(\w+) = "(.*?)"', PAGE, re.MULTILINE)
+    assert code is not None and len(entries) == 3
+    listed = "".join(f"[{group}]\n{name} = {place}\n" for group, name, place in entries)
+    install(tmp_path, "rhot_example", code[1], listed)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "rhot_example", raising=False)
+    return tmp_path
+
+
+@pytest.fixture
+def broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package whose plug-ins do everything wrong."""
+    code = BROKEN
+    entries = "[rhot.cameras]\nbad = rhot_broken:Camera\ngone = rhot_broken:Nothing\n[rhot.detectors]\n"
+    for name, what in (("raises", "1 / 0"), ("few", "()"), ("strange", "[None] * self.count")):
+        code += BROKEN[BROKEN.index("class Detector"):].replace("Detector", name).replace("WHAT", what)
+        entries += f"{name} = rhot_broken:{name}\n"
+    install(tmp_path / "broken", "rhot_broken", code, entries + "missing = rhot_nowhere:Detector\n")
+    monkeypatch.syspath_prepend(str(tmp_path / "broken"))
+    monkeypatch.delitem(sys.modules, "rhot_broken", raising=False)
+
+
+def settings(detector: str) -> NodeSettings:
+    """A node's settings with this detector."""
+    return msgspec.structs.replace(load_settings(resource_path("nodes", "left.json")), detector=detector)
+
+
+def test_the_example_camera_delivers(example: Path) -> None:
+    assert plugin_names("rhot.cameras") == ("grey",)
+    camera = open_camera("plug:grey:77", SETTINGS, NodeClock())
+    assert isinstance(camera, PluginCamera) and camera.size == (640, 480)
+    frame = camera.read(1.0)
+    assert isinstance(frame, Frame) and frame.number == 1 and frame.image.y[5, 5] == 77
+    assert camera.report() == {}
+    camera.close()
+
+
+@pytest.mark.parametrize(("spec", "sentence"), [
+    ("plug:nothing", "there is no plug-in 'nothing' of the kind rhot.cameras; installed: bad, gone"),
+    ("plug:gone", "the plug-in 'gone' of rhot-broken 1.0 cannot be loaded (AttributeError"),
+    ("plug:bad:open", "the plug-in 'bad' of rhot-broken 1.0 could not open its camera (KeyError: 'no such lens')")])
+def test_a_camera_that_cannot_be_opened_is_a_sentence(broken: None, spec: str, sentence: str) -> None:
+    with pytest.raises(CameraError) as raised:
+        open_camera(spec, SETTINGS, NodeClock())
+    assert sentence in str(raised.value)
+
+
+@pytest.mark.parametrize(("spec", "sentence"), [
+    ("plug:bad", "failed over a frame (ZeroDivisionError: the shutter)"),
+    ("plug:bad:nonsense", "something else than a frame of 640 x 480 px")])
+def test_a_camera_that_fails_later_is_a_sentence(broken: None, spec: str, sentence: str) -> None:
+    camera = open_camera(spec, SETTINGS, NodeClock())
+    with pytest.raises(CameraError) as raised:
+        camera.read(0.1)
+    assert sentence in str(raised.value)
+    camera.close()
+
+
+def test_the_example_detector_is_chosen_by_name(example: Path) -> None:
+    choice = DetectorChoice(lambda settings: pytest.fail("not asked for"))
+    chosen = settings("plug:middle")
+    detector = choice.make(chosen)
+    found = detector.detect(rehearsal_image(chosen.markers, (640, 480)))
+    assert [(one.index, one.x, one.y) for one in found] == [(k, 320.0, 240.0) for k in range(6)]
+    assert choice.troubles() == []
+
+
+class Fallback:
+    """Stands in for the fast detector."""
+
+    def detect(self, image: YuvImage) -> tuple[()]:
+        return ()
+
+    def reset(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("name", "sentence"), [
+    ("nothing", "There is no plug-in 'nothing'"), ("missing", "cannot be loaded (ModuleNotFoundError")])
+def test_a_detector_that_cannot_begin_gives_way(broken: None, name: str, sentence: str) -> None:
+    choice = DetectorChoice(lambda settings: Fallback())
+    assert isinstance(choice.make(settings(f"plug:{name}")), Fallback)
+    (check,) = choice.troubles()
+    assert sentence in check.text and check.text.endswith("The fast detector works in its place.")
+    choice.make(settings("fast"))
+    assert choice.troubles() == []
+
+
+@pytest.mark.parametrize(("name", "sentence"), [
+    ("raises", "ZeroDivisionError"), ("few", "not one of each marker"), ("strange", "else than MarkerObservation")])
+def test_a_detector_that_fails_states_all_as_lost(broken: None, name: str, sentence: str) -> None:
+    choice = DetectorChoice(lambda settings: Fallback())
+    detector = choice.make(settings(f"plug:{name}"))
+    assert isinstance(detector, PluginDetector)
+    found = detector.detect(rehearsal_image(settings("fast").markers, (64, 48)))
+    assert len(found) == 6 and all(one.flags == MarkerFlag.LOST for one in found)
+    assert sentence in choice.troubles()[0].text
+
+
+@pytest.mark.parametrize("detector", ["slow", "plug:", "plug:a b", ""])
+def test_settings_name_a_detector_that_can_be(detector: str) -> None:
+    document = msgspec.to_builtins(settings("fast")) | {"detector": detector}
+    with pytest.raises(SettingsError, match="may be \"fast\", \"reference\", or \"plug:NAME\""):
+        parse_settings(msgspec.json.encode(document), "settings")
+
+
+def test_a_node_runs_on_both(example: Path, tmp_path: Path) -> None:
+    path = tmp_path / "node.json"
+    save_settings(path, msgspec.structs.replace(
+        settings("plug:middle"), udp_port=0, control_port=0, preview_port=0, pairing_port=0, broadcast_port=None,
+        trust="open", bind_address="127.0.0.1", camera=SETTINGS))
+    command = [sys.executable, "-m", "rhot_node", "--settings", str(path), "--camera", "plug:grey:60"]
+    environment = os.environ | {"PYTHONPATH": str(example)}
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as node, \
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as master, zmq.Context() as context, \
+            context.socket(zmq.REQ) as control:
+        try:
+            assert node.stdout is not None
+            ready = json.loads(node.stdout.readline())
+            assert (ready["width"], ready["height"]) == (640, 480)
+            master.bind(("127.0.0.1", 0))
+            master.settimeout(20.0)
+            control.connect(f"tcp://127.0.0.1:{ready['control_port']}")
+            control.send_json({"request": "start", "session": 7, "host": "127.0.0.1", "port": master.getsockname()[1]})
+            assert control.recv_json()["verdict"] == "started"
+            message = decode(master.recv(65536))
+            assert isinstance(message, Observations)
+            assert [(one.x, one.y) for one in message.markers] == [(320.0, 240.0)] * 6
+            control.send_json({"request": "state"})
+            assert control.recv_json()["detector"] == "plug:middle"
+        finally:
+            node.terminate()
+            node.wait(20)
