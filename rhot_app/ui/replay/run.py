@@ -1,0 +1,238 @@
+"""A raw log tracked from its beginning to its end: every state is kept in a file and found again by its number. No Qt.
+
+Tracking needs no clock, so the same log with the same rig gives the same bytes. Stages of latency that this
+computer measured are left out of the states; `detect` and `network` are in the log and stay.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import mmap
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.engine.codec import TOPIC_STATE, decode, encode
+from rhot_app.engine.observer import condition_of
+from rhot_app.engine.replay_summary import replay_states
+from rhot_app.engine.warm_up import warm_up
+from rhot_app.errors import RecordingError
+from rhot_app.progress import Progress, silent
+from rhot_app.project import Rig
+from rhot_app.recording.raw_log import LogReader, Record, RecordKind
+from rhot_app.sources.replay import LogDoor
+from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.state import Condition, HandState
+from rhot_app.ui.models.jitter import JitterWindow
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int8]
+
+TRACKING, PARTIAL, LOST = range(3)
+"""Codes of a state's condition, the worse the greater; SEARCHING counts as LOST."""
+
+NO_STATE = -1
+"""Code of a time in which there is no state."""
+
+_CODES = {Condition.TRACKING: TRACKING, Condition.PARTIAL: PARTIAL}
+_IN_THE_LOG = ("detect", "network")
+_SAMPLE_NS = 100_000_000  # the plots' rows, as live
+_RECORD_BYTES = 21  # of a record beside its data, docs/log.md
+_ABANDONED_S = 86_400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """What is known of N states beside their bytes, of a rig with M markers. Times are the recording's master clock.
+
+    State k lies at `offsets[k]:offsets[k + 1]` of the file. `jitter` has K rows, a tenth of a second apart.
+    `note` says what of the log could not be read, "" when all was.
+    """
+
+    rig: Rig
+    times_ns: NDArray[np.int64]  # (N,), growing; a clock that was set back moves on by 1 ns a state
+    offsets: NDArray[np.int64]  # (N + 1,)
+    conditions: Codes  # (N,)
+    fingertips: Array  # (N, 5, 3) m
+    jitter_times_ns: NDArray[np.int64]  # (K,)
+    jitter: Array  # (K, M) mm
+    note: str = ""
+
+
+def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) -> Tracked:
+    """Track the whole log with `rig` and write all states to `out`. An error or a cancel leaves no file.
+
+    Raises RecordingError when the log is none or holds nothing that can be tracked, RigError as the tracker does.
+    """
+    reader = LogReader(log)
+    try:
+        tracker = make_tracker(rig)
+        progress("Preparing the tracker …", 0.0)
+        warm_up(tracker, rig)
+        records = _Readable(reader, progress)
+        collected = _Collected(rig)
+        with out.open("wb") as file:
+            for state in replay_states(iter(records), LogDoor(rig), tracker):
+                file.write(collected.take(state))
+        if not collected.times_ns:
+            raise RecordingError(f"{log}: {_why_nothing(records)}")
+        return collected.tracked(records.note)
+    except BaseException:
+        out.unlink(missing_ok=True)
+        raise
+    finally:
+        reader.close()
+
+
+def _why_nothing(records: _Readable) -> str:
+    if records.note:
+        return f"no state could be made of it. {records.note}"
+    if not records.datagrams:
+        return "it holds no datagrams: nothing was streaming while it was recorded. There is nothing to replay."
+    return (f"no state could be made of its {records.datagrams} datagrams. Is this the rig that it was recorded with, "
+            "and were both cameras streaming?")
+
+
+class _Readable:
+    """The records of a log as far as they can be read; `note` says afterwards where that ended too early."""
+
+    def __init__(self, reader: LogReader, progress: Progress) -> None:
+        self.note = ""
+        self.datagrams = 0
+        self._reader, self._progress = reader, progress
+
+    def __iter__(self) -> Iterator[Record]:
+        size, done = max(1, self._reader.path.stat().st_size), 0
+        try:
+            for record in self._reader:
+                done += _RECORD_BYTES + len(record.data)
+                if record.kind is RecordKind.DATAGRAM:
+                    self.datagrams += 1
+                    if self.datagrams % 64 == 0:
+                        self._progress("Tracking the recording …", min(1.0, done / size))
+                yield record
+        except RecordingError as exc:
+            self.note = f"{exc} What stands before it is shown."
+        if self._reader.torn_bytes:
+            self.note = (f"The last {self._reader.torn_bytes} bytes of {self._reader.path} are torn: the program died "
+                         "while writing. What stands before them is shown.")
+
+
+class _Collected:
+    """Takes states in their order and keeps what `Tracked` tells of them."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.times_ns: list[int] = []
+        self._rig = rig
+        self._offsets = [0]
+        self._conditions: list[int] = []
+        self._fingertips: list[Array] = []
+        self._jitter = JitterWindow()
+        self._jitter_times: list[int] = []
+        self._jitter_rows: list[Array] = []
+
+    def take(self, state: HandState) -> bytes:
+        """Note a state; its bytes, the same for every run."""
+        state = _without_measured_times(state)
+        data = encode(state)
+        t_ns = max(state.t_master_ns, self.times_ns[-1] + 1) if self.times_ns else state.t_master_ns
+        self.times_ns.append(t_ns)
+        self._offsets.append(self._offsets[-1] + len(data))
+        self._conditions.append(_CODES.get(condition_of(state), LOST))
+        self._fingertips.append(state.fingertip_positions)
+        self._jitter.add(state)
+        if not self._jitter_times or t_ns - self._jitter_times[-1] >= _SAMPLE_NS:
+            self._jitter_times.append(t_ns)
+            self._jitter_rows.append(1e3 * self._jitter.rms(t_ns))
+        return data
+
+    def tracked(self, note: str) -> Tracked:
+        """All that was noted."""
+        return Tracked(self._rig, np.array(self.times_ns, np.int64), np.array(self._offsets, np.int64),
+                       np.array(self._conditions, np.int8), np.array(self._fingertips),
+                       np.array(self._jitter_times, np.int64), np.array(self._jitter_rows), note)
+
+
+def _without_measured_times(state: HandState) -> HandState:
+    latency = {stage: state.latency_s[stage] for stage in _IN_THE_LOG if stage in state.latency_s}
+    other = None if state.other is None else _without_measured_times(state.other)
+    return replace(state, latency_s=latency, other=other)
+
+
+class Run:
+    """A tracked log. Its file has no name any more: it is gone when the run is closed, or the program has ended."""
+
+    def __init__(self, tracked: Tracked, path: Path) -> None:
+        """Take the file over; raises OSError when it cannot be read."""
+        self.tracked = tracked
+        with path.open("rb") as file:
+            self._bytes = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        path.unlink()
+
+    def __len__(self) -> int:
+        return len(self.tracked.times_ns)
+
+    @property
+    def rig(self) -> Rig:
+        """The rig that it was tracked with."""
+        return self.tracked.rig
+
+    @property
+    def times_s(self) -> Array:
+        """(N,) s since the first state."""
+        times = self.tracked.times_ns
+        return np.asarray(1e-9 * (times - times[0]))
+
+    def data(self, number: int) -> bytes:
+        """The bytes of a state."""
+        begin, end = self.tracked.offsets[number:number + 2].tolist()
+        return self._bytes[begin:end]
+
+    def state(self, number: int) -> HandState:
+        """A state; a few dozen microseconds."""
+        state = decode(TOPIC_STATE, self.data(number))
+        assert isinstance(state, HandState)
+        return state
+
+    def close(self) -> None:
+        """Free the file. May be called twice."""
+        self._bytes.close()
+
+
+def new_run_path(folder: Path, number: int) -> Path:
+    """Where the states of a run are written; what a program that died has left there a day ago is removed.
+
+    Raises RecordingError when the folder cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as exc:
+        raise RecordingError(f"{folder}: cannot be made ({exc.strerror}), so there is no room for the states.") from exc
+    for path in folder.glob("*.states"):
+        with contextlib.suppress(OSError):
+            if time.time() - path.stat().st_mtime > _ABANDONED_S:
+                path.unlink()
+    return folder / f"{os.getpid()}-{number}.states"
+
+
+def condition_bins(times_s: Array, conditions: Codes, duration_s: float, count: int) -> Codes:
+    """(count,) the worst condition in each part of the duration; NO_STATE where no state falls into it.
+
+    States that are sparser than the parts fill those up to the next state, for at most half a second.
+    """
+    bins = np.full(count, NO_STATE, np.int8)
+    if not len(times_s) or duration_s <= 0.0:
+        return bins
+    width_s = duration_s / count
+    ends = np.minimum(np.append(times_s[1:], duration_s), times_s + 0.5)
+    first = np.clip((times_s / width_s).astype(int), 0, count - 1)
+    last = np.clip(np.ceil(ends / width_s).astype(int) - 1, first, count - 1)
+    for reach in range(int((last - first).max()) + 1):
+        inside = last - first >= reach
+        np.maximum.at(bins, first[inside] + reach, conditions[inside])
+    return bins
