@@ -24,6 +24,7 @@ from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import RecordingError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
+from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogDoor
 from rhot_app.tracking.make import make_tracker
@@ -62,6 +63,7 @@ class Tracked:
     jitter_times_ns: NDArray[np.int64]  # (K,)
     jitter: Array  # (K, M) mm
     note: str = ""
+    bookmarks: tuple[Bookmark, ...] = ()  # of the log, by time
 
 
 def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) -> Tracked:
@@ -81,7 +83,7 @@ def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) ->
                 file.write(collected.take(state))
         if not collected.times_ns:
             raise RecordingError(f"{log}: {_why_nothing(records)}")
-        return collected.tracked(records.note)
+        return collected.tracked(records.note, tuple(bookmarks_of(records.marked)))
     except BaseException:
         out.unlink(missing_ok=True)
         raise
@@ -90,8 +92,6 @@ def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) ->
 
 
 def _why_nothing(records: _Readable) -> str:
-    if records.note:
-        return f"no state could be made of it. {records.note}"
     if not records.datagrams:
         return "it holds no datagrams: nothing was streaming while it was recorded. There is nothing to replay."
     return (f"no state could be made of its {records.datagrams} datagrams. Is this the rig that it was recorded with, "
@@ -99,28 +99,35 @@ def _why_nothing(records: _Readable) -> str:
 
 
 class _Readable:
-    """The records of a log as far as they can be read; `note` says afterwards where that ended too early."""
+    """The records of a log, with the progress of whoever takes them, and what they tell beside the hand."""
 
     def __init__(self, reader: LogReader, progress: Progress) -> None:
-        self.note = ""
         self.datagrams = 0
+        self.marked: list[Record] = []
         self._reader, self._progress = reader, progress
 
     def __iter__(self) -> Iterator[Record]:
         size, done = max(1, self._reader.path.stat().st_size), 0
-        try:
-            for record in self._reader:
-                done += _RECORD_BYTES + len(record.data)
-                if record.kind is RecordKind.DATAGRAM:
-                    self.datagrams += 1
-                    if self.datagrams % 64 == 0:
-                        self._progress("Tracking the recording …", min(1.0, done / size))
-                yield record
-        except RecordingError as exc:
-            self.note = f"{exc} What stands before it is shown."
-        if self._reader.torn_bytes:
-            self.note = (f"The last {self._reader.torn_bytes} bytes of {self._reader.path} are torn: the program died "
-                         "while writing. What stands before them is shown.")
+        for record in self._reader:
+            done += _RECORD_BYTES + len(record.data)
+            if record.kind is RecordKind.DATAGRAM:
+                self.datagrams += 1
+                if self.datagrams % 64 == 0:
+                    self._progress("Tracking the recording …", min(1.0, done / size))
+            elif record.kind is RecordKind.BOOKMARK:
+                self.marked.append(record)
+            yield record
+
+    @property
+    def note(self) -> str:
+        """What of the log could not be read, "" when all was."""
+        losses, said = self._reader.losses, []
+        if losses.damage:
+            said.append(f"In {self._reader.path} {losses.damage}.")
+        if losses.torn_bytes:
+            said.append(f"The last {losses.torn_bytes} bytes of {self._reader.path} are torn: the program died while "
+                        "writing.")
+        return " ".join([*said, "Everything else is shown."] if said else said)
 
 
 class _Collected:
@@ -151,11 +158,11 @@ class _Collected:
             self._jitter_rows.append(1e3 * self._jitter.rms(t_ns))
         return data
 
-    def tracked(self, note: str) -> Tracked:
+    def tracked(self, note: str, bookmarks: tuple[Bookmark, ...]) -> Tracked:
         """All that was noted."""
         return Tracked(self._rig, np.array(self.times_ns, np.int64), np.array(self._offsets, np.int64),
                        np.array(self._conditions, np.int8), np.array(self._fingertips),
-                       np.array(self._jitter_times, np.int64), np.array(self._jitter_rows), note)
+                       np.array(self._jitter_times, np.int64), np.array(self._jitter_rows), note, bookmarks)
 
 
 def _without_measured_times(state: HandState) -> HandState:
