@@ -15,7 +15,13 @@ from rhot_app.ui.models.notice import Level, Notice
 from rhot_app.ui.models.rows import bytes_text
 
 LOG_SUFFIX = ".rhotlog"
+LOG_FILTER = f"Recordings (*{LOG_SUFFIX});;All files (*)"
 SHOW_FOLDER = "show the recording's folder"
+
+
+def recordings_folder() -> Path:
+    """Where recordings are made; it may not exist yet."""
+    return user_documents_path() / "RHOT"
 
 
 class Recordings:
@@ -32,7 +38,7 @@ class Recordings:
         if self._controller.recording:
             self._controller.stop_recording()
             return
-        folder = user_documents_path() / "RHOT"
+        folder = recordings_folder()
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as exc:

@@ -30,6 +30,12 @@ class Comparison:
         found = int(self.partners[number])
         return found if found >= 0 else None
 
+    def highest_mm(self, least_spacing_ns: int) -> tuple[NDArray[np.int64], Array]:
+        """For a plot: times (K,), at least so far apart, and the highest differences (K, 5) from each to the next."""
+        spacing_ns = max(1, int(np.median(np.diff(self.times_ns)))) if len(self.times_ns) > 1 else least_spacing_ns
+        begins = np.arange(0, len(self.times_ns), max(1, round(least_spacing_ns / spacing_ns)))
+        return self.times_ns[begins], np.fmax.reduceat(self.differences_mm, begins, axis=0)
+
     def percentiles_mm(self, *percents: float) -> Array:
         """(len(percents), 5) of each fingertip's differences over the whole recording; NaN where there are none."""
         found = np.full((len(percents), self.differences_mm.shape[1]), np.nan)

@@ -66,8 +66,8 @@ class Solver:
             self._end(process)
             if stopped:
                 raise StoppedError("Stopped.") from exc
-            raise CalibrationError("The solving process ended unexpectedly; try again. If it happens again, use fewer "
-                                   "pictures: it may have run out of memory.") from exc
+            raise CalibrationError("The process that computes ended unexpectedly; try again. If it happens again, it "
+                                   "may have run out of memory: use fewer pictures or a shorter recording.") from exc
         except BaseException:  # whoever watches the progress wants no more of it
             self._end(process)
             raise

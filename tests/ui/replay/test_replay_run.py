@@ -113,3 +113,12 @@ def test_two_runs_are_compared_at_the_same_instants(grasp_log, tmp_path, run):
 
 def test_instants_without_a_partner_are_not_compared():
     assert nearest(np.array([0, 4, 6, 99]), np.array([1, 5, 7])).tolist() == [0, 1, 1, 2]
+
+
+def test_a_plot_of_many_states_keeps_the_peaks(run):
+    comparison = Comparison(run.tracked, run.tracked)
+    comparison.differences_mm[:] = 1.0
+    comparison.differences_mm[7, 2], comparison.differences_mm[8] = 9.0, np.nan
+    times, rows = comparison.highest_mm(round(1e9))
+    assert np.diff(times).min() > 0.9e9 and rows[0].tolist() == [1.0, 1.0, 9.0, 1.0, 1.0]
+    assert (rows[1:] == 1.0).all() and 3 <= len(rows) <= 6
