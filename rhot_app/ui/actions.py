@@ -34,6 +34,10 @@ class Actions(QObject):
         self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")
         self.nodes = self._make("Connect nodes …", "", "Enter the addresses of two nodes, see whether they answer, and "
                                 "write a rig file for them.")
+        self.open_recording = self._make("Open recording …", "Ctrl+Shift+O", "Track a recording and play it, in a "
+                                         "window of its own.")
+        self.recordings = self._make("Recordings …", "", "All recordings: how long and how well tracked; open, rename, "
+                                     "delete.")
         self.save_rig = self._make("Save rig", "Ctrl+S", "Write the rig as it is now to its file; what stood there is "
                                    "kept beside it.")
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
@@ -103,8 +107,8 @@ class MainToolBar(QToolBar):
         self.addAction(actions.record)
         self.addSeparator()
         a = actions
-        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.caps.menuAction(), a.save_rig,
-                                                 a.close_rig, None, a.quit])
+        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.open_recording, a.recordings, None,
+                                                 a.caps.menuAction(), a.save_rig, a.close_rig, None, a.quit])
         self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
                                                              a.markers, a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now,

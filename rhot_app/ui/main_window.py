@@ -28,6 +28,7 @@ from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.passing import PassingNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.recordings import SHOW_FOLDER, Recordings
+from rhot_app.ui.replay.desk import ReplayDesk
 from rhot_app.ui.rig_watch import RigWatch
 from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Screen
@@ -60,6 +61,7 @@ class MainWindow(QMainWindow):
         self.rig_watch = RigWatch(controller)
         self.wizards = Launcher(controller.backend.asker, controller.backend.client,
                                 lambda: self.appearance.scheme, settings, self)
+        self.replays = ReplayDesk(settings, lambda: self.appearance.scheme, self)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
         scheme = scheme_named(settings.scheme)
@@ -108,6 +110,8 @@ class MainWindow(QMainWindow):
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)
         a.nodes.triggered.connect(self.connect_nodes)
+        a.open_recording.triggered.connect(self.replays.choose)
+        a.recordings.triggered.connect(self.replays.list)
         a.save_rig.triggered.connect(lambda: self.rig_watch.save(self.tell))
         a.close_rig.triggered.connect(c.close_rig)
         a.quit.triggered.connect(self.close)
@@ -135,6 +139,7 @@ class MainWindow(QMainWindow):
         c.busy_changed.connect(self._show_busy)
         c.failed.connect(self._show_failure)
         self.appearance.scheme_changed.connect(self._recolour_buttons)
+        self.appearance.scheme_changed.connect(lambda: self.replays.set_scheme(self.appearance.scheme))
         self.docks.docks[2].visibilityChanged.connect(c.set_preview)
 
     def _connect_wizards(self) -> None:
@@ -302,4 +307,5 @@ class MainWindow(QMainWindow):
         self.settings.sync()
         self.dialogs.close()
         self.wizards.close()
+        self.replays.close()
         event.accept()

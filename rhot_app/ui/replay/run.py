@@ -40,7 +40,7 @@ TRACKING, PARTIAL, LOST = range(3)
 NO_STATE = -1
 """Code of a time in which there is no state."""
 
-_CODES = {Condition.TRACKING: TRACKING, Condition.PARTIAL: PARTIAL}
+CODES = {Condition.TRACKING: TRACKING, Condition.PARTIAL: PARTIAL}
 _IN_THE_LOG = ("detect", "network")
 _SAMPLE_NS = 100_000_000  # the plots' rows, as live
 _RECORD_BYTES = 21  # of a record beside its data, docs/log.md
@@ -76,7 +76,7 @@ def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) ->
         tracker = make_tracker(rig)
         progress("Preparing the tracker …", 0.0)
         warm_up(tracker, rig)
-        records = _Readable(reader, progress)
+        records = ReadableLog(reader, progress)
         collected = _Collected(rig)
         with out.open("wb") as file:
             for state in replay_states(iter(records), LogDoor(rig), tracker):
@@ -91,18 +91,24 @@ def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) ->
         reader.close()
 
 
-def _why_nothing(records: _Readable) -> str:
+def _why_nothing(records: ReadableLog) -> str:
     if not records.datagrams:
         return "it holds no datagrams: nothing was streaming while it was recorded. There is nothing to replay."
     return (f"no state could be made of its {records.datagrams} datagrams. Is this the rig that it was recorded with, "
             "and were both cameras streaming?")
 
 
-class _Readable:
-    """The records of a log, with the progress of whoever takes them, and what they tell beside the hand."""
+class ReadableLog:
+    """The records of a log, with the progress of whoever takes them, and what they tell beside the hand.
+
+    `first_ns` and `last_ns` are the receive times of the first and last datagram that have passed, `marked` the records
+    of bookmarks.
+    """
 
     def __init__(self, reader: LogReader, progress: Progress) -> None:
         self.datagrams = 0
+        self.first_ns: int | None = None
+        self.last_ns = 0
         self.marked: list[Record] = []
         self._reader, self._progress = reader, progress
 
@@ -112,11 +118,18 @@ class _Readable:
             done += _RECORD_BYTES + len(record.data)
             if record.kind is RecordKind.DATAGRAM:
                 self.datagrams += 1
+                self.first_ns = record.t_master_ns if self.first_ns is None else self.first_ns
+                self.last_ns = record.t_master_ns
                 if self.datagrams % 64 == 0:
                     self._progress("Tracking the recording …", min(1.0, done / size))
             elif record.kind is RecordKind.BOOKMARK:
                 self.marked.append(record)
             yield record
+
+    @property
+    def duration_s(self) -> float:
+        """From the first datagram to the last, s."""
+        return 0.0 if self.first_ns is None else 1e-9 * (self.last_ns - self.first_ns)
 
     @property
     def note(self) -> str:
@@ -150,7 +163,7 @@ class _Collected:
         t_ns = max(state.t_master_ns, self.times_ns[-1] + 1) if self.times_ns else state.t_master_ns
         self.times_ns.append(t_ns)
         self._offsets.append(self._offsets[-1] + len(data))
-        self._conditions.append(_CODES.get(condition_of(state), LOST))
+        self._conditions.append(CODES.get(condition_of(state), LOST))
         self._fingertips.append(state.fingertip_positions)
         self._jitter.add(state)
         if not self._jitter_times or t_ns - self._jitter_times[-1] >= _SAMPLE_NS:

@@ -187,6 +187,16 @@ class ReplayWindow(QMainWindow):
         """Track a recording as it was recorded, and show it."""
         self.work.start(path, Choice())
 
+    def follow(self, before: Path, after: Path) -> None:
+        """The file of the recording has another name now."""
+        if self.replay is not None and self.replay.path == before:
+            self.replay.path = after
+            self._show_name()
+
+    def _show_name(self) -> None:
+        self.toolbar.show_replay(self.replay)
+        self.setWindowTitle(f"{self.replay.path.name} – RHOT replay" if self.replay is not None else "RHOT replay")
+
     def ask_for_run(self, *, beside: bool) -> None:
         """Ask how to track it again."""
         if self.replay is None:
@@ -232,10 +242,9 @@ class ReplayWindow(QMainWindow):
         if comparison is not None:
             self.difference.show_comparison(comparison)
         self.difference.setVisible(comparison is not None)
-        self.toolbar.show_replay(replay)
+        self._show_name()
         self.timeline.show_replay(replay)
         self.transport.setEnabled(replay is not None)
-        self.setWindowTitle(f"{replay.path.name} – RHOT replay" if replay is not None else "RHOT replay")
         self._shown = None
 
     # -- moving about ----------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -189,7 +190,7 @@ def test_a_range_is_repeated(desk):
     assert abs(begin - 1.0) < 0.02 and abs(end - 1.4) < 0.02
     desk.press(Qt.Key.Key_Space)
     seen = []
-    desk.until(lambda: seen.append(desk.position_s) or any(b < a for a, b in zip(seen, seen[1:], strict=False)))
+    desk.until(lambda: seen.append(desk.position_s) or any(b < a for a, b in itertools.pairwise(seen)))
     assert min(seen) >= begin - 1e-9 and max(seen) <= end + 1e-9
     desk.until(desk.window.transport.loop_clear_button.isEnabled)
     desk.click(desk.window.transport.loop_clear_button)

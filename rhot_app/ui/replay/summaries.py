@@ -1,0 +1,85 @@
+"""Makes the summaries of recordings one after the other, in a process of its own, while the list is looked at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from rhot_app.ui.job import CancelledError, Job, Progress
+from rhot_app.ui.replay.library import Library, Summary, summarise_log
+from rhot_app.ui.wizards.solver import Solver, StoppedError
+
+
+class Summaries(QObject):
+    """`changed` gives the path of a recording of which more is known."""
+
+    changed = Signal(object)
+
+    def __init__(self, library: Library, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._library = library
+        self._solver = Solver()
+        self._made: dict[Path, Summary] = {}
+        self._words: dict[Path, str] = {}
+        self._waiting: list[Path] = []
+        self._job: Job | None = None
+        self._closed = False
+
+    def want(self, paths: list[Path]) -> None:
+        """These are looked at now, in this order; what was made of a file by another name or size is forgotten."""
+        self._made = {}
+        self._words = {path: words for path, words in self._words.items() if path in paths}
+        self._waiting = list(paths)
+        self._next()
+
+    def of(self, path: Path) -> Summary | None:
+        """What is known of a recording; None while nothing is."""
+        return self._made.get(path)
+
+    def words(self, path: Path) -> str:
+        """What stands in a summary's place: how far it is, or why there is none."""
+        return self._words.get(path, "waiting …")
+
+    def close(self) -> None:
+        """End the work and its process."""
+        self._closed = True
+        self._waiting = []
+        if self._job is not None:
+            self._job.cancel()
+        self._solver.stop()
+
+    def _next(self) -> None:
+        if self._job is not None or not self._waiting or self._closed:
+            return
+        path = self._waiting.pop(0)
+        self._job = Job(lambda progress: self._summarise(path, progress), lambda summary: self._take(path, summary),
+                        lambda sentence: self._fail(path, sentence),
+                        lambda text, fraction: self._say(path, f"{100 * fraction:.0f} %"), self).start()
+
+    def _summarise(self, path: Path, progress: Progress) -> Summary:
+        known = self._library.known_summary(path)
+        if known is not None:
+            return known
+        try:
+            made: Summary = self._solver.run(summarise_log, (path,), progress.report)
+        except StoppedError as exc:
+            raise CancelledError("Cancelled.") from exc
+        self._library.keep_summary(path, made)
+        return made
+
+    def _take(self, path: Path, summary: Any) -> None:
+        self._job = None
+        self._made[path] = summary
+        self.changed.emit(path)
+        self._next()
+
+    def _fail(self, path: Path, sentence: str) -> None:
+        self._job = None
+        self._say(path, sentence)
+        self._next()
+
+    def _say(self, path: Path, words: str) -> None:
+        self._words[path] = words
+        self.changed.emit(path)
