@@ -183,14 +183,16 @@ def _entry(path: Path) -> Entry:
 
 
 def _refuse_while_recorded(path: Path) -> None:
-    """The engine holds a lock on the log that it writes."""
+    """The engine holds a lock on the log that it writes; some network file systems have no locks."""
     try:
-        with path.open("rb") as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError as exc:
-        raise RecordingError(f"{path.stem} is being recorded; stop the recording first.") from exc
+        file = path.open("rb")
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
+    with file, contextlib.suppress(OSError):
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError as exc:
+            raise RecordingError(f"{path.stem} is being recorded; stop the recording first.") from exc
 
 
 def _move(path: Path, target: Path) -> Path:
