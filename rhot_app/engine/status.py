@@ -63,6 +63,8 @@ class EngineStatus:
     latency: dict[str, LatencySummary] = field(default_factory=dict)
     log_path: str = ""  # empty when nothing is recorded
     log_bytes: int = 0
+    log_seconds: float = 0.0  # how long it has been recorded
+    replaying: str = ""  # the log that is replayed; empty when nodes are live
 
 
 @dataclass(frozen=True, slots=True)

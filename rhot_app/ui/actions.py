@@ -28,6 +28,7 @@ class Actions(QObject):
         super().__init__(parent)
         self.start = self._make("Start", "", "Tell the nodes to stream, or to stop (Space).")
         self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it (R).")
+        self.bookmark = self._make("Bookmark", "B", "Write a few words about this moment into the recording (B).")
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
         self.caps = QMenu("Cover a simulated camera", parent)
         self.caps.setToolTipsVisible(True)
@@ -107,8 +108,9 @@ class MainToolBar(QToolBar):
         self.addAction(actions.record)
         self.addSeparator()
         a = actions
-        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.open_recording, a.recordings, None,
-                                                 a.caps.menuAction(), a.save_rig, a.close_rig, None, a.quit])
+        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.open_recording, a.recordings,
+                                                 a.bookmark, None, a.caps.menuAction(), a.save_rig, a.close_rig, None,
+                                                 a.quit])
         self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
                                                              a.markers, a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now,
@@ -117,6 +119,8 @@ class MainToolBar(QToolBar):
         spacer = QWidget()
         spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.addWidget(spacer)
+        self.source_label = QLabel("")
+        self.addWidget(self.source_label)
         self.rig_label = QLabel("")
         self.rig_label.setProperty("muted", True)
         self.addWidget(self.rig_label)
@@ -149,6 +153,12 @@ class MainToolBar(QToolBar):
             unsaved = "\nThe engine's rig differs from this file; Rig, Save rig writes it." if edited else ""
             self.rig_label.setToolTip(f"{path}{unsaved}")
 
+    def show_source(self, text: str, meaning: str) -> None:
+        """That what is seen is being recorded, or is a replay; "" for neither."""
+        if text != self.source_label.text():
+            self.source_label.setText(text)
+            self.source_label.setToolTip(meaning)
+
     def set_scheme(self, actions: Actions, scheme: Scheme, *, running: bool, recording: bool) -> None:
         """Words and icons of the two buttons that change."""
         ratio = self.devicePixelRatioF()
@@ -157,6 +167,7 @@ class MainToolBar(QToolBar):
         actions.record.setText("Stop recording" if recording else "Record")
         actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
         self.badge.set_scheme(scheme)
+        self.source_label.setStyleSheet(f"color: {scheme.accent}; font-weight: 700; padding: 0 8px;")
 
 
 def _calm_down(button: QToolButton) -> None:

@@ -34,7 +34,7 @@ from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
 from rhot_app.ui.theme import scheme_named
-from rhot_app.ui.voice import look_of, notices_of
+from rhot_app.ui.voice import label_of, look_of, notices_of
 from rhot_app.ui.welcome import WelcomePage
 from rhot_app.ui.wizards.catalogue import OPEN_WIZARD, WIZARDS, wizard_named
 from rhot_app.ui.wizards.launcher import Launcher
@@ -107,6 +107,7 @@ class MainWindow(QMainWindow):
         a.start.triggered.connect(c.start_or_stop)
         QShortcut(QKeySequence(Qt.Key.Key_Space), self).activated.connect(self._press_space)
         a.record.triggered.connect(self.recordings.begin_or_end)
+        a.bookmark.triggered.connect(lambda: self.recordings.ask_for_bookmark(self))
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)
         a.nodes.triggered.connect(self.connect_nodes)
@@ -249,6 +250,7 @@ class MainWindow(QMainWindow):
         status = self.controller.live.status
         rate = status.state_rate_hz if status is not None and not self.controller.engine_gone else None
         self.toolbar.badge.show_look(look_of(self.controller), rate)
+        self.toolbar.show_source(*label_of(self.controller))
         self.advice.show_notices(notices_of(self.controller, self.passing.current(now)))
 
     def _recolour_buttons(self) -> None:

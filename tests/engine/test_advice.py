@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from rhot_app.engine.advice import NodeFacts, no_marker_advice, node_advice, tracker_advice
+from rhot_app.engine.advice import NodeFacts, disk_advice, no_marker_advice, node_advice, tracker_advice
 from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import NodeStatus
 from rhot_app.project import load_rig, with_tracker
@@ -76,3 +76,12 @@ def test_lenses_that_nobody_calibrated_are_no_lenses_to_be_sure_of() -> None:
     assert tracker_advice(with_tracker(rig, "classic")) == []
     (advice,) = tracker_advice(with_tracker(rig, "model"))
     assert "left and right" in advice.text and "Calibrate" in advice.text
+
+
+@pytest.mark.parametrize(("seconds", "level", "words"), [(599.0, "warning", "in 9 minutes"),
+                                                         (119.0, "warning", "in about a minute"),
+                                                         (20.0, "error", "in less than a minute")])
+def test_a_disk_that_will_be_full_is_told_in_minutes(seconds: float, level: str, words: str) -> None:
+    (advice,) = disk_advice("/data/RHOT", seconds)
+    assert advice.level == level and words in advice.text and "/data/RHOT" in advice.text
+    assert disk_advice("/data/RHOT", 600.0) == disk_advice("/data/RHOT", float("inf")) == []

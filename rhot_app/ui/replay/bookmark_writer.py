@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QInputDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
+from rhot_app.ui.bookmark_dialog import BookmarkDialog
 from rhot_app.ui.job import Job
 from rhot_app.ui.replay.session import Replay
 
@@ -19,7 +20,7 @@ class BookmarkWriter(QObject):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self._window = parent
-        self.dialog: QInputDialog | None = None
+        self.dialog: BookmarkDialog | None = None
         self._writing: Job | None = None
         self._waiting: list[tuple[Replay, Bookmark]] = []
 
@@ -28,12 +29,8 @@ class BookmarkWriter(QObject):
         if self.dialog is not None:
             return
         at_ns = replay.position_ns
-        self.dialog = dialog = QInputDialog(self._window)
-        dialog.setWindowTitle("Bookmark")
-        dialog.setLabelText("What happens here?")
-        dialog.textValueSelected.connect(lambda text: self._write(replay, Bookmark(at_ns, text.strip())))
-        dialog.finished.connect(self._forget_dialog)
-        dialog.open()
+        self.dialog = BookmarkDialog(lambda text: self._write(replay, Bookmark(at_ns, text)), self._window)
+        self.dialog.finished.connect(self._forget_dialog)
 
     def remove(self, replay: Replay, bookmark: Bookmark) -> None:
         """Remove a bookmark."""
@@ -46,8 +43,7 @@ class BookmarkWriter(QObject):
 
     def _write(self, replay: Replay, bookmark: Bookmark) -> None:
         """One after the other: a worker reads the whole log to find its end."""
-        if bookmark.text or any(one.t_master_ns == bookmark.t_master_ns for one in replay.bookmarks):
-            self._waiting.append((replay, bookmark))
+        self._waiting.append((replay, bookmark))
         if self._writing is None:
             self._next()
 
