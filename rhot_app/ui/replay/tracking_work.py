@@ -18,6 +18,8 @@ from rhot_app.ui.wizards.solver import Solver, StoppedError
 
 _COUNT = itertools.count()
 
+_NICENESS = 10  # somebody waits for it, but window and engine come first
+
 
 def states_folder() -> Path:
     """Where the states of open recordings lie: a disk, because a folder in memory would hold 300 MB for ten minutes."""
@@ -34,7 +36,7 @@ class TrackingWork(QObject):
 
     def __init__(self, folder: Path | None = None, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.solver = Solver()
+        self.solver = Solver(_NICENESS)
         self.text = ""
         self._folder = folder or states_folder()
         self._job: Job | None = None

@@ -8,6 +8,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QLineEdit
 
+from rhot_app.errors import EngineError
+from rhot_app.ui.replay.library import Library, summarise_log
+from rhot_app.ui.replay.library_window import summaries_folder
+
 
 def test_length_and_size_are_told_while_recording(tracking):
     label = tracking.window.toolbar.source_label
@@ -45,6 +49,7 @@ def test_b_says_so_when_nothing_is_recorded(tracking):
 
 def test_the_menu_opens_the_page_and_the_page_a_replay(bench, log, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    Library(log.parent, summaries_folder()).keep_summary(log, summarise_log(log))
     window, desk = bench.window, bench.window.replays
     window.actions_.recordings.trigger()
     page = desk.library
@@ -94,8 +99,6 @@ def test_a_window_attaches_to_an_engine_that_begins_to_replay(bench):
 
 
 def test_an_engine_that_does_not_answer_yet_is_asked_again_quietly(bench, monkeypatch):
-    from rhot_app.errors import EngineError
-
     answers = [EngineError("the engine does not answer")]
     attach = bench.backend.attach
 
