@@ -17,7 +17,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot": ("--version", "demo", "engine", "replay", "simulate", "evaluate"),
     "rhot demo": ("--motion", "--seed"),
     "rhot engine": ("--rig", "--log"),
-    "rhot replay": ("LOG", "--rig"),
+    "rhot replay": ("LOG", "--rig", "--keep", "--smooth"),
     "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--points", "--markers", "--lamp",
                       "--kelvin"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json",

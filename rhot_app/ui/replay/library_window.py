@@ -115,7 +115,7 @@ class LibraryWindow(QDialog):
         table.setEditTriggers(QAbstractItemView.EditTrigger.EditKeyPressed)
         table.setItemDelegateForColumn(BAR, self._bars)
         table.horizontalHeader().setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
-        for column, width in ((DATE, 160), (RIG, 150), (LENGTH, 90), (SIZE, 90), (BAR, _BAR_PX)):
+        for column, width in ((DATE, 190), (RIG, 150), (LENGTH, 90), (SIZE, 90), (BAR, _BAR_PX)):
             table.setColumnWidth(column, width)
 
     def _lay_out(self) -> None:
@@ -209,7 +209,7 @@ class LibraryWindow(QDialog):
         if summary is None:
             bar.setText(self.summaries.words(path))
         else:
-            self._cell(row, LENGTH).setText(time_text(summary.duration_s).rpartition(".")[0])
+            self._cell(row, LENGTH).setText(time_text(round(summary.duration_s)).rpartition(".")[0])
             bar.setText("")
             bar.setData(_CODES, summary.conditions)
             bar.setToolTip(summary.note or f"{summary.states} states, {summary.bookmarks} bookmarks. Green and full: "

@@ -97,7 +97,7 @@ def test_recordings_are_listed_with_rig_length_and_condition(shelf):
     assert shelf.names[-1] == "nothing", "the newest first"
     grasp, nothing, later = (shelf.names.index(name) for name in (GRASP, "nothing", "later"))
     shelf.until(lambda: shelf.text(grasp, LENGTH))
-    assert shelf.text(grasp, LENGTH) == "0:03" and shelf.text(grasp, RIG)
+    assert shelf.text(grasp, LENGTH) == "0:04" and shelf.text(grasp, RIG)
     codes = np.array(window.table.item(grasp, BAR).data(Qt.ItemDataRole.UserRole))
     assert len(codes) == BAR_PARTS and (codes == TRACKING).sum() > BAR_PARTS // 2
     shelf.until(lambda: shelf.text(nothing, LENGTH) == "0:00")
@@ -114,7 +114,7 @@ def test_a_summary_is_made_once(themed, log, tmp_path, monkeypatch):
     Library(log.parent, tmp_path / "cache").keep_summary(log, summarise_log(log))
     monkeypatch.setattr("rhot_app.ui.wizards.solver.Solver.run", never)
     shelf = Shelf(log.parent, tmp_path / "cache")
-    shelf.until(lambda: shelf.text(0, LENGTH) == "0:03")
+    shelf.until(lambda: shelf.text(0, LENGTH) == "0:04")
     shelf.window.close()
     shelf.window.deleteLater()
 
