@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from platformdirs import user_cache_path
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt, QUrl, Signal
+from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QRectF, Qt, QUrl, Signal
 from PySide6.QtGui import QCloseEvent, QDesktopServices, QKeySequence, QPainter, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -181,7 +181,7 @@ class LibraryWindow(QDialog):
         self._filling = False
         self.empty.setVisible(not entries)
         self.table.setVisible(bool(entries))
-        self.summaries.want([entry.path for entry in entries if not entry.problem])
+        self.summaries.want([entry for entry in entries if not entry.problem])
         self.choose(chosen.path if chosen is not None else None)
         self._show_choice()
 
@@ -302,6 +302,13 @@ class LibraryWindow(QDialog):
         folder = self.library.folder
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
             self.sentence.setText(f"This desktop opens no folders. The recordings lie in {folder}.")
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Back from another window: look again, a recording may have been made meanwhile."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ActivationChange and self.isActiveWindow() and (
+                self.table.state() != QAbstractItemView.State.EditingState):
+            self.refresh()
 
     def reject(self) -> None:
         """Escape closes the page."""

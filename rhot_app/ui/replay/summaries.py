@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from rhot_app.ui.job import CancelledError, Job, Progress
-from rhot_app.ui.replay.library import Library, Summary, summarise_log
+from rhot_app.ui.replay.library import Entry, Library, Summary, summarise_log
 from rhot_app.ui.wizards.solver import Solver, StoppedError
 
 
@@ -21,22 +21,25 @@ class Summaries(QObject):
         super().__init__(parent)
         self._library = library
         self._solver = Solver()
-        self._made: dict[Path, Summary] = {}
+        self._made: dict[Path, tuple[int, Summary]] = {}  # with the size of the file that each is of
+        self._sizes: dict[Path, int] = {}
         self._words: dict[Path, str] = {}
         self._waiting: list[Path] = []
         self._job: Job | None = None
         self._closed = False
 
-    def want(self, paths: list[Path]) -> None:
+    def want(self, entries: list[Entry]) -> None:
         """These are looked at now, in this order; what was made of a file by another name or size is forgotten."""
-        self._made = {}
-        self._words = {path: words for path, words in self._words.items() if path in paths}
-        self._waiting = list(paths)
+        self._sizes = {entry.path: entry.size for entry in entries}
+        self._made = {path: made for path, made in self._made.items() if self._sizes.get(path) == made[0]}
+        self._words = {path: words for path, words in self._words.items() if path in self._sizes}
+        self._waiting = [path for path in self._sizes if path not in self._made]
         self._next()
 
     def of(self, path: Path) -> Summary | None:
         """What is known of a recording; None while nothing is."""
-        return self._made.get(path)
+        made = self._made.get(path)
+        return None if made is None else made[1]
 
     def words(self, path: Path) -> str:
         """What stands in a summary's place: how far it is, or why there is none."""
@@ -71,7 +74,7 @@ class Summaries(QObject):
 
     def _take(self, path: Path, summary: Any) -> None:
         self._job = None
-        self._made[path] = summary
+        self._made[path] = (self._sizes.get(path, -1), summary)
         self.changed.emit(path)
         self._next()
 

@@ -232,3 +232,14 @@ def test_a_summary_is_made_anew_for_another_file(folder, tmp_path, log):
     assert library.known_summary(library.rename(log, "other")) == summary
     log.write_bytes((folder / "other.rhotlog").read_bytes()[:-1])
     assert library.known_summary(log) is None
+
+
+def test_a_recording_made_meanwhile_is_there_when_the_page_is_looked_at_again(shelf, folder, log, qtbot):
+    other = QWidget()
+    qtbot.addWidget(other)
+    other.show()
+    other.activateWindow()
+    assert QTest.qWaitForWindowActive(other)
+    (folder / "new.rhotlog").write_bytes(log.read_bytes())
+    shelf.window.activateWindow()
+    shelf.until(lambda: "new" in shelf.names)
