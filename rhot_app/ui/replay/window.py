@@ -13,43 +13,31 @@ from PySide6.QtWidgets import (
     QComboBox,
     QFileDialog,
     QMainWindow,
-    QSplitter,
     QVBoxLayout,
     QWidget,
 )
 
 from rhot_app.engine.observer import condition_of
 from rhot_app.recording.bookmarks import Bookmark
-from rhot_app.tracking.state import Condition
 from rhot_app.ui.guide import GuideViewer
 from rhot_app.ui.models.notice import Level, Notice
-from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.passing import PassingNotices
 from rhot_app.ui.models.words import Look, condition_look
 from rhot_app.ui.panels.advice_bar import AdviceBar
-from rhot_app.ui.panels.hand_panel import HandPanel
-from rhot_app.ui.panels.markers_panel import MarkersPanel
-from rhot_app.ui.plots.jitter_plot import JitterPlot
 from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.replay.bookmark_writer import BookmarkWriter
-from rhot_app.ui.replay.difference_plot import DifferencePlot
 from rhot_app.ui.replay.run import Run
 from rhot_app.ui.replay.run_dialog import RunDialog
+from rhot_app.ui.replay.screen import ReplayScreen
 from rhot_app.ui.replay.session import Choice, Replay
-from rhot_app.ui.replay.timeline import Timeline
 from rhot_app.ui.replay.toolbar import ReplayToolBar
 from rhot_app.ui.replay.tracking_work import TrackingWork
-from rhot_app.ui.replay.transport import Transport
 from rhot_app.ui.replay.work_strip import WorkStrip
-from rhot_app.ui.scene.view import SceneView
 from rhot_app.ui.settings import Settings
 
 TICK_MS = 16
-PANEL_S = 0.1
-PLOT_S = 0.25
 _SIZE = (1280, 800)
-_SIDE_PX, _PLOTS_PX = 440, 180
 _AT_BOOKMARK_S = 0.02  # a bookmark is where it was set, to a state or two
 
 _NO_STATE = Look("NO STATE", "cross", "bad", "The recording has no state at this moment.")
@@ -71,13 +59,11 @@ class ReplayWindow(QMainWindow):
         self.dialog: RunDialog | None = None
         self.bookmarks = BookmarkWriter(self)
         self.guide: GuideViewer | None = None
-        self._settings = settings
         self.passing = PassingNotices()
-        self._shown: tuple[int | None, float] | None = None
-        self._framed = False
-        self._next_panels = self._next_plots = 0.0
-        self._stale_scene = self._stale_panels = self._stale_plots = False
-        self._make_parts(scheme)
+        self.toolbar = ReplayToolBar(scheme, self)
+        self.strip = WorkStrip()
+        self.parts = ReplayScreen(settings, scheme)
+        self.advice = AdviceBar(scheme)
         self._lay_out()
         self._connect()
         self._show_run()
@@ -89,52 +75,19 @@ class ReplayWindow(QMainWindow):
 
     # -- putting it together ---------------------------------------------------------------------------------------
 
-    def _make_parts(self, scheme: Scheme) -> None:
-        self.toolbar = ReplayToolBar(scheme, self)
-        self.strip = WorkStrip()
-        self.scene = SceneView(scheme)
-        self.scene.show_names(self._settings.flag("names"))
-        if not self._settings.flag("clouds"):
-            self.scene.show_ellipsoids(None)
-        self.markers, self.hand = MarkersPanel(scheme), HandPanel(scheme)
-        self.jitter, self.difference = JitterPlot(scheme), DifferencePlot(scheme)
-        for plot in (self.jitter, self.difference):
-            plot.reset_button.hide()  # a recording's past is not forgotten
-        self.timeline, self.transport = Timeline(scheme), Transport(scheme)
-        self.advice = AdviceBar(scheme)
-        self.pacer = FramePacer()
-
     def _lay_out(self) -> None:
-        side = QSplitter(Qt.Orientation.Vertical)
-        side.addWidget(self.hand)
-        side.addWidget(self.markers)
-        middle = QSplitter(Qt.Orientation.Horizontal)
-        middle.addWidget(self.scene)
-        middle.addWidget(side)
-        middle.setSizes([_SIZE[0] - _SIDE_PX, _SIDE_PX])
-        self.plots = QSplitter(Qt.Orientation.Horizontal)
-        self.plots.addWidget(self.jitter)
-        self.plots.addWidget(self.difference)
-        whole = QSplitter(Qt.Orientation.Vertical)
-        whole.addWidget(middle)
-        whole.addWidget(self.plots)
-        whole.setSizes([_SIZE[1] - _PLOTS_PX, _PLOTS_PX])
-        for splitter in (side, middle, self.plots, whole):
-            splitter.setChildrenCollapsible(False)
         page = QWidget()
         layout = QVBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(4)
         layout.addWidget(self.strip)
-        layout.addWidget(whole, 1)
-        layout.addWidget(self.timeline)
-        layout.addWidget(self.transport)
+        layout.addWidget(self.parts, 1)
         layout.addWidget(self.advice)
         self.setCentralWidget(page)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.toolbar)
 
     def _connect(self) -> None:
-        bar, row = self.toolbar, self.transport
+        bar, row = self.toolbar, self.parts.transport
         bar.open.triggered.connect(self.choose)
         bar.again.triggered.connect(lambda: self.ask_for_run(beside=False))
         bar.compare.triggered.connect(lambda: self.ask_for_run(beside=True))
@@ -147,7 +100,7 @@ class ReplayWindow(QMainWindow):
         self.work.failed.connect(lambda sentence: self.tell("error", sentence))
         self.bookmarks.written.connect(self._show_bookmarks)
         self.bookmarks.failed.connect(lambda sentence: self.tell("error", sentence))
-        self.timeline.sought.connect(self.seek)
+        self.parts.timeline.sought.connect(self.seek)
         row.play_asked.connect(self.toggle)
         row.step_asked.connect(self.step)
         row.first_asked.connect(lambda: self.seek(0.0))
@@ -157,22 +110,19 @@ class ReplayWindow(QMainWindow):
         row.loop_end_asked.connect(lambda: self._loop("end"))
         row.loop_clear_asked.connect(lambda: self._loop("clear"))
         row.bookmark_asked.connect(self.ask_for_bookmark)
-        self.scene.frameSwapped.connect(lambda: self.pacer.end(time.monotonic()))
-        for plot in (self.jitter, self.difference):
+        for plot in self.parts.plots:
             plot.copied.connect(lambda sentence: self.tell("info", sentence))
         for key, action in (("Space", self._press_space), ("Left", lambda: self.step(-1)),
                             ("Right", lambda: self.step(1)), ("Home", lambda: self.seek(0.0)),
                             ("End", self.go_to_end), ("B", self.ask_for_bookmark), ("[", lambda: self._loop("begin")),
-                            ("]", lambda: self._loop("end")), ("F", self.scene.frame_hand),
+                            ("]", lambda: self._loop("end")), ("F", self.parts.scene.frame_hand),
                             ("Ctrl+O", self.choose), ("F1", self.open_guide)):
             QShortcut(QKeySequence(key), self).activated.connect(action)
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
-        for part in (self.toolbar, self.scene, self.markers, self.hand, self.jitter, self.difference, self.timeline,
-                     self.transport, self.advice):
+        for part in (self.toolbar, self.parts, self.advice):
             part.set_scheme(scheme)
-        self._shown = None
 
     # -- opening and tracking --------------------------------------------------------------------------------------
 
@@ -223,9 +173,7 @@ class ReplayWindow(QMainWindow):
                 self.replay.close()
             self.replay = Replay(path, run, choice)
             self.passing.clear()
-            self.transport.speed_box.setCurrentIndex(self.transport.speed_box.findData(1.0))
-            self.scene.reset_view()
-            self._framed = False
+            self.parts.show_recording()
         self._show_run()
 
     def _show_work(self) -> None:
@@ -233,19 +181,8 @@ class ReplayWindow(QMainWindow):
 
     def _show_run(self) -> None:
         """Another recording, or other runs of it."""
-        replay = self.replay
-        rig = replay.run.rig if replay is not None else None
-        for part in (self.scene, self.markers, self.hand, self.jitter):
-            part.show_rig(rig)
-        self.scene.show_second_rig(replay.second.rig if replay is not None and replay.second is not None else None)
-        comparison = replay.comparison if replay is not None else None
-        if comparison is not None:
-            self.difference.show_comparison(comparison)
-        self.difference.setVisible(comparison is not None)
+        self.parts.show_run(self.replay)
         self._show_name()
-        self.timeline.show_replay(replay)
-        self.transport.setEnabled(replay is not None)
-        self._shown = None
 
     # -- moving about ----------------------------------------------------------------------------------------------
 
@@ -288,7 +225,7 @@ class ReplayWindow(QMainWindow):
         if self.replay is not None:
             player = self.replay.player
             {"begin": player.begin_loop, "end": player.end_loop, "clear": player.clear_loop}[what]()
-            self._shown = None
+            self.parts.look_again()
 
     # -- bookmarks -------------------------------------------------------------------------------------------------
 
@@ -308,9 +245,8 @@ class ReplayWindow(QMainWindow):
         return None if replay is None else replay.bookmark_near(replay.player.position_s, _AT_BOOKMARK_S)
 
     def _show_bookmarks(self) -> None:
-        self.toolbar.show_replay(self.replay)
-        self.timeline.update()
-        self._shown = None
+        self._show_name()
+        self.parts.look_again()
 
     # -- every tick ------------------------------------------------------------------------------------------------
 
@@ -320,42 +256,12 @@ class ReplayWindow(QMainWindow):
         self.advice.show_notices(self._notices(now))
         if self.replay is None:
             return
-        player = self.replay.player
-        player.advance(now)
-        shown = (player.shown, player.position_s)
-        if shown != self._shown or self.transport.is_playing != player.playing:
-            self._shown = shown
-            self._stale_panels = self._stale_plots = self._stale_scene = True
-            self.timeline.update()
-            self.transport.show_replay(self.replay)
+        self.replay.player.advance(now)
+        if self.parts.refresh(self.replay, now):
             self.toolbar.remove.setEnabled(self._bookmark_here() is not None)
-        self._refresh(self.replay, now)
-
-    def _refresh(self, replay: Replay, now: float) -> None:
-        self.pacer.give_up(now)
-        if self._stale_scene and self.pacer.due(now):
-            self._stale_scene = False
-            self.pacer.begin(now)
-            state, second = replay.shown()
-            self.scene.show_state(state, second)
-            if not self._framed and state is not None and state.condition is Condition.TRACKING:
-                self._framed = True
-                self.scene.frame_first()
-        if self._stale_panels and now >= self._next_panels:
-            self._stale_panels, self._next_panels = False, now + PANEL_S
-            self._show_panels(replay)
-        if self._stale_plots and now >= self._next_plots:
-            self._stale_plots, self._next_plots = False, now + PLOT_S
-            self.jitter.refresh(replay.jitter, replay.position_ns)
-            if replay.differences is not None:
-                self.difference.refresh(replay.differences, replay.position_ns)
-
-    def _show_panels(self, replay: Replay) -> None:
-        state, _ = replay.shown()
-        self.markers.show_state(state, running=True)
-        self.hand.show_state(state)
+        state = self.parts.state
         look = condition_look(condition_of(state).value) if state is not None else _NO_STATE
-        self.toolbar.badge.show_look(look, replay.rate_hz)
+        self.toolbar.badge.show_look(look, self.replay.rate_hz)
 
     def tell(self, level: Level, sentence: str) -> None:
         """Show a sentence for a while."""

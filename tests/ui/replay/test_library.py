@@ -20,7 +20,8 @@ from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header, enc
 from rhot_app.recording.recorder import Recorder
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.replay.library import BAR_PARTS, TRASH, Library, summarise_log
-from rhot_app.ui.replay.library_window import BAR, LENGTH, NAME, RIG, LibraryWindow
+from rhot_app.ui.replay.library_table import BAR, LENGTH, NAME, RIG
+from rhot_app.ui.replay.library_window import LibraryWindow
 from rhot_app.ui.replay.run import NO_STATE, TRACKING
 
 
@@ -137,7 +138,7 @@ def test_a_recording_is_renamed(shelf, log):
     shelf.type_name("thumb test")
     shelf.until(lambda: "thumb test" in shelf.names)
     assert renamed == [(log, log.with_name("thumb test.rhotlog"))] and not log.exists()
-    shelf.until(lambda: shelf.window.chosen.path.stem == "thumb test")
+    shelf.until(lambda: shelf.window.table.chosen.path.stem == "thumb test")
 
 
 @pytest.mark.parametrize(("name", "why"), [("nothing", "already"), ("a/b", "no name for a recording"),
@@ -167,7 +168,7 @@ def test_a_deleted_recording_comes_back(shelf, log, folder):
     QTest.keyClick(shelf.window.table, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     shelf.until(lambda: GRASP in shelf.names and log.exists())
     shelf.until(lambda: not shelf.window.undo_button.isEnabled())
-    assert shelf.window.chosen.path == log
+    assert shelf.window.table.chosen.path == log
 
 
 def test_closing_the_page_makes_an_end_of_what_was_deleted(shelf, log, folder):

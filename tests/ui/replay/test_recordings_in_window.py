@@ -53,7 +53,7 @@ def test_the_menu_opens_the_page_and_the_page_a_replay(bench, log, monkeypatch, 
     window, desk = bench.window, bench.window.replays
     window.actions_.recordings.trigger()
     page = desk.library
-    bench.until(lambda: [entry.path for entry in page.entries] == [log])
+    bench.until(lambda: [entry.path for entry in page.table.entries] == [log])
     bench.click(page.open_button)
     bench.until(lambda: desk.window is not None and desk.window.replay is not None)
     assert desk.window.replay.path == log and desk.window.isVisible()
@@ -61,7 +61,7 @@ def test_the_menu_opens_the_page_and_the_page_a_replay(bench, log, monkeypatch, 
     page.renamed.emit(log, renamed)
     assert "better name" in desk.window.windowTitle() and desk.window.replay.path == renamed
     window.actions_.light.trigger()
-    assert desk.window.scene._scheme.name == "light"
+    assert desk.window.parts.scene._scheme.name == "light"
     window.actions_.dark.trigger()
     window.actions_.recordings.trigger()
     assert desk.library is page

@@ -31,7 +31,7 @@ class Desk:
     def __init__(self, folder: Path) -> None:
         self.states = folder / "states"
         self.window = ReplayWindow(Settings(folder / "app.ini"), DARK, self.states)
-        self.window.pacer = FramePacer(most_hz=8.0)
+        self.window.parts.pacer = FramePacer(most_hz=8.0)
         self.window.show()
         self.window.activateWindow()
         assert QTest.qWaitForWindowActive(self.window)
@@ -55,7 +55,7 @@ class Desk:
 
     def scrub(self, begin_s: float, *ends_s: float) -> None:
         """Drag over the timeline."""
-        line = self.window.timeline
+        line = self.window.parts.timeline
         at = [QPoint(round(line.x_of(s)), FLAG_PX + 10) for s in (begin_s, *ends_s)]
         QTest.mousePress(line, Qt.MouseButton.LeftButton, pos=at[0])
         for place in at[1:]:
@@ -69,12 +69,12 @@ class Desk:
     @property
     def drawn_ns(self) -> int | None:
         """The moment of the hand in the scene."""
-        state = self.window.scene._in_rig
+        state = self.window.parts.scene._in_rig
         return None if state is None else state.t_master_ns
 
     def number(self) -> int:
         """The state that the window names."""
-        return int(self.window.transport.place.text().split("state ")[1].split(" of ")[0])
+        return int(self.window.parts.transport.place.text().split("state ")[1].split(" of ")[0])
 
 
 @pytest.fixture(scope="module")
@@ -111,10 +111,10 @@ def test_a_recording_is_shown_with_its_name(desk):
     window = desk.window
     assert "grasp.rhotlog" in window.toolbar.name.text() and "grasp.rhotlog" in window.windowTitle()
     assert window.toolbar.word.text() == "REPLAY"
-    assert desk.window.transport.place.text().startswith("0:00.00 of 0:03.9")
+    assert desk.window.parts.transport.place.text().startswith("0:00.00 of 0:03.9")
     assert not list(desk.states.iterdir()), "the states' file has no name any more"
-    assert window.timeline.codes is not None and len(window.timeline.codes) > 500
-    assert "tracking" in window.timeline.told_at(window.timeline.x_of(2.0))
+    assert window.parts.timeline.codes is not None and len(window.parts.timeline.codes) > 500
+    assert "tracking" in window.parts.timeline.told_at(window.parts.timeline.x_of(2.0))
 
 
 def test_space_plays_and_pauses(desk):
@@ -129,18 +129,18 @@ def test_space_plays_and_pauses(desk):
 
 
 def test_it_plays_to_the_end_and_begins_again(desk):
-    box = desk.window.transport.speed_box
+    box = desk.window.parts.transport.speed_box
     box.setCurrentIndex(box.findData(4.0))
     box.activated.emit(box.currentIndex())
-    desk.click(desk.window.transport.play_button)
+    desk.click(desk.window.parts.transport.play_button)
     desk.until(lambda: desk.window.replay.player.at_end)
-    desk.until(lambda: not desk.window.transport.is_playing)
-    desk.click(desk.window.transport.play_button)
+    desk.until(lambda: not desk.window.parts.transport.is_playing)
+    desk.click(desk.window.parts.transport.play_button)
     assert desk.position_s < 2.0 and desk.window.replay.player.playing
 
 
 def test_a_click_leaves_the_space_bar_to_the_player(desk):
-    desk.click(desk.window.transport.on_button)
+    desk.click(desk.window.parts.transport.on_button)
     desk.press(Qt.Key.Key_Space)
     assert desk.window.replay.player.playing
 
@@ -156,19 +156,19 @@ def test_arrows_go_from_state_to_state(desk):
     desk.until(lambda: desk.number() == len(times) and desk.drawn_ns == times[-1])
     desk.press(Qt.Key.Key_Home)
     desk.until(lambda: desk.number() == 1)
-    for button, number in ((desk.window.transport.on_button, 2), (desk.window.transport.last_button, len(times)),
-                           (desk.window.transport.back_button, len(times) - 1),
-                           (desk.window.transport.first_button, 1)):
+    row = desk.window.parts.transport
+    for button, number in ((row.on_button, 2), (row.last_button, len(times)), (row.back_button, len(times) - 1),
+                           (row.first_button, 1)):
         desk.click(button)
         desk.until(lambda number=number: desk.number() == number)
 
 
 def test_arrows_step_although_the_scene_has_the_focus(desk):
-    desk.window.scene.setFocus()
-    view = desk.window.scene.cameraParams()
-    QTest.keyClick(desk.window.scene, Qt.Key.Key_Right)
+    desk.window.parts.scene.setFocus()
+    view = desk.window.parts.scene.cameraParams()
+    QTest.keyClick(desk.window.parts.scene, Qt.Key.Key_Right)
     desk.until(lambda: desk.number() == 2)
-    assert desk.window.scene.cameraParams() == view
+    assert desk.window.parts.scene.cameraParams() == view
 
 
 def test_scrubbing_goes_there_at_once(desk):
@@ -176,9 +176,9 @@ def test_scrubbing_goes_there_at_once(desk):
     assert abs(desk.position_s - 3.0) < 0.02
     number = desk.window.replay.player.number
     desk.until(lambda: desk.drawn_ns == desk.window.replay.run.tracked.times_ns[number])
-    desk.until(lambda: desk.window.jitter._window[0].size and desk.window.jitter._window[0][0] > -3.2)
+    desk.until(lambda: desk.window.parts.jitter._window[0].size and desk.window.parts.jitter._window[0][0] > -3.2)
     desk.scrub(0.5)
-    desk.until(lambda: desk.window.jitter._window[0].size and desk.window.jitter._window[0][0] > -0.6)
+    desk.until(lambda: desk.window.parts.jitter._window[0].size and desk.window.parts.jitter._window[0][0] > -0.6)
 
 
 def test_a_range_is_repeated(desk):
@@ -192,8 +192,8 @@ def test_a_range_is_repeated(desk):
     seen = []
     desk.until(lambda: seen.append(desk.position_s) or any(b < a for a, b in itertools.pairwise(seen)))
     assert min(seen) >= begin - 1e-9 and max(seen) <= end + 1e-9
-    desk.until(desk.window.transport.loop_clear_button.isEnabled)
-    desk.click(desk.window.transport.loop_clear_button)
+    desk.until(desk.window.parts.transport.loop_clear_button.isEnabled)
+    desk.click(desk.window.parts.transport.loop_clear_button)
     desk.until(lambda: desk.position_s > end + 0.05)
 
 
@@ -213,7 +213,7 @@ def test_a_bookmark_is_set_found_and_removed(desk):
     window.toolbar.menu.actions()[0].trigger()
     assert abs(desk.position_s - at_s) < 1e-6 and "0:0" in window.toolbar.menu.actions()[0].text()
     desk.press(Qt.Key.Key_Home)
-    line = window.timeline
+    line = window.parts.timeline
     assert "thumb behind the palm" in line.told_at(line.x_of(at_s) + 2)
     desk.click(line, QPoint(round(line.x_of(at_s)) + 3, 5))
     assert abs(desk.position_s - at_s) < 1e-6, "a click on a flag meets it exactly"
@@ -228,7 +228,7 @@ def test_a_bookmark_that_cannot_be_written_is_said(desk, monkeypatch):
         raise OSError("the disk is full")
 
     monkeypatch.setattr("rhot_app.ui.replay.bookmark_writer.append_bookmark", refuse)
-    desk.click(desk.window.transport.bookmark_button)
+    desk.click(desk.window.parts.transport.bookmark_button)
     edit = desk.window.bookmarks.dialog.findChild(QLineEdit)
     QTest.keyClicks(edit, "x")
     QTest.keyClick(edit, Qt.Key.Key_Return)
@@ -246,15 +246,16 @@ def test_two_runs_are_compared_side_by_side(desk):
     assert window.replay.run.rig.tracker.kind == "classic" and window.replay.second.rig.tracker.kind == "model"
     desk.scrub(2.5)
     desk.until(lambda: desk.drawn_ns == window.replay.run.tracked.times_ns[window.replay.player.number])
-    first, second = (actors._hands[0].items[3] for actors in (window.scene._actors, window.scene._second))
+    first, second = (actors._hands[0].items[3] for actors in (window.parts.scene._actors, window.parts.scene._second))
     assert first.visible() and second.visible()
     assert 0 < second._arrays[2][:, 3].max() < first._arrays[2][:, 3].max()
     assert abs(np.mean(first._arrays[0] - second._arrays[0])) < 0.02
-    desk.until(window.difference.isVisible)
-    desk.until(lambda: [values[0] != "–" for values in window.difference.legend.values] == [True] * 5)
+    desk.until(window.parts.difference.isVisible)
+    desk.until(lambda: [values[0] != "–" for values in window.parts.difference.legend.values] == [True] * 5)
     desk.until(lambda: "Solid: as recorded. Blue and translucent: model tracker." in window.advice.texts)
     window.toolbar.alone.trigger()
-    assert window.scene._second is None and window.replay.second is None and not window.difference.isVisible()
+    assert window.parts.scene._second is None and window.replay.second is None
+    assert not window.parts.difference.isVisible()
 
 
 def test_it_is_tracked_again_with_another_hand_at_the_same_moment(desk, tmp_path, monkeypatch):
