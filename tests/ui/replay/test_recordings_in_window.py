@@ -9,8 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QLineEdit
 
 from rhot_app.errors import EngineError
-from rhot_app.ui.replay.library import Library, summarise_log
-from rhot_app.ui.replay.library_window import summaries_folder
+from rhot_app.ui.wizards.solver import Solver
 
 
 def test_length_and_size_are_told_while_recording(tracking):
@@ -49,7 +48,9 @@ def test_b_says_so_when_nothing_is_recorded(tracking):
 
 def test_the_menu_opens_the_page_and_the_page_a_replay(bench, log, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    Library(log.parent, summaries_folder()).keep_summary(log, summarise_log(log))
+    monkeypatch.setattr(Solver, "prepare", lambda self, module: None)
+    monkeypatch.setattr(Solver, "run", lambda self, function, arguments, progress: function(*arguments,
+                                                                                            progress=progress))
     window, desk = bench.window, bench.window.replays
     window.actions_.recordings.trigger()
     page = desk.library
