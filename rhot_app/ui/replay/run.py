@@ -84,6 +84,10 @@ def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) ->
         if not collected.times_ns:
             raise RecordingError(f"{log}: {_why_nothing(records)}")
         return collected.tracked(records.note, tuple(bookmarks_of(records.marked)))
+    except OSError as exc:
+        out.unlink(missing_ok=True)
+        raise RecordingError(f"{out}: the states of the recording cannot be written ({exc.strerror}). They take about "
+                             "5 kB each; make room there.") from exc
     except BaseException:
         out.unlink(missing_ok=True)
         raise

@@ -122,3 +122,15 @@ def test_a_plot_of_many_states_keeps_the_peaks(run):
     times, rows = comparison.highest_mm(round(1e9))
     assert np.diff(times).min() > 0.9e9 and rows[0].tolist() == [1.0, 1.0, 9.0, 1.0, 1.0]
     assert (rows[1:] == 1.0).all() and 3 <= len(rows) <= 6
+
+
+def test_a_disk_without_room_for_the_states_is_said(grasp_log):
+    if not Path("/dev/full").exists():
+        pytest.skip("needs /dev/full")
+
+    class Full(type(Path())):
+        def unlink(self, missing_ok: bool = False) -> None:
+            pass  # the device stays
+
+    with pytest.raises(RecordingError, match="cannot be written .No space left"):
+        track_log(grasp_log, rig_of(grasp_log), Full("/dev/full"))
