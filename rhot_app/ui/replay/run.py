@@ -7,6 +7,7 @@ computer measured are left out of the states; `detect` and `network` are in the 
 from __future__ import annotations
 
 import contextlib
+import io
 import mmap
 import os
 import time
@@ -78,21 +79,28 @@ def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) ->
         warm_up(tracker, rig)
         records = ReadableLog(reader, progress)
         collected = _Collected(rig)
-        with out.open("wb") as file:
+        with out.open("wb", buffering=0) as file:
             for state in replay_states(iter(records), LogDoor(rig), tracker):
-                file.write(collected.take(state))
+                _write(file, collected.take(state), out)
         if not collected.times_ns:
             raise RecordingError(f"{log}: {_why_nothing(records)}")
         return collected.tracked(records.note, tuple(bookmarks_of(records.marked)))
-    except OSError as exc:
-        out.unlink(missing_ok=True)
-        raise RecordingError(f"{out}: the states of the recording cannot be written ({exc.strerror}). They take about "
-                             "5 kB each; make room there.") from exc
     except BaseException:
         out.unlink(missing_ok=True)
         raise
     finally:
         reader.close()
+
+
+def _write(file: io.FileIO, data: bytes, out: Path) -> None:
+    """All bytes; a raw file may take only a part of them at a time."""
+    try:
+        view = memoryview(data)
+        while view:
+            view = view[file.write(view):]
+    except OSError as exc:
+        raise RecordingError(f"{out}: the states of the recording cannot be written ({exc.strerror}). They take about "
+                             "5 kB each; make room there.") from exc
 
 
 def _why_nothing(records: ReadableLog) -> str:
