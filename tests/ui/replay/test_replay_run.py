@@ -132,5 +132,5 @@ def test_a_disk_without_room_for_the_states_is_said(grasp_log):
         def unlink(self, missing_ok: bool = False) -> None:
             pass  # the device stays
 
-    with pytest.raises(RecordingError, match="cannot be written .No space left"):
+    with pytest.raises(RecordingError, match=r"cannot be written \(No space left"):
         track_log(grasp_log, rig_of(grasp_log), Full("/dev/full"))
