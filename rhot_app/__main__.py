@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from types import ModuleType
 
-from rhot_app.errors import RhotError
-from rhot_node.errors import NodeError
+from rhot_app.errors import RhotError, take_losses
+from rhot_node.errors import NodeError, printable_lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,7 @@ SUBCOMMANDS = {
     "demo": Subcommand("rhot_app.ui.demo_command", "open the app on the simulated rig"),
     "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
+    "recover": Subcommand("rhot_app.recording.recover_command", "write a damaged log's sound records to a clean one"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
     "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),
@@ -37,17 +38,24 @@ SUBCOMMANDS = {
     "nodes": Subcommand("rhot_app.sources.nodes_command", "look for nodes on the network"),
     "pair": Subcommand("rhot_app.sources.pair_command", "pair with a node by the code that it shows"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),
+    "report": Subcommand("rhot_app.engine.report_command", "collect what somebody needs who looks for a fault"),
     "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "play a simulated run and compare with its truth"),
 }
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 2 for a mistake that has a sentence, 130 when interrupted."""
+    """Run one command; returns its exit code: 2 for a mistake that has a sentence, 3 for work done on a log that could
+    be read in part only, 130 when interrupted."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    take_losses()
     try:
-        return _run(arguments)
+        code = _run(arguments)
+        losses = take_losses()
+        for sentence in losses:
+            print(f"rhot: {printable_lines(sentence)}", file=sys.stderr)
+        return 3 if losses and code == 0 else code
     except (RhotError, NodeError) as exc:
-        print(f"rhot: {exc}", file=sys.stderr)
+        print(f"rhot: {printable_lines(str(exc))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130

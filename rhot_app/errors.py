@@ -2,7 +2,7 @@
 
 
 class RhotError(Exception):
-    """Root of all errors of this package; commands print it and exit with code 2."""
+    """Root of all errors of this package; commands print it and exit with code 2: nothing came of it."""
 
 
 class RigError(RhotError):
@@ -31,3 +31,18 @@ class EngineError(RhotError):
 
 class CalibrationError(RhotError):
     """A calibration cannot begin or end: its input is missing, unreadable, or does not determine the answer."""
+
+
+_losses: dict[str, str] = {}  # by file
+
+
+def note_loss(path: str, sentence: str) -> None:
+    """Something was read of `path`, but not all: the command says so at its end and exits with code 3."""
+    _losses[path] = sentence
+
+
+def take_losses() -> list[str]:
+    """What was noted since the last call."""
+    sentences = list(_losses.values())
+    _losses.clear()
+    return sentences

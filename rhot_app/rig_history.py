@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, save_rig
+from rhot_node.files import require_replaceable
 
 KEPT = 50  # versions; the oldest go first
 
@@ -36,6 +37,7 @@ def accept(path: Path, rig: Rig, reason: str) -> Version | None:
     cannot be written; the rig file is then as it was.
     """
     try:
+        require_replaceable(path)
         if not path.exists():
             save_rig(path, rig)
             return None

@@ -19,7 +19,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from rhot_node.commands import COMMANDS, HELP, run_command
-from rhot_node.errors import NodeError
+from rhot_node.errors import NodeError, printable_lines
 
 if TYPE_CHECKING:
     from rhot_node.config import NodeSettings
@@ -71,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return run_command(arguments[0], arguments[1:])
         return _serve(_parse(arguments))
     except NodeError as exc:
-        print(f"rhot-node: {exc}", file=sys.stderr)
+        print(f"rhot-node: {printable_lines(str(exc))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 0

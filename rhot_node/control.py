@@ -11,6 +11,7 @@ import contextlib
 import logging
 import os
 import threading
+import time
 
 import msgspec
 import zmq
@@ -100,6 +101,7 @@ class ControlServer:
         if self._previews in ready:
             self._take_subscription(self._previews.recv())
         self._publish_preview()
+        reception.expire(time.monotonic())
 
     def _answer(self, responder: Responder) -> None:
         frames = self._requests.recv_multipart(copy=False)

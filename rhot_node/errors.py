@@ -8,6 +8,11 @@ def printable(text: str, limit: int = 400) -> str:
     return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in cut)
 
 
+def printable_lines(text: str) -> str:
+    """A sentence of our own, safe for a terminal whatever file names and answers it repeats."""
+    return "\n".join(printable(line, 10_000) for line in text.split("\n"))
+
+
 class NodeError(Exception):
     """Root of all errors of this package; commands print it and exit with code 2."""
 

@@ -7,10 +7,13 @@ that handler. Without one libzmq would admit all who know the public key; ZAP_EN
 from __future__ import annotations
 
 import logging
+import time
 
 import zmq
 
+from rhot_node.errors import printable
 from rhot_node.keys import serve_with
+from rhot_node.log_limit import LogLimit
 from rhot_node.trust import NodeTrust
 
 log = logging.getLogger(__name__)
@@ -28,6 +31,7 @@ class Gate:
         """Must be there before a socket is guarded."""
         self.trust = trust
         self.refused = 0  # handshakes of strangers
+        self._limit = LogLimit()
         self.socket = context.socket(zmq.REP)
         self.socket.linger = 0
         self.socket.bind(_ENDPOINT)
@@ -45,9 +49,15 @@ class Gate:
         admitted = domain == _DOMAIN and len(key) == 2 * _KEY_LENGTH and self.trust.admits(key)
         if not admitted:
             self.refused += 1
-            log.info("a stranger at %s was not let in, key %s", address.decode(errors="replace"), key)
+            self._tell(printable(address.decode(errors="replace"), 64), key)
         status = (b"200", b"OK", key.encode()) if admitted else (b"400", b"not paired with this node", b"")
         self.socket.send_multipart([_VERSION, request_id, *status, b""])
+
+    def _tell(self, address: str, key: str) -> None:
+        count = self._limit.due(address, time.monotonic())
+        if count:
+            again = "" if count == 1 else f", {count} times since this was last said"
+            log.info("a stranger at %s was not let in, key %s%s", address, key, again)
 
 
 def master_of(frame: zmq.Frame) -> str:

@@ -5,6 +5,7 @@ Nothing here shows a picture, a setting or a place, and nothing but a proof of t
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Callable
 from typing import Annotated, Any
@@ -21,6 +22,7 @@ from rhot_node.trust import Master, NodeTrust, trust_state
 
 log = logging.getLogger(__name__)
 
+EXPIRE_S = 1.0
 REQUEST_MAX = 1024  # bytes; a pair request has about 400
 NO_CODE = ("this node offers no code now. Run `rhot-node pair` on it; a code is valid for five minutes, five tries "
            "and one master.")
@@ -50,6 +52,7 @@ class Reception:
         self._trust = trust
         self._offers = offers
         self._about = about
+        self._expire_s = 0.0
 
     def answer(self, data: bytes) -> bytes:
         """The answer to one request. Never raises."""
@@ -62,6 +65,14 @@ class Reception:
             log.exception("a stranger's request failed")
             reply = {"ok": False, "error": "the node could not do that; see its log."}
         return msgspec.json.encode(reply)
+
+    def expire(self, now_s: float) -> None:
+        """Remove a code that is not valid any more; looks once a second. `now_s`: monotonic, s. Never raises."""
+        if now_s < self._expire_s:
+            return
+        self._expire_s = now_s + EXPIRE_S
+        with contextlib.suppress(NodeError):  # who asks for it hears what is wrong with the file
+            self._offers.current()
 
     def _hello(self) -> dict[str, Any]:
         about = {"ok": True, **self._about(), "trust": trust_state(self._trust).name.lower()}

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhot_app.engine.node_meter import Recent
+from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, NodeStatus
 from rhot_app.project import Rig
+from rhot_node.addresses import is_loopback
 
 UNSEEN_S = 3.0
 """A marker that one camera has not seen for so long is worth a sentence."""
@@ -19,6 +20,9 @@ DISK_WARNING_S = 600.0
 """A person who is told so long before the disk is full can end what is being recorded in good order."""
 
 MANY_LOST = 0.05
+FLOOD_HZ = 1000.0
+"""More than the frame rate that a node's settings allow (docs/node.md, `fps`)."""
+
 _RECENT_MIN = 5  # refusals within two seconds that are not chance
 
 _REFUSALS = {
@@ -38,6 +42,8 @@ _REFUSALS = {
                                    "them. Close other programs, or allow a larger buffer with "
                                    "`sudo sysctl -w net.core.rmem_max=8388608`."),
 }
+_REFUSED_HERE = ("kernel_overflow", "time")  # they came, but are missing in the sequence; said by `_REFUSALS`
+_BUSY = "This computer is too busy: close other programs, or lower the frame rate."
 _MALFORMED = frozenset({"magic", "length", "type", "flags", "header", "reserved", "count", "index", "size", "marker",
                         "range", "text", "kind"})
 
@@ -150,6 +156,8 @@ def _refusal_advice(facts: NodeFacts) -> list[Advice]:
     found = []
     dropped = facts.recent.dropped
     for reason, (level, sentence) in _REFUSALS.items():
+        if reason == "time" and is_loopback(facts.address):
+            level, sentence = "warning", f"Frames of node {{name}} on this computer come too late to be used. {_BUSY}"
         if dropped.get(reason, 0) >= _RECENT_MIN:
             size = "{} x {}".format(*facts.sent_size) if facts.sent_size else "another size"
             found.append(Advice(level, sentence.format(  # type: ignore[arg-type]
@@ -166,20 +174,25 @@ def _refusal_advice(facts: NodeFacts) -> list[Advice]:
 def _link_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     found = []
     status, recent = facts.status, facts.recent
-    name = status.name
-    total = recent.accepted + recent.lost
-    if total >= 20 and recent.lost > MANY_LOST * total:
-        found.append(Advice("warning", f"Node {name}: {100 * recent.lost / total:.0f} % of the datagrams are lost. "
-                                       "Use a cable instead of wireless, or a lower frame rate."))
+    name, here = status.name, is_loopback(facts.address)
+    lost = max(0, recent.lost - sum(recent.dropped.get(reason, 0) for reason in _REFUSED_HERE))
+    total = recent.accepted + sum(recent.dropped.values()) + lost
+    if total >= 20 and lost > MANY_LOST * total:
+        found.append(Advice("warning", f"Node {name}: {100 * lost / total:.0f} % of the datagrams are lost. "
+                            + (_BUSY if here else "Use a cable instead of wireless, or a lower frame rate.")))
     if recent.skipped:
-        found.append(Advice("warning", f"Node {name} floods this computer with {status.rate_hz:.0f} datagrams/s; only "
-                                       "the newest are tracked. Lower its frame rate."))
+        arrived_hz = 1e9 * recent.accepted / RECENT_NS
+        found.append(Advice("warning", f"Node {name} floods this computer with {arrived_hz:.0f} datagrams/s; only the "
+                                       "newest are tracked. Lower its frame rate." if arrived_hz > FLOOD_HZ else
+                                       f"{recent.skipped} frames of node {name} were not tracked within two seconds. "
+                                       f"{_BUSY}"))
     if running and not status.text_datagrams:
         if status.clock_bound_s is None:
             found.append(Advice("info", f"Node {name}: waiting for its clock."))
         elif status.clock_bound_s > WIDE_BOUND_S:
             found.append(Advice("warning", f"Node {name}: its clock is known to ±{1e3 * status.clock_bound_s:.1f} ms "
-                                           "only, so fast movements blur. Use a cable instead of wireless."))
+                                           "only, so fast movements blur. "
+                                           + (_BUSY if here else "Use a cable instead of wireless.")))
     return found
 
 

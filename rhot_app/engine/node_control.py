@@ -117,7 +117,7 @@ class NodeControl:
             for asked, answer, attachment in _receive(peer):
                 if asked.client is None:
                     state = answer.get("answer", {})
-                    peer.message = str(state.get("message", ""))
+                    peer.message = printable(str(state.get("message", "")))
                     peer.health = health_advice(peer.node.name, state)
                 else:
                     done.append((asked.client, (answer, attachment)))
@@ -237,9 +237,10 @@ def _translate(name: str, command: str, parts: list[bytes]) -> tuple[Answer, byt
     try:
         reply = decode_message(parts[0], dict[str, Any])
     except msgspec.MsgspecError as exc:
-        return refusal(EngineError(f"node {name} gave an answer that cannot be read ({exc}).")), None
+        return refusal(EngineError(f"node {name} gave an answer that cannot be read ({printable(str(exc))}).")), None
     if not reply.pop("ok", False):
-        return refusal(EngineError(f"node {name}: {reply.get('error', 'it refused without a reason')}")), None
+        reason = printable(str(reply.get("error", "it refused without a reason")))
+        return refusal(EngineError(f"node {name}: {reason}")), None
     if len(parts) > 1:
         name_of_part = str(reply.get("format", "png")) if command == "still" else "data"
         return {"ok": True, "answer": reply, "attachment": name_of_part}, parts[1]

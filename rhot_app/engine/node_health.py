@@ -11,6 +11,7 @@ from typing import Any, Literal
 import msgspec
 
 from rhot_app.engine.status import Advice
+from rhot_node.errors import printable
 
 SENTENCE_MAX = 300  # characters
 _TOLD_MAX = 8  # per node
@@ -35,7 +36,7 @@ def health_advice(name: str, state: Mapping[str, Any]) -> tuple[Advice, ...]:
             trouble = msgspec.convert(item, _Trouble)
         except msgspec.ValidationError:
             continue
-        sentence = f"{trouble.text} {trouble.remedy}".rstrip()[:SENTENCE_MAX]
+        sentence = printable(f"{trouble.text} {trouble.remedy}".rstrip())[:SENTENCE_MAX]
         found.append(Advice(trouble.level, f"Node {name}: {sentence[:1].lower()}{sentence[1:]}"))
     return tuple(found)
 

@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _conclude(replay: LogReplay, serve: Serving, keep: bool) -> None:
-    """Say what came of the replay, and serve on; raises RecordingError when the log is broken in the middle."""
+    """Say what came of the replay, and serve on; raises RecordingError when nothing of it could be read."""
     if replay.failure:
         raise RecordingError(replay.failure)
     print(f"the log is over: {serve.states.count} states in {replay.played_s:.1f} s."

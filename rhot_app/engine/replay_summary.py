@@ -33,7 +33,7 @@ def replay_states(records: Iterable[Record], door: LogDoor, tracker: Tracker) ->
 def summarise(reader: LogReader, rig: Rig, tracker: Tracker) -> dict[str, Any]:
     """What a log holds and what the tracker makes of it; every key ends in its unit.
 
-    Raises RecordingError where the log is broken in the middle.
+    Raises RecordingError when not one record of the log can be read.
     """
     door = LogDoor(rig)
     times = _Span()
@@ -41,6 +41,7 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker) -> dict[str, Any]:
     duration_s = 1e-9 * (states[-1].t_master_ns - states[0].t_master_ns) if len(states) > 1 else 0.0
     return {
         "log": str(reader.path), "duration_s": times.duration_s, "torn_bytes": reader.torn_bytes,
+        "damaged_places": reader.losses.places, "skipped_bytes": reader.losses.skipped_bytes,
         "missed_records": door.gaps, "unknown_node_records": door.unknown_nodes,
         "states": len(states), "state_rate_hz": (len(states) - 1) / duration_s if duration_s else 0.0,
         "nodes": {link.node.name: {

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO, Final
 import msgspec
 import numpy as np
 
-from rhot_app.errors import RecordingError
+from rhot_app.errors import RecordingError, note_loss
 from rhot_app.project import Rig, parse_rig
 from rhot_node.files import decode_json, open_input
 
@@ -98,7 +98,11 @@ def encode_record(record: Record) -> bytes:
     """The bytes of one record. Raises RecordingError when its data are longer than a reader takes."""
     if len(record.data) > PAYLOAD_MAX:
         raise RecordingError(f"a record of {len(record.data)} bytes does not fit a log; {PAYLOAD_MAX} do.")
-    body = _RECORD.pack(record.kind, record.node_id, record.t_master_ns, len(record.data)) + record.data
+    return _encode(record.kind, record.node_id, record.t_master_ns, record.data)
+
+
+def _encode(kind: int, node_id: int, t_master_ns: int, data: bytes) -> bytes:
+    body = _RECORD.pack(kind, node_id, t_master_ns, len(data)) + data
     return body + _CRC.pack(zlib.crc32(body))
 
 
@@ -139,32 +143,43 @@ class LogReader:
 
         Raises RecordingError at the end when there is damage and not one record was sound.
         """
+        for kind, node_id, t_master_ns, data in self._sound():
+            if kind in _KINDS:
+                yield Record(RecordKind(kind), node_id, t_master_ns, data)
+            else:
+                self.losses.unknown_records += 1
+
+    def sound_records(self) -> Iterator[bytes]:
+        """The bytes of every sound record, of whatever kind. Raises RecordingError as iterating does."""
+        for kind, node_id, t_master_ns, data in self._sound():
+            yield _encode(kind, node_id, t_master_ns, data)
+
+    def _sound(self) -> Iterator[tuple[int, int, int, bytes]]:
+        """Kind, node, time and data of every sound record; `losses` counts what lies between them."""
         file, at, sound = self._file, self._records_at, 0
         self.losses = losses = Losses(places=int(self._header_losses > 0), skipped_bytes=self._header_losses)
         file.seek(at)
         while head := file.read(_RECORD.size):
             found = _read_record(file, head)
-            if found is None:
-                size = file.seek(0, 2) - at
-                following = _next_sound(file, at + 1)
-                if following is None and _is_torn(head, size):
-                    losses.torn_bytes = size
-                    break
-                losses.places += 1
-                losses.skipped_bytes += size if following is None else following - at
-                if following is None:
-                    break
-                at = file.seek(following)
+            if found is not None:
+                at += _RECORD.size + len(found[3]) + _CRC.size
+                sound += 1
+                yield found
                 continue
-            kind, node_id, t_master_ns, data = found
-            at += _RECORD.size + len(data) + _CRC.size
-            sound += 1
-            if kind in _KINDS:
-                yield Record(RecordKind(kind), node_id, t_master_ns, data)
-            else:
-                losses.unknown_records += 1
+            size = file.seek(0, 2) - at
+            following = _next_sound(file, at + 1)
+            if following is None and _is_torn(head, size):
+                losses.torn_bytes = size
+                break
+            losses.places += 1
+            losses.skipped_bytes += size if following is None else following - at
+            if following is None:
+                break
+            at = file.seek(following)
         if losses.damage and not sound:
             raise RecordingError(f"{self.path}: no record in it can be read; {losses.damage}.")
+        if losses.damage:
+            note_loss(str(self.path), f"{self.path}: {losses.damage}.")
 
     def close(self) -> None:
         """Close the file. May be called twice."""

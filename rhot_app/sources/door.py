@@ -106,15 +106,16 @@ class NodeDoor:
             return reason
         estimate = self.clock.estimate_at(t_receive_ns)
         if estimate is None:
+            self.sequence.take(message.sequence)  # it came, so it is not lost
             return "no_clock"
         t_row0_ns = estimate.to_master_ns(message.t_frame_node_ns) + self._time_offset_ns
         t_send_ns = estimate.to_master_ns(message.t_send_node_ns)
         bound_s = estimate.bound_s(t_receive_ns)
         if not self._plausible(t_row0_ns, t_send_ns, t_receive_ns, bound_s):
             return "time"
+        self.sequence.take(message.sequence)  # also what is refused for its clock has come
         if not self._travel.believed(t_receive_ns - t_send_ns, t_receive_ns, estimate):
             return "clock_in_doubt"
-        self.sequence.take(message.sequence)
         return message, t_row0_ns, t_send_ns, t_receive_ns, bound_s
 
     def _objection(self, message: Observations) -> str | None:

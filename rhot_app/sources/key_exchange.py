@@ -4,6 +4,7 @@ one falls silent, because a node that was restarted has forgotten its keys."""
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,8 +15,10 @@ from zmq.utils.monitor import recv_monitor_message
 from rhot_app.errors import SourceError
 from rhot_app.project import RigNode
 from rhot_app.sources.node_link import NodeLink
+from rhot_node.errors import printable
 from rhot_node.files import decode_message
 from rhot_node.keys import HexKey, KeyPair, connect_with
+from rhot_node.log_limit import LogLimit
 
 ASK_NS = 250_000_000
 """A node is not asked more often than this."""
@@ -51,6 +54,7 @@ class KeyExchange:
         """`own`: the master's keys. Raises SourceError when a node is paired and there are none, or when an address
         cannot be connected to."""
         self._peers: list[_Peer] = []
+        self._limit = LogLimit()
         paired = [link for link in links if link.paired]
         if paired and own is None:
             raise SourceError(f"node {paired[0].node.name} is paired, but this program has no keys to speak to it.")
@@ -105,18 +109,21 @@ class KeyExchange:
         except zmq.Again:
             pass
 
-    @staticmethod
-    def _take(link: NodeLink, data: bytes) -> None:
+    def _take(self, link: NodeLink, data: bytes) -> None:
         try:
             granted = decode_message(data, _Granted)
         except msgspec.MsgspecError as exc:
-            log.warning("node %s gave no key but something that cannot be read (%s)", link.node.name, exc)
+            self._tell(link, f"gave no key but something that cannot be read ({printable(str(exc))})")
             return
         link.turned_away = not granted.ok
         if granted.ok and granted.key is not None:
             link.use_key(granted.name, bytes.fromhex(granted.key))
         else:
-            log.warning("node %s gave no key: %s", link.node.name, granted.error)
+            self._tell(link, f"gave no key: {printable(granted.error)}")
+
+    def _tell(self, link: NodeLink, what: str) -> None:
+        if self._limit.due(link.node.name, time.monotonic()):
+            log.warning("node %s %s", link.node.name, what)
 
     def _connect(self, link: NodeLink, own: KeyPair | None) -> None:
         assert self._context is not None and own is not None

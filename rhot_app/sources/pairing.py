@@ -17,6 +17,7 @@ from msgspec import Meta
 
 from rhot_app.errors import PairingError
 from rhot_app.keys import KnownNode, MasterKeys, remember_node
+from rhot_node.errors import printable
 from rhot_node.files import PRINTABLE, decode_message
 from rhot_node.keys import Name
 from rhot_node.pairing import NONCE_LENGTH, Transcript, proof, proves, read_code
@@ -160,7 +161,8 @@ def _read(address: NodeAddress, answer: bytes | str | None, kind: type[T], timeo
         raise PairingError(answer)
     try:
         if not decode_message(answer, dict[str, Any]).get("ok"):
-            raise PairingError(f"{address}: {decode_message(answer, _Refusal).error}")
+            raise PairingError(f"{address}: {printable(decode_message(answer, _Refusal).error)}")
         return decode_message(answer, kind)
     except msgspec.MsgspecError as exc:
-        raise PairingError(f"{address}: something answered that is not a node of this system ({exc}).") from exc
+        raise PairingError(f"{address}: something answered that is not a node of this system "
+                           f"({printable(str(exc))}).") from exc

@@ -108,7 +108,7 @@ class LogReplay:
         self._deliver = deliver
 
     def notices(self) -> list[str]:
-        """That the log is over, broken or torn."""
+        """That the log is over, damaged or torn."""
         return [self._notice] if self._notice else []
 
     def configure(self, rig: Rig) -> None:
@@ -147,9 +147,10 @@ class LogReplay:
             with contextlib.closing(LogReader(self._path)) as reader:
                 if not self._play(reader):
                     return
-            torn = reader.torn_bytes
+            torn, damage = reader.losses.torn_bytes, reader.losses.damage
             self._notice = "The log is over; Start replays it again." if not torn else (
                 f"The log is over; its last {torn} bytes are torn (the program died while writing).")
+            self._notice += f" It is damaged: {damage}." if damage else ""
         except RecordingError as exc:
             self._notice = self.failure = str(exc)
         self.over = True

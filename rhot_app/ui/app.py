@@ -8,10 +8,12 @@ import sys
 from pathlib import Path
 
 from rhot_app.engine.directory import default_directory
+from rhot_app.errors import EngineError
 from rhot_app.project import load_rig
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_app.ui.environment import cap_software_gl, choose_gl_platform, give_way
+from rhot_node.files import require_replaceable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,11 +38,21 @@ def run(args: argparse.Namespace) -> int:
     return open_window(args, rig=args.rig, twin=None)
 
 
+def _require_settings_file(path: Path) -> None:
+    """Raises EngineError when settings cannot be kept there: Qt would replace a device or wait for a pipe."""
+    try:
+        require_replaceable(path)
+    except OSError as exc:
+        raise EngineError(f"--settings {path}: cannot be written ({exc.strerror}).") from exc
+
+
 def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice | None) -> int:
     """Run the app: on `rig`, on the simulated rig `twin`, on the engine that runs already, or on the first page.
 
     Returns 0 when the window was closed. Everything that the app started has ended then.
     """
+    if args.settings is not None:
+        _require_settings_file(args.settings)
     choose_gl_platform()
     cap_software_gl()
     from rhot_app.ui.job import workers

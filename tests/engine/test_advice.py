@@ -55,6 +55,27 @@ def test_trouble_is_named(facts: NodeFacts, words: list[str]) -> None:
         assert word in text
 
 
+HERE = replace(WELL, address="127.0.0.1")
+
+
+@pytest.mark.parametrize("facts", [
+    replace(WELL, status=replace(STATUS, rate_hz=119.0), recent=Recent(238, 0, {}, 30)),
+    replace(HERE, recent=Recent(100, 50, {}, 0)), replace(HERE, status=replace(STATUS, clock_bound_s=0.004)),
+    replace(HERE, recent=Recent(100, 0, {"time": 40}, 0)),
+])
+def test_a_busy_computer_is_not_blamed_on_a_healthy_node(facts: NodeFacts) -> None:
+    (text,) = texts(facts)
+    assert "This computer is too busy" in text
+    for blame in ("floods", "cable", "restart the node"):
+        assert blame not in text
+
+
+def test_what_arrived_and_was_refused_or_dropped_here_is_not_lost_on_the_way() -> None:
+    (text,) = texts(replace(WELL, recent=Recent(100, 50, {"kernel_overflow": 50}, 0)))
+    assert "kernel" in text
+    assert texts(replace(WELL, recent=Recent(30, 4, {"clock_in_doubt": 170}, 0))) == []
+
+
 def test_chance_is_not_trouble() -> None:
     assert texts(replace(WELL, recent=Recent(200, 3, {"magic": 2}, 0), unseen_s=(1.0, 0.0, 2.9))) == []
 

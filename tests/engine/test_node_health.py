@@ -34,6 +34,11 @@ def test_a_talkative_node_is_cut_short() -> None:
     assert len(many) == 8 and all(len(advice.text) < SENTENCE_MAX + 20 for advice in many)
 
 
+def test_a_node_does_not_steer_the_terminal() -> None:
+    (advice,) = health_advice("left", {"health": [{"level": "error", "text": "\x1b[2Jhot\n", "remedy": "\x9bcool"}]})
+    assert advice.text.isprintable()
+
+
 def test_errors_come_first() -> None:
     advice = [Advice("info", "a"), Advice("warning", "b"), Advice("error", "c"), Advice("warning", "d")]
     assert [one.text for one in most_urgent_first(advice)] == ["c", "b", "d", "a"]

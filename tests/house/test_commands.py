@@ -18,6 +18,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot demo": ("--motion", "--seed"),
     "rhot engine": ("--rig", "--log"),
     "rhot replay": ("LOG", "--rig", "--keep", "--smooth"),
+    "rhot report": ("LOG", "--out", "--rig", "--directory"),
+    "rhot recover": ("LOG", "--out", "--rig"),
     "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--points", "--markers", "--lamp",
                       "--kelvin"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json",

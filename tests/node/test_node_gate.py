@@ -13,6 +13,7 @@ from trusted_node import TrustedNode
 
 from rhot_node.capture.camera import Frame
 from rhot_node.keys import new_key_pair, serve_with
+from rhot_node.log_limit import LogLimit
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import Stop
 
@@ -35,6 +36,22 @@ def test_a_paired_master_is_answered(node: TrustedNode) -> None:
 def test_a_stranger_who_knows_the_nodes_key_is_not_let_in(node: TrustedNode) -> None:
     assert node.ask(node.connect(node.server.control_port, new_key_pair()), REFUSED_S, request="state") is None
     eventually(lambda: node.server.refused > 0)
+
+
+def test_a_stranger_who_knocks_for_ever_fills_no_log(node: TrustedNode, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO")
+    strangers = []
+    for count in range(4):
+        strangers.append(node.connect(node.server.control_port, new_key_pair()))
+        eventually(lambda count=count: node.server.refused > count)
+    assert sum("was not let in" in line for line in caplog.messages) == 1
+
+
+def test_log_lines_are_due_once_a_minute_of_each_and_count_what_was_left_out() -> None:
+    limit = LogLimit()
+    assert [limit.due("a", t_s) for t_s in (0.0, 1.0, 59.0, 60.0, 61.0)] == [1, 0, 0, 3, 0]
+    assert limit.due("b", 61.0) == 1
+    assert sum(limit.due(f"address {k}", 62.0) > 0 for k in range(10_000)) < 50, "addresses cost nothing to make up"
 
 
 def test_without_encryption_nothing_is_answered(node: TrustedNode) -> None:

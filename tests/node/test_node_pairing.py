@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from patience import eventually, settled
 from trusted_node import TrustedNode
 
 from rhot_node.errors import TrustError
@@ -94,6 +95,13 @@ def test_a_code_is_valid_for_five_minutes_of_one_boot(node: TrustedNode, seconds
     node.clock.boot_id = boot_id
     assert try_to_pair(node, code, own, hello)[0]["ok"] is paired
     assert not node.offers.path.exists(), "used or void, it is removed"
+
+
+def test_a_code_is_removed_after_its_five_minutes_though_nobody_asks(node: TrustedNode) -> None:
+    node.offers.renew()
+    assert settled(node.offers.path.exists, 1.5)
+    node.clock.now_ns += 300 * 10**9
+    eventually(lambda: not node.offers.path.exists())
 
 
 def test_a_fresh_code_voids_the_one_before(node: TrustedNode) -> None:

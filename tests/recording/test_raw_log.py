@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 from patience import eventually
 
+from rhot_app.__main__ import main
 from rhot_app.errors import RecordingError, RhotError
+from rhot_app.project import save_rig
 from rhot_app.recording.raw_log import LogReader, Losses, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
 from rhot_app.simulator.synthetic_node import synthetic_rig
@@ -253,6 +255,46 @@ def test_a_killed_recording_opens_and_misses_at_most_a_second(tmp_path: Path) ->
 
 def record_for_ever(path: Path) -> None:
     recorder = Recorder(path, synthetic_rig())
-    while True:
+    pace = threading.Event()
+    while not pace.wait(0.001):
         recorder.put(RecordKind.DATAGRAM, 1, time.monotonic_ns(), b"x" * 200)
-        time.sleep(0.001)
+
+
+def test_recover_writes_a_clean_log_of_what_is_sound(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, clean = tmp_path / "a.log", tmp_path / "clean.log"
+    unknown = bytes([200]) + bytes(16) + zlib.crc32(bytes([200]) + bytes(16)).to_bytes(4, "little")
+    path.write_bytes(damaged(write_log(path), -LAST_TWO, b"\xff") + unknown + b"\1torn")
+    assert main(["recover", str(path), "--out", str(clean)]) == 3
+    said = capsys.readouterr()
+    assert f"{clean}: 4 records" in said.out
+    assert "1 damaged place was skipped (60021 bytes, at least 1 record)" in said.err
+    reader = LogReader(clean)
+    assert list(reader) == [RECORDS[0], RECORDS[1], RECORDS[3]]
+    assert (reader.losses.unknown_records, reader.losses.damage, reader.torn_bytes) == (1, "", 0)
+    assert reader.about == {"created": "today"}
+    assert main(["recover", str(path), "--out", str(clean)]) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_recover_with_a_rig_reads_a_log_without_a_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, clean, rig = tmp_path / "a.log", tmp_path / "clean.log", tmp_path / "rig.json"
+    path.write_bytes(bytes(500) + write_log(path)[HEADER_SIZE + 30:])
+    save_rig(rig, synthetic_rig())
+    assert main(["recover", str(path), "--out", str(clean)]) == 2
+    assert "--rig" in capsys.readouterr().err
+    assert not clean.exists()
+    assert main(["recover", str(path), "--out", str(clean), "--rig", str(rig)]) == 3
+    assert list(LogReader(clean)) == RECORDS[2:]
+
+
+def test_a_command_tells_losses_from_nothing_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.log"
+    data = write_log(path)
+    for content, code in ((data, 0), (data[:-3], 0), (data + bytes(5000), 3),
+                          (damaged(data, -100, b"y"), 3), (data[:HEADER_SIZE] + bytes(5000), 2), (b"", 2)):
+        path.write_bytes(content)
+        assert main(["replay", str(path), "--json"]) == code
+        said = capsys.readouterr()
+        if code == 3:
+            assert "1 damaged place was skipped" in said.err
+            assert json.loads(said.out)["damaged_places"] == 1

@@ -156,6 +156,18 @@ def test_a_network_that_becomes_slow_is_believed_after_an_exchange(rig: Rig, doo
     assert len(streamed(rig, door, NODE_CLOCK, NOW_NS + 200_000_000, 50, 8_000_000)) == 40
     assert len(streamed(rig, door, NODE_CLOCK, NOW_NS + 700_000_000, 50, 2_000_000)) == 50
     assert door.dropped == {"clock_in_doubt": 10}
+    assert door.sequence.lost == 0, "what came is not lost"
+
+
+def test_frames_that_wait_for_the_clock_are_not_lost(rig: Rig) -> None:
+    door = NodeDoor(rig, 1, NodeClockModel())
+    door.expect_session(SESSION)
+    for k in (0, 1, 2):
+        assert door.admit(encode(message(rig, sequence=k)), NOW_NS) is None
+    door.clock = known_clock()
+    assert door.admit(encode(message(rig, sequence=4)), NOW_NS) is not None
+    assert door.dropped == {"no_clock": 3}
+    assert door.sequence.lost == 1
 
 
 def test_calibrated_time_offset_is_added(rig: Rig) -> None:

@@ -133,6 +133,7 @@ def test_an_impostor_who_says_yes_without_the_code_is_found_out(node: TrustedNod
 
 
 @pytest.mark.parametrize("answer", [b"", b"{}", b'{"ok": true}', b"[1]", b'{"ok": false}', b"\xff",
+                                    b'{"a": ' + b"[" * 2000 + b"]" * 2000 + b"}",
                                     b'{"ok": true, "node_id": 0, "name": "x", "state": "y", "trust": "maybe"}'])
 def test_what_is_no_node_is_named_so(node: TrustedNode, answer: bytes) -> None:
     server = node.context.socket(zmq.REP)
@@ -142,6 +143,26 @@ def test_what_is_no_node_is_named_so(node: TrustedNode, answer: bytes) -> None:
     (who,) = ask_who([address])
     thread.join()
     assert isinstance(who, str) and "not a node of this system" in who
+
+
+ABOUT_OK = {"ok": True, "node_id": 3, "name": "left", "state": "ready", "trust": "paired", **PORTS}
+STEERING = "\x1b]0;owned\x07\n\x9b2J\u202e"
+
+
+@pytest.mark.parametrize("answer", [
+    {"ok": False, "error": STEERING}, {**ABOUT_OK, "name": STEERING}, {**ABOUT_OK, "state": STEERING},
+    {**ABOUT_OK, "trust": STEERING}, {**ABOUT_OK, "public_key": STEERING}, {**ABOUT_OK, "public_key": 64 * "0" + "\n"},
+])
+def test_a_strangers_answer_does_not_steer_the_terminal(node: TrustedNode, answer: dict[str, Any],
+                                                        capsys: pytest.CaptureFixture[str]) -> None:
+    server = node.context.socket(zmq.REP)
+    port = server.bind_to_random_port("tcp://127.0.0.1")
+    thread = threading.Thread(target=lambda: (server.recv(), server.send_json(answer)))
+    thread.start()
+    assert main(["pair", f"127.0.0.1:{port}", "--code", show_code(new_code())]) == 2
+    thread.join()
+    said = capsys.readouterr()
+    assert (said.out + said.err).removesuffix("\n").isprintable()
 
 
 def test_the_command_pairs_and_writes_the_key_into_the_rig(node: TrustedNode, address: NodeAddress, tmp_path: Path,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -84,3 +85,9 @@ def test_an_option_that_the_subcommand_does_not_have_is_named(capsys: pytest.Cap
         main(["--rig", "rig.json", "demo"])
     assert ended.value.code == 2
     assert "'--rig'" in capsys.readouterr().err
+
+
+def test_settings_are_kept_in_a_file_and_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(tmp_path / "pipe.ini")
+    assert main(["--settings", str(tmp_path / "pipe.ini"), "--directory", str(tmp_path / "engine")]) == 2
+    assert "pipe.ini: cannot be written (it is a pipe" in capsys.readouterr().err

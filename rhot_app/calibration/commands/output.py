@@ -17,11 +17,17 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def require_folder(out: Path | None) -> None:
-    """Raise CalibrationError unless the folder of a file that is to be written is there: before the work, not after."""
+    """Raise CalibrationError unless a file can be written there: before the work, not after."""
     from rhot_app.errors import CalibrationError
+    from rhot_node.files import require_replaceable
 
     if out is not None and not out.parent.is_dir():
         raise CalibrationError(f"{out}: there is no folder {out.parent}. Make it first, or name another place.")
+    if out is not None:
+        try:
+            require_replaceable(out)
+        except OSError as exc:
+            raise CalibrationError(f"{out}: cannot be written ({exc.strerror}).") from exc
 
 
 def tell(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json: bool) -> None:
