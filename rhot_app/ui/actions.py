@@ -18,6 +18,7 @@ CLOUD_KINDS = (("joints", "Of the hand's inner joints; the model tracker estimat
                ("markers", "Of the markers, as far as they are not the fingertips drawn already."))
 """Whose uncertainty can be drawn; the words are the settings' names too."""
 
+_SOURCE_PX = 220  # of a long file's name no more is shown, so that the window's word stays in sight
 _CALM_MS = 100  # the system may report the mouse over the button once more when the menu above it has gone
 
 
@@ -155,6 +156,7 @@ class MainToolBar(QToolBar):
 
     def show_source(self, text: str, meaning: str) -> None:
         """That what is seen is being recorded, or is a replay; "" for neither."""
+        text = self.source_label.fontMetrics().elidedText(text, Qt.TextElideMode.ElideMiddle, _SOURCE_PX)
         if text != self.source_label.text():
             self.source_label.setText(text)
             self.source_label.setToolTip(meaning)

@@ -24,6 +24,7 @@ class Comparison:
         gaps_m[self.partners < 0] = np.nan
         self.differences_mm: Array = 1e3 * gaps_m
         self.times_ns = first.times_ns
+        self.of = (first, second)
 
     def partner(self, number: int) -> int | None:
         """The second run's state at the instant of the first one's; None when there is none."""

@@ -48,7 +48,7 @@ _RECORD_BYTES = 21  # of a record beside its data, docs/log.md
 _ABANDONED_S = 86_400.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
     """What is known of N states beside their bytes, of a rig with M markers. Times are the recording's master clock.
 

@@ -68,8 +68,8 @@ class Replay:
 
     # -- runs ------------------------------------------------------------------------------------------------------
 
-    def use(self, run: Run, choice: Choice) -> None:
-        """Another run in the first one's place; the moment that is shown stays."""
+    def use(self, run: Run, choice: Choice, comparison: Comparison | None = None) -> None:
+        """Another run in the first one's place; the moment that is shown stays. `comparison`: with the second run."""
         at_ns = self.position_ns
         self.run.close()
         self.run, self.choice = run, choice
@@ -78,19 +78,22 @@ class Replay:
         self.player = Player(run.times_s)
         self.player.speed = before.speed
         self.player.seek(self.seconds_of(at_ns))
-        self._compare()
+        self._compare(comparison)
 
-    def compare(self, run: Run | None, choice: Choice | None = None) -> None:
-        """Another run beside the first one; None for none."""
+    def compare(self, run: Run | None, choice: Choice | None = None, comparison: Comparison | None = None) -> None:
+        """Another run beside the first one, with its `comparison`; None for none."""
         if self.second is not None:
             self.second.close()
         self.second, self.second_choice = run, choice or Choice()
-        self._compare()
+        self._compare(comparison)
 
-    def _compare(self) -> None:
+    def _compare(self, comparison: Comparison | None) -> None:
+        """Take a comparison of both runs; one that was made of others is made anew."""
         self.comparison = self.differences = None
         if self.second is not None:
-            self.comparison = Comparison(self.run.tracked, self.second.tracked)
+            fits = comparison is not None and comparison.of == (self.run.tracked, self.second.tracked)
+            self.comparison = comparison if fits else Comparison(self.run.tracked, self.second.tracked)
+            assert self.comparison is not None
             self.differences = RecordedSeries(FINGERS, *self.comparison.highest_mm(_PLOT_SPACING_NS), STALE_S)
 
     def close(self) -> None:

@@ -10,6 +10,8 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
 from rhot_app.ui.replay.session import Replay
 
+_NAME_PX = 240
+
 
 class ReplayToolBar(QToolBar):
     """`bookmark_chosen` gives a position, s."""
@@ -59,7 +61,8 @@ class ReplayToolBar(QToolBar):
 
     def show_replay(self, replay: Replay | None) -> None:
         """Another recording, another run, or other bookmarks."""
-        self.name.setText(f" {replay.path.name}  " if replay is not None else " no recording  ")
+        name = replay.path.name if replay is not None else "no recording"
+        self.name.setText(f" {self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideMiddle, _NAME_PX)}  ")
         self.name.setToolTip(str(replay.path) if replay is not None else "")
         for action in (self.again, self.compare):
             action.setEnabled(replay is not None)

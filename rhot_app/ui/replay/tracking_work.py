@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import time
 from pathlib import Path
-from typing import Any
 
 from platformdirs import user_cache_path
 from PySide6.QtCore import QObject, Signal
 
 from rhot_app.ui.job import CancelledError, Job, Progress
+from rhot_app.ui.replay.comparison import Comparison
 from rhot_app.ui.replay.run import Run, Tracked, new_run_path, track_log
 from rhot_app.ui.replay.session import Choice
 from rhot_app.ui.wizards.models.remaining import Remaining
@@ -27,10 +27,10 @@ def states_folder() -> Path:
 
 
 class TrackingWork(QObject):
-    """One recording at a time. `done` gives the log's path, the `Run` and its `Choice`; `failed` a sentence; `changed`
-    after every report and at the end."""
+    """One recording at a time. `done` gives the log's path, the `Run`, its `Choice` and the `Comparison` that was asked
+    for or None; `failed` a sentence; `changed` after every report and at the end."""
 
-    done = Signal(object, object, object)
+    done = Signal(object, object, object, object)
     failed = Signal(str)
     changed = Signal()
 
@@ -57,13 +57,13 @@ class TrackingWork(QObject):
         """Remaining time in words."""
         return self._remaining.text(time.monotonic())
 
-    def start(self, log: Path, choice: Choice) -> None:
-        """Track `log`; what was under way is given up."""
+    def start(self, log: Path, choice: Choice, other: Tracked | None = None) -> None:
+        """Track `log`; what was under way is given up. `other`: the run that stays, to be compared with."""
         self.cancel()
         self.text = "Reading the recording …"
         self._remaining = Remaining(time.monotonic())
-        self._job = Job(lambda progress: self._track(log, choice, progress),
-                        lambda run: self._finish(log, run, choice), self._fail, self._report, self).start()
+        self._job = Job(lambda progress: self._compared(self._track(log, choice, progress), choice, other),
+                        lambda found: self._finish(log, choice, *found), self._fail, self._report, self).start()
         self.changed.emit()
 
     def cancel(self) -> None:
@@ -96,15 +96,22 @@ class TrackingWork(QObject):
             raise CancelledError("Cancelled.")
         return run
 
+    @staticmethod
+    def _compared(run: Run, choice: Choice, other: Tracked | None) -> tuple[Run, Comparison | None]:
+        """Here and not in the window's thread, because long runs take a tenth of a second."""
+        if other is None:
+            return run, None
+        return run, Comparison(other, run.tracked) if choice.beside else Comparison(run.tracked, other)
+
     def _report(self, text: str, fraction: float) -> None:
         self.text = text
         self._remaining.report(fraction, time.monotonic())
         self.changed.emit()
 
-    def _finish(self, log: Path, run: Any, choice: Choice) -> None:
+    def _finish(self, log: Path, choice: Choice, run: Run, comparison: Comparison | None) -> None:
         self._job = None
         self.changed.emit()
-        self.done.emit(log, run, choice)
+        self.done.emit(log, run, choice, comparison)
 
     def _fail(self, sentence: str) -> None:
         self._job = None

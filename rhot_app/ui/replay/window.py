@@ -27,6 +27,7 @@ from rhot_app.ui.models.words import Look, condition_look
 from rhot_app.ui.panels.advice_bar import AdviceBar
 from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.replay.bookmark_writer import BookmarkWriter
+from rhot_app.ui.replay.comparison import Comparison
 from rhot_app.ui.replay.run import Run
 from rhot_app.ui.replay.run_dialog import RunDialog
 from rhot_app.ui.replay.screen import ReplayScreen
@@ -153,8 +154,10 @@ class ReplayWindow(QMainWindow):
             return
         self.dialog = RunDialog(beside=beside, parent=self)
         self.dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        path = self.replay.path
-        self.dialog.chosen.connect(lambda choice: self.work.start(path, choice))
+        replay = self.replay
+        stays = replay.run if beside else replay.second
+        other = stays.tracked if stays is not None else None
+        self.dialog.chosen.connect(lambda choice: self.work.start(replay.path, choice, other))
         self.dialog.open()
 
     def stop_comparing(self) -> None:
@@ -163,11 +166,11 @@ class ReplayWindow(QMainWindow):
             self.replay.compare(None)
             self._show_run()
 
-    def _take_run(self, path: Path, run: Run, choice: Choice) -> None:
+    def _take_run(self, path: Path, run: Run, choice: Choice, comparison: Comparison | None) -> None:
         if choice.beside and self.replay is not None and self.replay.path == path:
-            self.replay.compare(run, choice)
+            self.replay.compare(run, choice, comparison)
         elif self.replay is not None and self.replay.path == path:
-            self.replay.use(run, choice)
+            self.replay.use(run, choice, comparison)
         else:
             if self.replay is not None:
                 self.replay.close()

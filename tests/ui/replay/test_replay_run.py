@@ -13,6 +13,7 @@ from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_hea
 from rhot_app.tracking.state import Condition
 from rhot_app.ui.replay.comparison import Comparison, nearest
 from rhot_app.ui.replay.run import LOST, NO_STATE, PARTIAL, TRACKING, Run, condition_bins, new_run_path, track_log
+from rhot_app.ui.replay.session import Choice, Replay
 
 
 def rig_of(log: Path) -> Rig:
@@ -134,3 +135,21 @@ def test_a_disk_without_room_for_the_states_is_said(grasp_log):
 
     with pytest.raises(RecordingError, match=r"cannot be written \(No space left"):
         track_log(grasp_log, rig_of(grasp_log), Full("/dev/full"))
+
+
+def test_runs_are_exchanged_and_compared_anew(grasp_log, tmp_path):
+    rig = rig_of(grasp_log)
+    first, second, third = (tracked(grasp_log, rig, tmp_path / name) for name in "abc")
+    replay = Replay(grasp_log, first, Choice())
+    made = Comparison(first.tracked, second.tracked)
+    replay.compare(second, Choice("model"), made)
+    assert replay.comparison is made and replay.differences is not None
+    replay.player.seek(1.0)
+    replay.use(third, Choice(), made)
+    assert replay.comparison is not made and replay.comparison.of == (third.tracked, second.tracked)
+    assert abs(replay.player.position_s - 1.0) < 1e-6
+    state, partner = replay.shown()
+    assert state is not None and partner is not None and state.t_master_ns == partner.t_master_ns
+    replay.compare(None)
+    assert replay.comparison is replay.differences is None and replay.shown()[1] is None
+    replay.close()
