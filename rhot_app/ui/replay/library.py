@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
 from dataclasses import dataclass
 from datetime import datetime
@@ -23,7 +22,7 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogDoor
 from rhot_app.tracking.make import make_tracker
 from rhot_app.ui.recordings import LOG_SUFFIX
-from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, condition_bins
+from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, being_recorded, condition_bins
 from rhot_node.errors import NodeError
 from rhot_node.files import write_document
 
@@ -183,16 +182,11 @@ def _entry(path: Path) -> Entry:
 
 
 def _refuse_while_recorded(path: Path) -> None:
-    """The engine holds a lock on the log that it writes; some network file systems have no locks."""
     try:
-        file = path.open("rb")
+        if being_recorded(path):
+            raise RecordingError(f"{path.stem} is being recorded; stop the recording first.")
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
-    with file, contextlib.suppress(OSError):
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError as exc:
-            raise RecordingError(f"{path.stem} is being recorded; stop the recording first.") from exc
 
 
 def _move(path: Path, target: Path) -> Path:

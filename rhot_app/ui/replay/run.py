@@ -7,6 +7,7 @@ computer measured are left out of the states; `detect` and `network` are in the 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import io
 import mmap
 import os
@@ -92,6 +93,19 @@ def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) ->
         reader.close()
 
 
+def being_recorded(path: Path) -> bool:
+    """Whether an engine is writing this log: it holds a lock on it. Some network file systems have no locks. Raises
+    OSError when there is no such file."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        return False
+
+
 def _write(file: io.FileIO, data: bytes, out: Path) -> None:
     """All bytes; a raw file may take only a part of them at a time."""
     try:
@@ -123,6 +137,7 @@ class ReadableLog:
         self.last_ns = 0
         self.marked: list[Record] = []
         self._reader, self._progress = reader, progress
+        self._growing = being_recorded(reader.path)
 
     def __iter__(self) -> Iterator[Record]:
         size, done = max(1, self._reader.path.stat().st_size), 0
@@ -146,7 +161,9 @@ class ReadableLog:
     @property
     def note(self) -> str:
         """What of the log could not be read, "" when all was."""
-        losses, said = self._reader.losses, []
+        losses, said = self._reader.losses, list[str]()
+        if self._growing:
+            return f"{self._reader.path} is still being recorded: what was written until now is shown."
         if losses.damage:
             said.append(f"In {self._reader.path} {losses.damage}.")
         if losses.torn_bytes:

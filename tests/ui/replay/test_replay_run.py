@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patience import eventually
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
+from rhot_app.recording.recorder import Recorder
 from rhot_app.tracking.state import Condition
 from rhot_app.ui.replay.comparison import Comparison, nearest
 from rhot_app.ui.replay.run import LOST, NO_STATE, PARTIAL, TRACKING, Run, condition_bins, new_run_path, track_log
@@ -153,3 +155,18 @@ def test_runs_are_exchanged_and_compared_anew(grasp_log, tmp_path):
     replay.compare(None)
     assert replay.comparison is replay.differences is None and replay.shown()[1] is None
     replay.close()
+
+
+def test_a_recording_under_way_is_played_so_far(grasp_log, tmp_path):
+    reader = LogReader(grasp_log)
+    recorder = Recorder(tmp_path / "now.rhotlog", reader.rig)
+    for record in reader:
+        recorder.put(record.kind, record.node_id, record.t_master_ns, record.data)
+    eventually(lambda: recorder.bytes_written > 0.9 * grasp_log.stat().st_size)
+    try:
+        run = tracked(recorder.path, reader.rig, tmp_path / "a")
+    finally:
+        recorder.close()
+        reader.close()
+    assert len(run) > 100 and "still being recorded" in run.tracked.note
+    assert tracked(recorder.path, reader.rig, tmp_path / "a").tracked.note == ""
