@@ -120,8 +120,11 @@ class MainToolBar(QToolBar):
         spacer = QWidget()
         spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.addWidget(spacer)
-        self.source_label = QLabel("")
-        self.addWidget(self.source_label)
+        self.source_label = QToolButton()
+        self.source_label.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.source_label.clicked.connect(actions.bookmark.trigger)
+        self._source_place = self.addWidget(self.source_label)
+        self._source_place.setVisible(False)
         self.rig_label = QLabel("")
         self.rig_label.setProperty("muted", True)
         self.addWidget(self.rig_label)
@@ -155,11 +158,13 @@ class MainToolBar(QToolBar):
             self.rig_label.setToolTip(f"{path}{unsaved}")
 
     def show_source(self, text: str, meaning: str) -> None:
-        """That what is seen is being recorded, or is a replay; "" for neither."""
+        """That what is seen is being recorded, or is a replay; "" for neither. While recording a click sets a bookmark.
+        """
         text = self.source_label.fontMetrics().elidedText(text, Qt.TextElideMode.ElideMiddle, _SOURCE_PX)
         if text != self.source_label.text():
             self.source_label.setText(text)
             self.source_label.setToolTip(meaning)
+            self._source_place.setVisible(bool(text))
 
     def set_scheme(self, actions: Actions, scheme: Scheme, *, running: bool, recording: bool) -> None:
         """Words and icons of the two buttons that change."""
@@ -169,7 +174,7 @@ class MainToolBar(QToolBar):
         actions.record.setText("Stop recording" if recording else "Record")
         actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
         self.badge.set_scheme(scheme)
-        self.source_label.setStyleSheet(f"color: {scheme.accent}; font-weight: 700; padding: 0 8px;")
+        self.source_label.setStyleSheet(f"color: {scheme.accent}; font-weight: 700;")
 
 
 def _calm_down(button: QToolButton) -> None:

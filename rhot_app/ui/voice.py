@@ -64,7 +64,7 @@ def label_of(controller: Controller) -> tuple[str, str]:
     if status is None or controller.engine_gone:
         return "", ""
     if status.log_path:
-        return f"REC {recording_text(status)}", f"Recording to {status.log_path}. B sets a bookmark."
+        return f"REC {recording_text(status)}", f"Recording to {status.log_path}. A click here, or B, sets a bookmark."
     if status.replaying:
         return f"REPLAY {Path(status.replaying).name}", f"An engine replays {status.replaying}; Start replays it again."
     return "", ""
