@@ -17,6 +17,9 @@ UNSEEN_S = 3.0
 WIDE_BOUND_S = 2e-3
 """At 2 m/s a clock wrong by this much moves a marker by 4 mm."""
 
+DISK_WARNING_S = 600.0
+"""A person who is told so long before the disk is full can end what is being recorded in good order."""
+
 MANY_LOST = 0.05
 FLOOD_HZ = 1000.0
 """More than the frame rate that a node's settings allow (docs/node.md, `fps`)."""
@@ -61,6 +64,16 @@ class NodeFacts:
     unseen_s: Sequence[float]  # per marker, since this camera last saw it
     streams_elsewhere: bool  # for another master
     not_started_s: float  # how long the node has been ready although it was told to start
+
+
+def disk_advice(folder: str, seconds_left: float) -> list[Advice]:
+    """That a recording will fill the disk soon: how soon, and what to do. A full disk ends the recording."""
+    if seconds_left >= DISK_WARNING_S:
+        return []
+    minutes = int(seconds_left / 60.0)
+    when = "in less than a minute" if minutes < 1 else "in about a minute" if minutes == 1 else f"in {minutes} minutes"
+    return [Advice("error" if minutes < 1 else "warning", f"The disk of {folder} will be full {when} at the rate of "
+                   "this recording, which then ends. Make room, or stop the recording.")]
 
 
 def node_advice(facts: NodeFacts, marker_ids: Sequence[str], running: bool, *, sight: bool = True) -> list[Advice]:

@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from rhot_app.engine.advice import hands_advice, moved_advice
+from rhot_app.engine.advice import disk_advice, hands_advice, moved_advice
 from rhot_app.engine.observer import NodeMessage, Observer
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
@@ -179,6 +179,8 @@ class Engine:
                 self.record_stop()
             self._follow_nodes()
             extra = [Advice("error", self._notice)] if self._notice else []
+            if self.recorder is not None:
+                extra += disk_advice(str(self.recorder.path.parent), self.recorder.disk.seconds_left)
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
             outputs = self._outputs
             extra += [] if outputs is None else [Advice("warning", text) for text in outputs.complaints()]

@@ -58,7 +58,8 @@ class Observer:
             state_rate_hz=self._pipeline.states.rate_hz(now_ns), nodes=nodes,
             advice=most_urgent_first((*extra, *self._advice(nodes, running, now_ns))), latency=self._latency,
             log_path="" if recorder is None else str(recorder.path),
-            log_bytes=0 if recorder is None else recorder.bytes_written)
+            log_bytes=0 if recorder is None else recorder.bytes_written,
+            log_seconds=0.0 if recorder is None else recorder.seconds, replaying=self._source.log_path)
 
     def _condition(self, running: bool, nodes: tuple[NodeStatus, ...], now_ns: int) -> Condition:
         if not running:

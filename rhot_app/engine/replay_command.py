@@ -32,6 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="N",
                         help="times real time, or max for as fast as possible (default 1)")
+    parser.add_argument("--smooth", action="store_true",
+                        help="reserved for a pass that also uses what comes after each instant; refused as yet")
     parser.add_argument("--json", action="store_true",
                         help="serve nothing: replay at once and print a summary as one JSON object")
     parser.add_argument("--keep", action="store_true",
@@ -48,6 +50,9 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.sources.replay import LogReplay
     from rhot_app.tracking.make import make_tracker
 
+    if args.smooth:
+        raise RecordingError("--smooth is reserved: there is no pass yet that uses what comes after an instant. "
+                             "Leave it out, and choose --tracker model for the smoothest states.")
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
     reader = LogReader(args.path)
     rig = load_rig(args.rig) if args.rig is not None else reader.rig

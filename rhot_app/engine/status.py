@@ -69,6 +69,8 @@ class EngineStatus:
     log_path: str = ""  # empty when nothing is recorded
     log_bytes: int = 0
     outputs: tuple[OutputStatus, ...] = ()  # the live streams to other programs
+    log_seconds: float = 0.0  # how long it has been recorded
+    replaying: str = ""  # the log that is replayed; empty when nodes are live
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from typing import Any
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
+from rhot_app.recording.disk_watch import DiskWatch
 from rhot_app.recording.raw_log import PAYLOAD_MAX, Record, RecordKind, encode_header, encode_record
 
 QUEUE_LIMIT = 65_536
@@ -33,6 +34,8 @@ class Recorder:
         self.path = path
         self.bytes_written = 0
         self.failure = ""
+        self.disk = DiskWatch(path.parent)
+        self._began_s = time.monotonic()
         self._queue: SimpleQueue[Record] = SimpleQueue()
         self._missed = 0
         self._synced_bytes = 0
@@ -59,6 +62,11 @@ class Recorder:
     def recording(self) -> bool:
         """Whether records are still taken."""
         return not self.failure and not self._ending.is_set()
+
+    @property
+    def seconds(self) -> float:
+        """How long it has been written, s."""
+        return time.monotonic() - self._began_s
 
     def put(self, kind: RecordKind, node_id: int, t_master_ns: int, data: bytes) -> None:
         """Take one record; when the disk is too slow it is left out and the gap is recorded."""
@@ -126,6 +134,7 @@ class Recorder:
             self.step(_FLUSH_S)
             if time.monotonic() >= due_s:
                 self._sync()
+                self.disk.look(self.bytes_written, time.monotonic())
                 due_s = time.monotonic() + SYNC_S
             time.sleep(0.02)  # gather a batch: one write for many records, and the lock of the interpreter left alone
         while not self.failure and self._queue.qsize():

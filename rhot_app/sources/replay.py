@@ -88,6 +88,7 @@ class LogReplay:
         self.played_s = 0.0  # of the log's own time, from its first datagram
         self._deliver: Deliver = to_nobody
         self.receivers: tuple[NodeReceiver, ...] = ()
+        self.log_path = str(path)
         LogReader(path).close()
         self._path = path
         self._speed = speed

@@ -34,6 +34,11 @@ class ObservationSource(Protocol):
         ...
 
     @property
+    def log_path(self) -> str:
+        """The log that is replayed, "" of live nodes."""
+        ...
+
+    @property
     def changes(self) -> int:
         """Grows whenever a node's clock was set or a session began: the tracker must then forget."""
         ...

@@ -18,6 +18,7 @@ class UdpNodes:
     """`ObservationSource` of the rig's nodes. Receives as soon as it is made; admits frames once started."""
 
     live = True
+    log_path = ""
 
     def __init__(self, rig: Rig, own: KeyPair | None = None) -> None:
         """Open all ports; `own`: the master's keys, which paired nodes ask for. Raises SourceError when a port is taken

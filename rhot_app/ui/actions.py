@@ -18,6 +18,7 @@ CLOUD_KINDS = (("joints", "Of the hand's inner joints; the model tracker estimat
                ("markers", "Of the markers, as far as they are not the fingertips drawn already."))
 """Whose uncertainty can be drawn; the words are the settings' names too."""
 
+_SOURCE_PX = 220  # of a long file's name no more is shown, so that the window's word stays in sight
 _CALM_MS = 100  # the system may report the mouse over the button once more when the menu above it has gone
 
 
@@ -28,6 +29,7 @@ class Actions(QObject):
         super().__init__(parent)
         self.start = self._make("Start", "", "Tell the nodes to stream, or to stop (Space).")
         self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it (R).")
+        self.bookmark = self._make("Bookmark", "B", "Write a few words about this moment into the recording (B).")
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
         self.caps = QMenu("Cover a simulated camera", parent)
         self.caps.setToolTipsVisible(True)
@@ -36,6 +38,10 @@ class Actions(QObject):
                                 "write a rig file for them.")
         self.export = self._make("Export recording …", "Ctrl+E", "Write a recording's hand as a file for other "
                                  "programs: tables, motion capture, animation (Ctrl+E).")
+        self.open_recording = self._make("Open recording …", "Ctrl+Shift+O", "Track a recording and play it, in a "
+                                         "window of its own.")
+        self.recordings = self._make("Recordings …", "", "All recordings: how long and how well tracked; open, rename, "
+                                     "delete.")
         self.save_rig = self._make("Save rig", "Ctrl+S", "Write the rig as it is now to its file; what stood there is "
                                    "kept beside it.")
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
@@ -105,8 +111,9 @@ class MainToolBar(QToolBar):
         self.addAction(actions.record)
         self.addSeparator()
         a = actions
-        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.caps.menuAction(), a.save_rig,
-                                                 a.close_rig, None, a.export, None, a.quit])
+        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.open_recording, a.recordings,
+                                                 a.bookmark, a.export, None, a.caps.menuAction(), a.save_rig,
+                                                 a.close_rig, None, a.quit])
         self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
                                                              a.markers, a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now,
@@ -115,6 +122,11 @@ class MainToolBar(QToolBar):
         spacer = QWidget()
         spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.addWidget(spacer)
+        self.source_label = QToolButton()
+        self.source_label.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.source_label.clicked.connect(actions.bookmark.trigger)
+        self._source_place = self.addWidget(self.source_label)
+        self._source_place.setVisible(False)
         self.rig_label = QLabel("")
         self.rig_label.setProperty("muted", True)
         self.addWidget(self.rig_label)
@@ -147,6 +159,15 @@ class MainToolBar(QToolBar):
             unsaved = "\nThe engine's rig differs from this file; Rig, Save rig writes it." if edited else ""
             self.rig_label.setToolTip(f"{path}{unsaved}")
 
+    def show_source(self, text: str, meaning: str) -> None:
+        """That what is seen is being recorded, or is a replay; "" for neither. While recording a click sets a bookmark.
+        """
+        text = self.source_label.fontMetrics().elidedText(text, Qt.TextElideMode.ElideMiddle, _SOURCE_PX)
+        if text != self.source_label.text():
+            self.source_label.setText(text)
+            self.source_label.setToolTip(meaning)
+            self._source_place.setVisible(bool(text))
+
     def set_scheme(self, actions: Actions, scheme: Scheme, *, running: bool, recording: bool) -> None:
         """Words and icons of the two buttons that change."""
         ratio = self.devicePixelRatioF()
@@ -155,6 +176,7 @@ class MainToolBar(QToolBar):
         actions.record.setText("Stop recording" if recording else "Record")
         actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
         self.badge.set_scheme(scheme)
+        self.source_label.setStyleSheet(f"color: {scheme.accent}; font-weight: 700;")
 
 
 def _calm_down(button: QToolButton) -> None:

@@ -23,6 +23,7 @@ SAMPLE_S = 0.1
 RESTART_TRIES = 3
 RESTART_FORGET_S = 60.0
 TWIN_CHECK_S = 0.5
+LOOK_S = 1.0
 RESTART_TWIN = "twin"
 RESTART_ENGINE = "engine"
 _CLOSE_WAIT_S = 15.0
@@ -51,7 +52,9 @@ class Controller(QObject):
         self._was_running = False
         self.twin_gone = False
         self.twin_pace: TwinPace | None = None
-        self._next_sample = self._next_twin_check = 0.0
+        self._next_sample = self._next_twin_check = self._next_look = 0.0
+        self._attaching: Job | None = None
+        self._known_engine = False  # one that runs was closed, or is none that appeared meanwhile
         self._begin_after_opening = False
 
     # -- opening and closing ---------------------------------------------------------------------------------------
@@ -160,6 +163,7 @@ class Controller(QObject):
 
     def _on_closed(self, left_running: str) -> None:
         self._job = None
+        self._known_engine = True  # until none runs any more
         self._set_busy(None)
         if left_running:
             self.problem = left_running
@@ -225,6 +229,8 @@ class Controller(QObject):
 
     def step(self) -> None:
         """Pull what arrived, sample the windows ten times a second, watch over engine and simulated nodes."""
+        if self.opened is None:
+            self._look_for_engine(time.monotonic())
         if self.link.client is None or self.opened is None:
             return
         try:
@@ -243,6 +249,22 @@ class Controller(QObject):
             self._restart(now)
         elif self.live.status is not None:
             self._was_running = self.live.status.running
+
+    def _look_for_engine(self, now: float) -> None:
+        """Attach to an engine that somebody starts while no rig is open, such as ``rhot replay``, once it answers."""
+        if now < self._next_look or self._job is not None or self._attaching is not None:
+            return
+        self._next_look = now + LOOK_S
+        found = self.backend.found()
+        self._known_engine &= found
+        if found and not self._known_engine:
+            self._attaching = Job(lambda progress: self.backend.attach(progress.report), self._attached,
+                                  lambda sentence: self._attached(None), None, self).start()
+
+    def _attached(self, opened: Opened | None) -> None:
+        self._attaching = None
+        if opened is not None and self.opened is None and self._job is None:
+            self._on_opened(opened)
 
     def _restart(self, now: float) -> None:
         """Start a vanished engine again, a few times in a minute and then no more until asked."""

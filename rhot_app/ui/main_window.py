@@ -28,12 +28,13 @@ from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.passing import PassingNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.recordings import SHOW_FOLDER, Recordings
+from rhot_app.ui.replay.desk import ReplayDesk
 from rhot_app.ui.rig_watch import RigWatch
 from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
 from rhot_app.ui.theme import scheme_named
-from rhot_app.ui.voice import look_of, notices_of
+from rhot_app.ui.voice import label_of, look_of, notices_of
 from rhot_app.ui.welcome import WelcomePage
 from rhot_app.ui.wizards.catalogue import OPEN_WIZARD, WIZARDS, wizard_named
 from rhot_app.ui.wizards.launcher import Launcher
@@ -60,6 +61,7 @@ class MainWindow(QMainWindow):
         self.rig_watch = RigWatch(controller)
         self.wizards = Launcher(controller.backend.asker, controller.backend.client,
                                 lambda: self.appearance.scheme, settings, self)
+        self.replays = ReplayDesk(settings, lambda: self.appearance.scheme, self)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
         scheme = scheme_named(settings.scheme)
@@ -105,10 +107,13 @@ class MainWindow(QMainWindow):
         a.start.triggered.connect(c.start_or_stop)
         QShortcut(QKeySequence(Qt.Key.Key_Space), self).activated.connect(self._press_space)
         a.record.triggered.connect(self.recordings.begin_or_end)
+        a.bookmark.triggered.connect(lambda: self.recordings.ask_for_bookmark(self))
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)
         a.nodes.triggered.connect(self.connect_nodes)
         a.export.triggered.connect(lambda: self.dialogs.export_recording())
+        a.open_recording.triggered.connect(self.replays.choose)
+        a.recordings.triggered.connect(self.replays.list)
         a.save_rig.triggered.connect(lambda: self.rig_watch.save(self.tell))
         a.close_rig.triggered.connect(c.close_rig)
         a.quit.triggered.connect(self.close)
@@ -136,6 +141,7 @@ class MainWindow(QMainWindow):
         c.busy_changed.connect(self._show_busy)
         c.failed.connect(self._show_failure)
         self.appearance.scheme_changed.connect(self._recolour_buttons)
+        self.appearance.scheme_changed.connect(lambda: self.replays.set_scheme(self.appearance.scheme))
         self.docks.docks[2].visibilityChanged.connect(c.set_preview)
 
     def _connect_wizards(self) -> None:
@@ -245,6 +251,7 @@ class MainWindow(QMainWindow):
         status = self.controller.live.status
         rate = status.state_rate_hz if status is not None and not self.controller.engine_gone else None
         self.toolbar.badge.show_look(look_of(self.controller), rate)
+        self.toolbar.show_source(*label_of(self.controller))
         self.advice.show_notices(notices_of(self.controller, self.passing.current(now)))
 
     def _recolour_buttons(self) -> None:
@@ -303,4 +310,5 @@ class MainWindow(QMainWindow):
         self.settings.sync()
         self.dialogs.close()
         self.wizards.close()
+        self.replays.close()
         event.accept()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -9,17 +10,20 @@ from pathlib import Path
 from platformdirs import user_documents_path
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QWidget
 
+from rhot_app.ui.bookmark_dialog import BookmarkDialog
 from rhot_app.ui.controller import Controller
 from rhot_app.ui.models.notice import Level, Notice
 from rhot_app.ui.models.rows import bytes_text
 
 LOG_SUFFIX = ".rhotlog"
+LOG_FILTER = f"Recordings (*{LOG_SUFFIX});;All files (*)"
 SHOW_FOLDER = "show the recording's folder"
 
 
 def recordings_folder() -> Path:
-    """Where recordings are made: the folder RHOT of the user's documents."""
+    """Where recordings are made; it may not exist yet."""
     return user_documents_path() / "RHOT"
 
 
@@ -31,6 +35,7 @@ class Recordings:
         self._tell = tell
         self._log_path = ""
         self._finished = Path()
+        self.dialog: BookmarkDialog | None = None
 
     def begin_or_end(self) -> None:
         """Begin a log in the documents folder, named by date and time; or end the one that is being written."""
@@ -44,6 +49,26 @@ class Recordings:
             self._say("error", f"{folder}: cannot be made ({exc.strerror}), so nothing is recorded.")
             return
         self._controller.record(folder / f"{datetime.now():%Y-%m-%d_%H-%M-%S}{LOG_SUFFIX}")
+
+    def ask_for_bookmark(self, window: QWidget) -> None:
+        """Ask for a few words about this moment, and have the engine write them into the log."""
+        if not self._controller.recording:
+            self._say("info", "Nothing is being recorded, so there is nothing to put a bookmark into. R records.")
+            return
+        if self.dialog is not None:
+            return
+        at_ns = time.monotonic_ns()  # the engine's clock too: it runs on this computer
+        self.dialog = BookmarkDialog(lambda text: self._set_bookmark(text, at_ns), window)
+        self.dialog.finished.connect(self._forget_dialog)
+
+    def _set_bookmark(self, text: str, at_ns: int) -> None:
+        self._controller.link.work(lambda client: client.command("bookmark", text=text, t_master_ns=at_ns),
+                                   lambda answer: self._say("info", f"Bookmark “{text}” is set."))
+
+    def _forget_dialog(self) -> None:
+        if self.dialog is not None:
+            self.dialog.deleteLater()
+            self.dialog = None
 
     def step(self) -> None:
         """Watch the engine's log; whoever ended it, and however, the person hears where the file is."""

@@ -1,4 +1,4 @@
-"""The shapes that go with the words: disc, ring, half, square, cross, tick, octagon, hatch; and the toolbar's signs."""
+"""The shapes that go with the words: disc, ring, half, square, cross, tick, octagon, hatch; and buttons' signs."""
 
 from __future__ import annotations
 
@@ -54,7 +54,31 @@ def paint_shape(painter: QPainter, shape: str, box: QRectF, colour: QColor) -> N
         painter.drawRect(inner.adjusted(width / 2, width / 2, -width / 2, -width / 2))
     elif shape == "info":
         _paint_info(painter, square, colour)
+    elif shape in _PLAYER_SIGNS:
+        _paint_player_sign(painter, shape, inner, colour)
     painter.restore()
+
+
+_PLAYER_SIGNS = ("pause", "next", "previous", "first", "last")
+
+
+def _paint_player_sign(painter: QPainter, shape: str, box: QRectF, colour: QColor) -> None:
+    """The signs of a player: two bars, or a triangle with a bar at its tip (a step) or with two (to the end)."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(colour)
+    bar = 0.22 * box.width()
+    if shape == "pause":
+        painter.drawRect(QRectF(box.left() + 0.1 * box.width(), box.top(), bar, box.height()))
+        painter.drawRect(QRectF(box.right() - 0.1 * box.width() - bar, box.top(), bar, box.height()))
+        return
+    if shape in ("previous", "first"):  # the mirror image
+        painter.translate(2.0 * box.center().x(), 0.0)
+        painter.scale(-1.0, 1.0)
+    bars = 2 if shape in ("first", "last") else 1
+    tip = box.right() - bars * 1.4 * bar + 0.4 * bar
+    painter.drawPolygon(QPolygonF([box.topLeft(), box.bottomLeft(), QPointF(tip, box.center().y())]))
+    for number in range(bars):
+        painter.drawRect(QRectF(box.right() - bar - number * 1.4 * bar, box.top(), bar, box.height()))
 
 
 def _paint_octagon(painter: QPainter, square: QRectF, colour: QColor) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
-from rhot_app.engine.status import Advice
+from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.ui.backend.contract import TwinPace
 from rhot_app.ui.controller import RESTART_ENGINE, RESTART_TWIN, Controller
 from rhot_app.ui.models.notice import Notice
@@ -47,10 +48,28 @@ def _notices(controller: Controller) -> list[Notice]:
     if status is not None and not controller.engine_gone:
         notices += [_advice_notice(advice) for advice in status.advice]
         if status.log_path:
-            notices.append(Notice("info", f"Recording to {status.log_path} ({bytes_text(status.log_bytes)})."))
+            notices.append(Notice("info", f"Recording to {status.log_path} ({recording_text(status)})."))
     if controller.twin_pace is not None and controller.running:
         notices.append(_pace_notice(controller.twin_pace))
     return notices
+
+
+def recording_text(status: EngineStatus) -> str:
+    """Length and size of what is being recorded, e.g. "1:02, 3.2 MB"."""
+    minutes, seconds = divmod(int(status.log_seconds), 60)
+    return f"{minutes}:{seconds:02d}, {bytes_text(status.log_bytes)}"
+
+
+def label_of(controller: Controller) -> tuple[str, str]:
+    """What stands before the rig's name while something is recorded or replayed, and its tooltip; "" for nothing."""
+    status = controller.live.status
+    if status is None or controller.engine_gone:
+        return "", ""
+    if status.log_path:
+        return f"REC {recording_text(status)}", f"Recording to {status.log_path}. A click here, or B, sets a bookmark."
+    if status.replaying:
+        return f"REPLAY {Path(status.replaying).name}", f"An engine replays {status.replaying}; Start replays it again."
+    return "", ""
 
 
 def _advice_notice(advice: Advice) -> Notice:

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from rhot_app.calibration.rig_checks import check_rig
-from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
+from rhot_app.engine.advice import NodeFacts, calibration_advice, disk_advice, no_marker_advice, node_advice
 from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import NodeStatus
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig, with_tracker
@@ -116,3 +116,12 @@ def test_a_rig_known_exactly_and_one_that_was_calibrated_need_no_words() -> None
     unproven = msgspec.structs.replace(calibrated, calibration=CameraCalibration("board", "skipped", 5e-4))
     (advice,) = calibration_advice(unproven)
     assert advice.text.startswith("Lengths were never checked against a ruler.") and advice.mender == "stereo"
+
+
+@pytest.mark.parametrize(("seconds", "level", "words"), [(599.0, "warning", "in 9 minutes"),
+                                                         (119.0, "warning", "in about a minute"),
+                                                         (20.0, "error", "in less than a minute")])
+def test_a_disk_that_will_be_full_is_told_in_minutes(seconds: float, level: str, words: str) -> None:
+    (advice,) = disk_advice("/data/RHOT", seconds)
+    assert advice.level == level and words in advice.text and "/data/RHOT" in advice.text
+    assert disk_advice("/data/RHOT", 600.0) == disk_advice("/data/RHOT", float("inf")) == []

@@ -3,6 +3,7 @@
 import resource
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import msgspec
 import numpy as np
@@ -130,8 +131,9 @@ def test_log_replays_to_the_same_states(tmp_path: Path, rig: Rig, bench: Bench, 
         bench.engine.record(tmp_path / "b.log")
     first = len(bench.published)
     bench.until_published(60)
-    assert bench.engine.status().log_bytes > 0
+    assert bench.engine.status().log_bytes > 0 and 0.0 < bench.engine.status().log_seconds < 60.0
     bench.engine.record_stop()
+    assert bench.engine.status().log_seconds == 0.0 and bench.engine.status().replaying == ""
     live = np.array([_decode_state(payload).t_master_ns for payload in bench.published[first:]])
     reader = LogReader(tmp_path / "a.log")
     summary = summarise(reader, reader.rig, FakeTracker(rig))
@@ -158,6 +160,17 @@ def test_tracking_goes_on_when_the_disk_is_full(tmp_path: Path, bench: Bench, no
     bench.until_published(len(bench.published) + 20)
     assert bench.engine.status().log_path == ""
     assert any(record.kind is RecordKind.DATAGRAM for record in LogReader(tmp_path / "a.log"))
+
+
+def test_a_disk_that_fills_is_told_before_it_is_full(tmp_path: Path, bench: Bench, nodes: list[SyntheticNode],
+                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rhot_app.recording.disk_watch.os.statvfs",
+                        lambda path: SimpleNamespace(f_bavail=9, f_frsize=512))
+    bench.engine.start()
+    bench.engine.record(tmp_path / "a.log")
+    bench.run_until(lambda: any("will be full" in advice.text for advice in bench.engine.status().advice))
+    bench.engine.record_stop()
+    assert not any("will be full" in advice.text for advice in bench.engine.status().advice)
 
 
 def _decode_state(payload: bytes) -> HandState:

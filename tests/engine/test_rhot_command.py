@@ -53,6 +53,7 @@ def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
         (("replay", str(tmp_path / "foreign.log"), "--json"), "foreign.log: this is not a raw log"),
         (("engine", "--rig", str(tmp_path / "foreign.log")), "foreign.log: not valid JSON"),
         (("engine", "--rig", str(tmp_path / "binary.log")), "binary.log: this is no text, so no rhot-rig file"),
+        (("replay", str(tmp_path / "foreign.log"), "--smooth"), "--smooth is reserved"),
         (("replay", str(tmp_path / "foreign.log"), "--speed", "fast"), "fast is neither a number nor max"),
         (("replay", str(tmp_path / "foreign.log"), "--jsn"), "there is no '--jsn' here; did you mean --json?"),
         (("dance",), "dance"),

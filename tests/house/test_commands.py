@@ -17,7 +17,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot": ("--version", "demo", "engine", "replay", "simulate", "evaluate"),
     "rhot demo": ("--motion", "--seed"),
     "rhot engine": ("--rig", "--log", "--output", "--web"),
-    "rhot replay": ("LOG", "--rig"),
+    "rhot replay": ("LOG", "--rig", "--keep", "--smooth"),
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot recover": ("LOG", "--out", "--rig"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",

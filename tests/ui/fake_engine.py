@@ -85,6 +85,7 @@ class FakeEngine:
         self.lost = {node.name: 0 for node in self.rig.nodes}
         self.dead = False
         self.log_path = ""
+        self.replaying = ""
         self.rig_path = ""
         self.refuse_rig = ""  # why the engine takes no other rig
         self.scale = (1.03, 0.017)  # what a floating hand's size is estimated to be
@@ -188,7 +189,8 @@ class FakeEngine:
             advice=(*self.advice, *calibration_advice(self.rig)),
             latency={stage: LatencySummary(value, 1.4 * value)
                      for stage, value in zip(LATENCY_STAGES, _STAGE_S, strict=True)},
-            log_path=self.log_path, log_bytes=120_000 if self.log_path else 0)
+            log_path=self.log_path, log_bytes=120_000 if self.log_path else 0,
+            replaying=self.replaying)
 
     def preview(self, camera: int, t_s: float) -> Preview:
         """A picture of the hand as a camera would see it: skin and painted tips on a cluttered desk."""

@@ -20,7 +20,7 @@ def test_r_records_and_says_where_the_file_is(tracking, tmp_path, monkeypatch):
     tracking.until(lambda: engine.log_path)
     path = Path(engine.log_path)
     assert path.suffix == ".rhotlog" and path.parent == tmp_path / "RHOT"
-    tracking.until(lambda: advice.texts == [f"Recording to {path} (120.0 kB)."])
+    tracking.until(lambda: advice.texts == [f"Recording to {path} (0:00, 120.0 kB)."])
     tracking.press(Qt.Key.Key_R)
     tracking.until(lambda: advice.texts == [f"Recorded 120.0 kB to {path}."])
     opened = []

@@ -27,6 +27,8 @@ TERMS: dict[str, str] = {
     "solve": "From points to the hand's joints.",
     "publish": "From the finished state to the clients.",
     "rate": "States per second and frames per second of each node; bars show lost datagrams per second.",
+    "fingertip difference": "How far the fingertips of the two runs are apart at the same instant, in mm. p50 and p95 "
+                            "are over the whole recording.",
     "measured": "Seen by enough cameras at this instant. Drawn solid.",
     "inferred": "Follows from what is measured through the hand model, or from a half-hidden sight. "
                 "Drawn translucent.",

@@ -53,6 +53,23 @@ class Series:
         return np.asarray(seconds[inside], dtype=np.float64), self._rows[order][inside]
 
 
+class RecordedSeries(Series):
+    """All rows of a recording, to be looked at from any instant of it. A pause longer than `gap_s` is a row of NaN."""
+
+    def __init__(self, names: tuple[str, ...], times_ns: NDArray[np.int64], rows: Array, gap_s: float = 1.0) -> None:
+        """`times_ns` (n,) grow; `rows` (n, columns)."""
+        super().__init__(names, capacity=1)
+        pauses = np.flatnonzero(np.diff(times_ns) > 1e9 * gap_s) + 1
+        self._times = np.insert(times_ns, pauses, times_ns[pauses - 1] + 1)
+        self._rows = np.insert(rows, pauses, np.nan, axis=0)
+        self._count = len(self._times)
+
+    def window(self, now_ns: int, span_s: float) -> tuple[Array, Array]:
+        """Rows of the `span_s` seconds before `now_ns`: seconds from then (n,), all <= 0, and values (n, columns)."""
+        begin, end = np.searchsorted(self._times, [now_ns - round(1e9 * span_s), now_ns + 1])
+        return np.asarray((self._times[begin:end] - now_ns) * 1e-9), self._rows[begin:end]
+
+
 def to_csv(seconds: Array, rows: Array, names: tuple[str, ...], unit: str) -> str:
     """Comma-separated text with a heading; times in s before now, an empty field where there is no value."""
     head = ",".join(["time [s]", *(f"{name} [{unit}]" if unit else name for name in names)])

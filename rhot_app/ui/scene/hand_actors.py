@@ -19,10 +19,14 @@ Colours = NDArray[np.uint8]
 
 
 class HandActors:
-    """The moving items of one hand in one colour scheme. `items` are to be added to the view, in drawing order."""
+    """The moving items of one hand in one colour scheme. `items` are to be added to the view, in drawing order.
 
-    def __init__(self, hand: OneHand, scheme: Scheme) -> None:
+    `opacity` 0..1 makes all of them translucent.
+    """
+
+    def __init__(self, hand: OneHand, scheme: Scheme, opacity: float = 1.0) -> None:
         self._scheme = scheme
+        self._opacity = opacity
         self._hand = hand
         self._skin = HandMesh(hand.anatomy)
         self._skeleton = SkeletonMesh()
@@ -65,9 +69,11 @@ class HandActors:
         if choice is not None and choice.any:
             self._draw(self._ellipsoid_item, self._ellipsoids.pose(state, choice), self._ellipsoids.colours)
 
-    @staticmethod
-    def _draw(item: MeshItem, mesh: PosedMesh, colours: Colours) -> None:
+    def _draw(self, item: MeshItem, mesh: PosedMesh, colours: Colours) -> None:
         """What is guessed is hatched, whatever it is."""
+        if self._opacity < 1.0:
+            colours = colours.copy()
+            colours[:, 3] = self._opacity * colours[:, 3]
         item.set_vertices(mesh.vertices, mesh.normals, colours, mesh.knowledge == Knowledge.GUESSED)
 
     def _pose_shadow(self, skin: PosedMesh) -> None:

@@ -17,7 +17,7 @@ from rhot_app.ui.models.hands import each_hand, hand_names
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.scene import stage
-from rhot_app.ui.scene.actors import Actors
+from rhot_app.ui.scene.actors import Actors, second_actors
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import Up, camera_like, camera_like_state, frustum_lines, to_display
 from rhot_app.ui.scene.labels import LabelPainter, TextStyle, pixels_of
@@ -57,6 +57,9 @@ class SceneView(GLViewWidget):
         self._state: HandState | None = None
         self._in_rig: HandState | None = None
         self._actors: Actors | None = None
+        self._second_rig: Rig | None = None
+        self._second_state: HandState | None = None
+        self._second: Actors | None = None
         self._labels = LabelPainter()
         self._legend = Legend()
         self._show_labels = True
@@ -80,12 +83,22 @@ class SceneView(GLViewWidget):
         self._state = self._in_rig = None
         self._rebuild()
 
-    def show_state(self, state: HandState | None) -> None:
-        """Pose hands and markers; None hides them, and so does a state that came before its rig or after it."""
-        if state is not None and self._rig is not None and state.marker_ids != self._rig.markers.ids:
-            state = None
+    def show_second_rig(self, rig: Rig | None) -> None:
+        """Whose hands are drawn beside the first ones, translucent and in another colour; None for nobody's."""
+        self._second_rig = rig
+        self._second_state = None
+        self._rebuild()
+
+    def show_state(self, state: HandState | None, second: HandState | None = None) -> None:
+        """Pose hands and markers; None hides them, and so does a state that came before its rig or after it.
+
+        `second`: a state of the second rig.
+        """
+        state = _of_rig(state, self._rig)
+        second = _of_rig(second, self._second_rig)
         self._in_rig = state
         self._state = None if state is None else camera_like_state(state, self._up)
+        self._second_state = None if second is None else camera_like_state(second, self._up)
         self._pose()
         self.update()
 
@@ -196,6 +209,9 @@ class SceneView(GLViewWidget):
             self._actors.ellipsoids = self._ellipsoids
             for item in self._actors.items:
                 self.addItem(item)
+        self._second = second_actors(self._second_rig, self._scheme) if self._second_rig is not None else None
+        for item in self._second.items if self._second is not None else ():
+            self.addItem(item)
         self._pose()
         self.update()
 
@@ -204,12 +220,11 @@ class SceneView(GLViewWidget):
         return "-y" if self._rig is None else self._rig.up
 
     def _pose(self) -> None:
-        if self._actors is None:
-            return
-        if self._state is None:
-            self._actors.hide()
-        else:
-            self._actors.pose(self._state)
+        for actors, state in ((self._actors, self._state), (self._second, self._second_state)):
+            if actors is not None and state is not None:
+                actors.pose(state)
+            elif actors is not None:
+                actors.hide()
 
     def _add_lines(self, segments: Array, colour: Array | str, width: float = 1.0, depth: int = -10) -> None:
         item = GLLinePlotItem(pos=segments, color=colour if isinstance(colour, np.ndarray) else pg.mkColor(colour),
@@ -249,3 +264,8 @@ class SceneView(GLViewWidget):
             text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self._actors.cut,
                                   pictures_alone=self._by_calibration.sd_m != 0.0)
             self._legend.paint(painter, self.height(), self._scheme, text)
+
+
+def _of_rig(state: HandState | None, rig: Rig | None) -> HandState | None:
+    """`state`, unless it has another rig's markers."""
+    return state if state is None or rig is None or state.marker_ids == rig.markers.ids else None

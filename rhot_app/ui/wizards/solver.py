@@ -17,6 +17,7 @@ from typing import Any
 
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress
+from rhot_app.ui.wizards.solver_process import NICENESS
 
 _COMMAND = (sys.executable, "-m", "rhot_app.ui.wizards.solver_process")
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -32,7 +33,9 @@ class StoppedError(CalibrationError):
 class Solver:
     """Runs one piece of work at a time. `run` waits, so call it in a worker; `stop` may be called from any thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, niceness: int = NICENESS) -> None:
+        """`niceness` of the process; by default it takes only what nobody else wants."""
+        self._command = (*_COMMAND, str(niceness))
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -66,8 +69,8 @@ class Solver:
             self._end(process)
             if stopped:
                 raise StoppedError("Stopped.") from exc
-            raise CalibrationError("The solving process ended unexpectedly; try again. If it happens again, use fewer "
-                                   "pictures: it may have run out of memory.") from exc
+            raise CalibrationError("The process that computes ended unexpectedly; try again. If it happens again, it "
+                                   "may have run out of memory: use fewer pictures or a shorter recording.") from exc
         except BaseException:  # whoever watches the progress wants no more of it
             self._end(process)
             raise
@@ -82,7 +85,7 @@ class Solver:
     def _started(self) -> subprocess.Popen[bytes]:
         with self._lock:
             if self._process is None or self._process.poll() is not None:
-                self._process = subprocess.Popen(_COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                self._process = subprocess.Popen(self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                                  env={**os.environ, **_ONE_THREAD})
             return self._process
 

@@ -1,4 +1,4 @@
-"""The process in which long work of the wizards runs: ``python -m rhot_app.ui.wizards.solver_process``. No Qt.
+"""The process in which long work of the app runs: ``python -m rhot_app.ui.wizards.solver_process [NICENESS]``. No Qt.
 
 It reads pickled messages from standard input: a module's name to import in good time, or (function, arguments,
 options) to run.
@@ -71,7 +71,7 @@ def main() -> None:
     sink = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a library prints must not end up among the answers
     with contextlib.suppress(OSError, AttributeError):
-        os.nice(NICENESS - os.nice(0))
+        os.nice((int(sys.argv[1]) if len(sys.argv) > 1 else NICENESS) - os.nice(0))
     with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
         serve(sys.stdin.buffer, sink)
 

@@ -1,0 +1,80 @@
+"""The replay window's toolbar: the REPLAY badge with the file's name, runs, bookmarks, and the state's word."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
+
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.panels.state_badge import StateBadge
+from rhot_app.ui.replay.session import Replay
+
+_NAME_PX = 240
+
+
+class ReplayToolBar(QToolBar):
+    """`bookmark_chosen` gives a position, s."""
+
+    bookmark_chosen = Signal(float)
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__("Replay", parent)
+        self.setObjectName("replay toolbar")
+        self.setMovable(False)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+        self.word = QLabel("REPLAY")
+        self.name = QLabel("")
+        self.open = self._action("Open …", "Open a recording (Ctrl+O).")
+        self.again = self._action("Track again …", "Track the recording with another tracker, rig or hand.")
+        self.compare = self._action("Compare …", "Track it in another way too, and show both hands together.")
+        self.alone = self._action("End comparison", "Show one run alone again.")
+        self.remove = self._action("Remove the bookmark here", "Remove the bookmark at which the recording stands.")
+        self.bookmarks_button, self.menu = QToolButton(), QMenu(self)
+        self.bookmarks_button.setText("Bookmarks")
+        self.bookmarks_button.setToolTip("Moments that were marked, while recording or here; choose one to go there.")
+        self.bookmarks_button.setMenu(self.menu)
+        self.bookmarks_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.badge = StateBadge(scheme)
+        self.addWidget(self.word)
+        self.addWidget(self.name)
+        self.addSeparator()
+        self.addActions([self.open, self.again, self.compare, self.alone])
+        self.addWidget(self.bookmarks_button)
+        spacer = QWidget()
+        spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self.addWidget(spacer)
+        self.addWidget(self.badge)
+        self.set_scheme(scheme)
+        self.show_replay(None)
+
+    def _action(self, text: str, meaning: str) -> QAction:
+        action = QAction(text, self)
+        action.setToolTip(meaning)
+        return action
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self.word.setStyleSheet(f"background: {scheme.accent}; color: {scheme.on_accent}; border-radius: 6px; "
+                                "padding: 4px 10px; font-weight: 700;")
+        self.badge.set_scheme(scheme)
+
+    def show_replay(self, replay: Replay | None) -> None:
+        """Another recording, another run, or other bookmarks."""
+        name = replay.path.name if replay is not None else "no recording"
+        self.name.setText(f" {self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideMiddle, _NAME_PX)}  ")
+        self.name.setToolTip(str(replay.path) if replay is not None else "")
+        for action in (self.again, self.compare):
+            action.setEnabled(replay is not None)
+        self.alone.setVisible(replay is not None and replay.second is not None)
+        self.bookmarks_button.setEnabled(replay is not None)
+        self.menu.clear()
+        for mark in replay.bookmarks if replay is not None else ():
+            assert replay is not None
+            position = replay.seconds_of(mark.t_master_ns)
+            entry = self.menu.addAction(replay.bookmark_text(mark))
+            entry.triggered.connect(lambda checked=False, position=position: self.bookmark_chosen.emit(position))
+        if replay is not None and not replay.bookmarks:
+            self.menu.addAction("No bookmarks yet: B sets one.").setEnabled(False)
+        self.menu.addSeparator()
+        self.menu.addAction(self.remove)

@@ -1,0 +1,301 @@
+"""The replay's window: the scene and the plots of a recording at any moment of it. A timer plays and shows."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QComboBox,
+    QFileDialog,
+    QMainWindow,
+    QVBoxLayout,
+    QWidget,
+)
+
+from rhot_app.engine.observer import condition_of
+from rhot_app.recording.bookmarks import Bookmark
+from rhot_app.ui.guide import GuideViewer
+from rhot_app.ui.models.notice import Level, Notice
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.passing import PassingNotices
+from rhot_app.ui.models.words import Look, condition_look
+from rhot_app.ui.panels.advice_bar import AdviceBar
+from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
+from rhot_app.ui.replay.bookmark_writer import BookmarkWriter
+from rhot_app.ui.replay.comparison import Comparison
+from rhot_app.ui.replay.run import Run
+from rhot_app.ui.replay.run_dialog import RunDialog
+from rhot_app.ui.replay.screen import ReplayScreen
+from rhot_app.ui.replay.session import Choice, Replay
+from rhot_app.ui.replay.toolbar import ReplayToolBar
+from rhot_app.ui.replay.tracking_work import TrackingWork
+from rhot_app.ui.replay.work_strip import WorkStrip
+from rhot_app.ui.settings import Settings
+
+TICK_MS = 16
+_SIZE = (1280, 800)
+_AT_BOOKMARK_S = 0.02  # a bookmark is where it was set, to a state or two
+
+_NO_STATE = Look("NO STATE", "cross", "bad", "The recording has no state at this moment.")
+
+
+class ReplayWindow(QMainWindow):
+    """`open` tracks a recording and shows it. `tick` is one turn of the timer, so that tests can turn by hand."""
+
+    def __init__(self, settings: Settings, scheme: Scheme, states: Path | None = None,
+                 parent: QWidget | None = None) -> None:
+        """`states`: the folder for the states of open recordings."""
+        super().__init__(parent)
+        self.setObjectName("replay window")
+        self.setWindowTitle("RHOT replay")
+        self.setProperty("guide", "recording")
+        self.resize(*_SIZE)
+        self.replay: Replay | None = None
+        self.work = TrackingWork(states, self)
+        self.dialog: RunDialog | None = None
+        self.bookmarks = BookmarkWriter(self)
+        self.guide: GuideViewer | None = None
+        self.passing = PassingNotices()
+        self.toolbar = ReplayToolBar(scheme, self)
+        self.strip = WorkStrip()
+        self.parts = ReplayScreen(settings, scheme)
+        self.advice = AdviceBar(scheme)
+        self._lay_out()
+        self._connect()
+        self._show_run()
+        self.work.solver.prepare("rhot_app.ui.replay.run")
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start(TICK_MS)
+
+    # -- putting it together ---------------------------------------------------------------------------------------
+
+    def _lay_out(self) -> None:
+        page = QWidget()
+        layout = QVBoxLayout(page)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(4)
+        layout.addWidget(self.strip)
+        layout.addWidget(self.parts, 1)
+        layout.addWidget(self.advice)
+        self.setCentralWidget(page)
+        self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.toolbar)
+
+    def _connect(self) -> None:
+        bar, row = self.toolbar, self.parts.transport
+        bar.open.triggered.connect(self.choose)
+        bar.again.triggered.connect(lambda: self.ask_for_run(beside=False))
+        bar.compare.triggered.connect(lambda: self.ask_for_run(beside=True))
+        bar.alone.triggered.connect(self.stop_comparing)
+        bar.remove.triggered.connect(self.remove_bookmark)
+        bar.bookmark_chosen.connect(self.seek)
+        self.strip.cancel_asked.connect(self.work.cancel)
+        self.work.changed.connect(self._show_work)
+        self.work.done.connect(self._take_run)
+        self.work.failed.connect(lambda sentence: self.tell("error", sentence))
+        self.bookmarks.written.connect(self._show_bookmarks)
+        self.bookmarks.failed.connect(lambda sentence: self.tell("error", sentence))
+        self.parts.timeline.sought.connect(self.seek)
+        row.play_asked.connect(self.toggle)
+        row.step_asked.connect(self.step)
+        row.first_asked.connect(lambda: self.seek(0.0))
+        row.last_asked.connect(self.go_to_end)
+        row.speed_chosen.connect(self.set_speed)
+        row.loop_begin_asked.connect(lambda: self._loop("begin"))
+        row.loop_end_asked.connect(lambda: self._loop("end"))
+        row.loop_clear_asked.connect(lambda: self._loop("clear"))
+        row.bookmark_asked.connect(self.ask_for_bookmark)
+        for plot in self.parts.plots:
+            plot.copied.connect(lambda sentence: self.tell("info", sentence))
+        for key, action in (("Space", self._press_space), ("Left", lambda: self.step(-1)),
+                            ("Right", lambda: self.step(1)), ("Home", lambda: self.seek(0.0)),
+                            ("End", self.go_to_end), ("B", self.ask_for_bookmark), ("[", lambda: self._loop("begin")),
+                            ("]", lambda: self._loop("end")), ("F", self.parts.scene.frame_hand),
+                            ("Ctrl+O", self.choose), ("F1", self.open_guide)):
+            QShortcut(QKeySequence(key), self).activated.connect(action)
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        for part in (self.toolbar, self.parts, self.advice):
+            part.set_scheme(scheme)
+
+    # -- opening and tracking --------------------------------------------------------------------------------------
+
+    def choose(self) -> None:
+        """Ask for a recording and open it."""
+        start = self.replay.path.parent if self.replay is not None else recordings_folder()
+        name, _ = QFileDialog.getOpenFileName(self, "Open a recording", str(start), LOG_FILTER)
+        if name:
+            self.open(Path(name))
+
+    def open(self, path: Path) -> None:
+        """Track a recording as it was recorded, and show it."""
+        self.work.start(path, Choice())
+
+    def follow(self, before: Path, after: Path) -> None:
+        """The file of the recording has another name now."""
+        if self.replay is not None and self.replay.path == before:
+            self.replay.path = after
+            self._show_name()
+
+    def _show_name(self) -> None:
+        self.toolbar.show_replay(self.replay)
+        self.setWindowTitle(f"{self.replay.path.name} – RHOT replay" if self.replay is not None else "RHOT replay")
+
+    def ask_for_run(self, *, beside: bool) -> None:
+        """Ask how to track it again."""
+        if self.replay is None:
+            return
+        self.dialog = RunDialog(beside=beside, parent=self)
+        self.dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        replay = self.replay
+        stays = replay.run if beside else replay.second
+        other = stays.tracked if stays is not None else None
+        self.dialog.chosen.connect(lambda choice: self.work.start(replay.path, choice, other))
+        self.dialog.open()
+
+    def stop_comparing(self) -> None:
+        """One run alone again."""
+        if self.replay is not None:
+            self.replay.compare(None)
+            self._show_run()
+
+    def _take_run(self, path: Path, run: Run, choice: Choice, comparison: Comparison | None) -> None:
+        if choice.beside and self.replay is not None and self.replay.path == path:
+            self.replay.compare(run, choice, comparison)
+        elif self.replay is not None and self.replay.path == path:
+            self.replay.use(run, choice, comparison)
+        else:
+            if self.replay is not None:
+                self.replay.close()
+            self.replay = Replay(path, run, choice)
+            self.passing.clear()
+            self.parts.show_recording()
+        self._show_run()
+
+    def _show_work(self) -> None:
+        self.strip.show_work(self.work.text if self.work.running else "", self.work.fraction, self.work.remaining)
+
+    def _show_run(self) -> None:
+        """Another recording, or other runs of it."""
+        self.parts.show_run(self.replay)
+        self._show_name()
+
+    # -- moving about ----------------------------------------------------------------------------------------------
+
+    def _press_space(self) -> None:
+        """Play or pause, unless the key means something where the focus is."""
+        focus = QApplication.focusWidget()
+        if isinstance(focus, QAbstractButton):
+            focus.click()
+        elif isinstance(focus, QComboBox):
+            focus.showPopup()
+        else:
+            self.toggle()
+
+    def toggle(self) -> None:
+        """Play or pause."""
+        if self.replay is not None:
+            self.replay.player.toggle(time.monotonic())
+
+    def step(self, count: int) -> None:
+        """So many states on, or back when negative."""
+        if self.replay is not None:
+            self.replay.player.step(count)
+
+    def seek(self, position_s: float) -> None:
+        """Go to a moment."""
+        if self.replay is not None:
+            self.replay.player.seek(position_s)
+
+    def go_to_end(self) -> None:
+        """The last state."""
+        if self.replay is not None:
+            self.seek(self.replay.player.duration_s)
+
+    def set_speed(self, speed: float) -> None:
+        """Times real time."""
+        if self.replay is not None:
+            self.replay.player.set_speed(speed, time.monotonic())
+
+    def _loop(self, what: str) -> None:
+        if self.replay is not None:
+            player = self.replay.player
+            {"begin": player.begin_loop, "end": player.end_loop, "clear": player.clear_loop}[what]()
+            self.parts.look_again()
+
+    # -- bookmarks -------------------------------------------------------------------------------------------------
+
+    def ask_for_bookmark(self) -> None:
+        """Ask for a few words about the moment that is shown now."""
+        if self.replay is not None:
+            self.bookmarks.ask(self.replay)
+
+    def remove_bookmark(self) -> None:
+        """Remove the bookmark at which the recording stands."""
+        mark = self._bookmark_here()
+        if self.replay is not None and mark is not None:
+            self.bookmarks.remove(self.replay, mark)
+
+    def _bookmark_here(self) -> Bookmark | None:
+        replay = self.replay
+        return None if replay is None else replay.bookmark_near(replay.player.position_s, _AT_BOOKMARK_S)
+
+    def _show_bookmarks(self) -> None:
+        self._show_name()
+        self.parts.look_again()
+
+    # -- every tick ------------------------------------------------------------------------------------------------
+
+    def tick(self) -> None:
+        """Play on, and show what is due."""
+        now = time.monotonic()
+        self.advice.show_notices(self._notices(now))
+        if self.replay is None:
+            return
+        self.replay.player.advance(now)
+        if self.parts.refresh(self.replay, now):
+            self.toolbar.remove.setEnabled(self._bookmark_here() is not None)
+        state = self.parts.state
+        look = condition_look(condition_of(state).value) if state is not None else _NO_STATE
+        self.toolbar.badge.show_look(look, self.replay.rate_hz)
+
+    def tell(self, level: Level, sentence: str) -> None:
+        """Show a sentence for a while."""
+        self.passing.show(Notice(level, sentence), time.monotonic())
+
+    def _notices(self, now: float) -> list[Notice]:
+        return [*self.passing.current(now), *lasting_notices(self.replay, working=self.work.running)]
+
+    def open_guide(self) -> None:
+        """The guide's page about recordings."""
+        if self.guide is None:
+            self.guide = GuideViewer(self)
+        self.guide.open_page("recording", "Replay")
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """Free the states and end the process that tracks."""
+        self._timer.stop()
+        self.work.close()
+        if self.replay is not None:
+            self.replay.close()
+            self.replay = None
+        super().closeEvent(event)
+
+
+def lasting_notices(replay: Replay | None, *, working: bool) -> list[Notice]:
+    """What is said of a recording as long as it is open."""
+    if replay is None:
+        return [Notice("info", "One moment. Cancel leaves nothing behind." if working else
+                       "Open a recording (Ctrl+O). F1 opens the guide.")]
+    said = [Notice("warning", replay.run.tracked.note)] if replay.run.tracked.note else []
+    if replay.second is not None:
+        said.append(Notice("info", f"Solid: {replay.choice.text}. Blue and translucent: {replay.second_choice.text}."))
+    return said or [Notice("info", f"Tracked {replay.choice.text}. Space plays, the arrow keys go from state to "
+                                   "state.")]

@@ -1,0 +1,246 @@
+"""The page of recordings as a person uses it: look, open, rename, delete, take back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from patience import PATIENCE_S
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit, QWidget
+
+from rhot_app.errors import RecordingError
+from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header, encode_record
+from rhot_app.recording.recorder import Recorder
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.replay.library import BAR_PARTS, TRASH, Library, summarise_log
+from rhot_app.ui.replay.library_table import BAR, LENGTH, NAME, RIG
+from rhot_app.ui.replay.library_window import LibraryWindow
+from rhot_app.ui.replay.run import NO_STATE, TRACKING
+
+
+class Shelf:
+    """The page and a person's hands."""
+
+    def __init__(self, folder: Path, cache: Path) -> None:
+        self.window = LibraryWindow(DARK, folder, cache)
+        self.opened: list[Path] = []
+        self.window.open_asked.connect(self.opened.append)
+        self.window.show()
+        self.window.activateWindow()
+        assert QTest.qWaitForWindowActive(self.window)
+        self.until(lambda: self.window._listing is None)
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end and not condition():
+            QTest.qWait(10)
+        assert condition()
+
+    @property
+    def names(self) -> list[str]:
+        return [self.text(row, NAME) for row in range(self.window.table.rowCount())]
+
+    def text(self, row: int, column: int) -> str:
+        return self.window.table.item(row, column).text()
+
+    def click(self, button: QWidget) -> None:
+        assert button.isEnabled()
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    def choose(self, name: str) -> None:
+        self.window.table.setFocus()
+        item = self.window.table.item(self.names.index(name), NAME)
+        QTest.mouseClick(self.window.table.viewport(), Qt.MouseButton.LeftButton,
+                         pos=self.window.table.visualItemRect(item).center())
+
+    def type_name(self, name: str) -> None:
+        edit = self.window.table.findChild(QLineEdit)
+        edit.selectAll()
+        QTest.keyClicks(edit, name)
+        QTest.keyClick(edit, Qt.Key.Key_Return)
+
+
+@pytest.fixture
+def folder(log: Path) -> Path:
+    """Three recordings: a hand that grasps, one of nothing, and a file of a later version."""
+    reader = LogReader(log)
+    reader.close()
+    (log.parent / "nothing.rhotlog").write_bytes(encode_header(reader.rig, {"created": "2026-01-02T03:04:05+00:00"}))
+    later = bytearray(log.read_bytes())
+    later[8] = 99
+    at = later.find(b"RHOTLOG", 10)
+    later[at + 8] = 99
+    (log.parent / "later.rhotlog").write_bytes(later)
+    return log.parent
+
+
+@pytest.fixture
+def shelf(themed: Any, folder: Path, tmp_path: Path) -> Iterator[Shelf]:
+    shelf = Shelf(folder, tmp_path / "cache")
+    yield shelf
+    shelf.window.close()
+    shelf.window.deleteLater()
+
+
+GRASP = "2026-05-01_10-00-00"
+
+
+def test_recordings_are_listed_with_rig_length_and_condition(shelf):
+    window = shelf.window
+    assert sorted(shelf.names) == sorted([GRASP, "nothing", "later"])
+    assert shelf.names[-1] == "nothing", "the newest first"
+    grasp, nothing, later = (shelf.names.index(name) for name in (GRASP, "nothing", "later"))
+    shelf.until(lambda: shelf.text(grasp, LENGTH))
+    assert shelf.text(grasp, LENGTH) == "0:04" and shelf.text(grasp, RIG)
+    codes = np.array(window.table.item(grasp, BAR).data(Qt.ItemDataRole.UserRole))
+    assert len(codes) == BAR_PARTS and (codes == TRACKING).sum() > BAR_PARTS // 2
+    shelf.until(lambda: shelf.text(nothing, LENGTH) == "0:00")
+    assert "no datagrams" in window.table.item(nothing, BAR).toolTip()
+    assert shelf.text(later, BAR) == "cannot be read"
+    shelf.choose("later")
+    assert "version 99" in window.sentence.text() and not window.open_button.isEnabled()
+
+
+def test_a_summary_is_made_once(themed, log, tmp_path, monkeypatch):
+    def never(*args: Any, **options: Any) -> None:
+        raise RecordingError("made again")
+
+    Library(log.parent, tmp_path / "cache").keep_summary(log, summarise_log(log))
+    monkeypatch.setattr("rhot_app.ui.wizards.solver.Solver.run", never)
+    shelf = Shelf(log.parent, tmp_path / "cache")
+    shelf.until(lambda: shelf.text(0, LENGTH) == "0:04")
+    shelf.window.close()
+    shelf.window.deleteLater()
+
+
+def test_a_recording_is_opened_by_button_and_by_double_click(shelf, log):
+    shelf.choose(GRASP)
+    shelf.click(shelf.window.open_button)
+    item = shelf.window.table.item(shelf.names.index(GRASP), NAME)
+    QTest.mouseDClick(shelf.window.table.viewport(), Qt.MouseButton.LeftButton,
+                      pos=shelf.window.table.visualItemRect(item).center())
+    QTest.keyClick(shelf.window.table, Qt.Key.Key_Return)
+    assert shelf.opened == [log] * 3
+
+
+def test_a_recording_is_renamed(shelf, log):
+    renamed = []
+    shelf.window.renamed.connect(lambda before, after: renamed.append((before, after)))
+    shelf.choose(GRASP)
+    shelf.click(shelf.window.rename_button)
+    shelf.type_name("thumb test")
+    shelf.until(lambda: "thumb test" in shelf.names)
+    assert renamed == [(log, log.with_name("thumb test.rhotlog"))] and not log.exists()
+    shelf.until(lambda: shelf.window.table.chosen.path.stem == "thumb test")
+
+
+@pytest.mark.parametrize(("name", "why"), [("nothing", "already"), ("a/b", "no name for a recording"),
+                                           ("", "no name for a recording")])
+def test_a_name_that_cannot_be_is_refused_in_a_sentence(shelf, log, name, why):
+    shelf.choose(GRASP)
+    QTest.keyClick(shelf.window.table, Qt.Key.Key_F2)
+    edit = shelf.window.table.findChild(QLineEdit)
+    edit.clear()
+    shelf.type_name(name)
+    shelf.until(lambda: why in shelf.window.sentence.text() and shelf.window._listing is None)
+    assert log.exists() and GRASP in shelf.names
+
+
+def test_a_deleted_recording_comes_back(shelf, log, folder):
+    shelf.choose(GRASP)
+    shelf.click(shelf.window.delete_button)
+    shelf.until(lambda: GRASP not in shelf.names)
+    assert not log.exists() and len(list((folder / TRASH).iterdir())) == 1
+    assert f"Deleted {GRASP}. Undo brings it back" in shelf.window.sentence.text()
+    shelf.choose("nothing")
+    QTest.keyClick(shelf.window.table, Qt.Key.Key_Delete)
+    shelf.until(lambda: shelf.names == ["later"])
+    shelf.click(shelf.window.undo_button)
+    shelf.until(lambda: "nothing" in shelf.names)
+    shelf.window.table.setFocus()
+    QTest.keyClick(shelf.window.table, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    shelf.until(lambda: GRASP in shelf.names and log.exists())
+    shelf.until(lambda: not shelf.window.undo_button.isEnabled())
+    assert shelf.window.table.chosen.path == log
+
+
+def test_closing_the_page_makes_an_end_of_what_was_deleted(shelf, log, folder):
+    shelf.choose(GRASP)
+    shelf.click(shelf.window.delete_button)
+    shelf.until(lambda: GRASP not in shelf.names)
+    shelf.click(shelf.window.close_button)
+    assert not (folder / TRASH).exists() and not log.exists() and (folder / "nothing.rhotlog").exists()
+
+
+def test_what_is_being_recorded_is_left_alone(shelf, folder, log):
+    reader = LogReader(log)
+    reader.close()
+    recorder = Recorder(folder / "now.rhotlog", reader.rig)
+    try:
+        shelf.window.refresh()
+        shelf.until(lambda: "now" in shelf.names)
+        shelf.choose("now")
+        shelf.click(shelf.window.delete_button)
+        assert "now is being recorded" in shelf.window.sentence.text() and recorder.path.exists()
+        with pytest.raises(RecordingError, match="being recorded"):
+            shelf.window.library.rename(recorder.path, "then")
+    finally:
+        recorder.close()
+
+
+def test_the_folder_is_opened_or_named(shelf, folder, monkeypatch):
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: False)
+    shelf.click(shelf.window.folder_button)
+    assert str(folder) in shelf.window.sentence.text()
+
+
+def test_an_empty_folder_says_what_to_do(themed, tmp_path):
+    shelf = Shelf(tmp_path / "none", tmp_path / "cache")
+    shelf.until(shelf.window.empty.isVisible)
+    assert "Press Record" in shelf.window.empty.label.text() and not shelf.window.open_button.isEnabled()
+    shelf.window.close()
+    shelf.window.deleteLater()
+
+
+def test_a_hand_that_is_gone_shows_in_the_bar(grasp_log, tmp_path):
+    """From the middle of the recording on no camera sends anything for a while."""
+    reader = LogReader(grasp_log)
+    records = list(reader)
+    reader.close()
+    times = [record.t_master_ns for record in records if record.kind is RecordKind.DATAGRAM]
+    begin, end = times[len(times) // 2], times[3 * len(times) // 4]
+    kept = [record for record in records if record.kind is not RecordKind.DATAGRAM
+            or not begin < record.t_master_ns < end]
+    log = tmp_path / "gap.rhotlog"
+    log.write_bytes(encode_header(reader.rig, {}) + b"".join(encode_record(record) for record in kept))
+    codes = np.array(summarise_log(log).conditions)
+    gap = codes == NO_STATE
+    assert 20 < gap.sum() < 60 and gap[150:170].all() and (codes[20:110] == TRACKING).any()
+
+
+def test_a_summary_is_made_anew_for_another_file(folder, tmp_path, log):
+    library = Library(folder, tmp_path / "cache")
+    summary = summarise_log(log)
+    library.keep_summary(log, summary)
+    assert library.known_summary(log) == summary
+    assert library.known_summary(library.rename(log, "other")) == summary
+    log.write_bytes((folder / "other.rhotlog").read_bytes()[:-1])
+    assert library.known_summary(log) is None
+
+
+def test_a_recording_made_meanwhile_is_there_when_the_page_is_looked_at_again(shelf, folder, log, qtbot):
+    other = QWidget()
+    qtbot.addWidget(other)
+    other.show()
+    other.activateWindow()
+    assert QTest.qWaitForWindowActive(other)
+    (folder / "new.rhotlog").write_bytes(log.read_bytes())
+    shelf.window.activateWindow()
+    shelf.until(lambda: "new" in shelf.names)

@@ -1,0 +1,348 @@
+"""The replay as a person uses it: open a recording, play, step, scrub, loop, bookmark, track again, compare."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from patience import PATIENCE_S
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
+
+from rhot_app.hand.anatomy import load_hand
+from rhot_app.recording.bookmarks import Bookmark, append_bookmark, read_bookmarks
+from rhot_app.ui.models.pacing import FramePacer
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.replay.timeline import FLAG_PX
+from rhot_app.ui.replay.window import ReplayWindow
+from rhot_app.ui.settings import Settings
+from rhot_node.files import resource_path
+
+
+class Desk:
+    """A replay window and a person's hands."""
+
+    def __init__(self, folder: Path) -> None:
+        self.states = folder / "states"
+        self.window = ReplayWindow(Settings(folder / "app.ini"), DARK, self.states)
+        self.window.parts.pacer = FramePacer(most_hz=8.0)
+        self.window.show()
+        self.window.activateWindow()
+        assert QTest.qWaitForWindowActive(self.window)
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end and not condition():
+            QTest.qWait(10)
+        assert condition()
+
+    def open(self, path: Path) -> None:
+        self.window.open(path)
+        self.until(lambda: self.window.replay is not None and not self.window.work.running)
+
+    def press(self, key: Qt.Key) -> None:
+        QTest.keyClick(self.window, key)
+
+    def click(self, widget: QWidget, at: QPoint | None = None) -> None:
+        assert widget.isVisible()
+        QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=at or widget.rect().center())
+
+    def scrub(self, begin_s: float, *ends_s: float) -> None:
+        """Drag over the timeline."""
+        line = self.window.parts.timeline
+        at = [QPoint(round(line.x_of(s)), FLAG_PX + 10) for s in (begin_s, *ends_s)]
+        QTest.mousePress(line, Qt.MouseButton.LeftButton, pos=at[0])
+        for place in at[1:]:
+            QTest.mouseMove(line, place)
+        QTest.mouseRelease(line, Qt.MouseButton.LeftButton, pos=at[-1])
+
+    @property
+    def position_s(self) -> float:
+        return self.window.replay.player.position_s
+
+    @property
+    def drawn_ns(self) -> int | None:
+        """The moment of the hand in the scene."""
+        state = self.window.parts.scene._in_rig
+        return None if state is None else state.t_master_ns
+
+    def number(self) -> int:
+        """The state that the window names."""
+        return int(self.window.parts.transport.place.text().split("state ")[1].split(" of ")[0])
+
+
+@pytest.fixture(scope="module")
+def one_desk(themed: Any, tmp_path_factory: pytest.TempPathFactory, grasp_log: Path) -> Iterator[Desk]:
+    """One window for all tests; the process that tracks starts once."""
+    folder = tmp_path_factory.mktemp("desk")
+    desk = Desk(folder)
+    log = folder / "grasp.rhotlog"
+    log.write_bytes(grasp_log.read_bytes())
+    desk.open(log)
+    yield desk
+    desk.window.close()
+    assert not list(desk.states.iterdir())
+    desk.window.deleteLater()
+
+
+@pytest.fixture
+def desk(one_desk: Desk) -> Desk:
+    """The recording at its beginning, one run, nothing repeated."""
+    window = one_desk.window
+    player = window.replay.player
+    player.pause()
+    player.clear_loop()
+    player.seek(0.0)
+    player.speed = 1.0
+    window.passing.clear()
+    window.stop_comparing()
+    window.setFocus()
+    window.tick()
+    return one_desk
+
+
+def test_a_recording_is_shown_with_its_name(desk):
+    window = desk.window
+    assert "grasp.rhotlog" in window.toolbar.name.text() and "grasp.rhotlog" in window.windowTitle()
+    assert window.toolbar.word.text() == "REPLAY"
+    assert desk.window.parts.transport.place.text().startswith("0:00.00 of 0:03.9")
+    assert not list(desk.states.iterdir()), "the states' file has no name any more"
+    assert window.parts.timeline.codes is not None and len(window.parts.timeline.codes) > 500
+    assert "tracking" in window.parts.timeline.told_at(window.parts.timeline.x_of(2.0))
+
+
+def test_space_plays_and_pauses(desk):
+    desk.press(Qt.Key.Key_Space)
+    desk.until(lambda: desk.position_s > 0.3)
+    desk.until(lambda: desk.window.toolbar.badge.word in ("TRACKING", "PARTIAL"))
+    desk.press(Qt.Key.Key_Space)
+    stood = desk.position_s
+    QTest.qWait(80)
+    assert desk.position_s == stood
+    desk.until(lambda: desk.drawn_ns == desk.window.replay.run.tracked.times_ns[desk.window.replay.player.number])
+
+
+def test_it_plays_to_the_end_and_begins_again(desk):
+    box = desk.window.parts.transport.speed_box
+    box.setCurrentIndex(box.findData(4.0))
+    box.activated.emit(box.currentIndex())
+    desk.click(desk.window.parts.transport.play_button)
+    desk.until(lambda: desk.window.replay.player.at_end)
+    desk.until(lambda: not desk.window.parts.transport.is_playing)
+    desk.click(desk.window.parts.transport.play_button)
+    assert desk.position_s < 2.0 and desk.window.replay.player.playing
+
+
+def test_a_click_leaves_the_space_bar_to_the_player(desk):
+    desk.click(desk.window.parts.transport.on_button)
+    desk.press(Qt.Key.Key_Space)
+    assert desk.window.replay.player.playing
+
+
+def test_arrows_go_from_state_to_state(desk):
+    times = desk.window.replay.run.tracked.times_ns
+    for _ in range(3):
+        desk.press(Qt.Key.Key_Right)
+    desk.until(lambda: desk.number() == 4 and desk.drawn_ns == times[3])
+    desk.press(Qt.Key.Key_Left)
+    desk.until(lambda: desk.number() == 3 and desk.drawn_ns == times[2])
+    desk.press(Qt.Key.Key_End)
+    desk.until(lambda: desk.number() == len(times) and desk.drawn_ns == times[-1])
+    desk.press(Qt.Key.Key_Home)
+    desk.until(lambda: desk.number() == 1)
+    row = desk.window.parts.transport
+    for button, number in ((row.on_button, 2), (row.last_button, len(times)), (row.back_button, len(times) - 1),
+                           (row.first_button, 1)):
+        desk.click(button)
+        desk.until(lambda number=number: desk.number() == number)
+
+
+def test_arrows_step_although_the_scene_has_the_focus(desk):
+    desk.window.parts.scene.setFocus()
+    view = desk.window.parts.scene.cameraParams()
+    QTest.keyClick(desk.window.parts.scene, Qt.Key.Key_Right)
+    desk.until(lambda: desk.number() == 2)
+    assert desk.window.parts.scene.cameraParams() == view
+
+
+def test_scrubbing_goes_there_at_once(desk):
+    desk.scrub(1.0, 2.0, 3.0)
+    assert abs(desk.position_s - 3.0) < 0.02
+    number = desk.window.replay.player.number
+    desk.until(lambda: desk.drawn_ns == desk.window.replay.run.tracked.times_ns[number])
+    desk.until(lambda: desk.window.parts.jitter._window[0].size and desk.window.parts.jitter._window[0][0] > -3.2)
+    desk.scrub(0.5)
+    desk.until(lambda: desk.window.parts.jitter._window[0].size and desk.window.parts.jitter._window[0][0] > -0.6)
+
+
+def test_a_range_is_repeated(desk):
+    desk.scrub(1.0)
+    desk.press(Qt.Key.Key_BracketLeft)
+    desk.scrub(1.4)
+    desk.press(Qt.Key.Key_BracketRight)
+    begin, end = desk.window.replay.player.loop
+    assert abs(begin - 1.0) < 0.02 and abs(end - 1.4) < 0.02
+    desk.press(Qt.Key.Key_Space)
+    seen = []
+    desk.until(lambda: seen.append(desk.position_s) or any(b < a for a, b in itertools.pairwise(seen)))
+    assert min(seen) >= begin - 1e-9 and max(seen) <= end + 1e-9
+    desk.until(desk.window.parts.transport.loop_clear_button.isEnabled)
+    desk.click(desk.window.parts.transport.loop_clear_button)
+    desk.until(lambda: desk.position_s > end + 0.05)
+
+
+def test_a_bookmark_is_set_found_and_removed(desk):
+    window = desk.window
+    desk.scrub(2.0)
+    at_s = desk.position_s
+    desk.press(Qt.Key.Key_B)
+    edit = window.bookmarks.dialog.findChild(QLineEdit)
+    QTest.keyClicks(edit, "thumb behind the palm")
+    QTest.keyClick(edit, Qt.Key.Key_Return)
+    desk.until(lambda: window.replay.bookmarks)
+    (mark,) = read_bookmarks(window.replay.path)
+    assert mark.text == "thumb behind the palm"
+    assert abs(window.replay.seconds_of(mark.t_master_ns) - at_s) < 1e-6
+    desk.press(Qt.Key.Key_Home)
+    window.toolbar.menu.actions()[0].trigger()
+    assert abs(desk.position_s - at_s) < 1e-6 and "0:0" in window.toolbar.menu.actions()[0].text()
+    desk.press(Qt.Key.Key_Home)
+    line = window.parts.timeline
+    assert "thumb behind the palm" in line.told_at(line.x_of(at_s) + 2)
+    desk.click(line, QPoint(round(line.x_of(at_s)) + 3, 5))
+    assert abs(desk.position_s - at_s) < 1e-6, "a click on a flag meets it exactly"
+    desk.until(window.toolbar.remove.isEnabled)
+    window.toolbar.remove.trigger()
+    desk.until(lambda: not window.replay.bookmarks)
+    assert read_bookmarks(window.replay.path) == []
+
+
+def test_a_bookmark_that_cannot_be_written_is_said(desk, monkeypatch):
+    def refuse(path: Path, mark: Bookmark) -> None:
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr("rhot_app.ui.replay.bookmark_writer.append_bookmark", refuse)
+    desk.click(desk.window.parts.transport.bookmark_button)
+    edit = desk.window.bookmarks.dialog.findChild(QLineEdit)
+    QTest.keyClicks(edit, "x")
+    QTest.keyClick(edit, Qt.Key.Key_Return)
+    desk.until(lambda: "the disk is full" in desk.window.advice.texts)
+    assert desk.window.replay.bookmarks == []
+
+
+def test_two_runs_are_compared_side_by_side(desk):
+    window = desk.window
+    window.toolbar.compare.trigger()
+    dialog = window.dialog
+    dialog.tracker_box.setCurrentIndex(dialog.tracker_box.findData("model"))
+    desk.click(dialog.start_button)
+    desk.until(lambda: window.replay.second is not None)
+    assert window.replay.run.rig.tracker.kind == "classic" and window.replay.second.rig.tracker.kind == "model"
+    desk.scrub(2.5)
+    desk.until(lambda: desk.drawn_ns == window.replay.run.tracked.times_ns[window.replay.player.number])
+    first, second = (actors._hands[0].items[3] for actors in (window.parts.scene._actors, window.parts.scene._second))
+    assert first.visible() and second.visible()
+    assert 0 < second._arrays[2][:, 3].max() < first._arrays[2][:, 3].max()
+    assert abs(np.mean(first._arrays[0] - second._arrays[0])) < 0.02
+    desk.until(window.parts.difference.isVisible)
+    desk.until(lambda: [values[0] != "–" for values in window.parts.difference.legend.values] == [True] * 5)
+    desk.until(lambda: "Solid: as recorded. Blue and translucent: model tracker." in window.advice.texts)
+    window.toolbar.alone.trigger()
+    assert window.parts.scene._second is None and window.replay.second is None
+    assert not window.parts.difference.isVisible()
+
+
+def test_it_is_tracked_again_with_another_hand_at_the_same_moment(desk, tmp_path, monkeypatch):
+    window = desk.window
+    desk.scrub(3.0)
+    at_ns = window.replay.position_ns
+    path = resource_path("hands", "left.json")
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *args: (str(path), ""))
+    window.toolbar.again.trigger()
+    desk.click(window.dialog.hand_choice.choose_button)
+    assert window.dialog.hand_choice.label.text() == "left.json"
+    desk.click(window.dialog.start_button)
+    desk.until(lambda: window.replay.choice.hand is not None)
+    assert window.replay.run.rig.hand == load_hand(path) and abs(window.replay.position_ns - at_ns) < 2
+    desk.until(lambda: "Tracked left.json." in window.advice.texts[0])
+    window.toolbar.again.trigger()
+    desk.click(window.dialog.start_button)
+    desk.until(lambda: window.replay.choice.hand is None)
+
+
+def test_a_rig_file_that_is_none_is_said_and_the_run_stays(desk, tmp_path, monkeypatch):
+    window, before = desk.window, desk.window.replay.run
+    path = tmp_path / "broken.json"
+    path.write_text("{}")
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *args: (str(path), ""))
+    window.toolbar.again.trigger()
+    desk.click(window.dialog.rig_choice.choose_button)
+    desk.click(window.dialog.start_button)
+    desk.until(lambda: any(str(path) in text for text in window.advice.texts))
+    assert window.replay.run is before
+
+
+def test_tracking_can_be_cancelled(desk):
+    window, before = desk.window, desk.window.replay.run
+    window.toolbar.again.trigger()
+    desk.click(window.dialog.start_button)
+    desk.click(window.strip.cancel_button)
+    desk.until(lambda: not window.strip.isVisible())
+    QTest.qWait(100)
+    assert window.replay.run is before and not list(desk.states.iterdir())
+
+
+def test_files_that_are_no_recordings_are_said(desk, tmp_path):
+    window, before = desk.window, desk.window.replay.path
+    foreign = tmp_path / "notes.txt"
+    foreign.write_text("shopping")
+    window.open(foreign)
+    desk.until(lambda: any("notes.txt: this is not a raw log" in text for text in window.advice.texts))
+    assert window.replay.path == before
+
+
+def test_a_torn_recording_is_played_and_said(desk, log):
+    before = desk.window.replay.path
+    log.write_bytes(log.read_bytes()[:-9])
+    desk.window.open(log)
+    desk.until(lambda: desk.window.replay.path == log)
+    desk.until(lambda: any("are torn" in text for text in desk.window.advice.texts))
+    desk.press(Qt.Key.Key_End)
+    desk.until(lambda: desk.drawn_ns is not None)
+    desk.window.open(before)
+    desk.until(lambda: desk.window.replay.path == before)
+
+
+def test_bookmarks_of_the_recording_are_there(desk, log):
+    before, first_ns = desk.window.replay.path, int(desk.window.replay.run.tracked.times_ns[0])
+    append_bookmark(log, Bookmark(first_ns + 1_500_000_000, "set while recording"))
+    desk.window.open(log)
+    desk.until(lambda: desk.window.replay.path == log)
+    assert desk.window.toolbar.menu.actions()[0].text() == "0:01.50  set while recording"
+    desk.window.open(before)
+    desk.until(lambda: desk.window.replay.path == before)
+
+
+def test_the_window_stays_quick(desk):
+    """No tick may hold the window for long; other programs may hold it."""
+    costs, window = [], desk.window
+    tick = window.tick
+
+    def timed():
+        begin = time.thread_time()
+        tick()
+        costs.append(time.thread_time() - begin)
+
+    desk.press(Qt.Key.Key_Space)
+    window._timer.timeout.disconnect()
+    window._timer.timeout.connect(timed)
+    desk.until(lambda: len(costs) >= 30)
+    window._timer.timeout.disconnect()
+    window._timer.timeout.connect(tick)
+    assert sorted(costs)[len(costs) // 2] < 0.05
