@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
+from rhot_app.errors import ExportError
 from rhot_app.export.frames import Frame
 from rhot_app.export.states import HandStates
 from rhot_app.project import Rig
@@ -71,3 +73,12 @@ class Writer(Protocol):
     def close(self) -> None:
         """Let go of the file, whole or not. May be called twice."""
         ...
+
+
+def require(package: str, what: str, extra: str = "export") -> Any:
+    """The module of an optional package. Raises ExportError that names `what` needs it, and the extra that has it."""
+    try:
+        return importlib.import_module(package)
+    except ImportError as exc:
+        raise ExportError(f"{what} needs the package {package.split('.')[0]!r}, which cannot be imported ({exc}). "
+                          f"Install it with: pip install 'rhot[{extra}]'") from exc

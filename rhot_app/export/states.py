@@ -91,7 +91,7 @@ class HandStates:
 
         Raises ExportError when pandas is not installed.
         """
-        from rhot_app.export.requirements import require
+        from rhot_app.export.plan import require
         from rhot_app.export.tables import columns
 
         frame = require("pandas", "a data frame")

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.export.frames import quaternions
-from rhot_app.export.plan import Plan
-from rhot_app.export.requirements import require
+from rhot_app.export.plan import Plan, require
 from rhot_app.export.states import ARRAYS, HandStates
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
