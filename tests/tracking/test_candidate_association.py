@@ -106,8 +106,8 @@ def test_a_thing_does_not_take_the_place_of_a_hidden_marker(kind: str) -> None:
 def association_of_a_still_hand() -> tuple[MarkerAssociation, CameraObservations]:
     association = MarkerAssociation(compile_rig(RIG))
     frame = observe(RIG, WIDE, still_trajectory(REST), 0.1, Sight())[0]
-    association.note(frame.t_row0_master_ns - 25_000_000, REST)
-    association.note(frame.t_row0_master_ns, REST)
+    association.update(frame.t_row0_master_ns - 25_000_000, REST)
+    association.update(frame.t_row0_master_ns, REST)
     return association, frame
 
 
@@ -126,7 +126,7 @@ def test_going_over_to_another_candidate_begins_another_track() -> None:
     moved = REST.copy()
     moved[1] = THING
     for _ in range(2):
-        association.note(frame.t_row0_master_ns + 25_000_000, moved)
+        association.update(frame.t_row0_master_ns + 25_000_000, moved)
     later = replace(frame, t_row0_master_ns=frame.t_row0_master_ns + 25_000_000)
     there = association.select(with_further(later, [1], THING[None]))
     assert there.flags[1] & ACQUIRED
