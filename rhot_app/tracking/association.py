@@ -99,18 +99,24 @@ class MarkerAssociation:
         """Forget all positions and frames."""
         cameras, markers = len(self._rig.cameras), len(self._rig.marker_ids)
         self._positions, self._velocities = np.full((markers, 3), np.nan), np.zeros((markers, 3))
+        self._covariances = np.zeros((markers, 3, 3))
         self._located_ns = np.zeros(markers, dtype=np.int64)  # master time of `_positions`
         self._chosen = np.full((cameras, markers, 2), np.nan)  # px, in the newest frame of each camera
         self._frames: list[CameraObservations | None] = [None] * cameras  # newest of each camera, all candidates
 
-    def update(self, t_ns: int, positions: Array) -> None:
-        """Take in the markers' positions (M, 3) m, world frame, at master time `t_ns`; NaN where not known."""
+    def update(self, t_ns: int, positions: Array, covariances: Array | None = None) -> None:
+        """Take in the markers' positions (M, 3) m, world frame, at master time `t_ns`; NaN where not known.
+
+        `covariances` (M, 3, 3) m^2 of the positions; None: POSITION_SD_M on every axis.
+        """
         known = np.isfinite(positions[:, 0])
         dt_s = 1e-9 * (t_ns - self._located_ns)
         steady = known & np.isfinite(self._positions[:, 0]) & (dt_s > 0.0) & (dt_s < FORGET_S)
         self._velocities[known] = 0.0
         self._velocities[steady] = (positions[steady] - self._positions[steady]) / dt_s[steady, None]
         self._positions[known], self._located_ns[known] = positions[known], t_ns
+        floor = POSITION_SD_M**2 * np.eye(3)
+        self._covariances[known] = floor if covariances is None else covariances[known] + floor
 
     def select(self, frame: CameraObservations) -> CameraObservations:
         """The frame with the likeliest candidate of each marker. A marker without a candidate in its gate is lost.
@@ -124,45 +130,56 @@ class MarkerAssociation:
             self._chosen[frame.camera] = frame.pixels
             return frame
         listed = _list_candidates(frame)
-        predicted, variances = self._predict(frame)
-        chosen, ambiguous = self._choose(listed, predicted, variances)
+        predicted, covariances = self._predict(frame)
+        chosen, rivals = self._choose(listed, predicted, covariances)
         unknown = np.isnan(predicted[:, 0])
         if unknown.any():
             chosen = np.where(unknown, self._choose_by_rays(frame, listed), chosen)
-        return self._selected(frame, listed, chosen, ambiguous)
+        return self._selected(frame, listed, chosen, rivals)
 
     def _predict(self, frame: CameraObservations) -> tuple[Array, Array]:
-        """Predicted pixels (M, 2), NaN where nothing is, and their variances (M,) px^2."""
+        """Predicted pixels (M, 2), NaN where nothing is, and their covariances (M, 2, 2) px^2."""
         rig, camera = self._rig, frame.camera
         middle_ns = frame.row_time_ns * rig.intrinsics[camera, 3]  # when the row of the principal point is exposed
         dt_s = 1e-9 * (frame.t_row0_master_ns + middle_ns - self._located_ns)
         points = self._positions + self._velocities * dt_s[:, None]
-        variances = POSITION_SD_M**2 + (0.5 * ACCELERATION_SD * dt_s**2) ** 2
+        spread = self._covariances + ((0.5 * ACCELERATION_SD * dt_s**2) ** 2)[:, None, None] * np.eye(3)
         tracked = np.isfinite(points[:, 0]) & (np.abs(dt_s) < FORGET_S)
         newest = tracked & self._on_hand & (self._located_ns == np.max(self._located_ns, initial=0, where=tracked))
         # A marker that is not tracked, or whose own prediction is less certain than this, is somewhere on the hand.
-        by_hand = self._on_hand & newest.any() & ~(tracked & (variances < self._hand_sd_m**2))
+        certain = tracked & (np.trace(spread, axis1=1, axis2=2) < 3.0 * self._hand_sd_m**2)
+        by_hand = self._on_hand & newest.any() & ~certain
         points[~tracked] = np.nan
         points[by_hand] = points[newest].mean(axis=0) if newest.any() else np.nan
-        variances = np.where(by_hand, self._hand_sd_m**2, variances)
-        local = points @ rig.cameras[camera, :, :3].T + rig.cameras[camera, :, 3]
+        spread[by_hand] = (self._hand_sd_m**2)[by_hand, None, None] * np.eye(3)
+        rotation = rig.cameras[camera, :, :3]
+        local = points @ rotation.T + rig.cameras[camera, :, 3]
         depth = np.where(local[:, 2] > 0.0, local[:, 2], np.nan)
-        pixels = project_normalised(np.ascontiguousarray(local[:, :2] / depth[:, None]), rig.intrinsics[camera])
-        return pixels, variances * (rig.focal[camera, 0] / depth) ** 2
+        normalised = np.ascontiguousarray(local[:, :2] / depth[:, None])
+        slope = np.zeros((len(points), 2, 3))  # px per m along the camera's axes, lens distortion left out
+        slope[:, 0, 0] = slope[:, 1, 1] = 1.0
+        slope[:, :, 2] = -normalised
+        slope *= rig.focal[camera][None, :, None] / depth[:, None, None]
+        slope = slope @ rotation
+        return project_normalised(normalised, rig.intrinsics[camera]), slope @ spread @ slope.transpose(0, 2, 1)
 
-    def _choose(self, listed: _CandidateList, predicted: Array, variances: Array) -> tuple[Indices, NDArray[np.bool_]]:
-        """The candidate of each marker (M,), -1 for none, and (M,) whether another one is about as likely.
+    def _choose(self, listed: _CandidateList, predicted: Array, covariances: Array) -> tuple[Indices, Indices]:
+        """The candidate of each marker (M,), and another one that is about as likely; -1 for none.
 
-        `predicted` (M, 2) px, NaN for none, with `variances` (M,) px^2 per axis.
+        `predicted` (M, 2) px, NaN for none, with `covariances` (M, 2, 2) px^2.
         """
         markers = len(predicted)
         known = np.isfinite(predicted[:, 0])
         own = np.arange(markers)[:, None] == listed.markers[None]
-        covariances = np.where(known, variances, 1.0)[:, None, None] * np.eye(2)
-        chosen, costs = assign(np.nan_to_num(predicted), covariances, listed.pixels, listed.covariances,
-                               np.where(own & known[:, None], 0.0, np.inf))
-        nearest = np.partition(np.hstack([costs, np.full((markers, 2), _FORBIDDEN)]), 1, axis=1)
-        return chosen, (nearest[:, 1] < GATE) & (nearest[:, 1] - nearest[:, 0] < AMBIGUITY_MARGIN)
+        chosen, costs = assign(np.nan_to_num(predicted), np.where(known[:, None, None], covariances, np.eye(2)),
+                               listed.pixels, listed.covariances, np.where(own & known[:, None], 0.0, np.inf))
+        every = np.arange(markers)
+        paid = costs[every, chosen]
+        others = costs.copy()
+        others[every, chosen] = _FORBIDDEN
+        rivals = np.argmin(others, axis=1)
+        near = (others[every, rivals] < GATE) & (others[every, rivals] - paid < AMBIGUITY_MARGIN) & (chosen >= 0)
+        return chosen, np.where(near, rivals, -1)
 
     def _choose_by_rays(self, frame: CameraObservations, listed: _CandidateList) -> Indices:
         """The candidate of each marker (M,) by the rays of two cameras, -1 for none.
@@ -230,13 +247,19 @@ class MarkerAssociation:
         return chosen, int(counts[anchor])
 
     def _selected(self, frame: CameraObservations, listed: _CandidateList, chosen: Indices,
-                  ambiguous: NDArray[np.bool_]) -> CameraObservations:
-        """The frame with the chosen candidates (M,), -1 for lost, and their flags; they are kept for the next frame."""
+                  rivals: Indices) -> CameraObservations:
+        """The frame with the chosen candidates (M,), -1 for lost, and their flags; they are kept for the next frame.
+
+        A candidate that another one rivals has the second moment of both about it, each with a probability of 1/2.
+        """
         found = chosen >= 0
         rows = np.where(found, chosen, 0)
         before = self._chosen[frame.camera]
         pixels = np.where(found[:, None], listed.pixels[rows], np.nan)
+        ambiguous = rivals >= 0
         flags = np.where(found, listed.flags[rows] | np.where(ambiguous, _AMBIGUOUS, 0), _LOST).astype(np.uint16)
+        apart = np.where(ambiguous[:, None], listed.pixels[rivals] - listed.pixels[rows], 0.0)
+        covariances = listed.covariances[rows] + 0.5 * apart[:, :, None] * apart[:, None, :]
         for m in np.flatnonzero(found & np.isfinite(before[:, 0])):
             own = np.flatnonzero(listed.markers == m)
             nearest = own[np.argmin(np.linalg.norm(listed.pixels[own] - before[m], axis=1))]
@@ -244,7 +267,7 @@ class MarkerAssociation:
                 flags[m] |= _ACQUIRED
         self._chosen[frame.camera] = pixels
         return replace(frame, further=None, pixels=pixels, flags=flags,
-                       covariances=np.where(found[:, None, None], listed.covariances[rows], np.nan),
+                       covariances=np.where(found[:, None, None], covariances, np.nan),
                        diameters=np.where(found, listed.diameters[rows], 0.0),
                        qualities=np.where(found, listed.qualities[rows], 0.0))
 
