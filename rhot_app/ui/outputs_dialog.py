@@ -102,7 +102,7 @@ class OutputsDialog(QDialog):
         self.kind_box.setToolTip("Which protocol the other program understands.")
         self.joints_box.setToolTip("The joint set: which joints, in whose order and axes.")
         self.rate_box.setRange(0.0, 1000.0)
-        self.rate_box.setDecimals(0)
+        self.rate_box.setDecimals(1)
         self.rate_box.setSuffix(" states/s")
         self.rate_box.setSpecialValueText("every state")
         self.rate_box.setMinimumHeight(30)
@@ -228,7 +228,9 @@ class OutputsDialog(QDialog):
         """Put an output into the form."""
         self._changing = settings
         self.form_title.setText(f"Change {title_of(settings)}")
-        self.kind_box.setCurrentIndex(max(self.kind_box.findData(settings.kind), 0))
+        if self.kind_box.findData(settings.kind) < 0:  # a plug-in that is not installed here
+            self.kind_box.addItem(kind_of(settings.kind).title, settings.kind)
+        self.kind_box.setCurrentIndex(self.kind_box.findData(settings.kind))
         self.target_edit.setText(settings.target)
         self.joints_box.setCurrentIndex(self.joints_box.findData(settings.joints))
         self.rate_box.setValue(settings.rate_hz or 0.0)
