@@ -74,6 +74,12 @@ def video_path(log: Path, node: str, folder: Path | None = None) -> Path:
     return (log.parent if folder is None else folder) / f"{log.stem}.{safe}.avi"
 
 
+def videos_of(log: Path) -> list[Path]:
+    """What was collected beside a log: videos, their tables, and pieces of videos."""
+    ours = re.compile(re.escape(log.stem) + r"\.[\w-]+\.(avi|avi\.part|csv)")
+    return sorted(path for path in log.parent.iterdir() if ours.fullmatch(path.name))
+
+
 def collect_videos(log: Path, rig: Rig, own: KeyPair, folder: Path | None = None, *, keep: bool = False,
                    patience_s: float = PATIENCE_S, progress: Progress = silent) -> list[Collected]:
     """Fetch the videos of `log` from the nodes of `rig` into `folder`, by default beside the log.

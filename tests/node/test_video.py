@@ -201,7 +201,8 @@ def ask(make: MakeRecorder, tmp_path: Path) -> Callable[..., dict[str, Any]]:
     return ask_node
 
 
-@pytest.mark.parametrize("name", ["", ".", "..", "../left", "a/b", "/etc/passwd", "a.json", "a\0", "a\n", "x" * 65, "-a"])
+@pytest.mark.parametrize("name", ["", ".", "..", "../left", "a/b", "/etc/passwd", "a.json", "a\0", "a\n", "x" * 65,
+                                  "-a"])
 def test_names_that_could_lead_out_of_the_folder_are_refused(
         ask: Callable[..., dict[str, Any]], tmp_path: Path, name: str) -> None:
     before = sorted(tmp_path.rglob("*"))

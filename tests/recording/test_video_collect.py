@@ -1,4 +1,4 @@
-"""Videos of real node processes, fetched by `rhot video collect`: whole, after a cut too, and never over other files."""
+"""Videos of real node processes, fetched by `rhot video collect`: whole, also after a cut, never over other files."""
 
 from __future__ import annotations
 
