@@ -102,14 +102,16 @@ class Engine:
         return self._video if self.recorder is not None else ""
 
     def record(self, path: Path, *, video: bool = False) -> None:
-        """Write the raw log to `path` from now on, and have every node record its frames if `video`.
+        """Write the raw log to `path` from now on, and have every node record its frames if `video`; a replay has none.
 
-        Raises RecordingError, EngineError when something is recorded already."""
+        Raises RecordingError, EngineError when something is recorded already.
+        """
         with self._lock:
             if self.recorder is not None:
                 raise EngineError(f"already recording to {self.recorder.path}; stop that recording first.")
             self._notice = ""
             now = datetime.now(UTC)
+            video = video and self._source.live
             name = f"{now:%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}" if video else ""
             about = {"created": now.isoformat(timespec="seconds"), **({"video": name} if video else {})}
             recorder = Recorder(path, self.rig, about)

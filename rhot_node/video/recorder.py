@@ -182,7 +182,7 @@ class VideoRecorder:
         for name in names:
             with contextlib.suppress(OSError):
                 _finish(self.folder / f"{name}.avi", 0, "The node ended while it was being recorded.")
-            self._mending.discard(name)
+            self._mending = self._mending - {name}  # another one: the other thread may be going through the old one
 
 
 class _Take:

@@ -6,25 +6,30 @@ import contextlib
 import json
 import signal
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 from node_process import PERIOD_NS, READY_S, SIZE, Node, write_settings
-from patience import eventually
+from patience import PATIENCE_S, eventually
 
 from rhot_app.__main__ import main
 from rhot_app.errors import RecordingError
 from rhot_app.keys import load_master_keys
-from rhot_app.project import Rig
+from rhot_app.project import Rig, save_rig
 from rhot_app.recording import video as video_module
-from rhot_app.recording.raw_log import encode_header
+from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header
 from rhot_app.recording.video import collect_videos, video_path
 from rhot_app.simulator.synthetic_node import synthetic_rig
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.video.avi import read_stamps
+from rhot_node.wire.codec import decode
+from rhot_node.wire.messages import Observations
 
 pytestmark = pytest.mark.timeout(READY_S + 100.0)
 
@@ -69,6 +74,11 @@ class Setup:
         eventually(lambda: json.loads(node.ask(request="video_start", name=NAME)[0])["video"]["frames"] >= frames)
         node.ask(request="video_stop", name=NAME)
 
+    def videos(self) -> list[dict[str, Any]]:
+        assert self.node is not None
+        found: list[dict[str, Any]] = json.loads(self.node.ask(request="video_list")[0])["videos"]
+        return found
+
     def collect(self, **options: object) -> list[video_module.Collected]:
         return collect_videos(self.log, self.rig, load_master_keys().own, **options)  # type: ignore[arg-type]
 
@@ -83,7 +93,7 @@ def setup(tmp_path: Path) -> Iterator[Setup]:
 
 
 def test_a_video_comes_whole_though_its_node_dies_on_the_way(setup: Setup, capsys: pytest.CaptureFixture[str]) -> None:
-    node = setup.run()
+    setup.run()
     setup.record()
     target = video_path(setup.log, "left")
     part = target.with_name(f"{target.name}.part")
@@ -111,7 +121,6 @@ def test_a_video_comes_whole_though_its_node_dies_on_the_way(setup: Setup, capsy
 
     assert main(["video", "collect", str(setup.log)]) == 0  # nothing is left to do
     assert str(target) in capsys.readouterr().out
-    del node
 
 
 def test_what_cannot_be_collected_is_said_in_a_sentence(
@@ -145,3 +154,36 @@ def test_what_cannot_be_collected_is_said_in_a_sentence(
     setup.write_log({"video": "../../etc/passwd"})
     assert main(["video", "collect", str(setup.log)]) == 2
     assert "is it damaged" in capsys.readouterr().err
+
+
+def test_a_recording_with_video_has_the_same_frames_in_both(setup: Setup, tmp_path: Path) -> None:
+    node = setup.run()
+    rig = synthetic_rig(2)
+    ports = {name: node.ready[name] for name in ("udp_port", "control_port", "preview_port", "pairing_port")}
+    left = msgspec.structs.replace(rig.nodes[0], node_id=node.ready["node_id"], name="left", data_port=0, **ports)
+    save_rig(tmp_path / "rig.json", msgspec.structs.replace(rig, nodes=(left, rig.nodes[1])))
+    log = tmp_path / "both.rhotlog"
+    engine = subprocess.Popen(
+        [sys.executable, "-m", "rhot_app", "engine", "--rig", str(tmp_path / "rig.json"), "--unchecked", "--start",
+         "--log", str(log), "--video", "--directory", str(tmp_path / "engine")], stderr=subprocess.PIPE, text=True)
+    try:
+        eventually(lambda: any(one["frames"] > 40 for one in setup.videos()), READY_S, told=engine.poll)
+    finally:
+        engine.send_signal(signal.SIGTERM)
+        said = engine.communicate(timeout=PATIENCE_S)[1]
+    assert engine.returncode == 0, said
+    eventually(lambda: [one["state"] for one in setup.videos()] == ["done"])  # ended by the engine, not by its silence
+    assert setup.videos()[0]["message"] == ""
+    [collected] = collect_videos(log, msgspec.structs.replace(rig, nodes=(left,)), load_master_keys().own)
+    assert collected.path == tmp_path / "both.left.avi"
+    with contextlib.closing(LogReader(log)) as reader:
+        logged = [decode(one.data) for one in reader if one.kind is RecordKind.DATAGRAM]
+    observed = {(one.frame_number, one.t_frame_node_ns) for one in logged if isinstance(one, Observations)}
+    filmed = {(one.number, one.t_node_ns) for one in read_stamps(collected.path)}
+    assert len(filmed & observed) > 0.5 * len(filmed)
+
+
+def test_video_without_a_log_is_refused(setup: Setup, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save_rig(tmp_path / "rig.json", setup.rig)
+    assert main(["engine", "--rig", str(tmp_path / "rig.json"), "--video"]) == 2
+    assert "--video needs --log" in capsys.readouterr().err
