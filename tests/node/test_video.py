@@ -23,6 +23,7 @@ from rhot_node.daemon import NodeDaemon
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import VideoError
 from rhot_node.files import resource_path
+from rhot_node.link_keys import LinkKeys
 from rhot_node.markers import load_markers
 from rhot_node.pictures import PictureBox
 from rhot_node.requests import Responder, SettingsStore
@@ -226,3 +227,13 @@ def test_requests_are_answered_or_refused_in_a_sentence(ask: Callable[..., dict[
         assert not ask(request="video_read", name="a", **wrong)["ok"]
     assert ask(request="video_delete", name="a")["ok"]
     assert "no video a" in ask(request="video_delete", name="a")["error"]
+
+
+def test_a_node_that_forgets_its_masters_ends_its_video(make: MakeRecorder, tmp_path: Path) -> None:
+    settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")))
+    recorder = make()
+    responder = Responder(SettingsStore(tmp_path / "node.json", settings), Sessions(), PictureBox(4.0), NodeClock(),
+                          dict, dict, LinkKeys(), recorder)
+    responder.answer([b'{"request": "video_start", "name": "a"}'], "")
+    responder.revoke(lambda public_key: False)
+    wait_until_done(recorder, "a")
