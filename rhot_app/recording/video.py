@@ -6,6 +6,7 @@ Functions that wait; call them in a worker or a command.
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import hashlib
 import os
 import re
@@ -133,6 +134,12 @@ def _fetch(channel: _Channel, info: VideoInfo, target: Path, progress: Progress)
     """Fetch one video; raises RecordingError when it did not come whole, OSError."""
     part = target.with_name(f"{target.name}.part")
     with part.open("ab") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as exc:
+            raise RecordingError(f"{part}: the video is being fetched already. Wait for its end.") from exc
+        except OSError:  # some network file systems have no locks
+            pass
         have = file.tell()
         if have > info.size:
             have = file.truncate(0)
@@ -146,12 +153,12 @@ def _fetch(channel: _Channel, info: VideoInfo, target: Path, progress: Progress)
             have += len(data)
         file.flush()
         os.fsync(file.fileno())
-    progress(f"checking the video of {channel.node.name}", 0.99)
-    if _digest(part) != info.sha256:
-        part.unlink()
-        raise RecordingError(f"the video of node {channel.node.name} did not come as the node has it, so what came was "
-                             "removed. Collect it again.")
-    part.rename(target)
+        progress(f"checking the video of {channel.node.name}", 0.99)
+        if _digest(part) != info.sha256:
+            part.unlink()
+            raise RecordingError(f"the video of node {channel.node.name} did not come as the node has it, so what came "
+                                 "was removed. Collect it again.")
+        part.rename(target)
 
 
 def _write_times(video: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import signal
 import socket
@@ -138,6 +139,10 @@ def test_what_cannot_be_collected_is_said_in_a_sentence(
 
     part = target.with_name(f"{target.name}.part")
     part.write_bytes(b"of an older video")
+    with part.open("ab") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        with pytest.raises(RecordingError, match="being fetched already"):
+            setup.collect()
     with pytest.raises(RecordingError, match="did not come as the node has it"):
         setup.collect()
     assert not part.exists() and not target.exists()

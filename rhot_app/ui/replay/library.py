@@ -139,7 +139,7 @@ class Library:
             raise RecordingError(f"{trash}: cannot be made ({exc.strerror}), so nothing was deleted.") from exc
         target = trash / path.name
         number = 1
-        while target.exists():
+        while target.exists() or videos_of(target):
             number += 1
             target = trash / f"{path.stem} {number}{LOG_SUFFIX}"
         self._deleted.append((path, _move_all(path, target)))
@@ -196,6 +196,8 @@ def _refuse_while_recorded(path: Path) -> None:
 def _move_all(path: Path, target: Path) -> Path:
     """Move a log and the videos that were collected beside it; returns the log's new path. Raises RecordingError."""
     videos = videos_of(path)
+    if videos and videos_of(target):
+        raise RecordingError(f"there are videos of another recording called {target.stem} already; move them first.")
     moved = _move(path, target)
     for video in videos:
         _move(video, target.with_name(target.stem + video.name.removeprefix(path.stem)))

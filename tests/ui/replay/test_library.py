@@ -266,6 +266,11 @@ def test_videos_go_where_their_recording_goes(filmed, tmp_path):
 
     def there(stem: str, folder: Path = filmed.parent) -> list[bool]:
         return [(folder / f"{stem}.{name}").exists() for name in ours]
+    other = filmed.with_name("taken.left.avi")
+    other.write_bytes(b"of a recording that is gone")
+    with pytest.raises(RecordingError, match="videos of another recording called taken"):
+        library.rename(filmed, "taken")
+    assert other.read_bytes() == b"of a recording that is gone" and there("filmed") == [True] * 3
     path = library.rename(filmed, "wave")
     assert there("wave") == [True] * 3 and there("filmed") == [False] * 3
     assert path.with_name("wave.left.avi").read_bytes() == b"filmed.left.avi"
