@@ -1,16 +1,17 @@
-"""What finding six markers costs: this detector and the thesis's pipeline, in one run.
+"""Processing time for six markers: this detector and the thesis's pipeline, in one run.
 
     python benchmarks/detection.py [--rounds N] [--size S] [--shapes S] [--seed N] [--processor] [--json FILE]
 
 Three scenes of `independent_drawing`, 640x480, six markers (discs of 16 px): close together, spread to the frame's
 border, and before texture. Both programs get the same frames and take turns, a ring of frames each, so that a busy
-machine slows both alike; OpenCV and all else use one thread. The ring is larger than the caches.
+machine slows both alike. All code, OpenCV's too, uses one thread. The ring is larger than the caches.
 
-* tracked: all six followed, their outlines fitted, against the thesis's regions of interest.
-* one, two hidden: absent from the pictures. The thesis's pipeline then searches the whole frame for them; the ratio is
-  given to that and to its regions of interest with all markers.
-* all lost: the sum over all frames from losing all tracks to the last marker found, against one whole frame of the
-  thesis's. Cold start: the same from a detector that knows neither markers nor light.
+* tracked: all six followed, their outlines fitted; the reference is the thesis's regions of interest.
+* one, two hidden: absent from the pictures. The thesis's pipeline then searches the whole frame for them. The
+  references are that search, and its regions of interest with all markers.
+* all lost: the sum over all frames from the loss of all tracks until the last marker is found; the reference is one
+  whole frame of the thesis's pipeline.
+* cold start: the same for a new detector without tracks and without a known light.
 
 `--processor` counts the processor's time instead of the clock's: on a busy machine long calls are interrupted, short
 ones hardly ever. Ends with code 1 when an aim is missed.
@@ -55,7 +56,7 @@ class Timed:
         self.clock = clock
 
     def call(self, name: str, work: Callable[..., Any], *arguments: Any) -> Any:
-        """Call, and note under `name` what it took."""
+        """Call a function and record its time under `name`."""
         start = self.clock()
         result = work(*arguments)
         self.us.setdefault(name, []).append(1e-3 * (self.clock() - start))
@@ -63,7 +64,7 @@ class Timed:
 
 
 def frames_of(scene: Scene, hidden: tuple[int, ...]) -> tuple[list[YuvImage], list[Any]]:
-    """A ring of frames that sways to and fro so that the first may follow the last, as YUV and as BGR."""
+    """A ring of frames, as YUV and as BGR; the markers sway so that the first frame may follow the last."""
     rng = np.random.default_rng(1)
     yuv = [scene.picture(_moment(k), hidden).expose(rng) for k in range(RING)]
     return yuv, [to_bgr(image) for image in yuv]
@@ -75,8 +76,10 @@ def _moment(frame: int) -> int:
 
 def until_all_found(timed: Timed, name: str, detector: FastDetector, scene: Scene, yuv: list[YuvImage],
                     at: int) -> int:
-    """Detect from frame `at` on until all markers are found where they are: one entry, the sum. Returns the number of
-    frames."""
+    """Detect from frame `at` on until all markers are found at their true positions; returns the number of frames.
+
+    The sum of their times is one entry.
+    """
     one = Timed(timed.clock)
     for count in range(1, GIVE_UP + 1):
         frame = (at + count - 1) % RING
@@ -88,7 +91,7 @@ def until_all_found(timed: Timed, name: str, detector: FastDetector, scene: Scen
 
 
 def measure(scene: Scene, rounds: int, clock: Clock) -> tuple[dict[str, Array], dict[str, int]]:
-    """Microseconds per call or sum by stage, and the most frames that a start took by its kind."""
+    """Microseconds per call or sum by stage, and the greatest number of frames by the kind of start."""
     timed, worst = Timed(clock), {"all lost": 0, "cold start": 0}
     yuv, bgr = frames_of(scene, ())
     room, gate, everything = np.empty_like(bgr[0]), ColourGate(MARKERS), range(len(MARKERS.markers))

@@ -1,12 +1,12 @@
-"""How often a marker is measured that is not there: the twin's hand with paint missing, through the whole chain.
+"""How often a missing marker is reported as measured: the twin's hand with paint missing, through the whole chain.
 
     python benchmarks/false_locks.py [--frames N] [--trackers classic,model] [--json FILE]
 
-Skin before cloth, and before a cluttered desk with things in saturated colours; the hand wears no paint at all, or
-lacks one marker. Rendered pictures go through the nodes' detector, the wire and each tracker. A false lock is a marker
-that is called measured and is missing, or is more than 20 mm (a fingertip's length) from where it is. `measured` is the
-share of the worn markers, in all states, that are called measured. `--frames` counts both cameras, all cases together.
-Exit code 1 with any false lock.
+The hand has no paint at all, or lacks one marker. It is before cloth, or before a cluttered desk with objects in
+saturated colours. Rendered pictures go through the nodes' detector, the wire and each tracker. A false lock is a marker
+that is reported as measured although it is missing, or more than 20 mm (a fingertip's length) from its true position.
+`measured` is the share of the painted markers, in all states, that are reported as measured. `--frames` counts both
+cameras and all cases together. Exit code 1 with any false lock.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ FAR_M = 0.02
 
 
 def tally(filmed: Take, missing: frozenset[str], kind: str) -> Counter[str]:
-    """States of one tracker on one take: `false`, `measured` and `worn` markers, `states`."""
+    """Counts of one tracker on one recording: `false` locks, `measured` and painted (`worn`) markers, `states`."""
     rig = rig_with(filmed.rig, TrackerSettings(kind=kind))
     tracker = make_tracker(rig)
     warm_up(tracker, rig)

@@ -1,8 +1,9 @@
-"""Pictures of markers, drawn by themselves: neither the twin nor the tests' drawing has a part in them.
+"""Pictures of markers by a renderer of their own, which shares no code with the twin or with the tests' drawing.
 
-Discs and capsules in the display colours of the six-marker set before textured rooms, edges supersampled, blurred by a
-lens, with sensor noise in red, green and blue, as full-range BT.601 YUV420. Pixels: (0, 0) is the centre of the
-top-left pixel. Colours are grey levels of RGB. Also the Cramer-Rao bound of a marker's place in such a picture.
+Discs and capsules in the display colours of the six-marker set lie before textured rooms. Edges are supersampled and
+blurred by a lens. Red, green and blue have sensor noise. The pictures are full-range BT.601 YUV420; pixel (0, 0) is
+the centre of the top-left one. Colours are grey levels of RGB. The Cramer-Rao bound of a marker's position is computed
+from the same drawing.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ SIZES_PX = (12.0, 40.0)  # of what is mixed
 SHAPES = ("disc", "capsule", "mixed")
 CAPSULE = (0.3, 1.0)  # half the straight part of a capsule, in radii
 SHADING, BRIGHTNESS, TEXTURE = (0.0, 0.25), (0.7, 1.1), (0.5, 1.5)
-SWAY, WOBBLE, SWAY_RAD, WOBBLE_RAD = 6.0, 1.2, 0.13, 0.31  # px, and rad per frame: of all markers, of each
+SWAY, WOBBLE, SWAY_RAD, WOBBLE_RAD = 6.0, 1.2, 0.13, 0.31  # px, rad/frame: of all markers, of each
 NEUTRAL_HUE, NEUTRAL_SPAN = math.radians(137.0), math.radians(8.0)  # of wood and skin: between yellow and red paint
 CHROMA_MOST, NEUTRAL_CHROMA_MOST = 18.0, 36.0  # grey levels of a room's chroma: weaker than any paint
 
@@ -45,7 +46,7 @@ YCC = np.array([[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418
 
 @dataclass(frozen=True)
 class Shape:
-    """A disc, or a capsule where `half_length` is not 0. It darkens by `shading` from side to side towards `towards`.
+    """A disc, or a capsule where `half_length` is not 0. Its brightness falls by `shading` in the direction `towards`.
 
     `x`, `y`: its centroid; `radius`, `half_length` px; `turn`, `towards` rad; `rgb` (3,) grey levels.
     """
@@ -61,7 +62,7 @@ class Shape:
 
     @property
     def reach(self) -> float:
-        """The farthest that the outline is from the centroid, px."""
+        """Greatest distance of the outline from the centroid, px."""
         return self.radius + self.half_length
 
     def painted(self, canvas: Plane, x0: int, y0: int, samples: int = EDGE) -> Plane:
@@ -135,7 +136,7 @@ class Scene:
     def place_bound(self, index: int) -> Array:
         """(2,) px: the least standard deviations of x and y of one marker in a frame's chroma planes.
 
-        Unknown besides: radius, length and turn, the paint, strength and direction of the shading, and the
+        Also unknown: radius, length and turn, the paint, strength and direction of the shading, and the
         surroundings' mean colour.
         """
         shape = self.shapes[index]
@@ -164,14 +165,14 @@ class Scene:
 
 
 def _box(shape: Shape) -> tuple[int, int, int, int]:
-    """x0, y0, x1, y1 of even numbers: what a marker changes of the picture."""
+    """x0, y0, x1, y1, even: the part of the picture that a marker changes."""
     reach = shape.reach + REACH
     return (max(2 * math.floor((shape.x - reach) / 2), 0), max(2 * math.floor((shape.y - reach) / 2), 0),
             min(2 * math.ceil((shape.x + reach) / 2), WIDTH), min(2 * math.ceil((shape.y + reach) / 2), HEIGHT))
 
 
 def through_lens(rgb: Plane) -> Plane:
-    """RGB behind the lens."""
+    """RGB blurred by the lens."""
     return np.asarray(cv2.GaussianBlur(rgb, (0, 0), LENS_SIGMA), dtype=np.float32)
 
 
@@ -186,7 +187,7 @@ def to_planes(rgb: Plane) -> tuple[Plane, Plane, Plane]:
 
 @cache
 def _noise_planes() -> tuple[Plane, Plane, Plane]:
-    """Noise of Y, Cb, Cr, twice as wide and high as a picture: a picture's is a part of it, from anywhere."""
+    """Noise of Y, Cb and Cr, twice as wide and high as a picture, which takes its noise from a random part of it."""
     rgb = NOISE * np.random.default_rng(0).standard_normal((2 * HEIGHT, 2 * WIDTH, 3), dtype=np.float32)
     y, cb, cr = to_planes(rgb)
     return y, cb - np.float32(128.0), cr - np.float32(128.0)
@@ -195,7 +196,7 @@ def _noise_planes() -> tuple[Plane, Plane, Plane]:
 # Rooms ------------------------------------------------------------------------------------------------------------
 
 def _waves(rng: np.random.Generator, cell_x: float, cell_y: float) -> Array:
-    """(H, W) smooth noise of unit deviation whose waves are of so many pixels."""
+    """(H, W) smooth noise with a standard deviation of 1 and the given wavelength, px."""
     coarse = rng.standard_normal((math.ceil(HEIGHT / cell_y) + 2, math.ceil(WIDTH / cell_x) + 2))
     waves = cv2.resize(coarse, (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
     return np.asarray(waves / waves.std(), dtype=np.float64)
@@ -267,7 +268,7 @@ TRIES = 4000
 
 
 def _compact(rng: np.random.Generator, reach: Array) -> Array:
-    """All within a few marker sizes of each other."""
+    """Positions within a few marker sizes of each other."""
     room, margin = 2.5 * float(np.mean(reach)), float(reach.max()) + SWAY + 2 * WOBBLE
     while True:
         within = room + margin
@@ -281,7 +282,7 @@ def _compact(rng: np.random.Generator, reach: Array) -> Array:
 
 
 def _hand(rng: np.random.Generator, reach: Array) -> Array:
-    """An open hand that fills the frame, turned anyhow."""
+    """Positions as on an open hand that fills the frame, at a random rotation."""
     while True:
         turn = rng.uniform(0, math.tau)
         hand = (OPEN_HAND + rng.normal(0.0, 0.08, OPEN_HAND.shape)) @ np.array(
@@ -296,7 +297,7 @@ def _hand(rng: np.random.Generator, reach: Array) -> Array:
 
 
 def _spread(rng: np.random.Generator, reach: Array) -> Array:
-    """Anywhere, two of them in opposite corners."""
+    """Random positions, two of them in opposite corners."""
     while True:
         low, high = _limits(reach)
         places = low + (high - low) * rng.uniform(0, 1, (6, 2))
@@ -310,7 +311,7 @@ def _spread(rng: np.random.Generator, reach: Array) -> Array:
 
 
 def _limits(reach: Array | float) -> tuple[Array, Array]:
-    """Least and greatest places: in all frames BORDER px from the frame's border, and the outline within the frame."""
+    """Least and greatest positions: BORDER px from the frame's border and the outline inside it, in all frames."""
     away = np.maximum(BORDER, np.atleast_1d(reach) + 2.0)[:, None] + SWAY + 2 * WOBBLE
     low, high = away * np.ones(2), np.array([WIDTH - 1.0, HEIGHT - 1.0]) - away
     return (low, high) if np.ndim(reach) else (low[0], high[0])
@@ -331,7 +332,7 @@ LAYOUTS: dict[str, Callable[[np.random.Generator, Array], Array]] = {
 
 
 def build_scene(layout: str, size: str, room: str, seed: int, shapes: str = "mixed") -> Scene:
-    """A scene of a layout, a size (px, or "mixed"), a room and a seed; all else is drawn by lot from the ranges above.
+    """A scene of a layout, a size (px, or "mixed"), a room and a seed; the rest is random within the ranges above.
 
     `size` is a disc's diameter, a capsule's width.
     """

@@ -1,19 +1,20 @@
-"""Are all markers found, and how truly and steadily are they placed, in pictures that nothing of RHOT has drawn?
+"""Detection rate, bias and jitter of the detector in pictures that share no code with the twin or the tests.
 
     python benchmarks/independent_scenes.py [--seed N] [--frames N] [--scenes N] [--layout L] [--size S] [--room R]
                                             [--shapes S] [--told shipped|disc] [--part scenes|returns] [--json FILE]
 
 The pictures are those of `independent_drawing`: six discs and capsules of 12 to 40 px, from close together to spread
-to the frame's edge, before five kinds of rooms. Of each layout, size and room:
+to the frame's edge, before five kinds of rooms. For each layout, size and room:
 
-* stills: the detector is reset before each frame; sequence: the markers sway by less than 2 px a frame. The share of
-  frames in which the first listed observation of every marker is within half its width of the truth.
-* bias: the mean error over noise of a marker that keeps its place, px, rms over places and both axes together.
-* jitter against the Cramer-Rao bound of one frame, rms over markers and axes, px.
+* stills: the detector is reset before each frame. Share of frames in which the first observation of every marker is
+  within half its width of its true position.
+* sequence: the same while the markers sway by less than 2 px a frame.
+* bias: mean error of a marker that does not move, px, rms over positions and both axes together.
+* jitter: standard deviation, px, rms over markers and axes, with the Cramer-Rao bound of one frame.
 
-Then long sequences in which one or two markers vanish for a while and return: the share of frames in which all visible
-markers are found, those of a return's first frames excepted; the frames until a marker is found again; and frames in
-which a marker is stated that is not there. Ends with code 1 when an aim is missed.
+Then long sequences in which one or two markers vanish for a while and return. They give the share of frames in which
+all visible markers are found, without the first frames of a return; the frames until a marker is found again; and the
+frames in which a hidden marker is reported. Ends with code 1 when an aim is missed.
 """
 
 from __future__ import annotations
@@ -37,16 +38,16 @@ from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerObservation
 
 FOUND_AIM, BIAS_AIM, JITTER_AIM, RETURN_AIM = 0.99, 0.05, 1.15, 5  # share, px, of the bound, frames
-SETTLE = 12  # frames until all is learnt of markers that keep their places
-STILLS = 8  # frames of each scene that are found from nothing; the more the longer the run
-AWAY, APART = (8, 40), (12, 30)  # frames for which a marker is hidden, and between two such times
-BOTH = 0.3  # of the times when a marker is hidden, another is as well
-WORST = 12  # rows of the list of the worst
+SETTLE = 12  # frames that are not counted while the tracks of resting markers settle
+STILLS = 8  # frames of each scene with a reset before them, at least
+AWAY, APART = (8, 40), (12, 30)  # range of the frames for which a marker is hidden, and of those between two absences
+BOTH = 0.3  # probability that a second marker is hidden with the first
+WORST = 12  # rows of the list of the worst scenes
 
 
 @dataclass
 class Scored:
-    """What was found of one scene. `missed`: by marker, frames in which it was not found, of stills and sequence."""
+    """The figures of one scene. `missed`: by marker, stills and frames of the sequence in which it was not found."""
 
     layout: str
     size: str
@@ -61,13 +62,13 @@ class Scored:
 
 
 def right(seen: MarkerObservation, shape: Shape) -> bool:
-    """Whether an observation is within half the marker's width of the truth."""
+    """Whether an observation is within half the marker's width of its true position."""
     return seen.found and math.hypot(seen.x - shape.x, seen.y - shape.y) <= shape.radius
 
 
 def judge(scene: Scene, kind: tuple[str, str, str], frames: int, rng: np.random.Generator,
           markers: MarkerSet = MARKERS) -> Scored:
-    """Stills, a sequence and markers that keep their places, of one scene. `markers`: the set told to the detector."""
+    """Measure stills, a sequence and resting markers of one scene. `markers`: the detector's set."""
     detector, count = FastDetector(markers), len(scene.shapes)
     shares, missed = [], np.zeros(count, dtype=int)
     for length, still in ((STILLS, True), (frames, False)):
@@ -88,7 +89,7 @@ def judge(scene: Scene, kind: tuple[str, str, str], frames: int, rng: np.random.
 
 
 def keep_place(scene: Scene, detector: FastDetector, frames: int, rng: np.random.Generator, out: Scored) -> None:
-    """Add each marker's mean error, its variance per axis and the bound of that, where it is found in most frames."""
+    """Add the mean error, the variance per axis and its bound of every resting marker that is found in most frames."""
     picture = scene.picture()
     detector.reset()
     errors = np.full((SETTLE + frames, len(scene.shapes), 2), np.nan)
@@ -109,7 +110,7 @@ def keep_place(scene: Scene, detector: FastDetector, frames: int, rng: np.random
 
 
 def figures(scored: Sequence[Scored]) -> dict[str, float]:
-    """Share of stills and of sequences, bias, worst bias, jitter, its bound and their ratio, over scenes."""
+    """Over scenes: share of stills and of sequences found, bias, worst bias, jitter, its bound and their ratio."""
     bias, variance, bound = (np.array([getattr(one, name) for one in scored]).ravel()
                              for name in ("bias", "variance", "bound"))
     jitter, least = math.sqrt(np.nanmean(variance)), math.sqrt(np.nanmean(bound))
@@ -131,7 +132,7 @@ def written(row: dict[str, float]) -> str:
 
 
 def scenes(options: argparse.Namespace) -> tuple[list[Scored], dict[str, Any], bool]:
-    """Judge scenes of all kinds and print their table."""
+    """Measure scenes of all kinds and print their table."""
     told = MARKERS if options.told == "shipped" else msgspec.structs.replace(
         MARKERS, markers=tuple(msgspec.structs.replace(marker, shape="disc") for marker in MARKERS.markers))
     rng = np.random.default_rng(options.seed)
@@ -199,8 +200,11 @@ def absences(length: int, count: int, rng: np.random.Generator) -> NDArray[np.bo
 
 @dataclass
 class Returned:
-    """A long sequence. `found`: share of frames; `waits`: frames until each return was seen, 1 when at once, 0 when
-    never; `phantoms`: frames with a marker stated that is hidden; `hidden`: frames with a hidden marker."""
+    """The figures of a long sequence.
+
+    `found`: share of frames with all visible markers found. `waits`: frames until each return was found, 1 when at
+    once, 0 when never. `phantoms`: reports of a hidden marker, of `hidden` frames of hidden markers.
+    """
 
     name: str
     found: float

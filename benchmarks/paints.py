@@ -1,16 +1,17 @@
-"""Other paint than whole fingertips: what is measured, and how well, beside whole fingertips in the same motion.
+"""Accuracy with nails, dots, rings and worn paint, compared with whole fingertips in the same motion.
 
     python benchmarks/paints.py [--motion tap] [--seconds 4] [--seed 1] [--only NAME ...] [--logs DIR] [--json FILE]
 
-The twin's hand at 0.6 m, rendered, seen by the nodes' own detector, through the classic and the model tracker. Each
-paint is filmed from the sides of the hand that `PAINTS` names: `palm` or `back` towards the cameras. A table per side:
+The twin's hand at 0.6 m is rendered and goes through the nodes' detector, the classic and the model tracker. Each
+paint is rendered from the sides of the hand that `PAINTS` names: `palm` or `back` towards the cameras. Each
+side has a table:
 
     in view     share of marker frames in which both cameras see nine tenths of the paint that faces them
     tips seen   share of the fingertips' frames in which both cameras see any of their paint
-    measured    share of the markers in view that the tracker calls measured
-    tips, angles   fingertips called measured and angles of painted fingers, rms; tips are where the paint is
+    measured    share of the markers in view that the tracker reports as measured
+    tips, angles   rms errors of measured fingertips, at the paint's position, and of angles of painted fingers
 
-Markers are rhot6's, with the fields of `PAINTS` put in. `segment` is rhot6 itself, for comparison.
+The markers are those of rhot6 with the fields of `PAINTS`. `segment` is rhot6 itself, for comparison.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ BOTH = ("palm", "back")
 
 @dataclass(frozen=True)
 class Paint:
-    """`tips` and `wrist`: fields of those markers; `scene`: fields of the twin's settings; `sides`: from which."""
+    """A kind of paint: marker fields of `tips` and `wrist`, the twin's settings `scene`, and the `sides` in view."""
 
     tips: dict[str, Any] = field(default_factory=dict)
     wrist: dict[str, Any] = field(default_factory=dict)

@@ -159,12 +159,14 @@ class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 
 
 class OutputSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One live stream to other programs (docs/outputs.md). `rate_hz`: at most so many states/s; None: every one."""
+    """One live stream to other programs (docs/outputs.md). `rate_hz`: at most so many states/s; None: every one.
+    `enabled`: one that is switched off is kept, and not opened."""
 
     kind: Annotated[str, Meta(pattern=r"\A[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")]  # osc, vmc, ws, ..., or a plug-in's name
     target: Annotated[str, Meta(max_length=256)] = ""  # HOST:PORT, or what the kind understands
     joints: Literal["own", "openxr", "mediapipe"] = "own"
     rate_hz: Annotated[float, Meta(gt=0, le=1000)] | None = None
+    enabled: bool = True
 
     @property
     def spec(self) -> str:

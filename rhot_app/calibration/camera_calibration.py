@@ -1,6 +1,6 @@
-"""Whether a rig's lenses and poses are calibrated, and how far places may be off by them.
+"""Whether a rig's lenses and poses are calibrated, and the error of positions that their calibration leaves.
 
-``rhot check``, the engine's advice and the app all ask here, so that they agree.
+``rhot check``, the engine's advice and the app all use these functions, so that they agree.
 """
 
 from __future__ import annotations
@@ -20,12 +20,11 @@ Array = NDArray[np.float64]
 
 NOT_CALIBRATED = "Not calibrated: millimetres are not reliable."
 _NO_TURN = 1e-9
-"""Rotation vector part; a solve never finds two cameras as parallel as this, a file that states no rotation does."""
+"""Vector part of a rotation's quaternion below which a pose is nominal. No solve finds cameras that parallel."""
 
 
 def calibration_finding(rig: Rig) -> HealthFinding | None:
-    """The one thing that a rig's lenses and poses are blamed for, with the calibration to do next; None when all is
-    well, or when nothing is known against them."""
+    """The most serious fault of a rig's lenses and poses, with the calibration to do next; None without a known one."""
     if rig.depth.mode == "disparity":
         return HealthFinding("stereo", Finding(
             "disparity", Grade.FAIR, "Distances are estimates: the rig finds them from disparity, without a "
@@ -63,7 +62,7 @@ def calibration_text(rig: Rig) -> str:
 
 
 def lengths_text(rig: Rig) -> str:
-    """What a second known length said of the board's squares, in a few words."""
+    """How the size of the board's squares was checked against a second known length, in a few words."""
     record = rig.calibration
     if record is None:
         return "not recorded"
@@ -74,7 +73,7 @@ def lengths_text(rig: Rig) -> str:
 
 
 def with_lens(rig: Rig, camera: str, lens: Intrinsics) -> Rig:
-    """`rig` with another lens of `camera`; the poses were found with the old one, and the record says so."""
+    """`rig` with another lens of `camera`; its calibration record then says that the poses are outdated."""
     nodes = tuple(msgspec.structs.replace(node, intrinsics=lens) if node.name == camera else node for node in rig.nodes)
     record = rig.calibration
     if record is not None:
@@ -84,10 +83,10 @@ def with_lens(rig: Rig, camera: str, lens: Intrinsics) -> Rig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationError:
-    """What a rig's calibration adds to the uncertainty of places.
+    """What a rig's calibration adds to the uncertainty of positions.
 
-    `sd_m` is the standard deviation at `distance_m` from `middle` (3,) m, the middle of the cameras, in the rig frame;
-    NaN when nobody knows it, for the `reason` (a sentence).
+    `sd_m` is the standard deviation at `distance_m` from `middle` (3,) m, the middle of the cameras, in the rig frame.
+    It is NaN when it is unknown, and `reason` then says why in a sentence.
     """
 
     sd_m: float
@@ -97,12 +96,14 @@ class CalibrationError:
 
     @property
     def known(self) -> bool:
-        """Whether a standard deviation may be stated at all."""
+        """Whether the standard deviation is known."""
         return not self.reason
 
     def at(self, positions: Array) -> Array:
-        """(...,) m for places (..., 3) m of the rig frame. It grows with the square of the distance, as the error of a
-        distance from a baseline does: dz = z^2 / (B f) dx."""
+        """Standard deviations (...,) m at positions (..., 3) m of the rig frame.
+
+        They grow with the square of the distance, as the depth error of stereo does: dz = z^2 / (B f) dx.
+        """
         away = np.linalg.norm(np.asarray(positions) - self.middle, axis=-1)
         return np.asarray(self.sd_m * np.square(away / self.distance_m))
 

@@ -1,6 +1,6 @@
-"""Why the detector does not find a marker in a picture, or finds it in doubt: which of its tests says so.
+"""Why the detector does not find a marker in a picture, or flags it: the test that the marker does not pass.
 
-Every answer is read from the detector's own tables, labels, blobs and measurements; none of its rules stands here.
+Every cause is read from the detector's own tables, labels, blobs and measurements; no rule is repeated here.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ Code = Literal["hue", "pale", "dark", "bright", "other", "small", "large", "join
                "border", "hidden", "track"]
 Blob = NDArray[np.float64]
 
-JOINED = 2.2  # of the marker's area: something else belongs to it
-PASSING = 0.5  # of a marker's sample: with less the colour's bounds are to blame
+JOINED = 2.2  # of the marker's area: a larger blob includes something else
+PASSING = 0.5  # of a marker's sample: if fewer pixels pass, the colour's bounds are the cause
 
 _REMEDY: dict[Code, str] = {
     "hue": "Learn its colour anew in this light, or widen its hue.",
@@ -42,7 +42,7 @@ _REMEDY: dict[Code, str] = {
     "large": "Use a plainer background, or another paint.",
     "joined": "Put a grey border of some 3 mm round the marker, or use another paint.",
     "thin": "Paint a larger and even part of the finger, or go nearer.",
-    "rival": "Take the other thing away or cover it, or use another paint.",
+    "rival": "Take the other object away or cover it, or use another paint.",
     "crowded": "Use a plainer background, or another paint.",
     "border": "Keep the whole marker in the picture.",
     "hidden": "Turn the hand so that the whole marker is seen.",
@@ -52,19 +52,19 @@ _REMEDY: dict[Code, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One test of the detector that a marker does not pass: `code` for programs, `sentence` with figures, `remedy`."""
+    """A test of the detector that a marker does not pass: `code` for programs, and a `sentence` with figures."""
 
     code: Code
     sentence: str
 
     @property
     def remedy(self) -> str:
-        """What helps."""
+        """What to do about it, a sentence."""
         return _REMEDY[self.code]
 
 
 class Explainer:
-    """Asks the detector's tests about single markers of one set. Holds buffers: one thread only."""
+    """Applies the detector's tests to single markers of one set. It holds buffers: one thread only."""
 
     def __init__(self, markers: MarkerSet) -> None:
         self._markers = markers.markers
@@ -72,10 +72,10 @@ class Explainer:
 
     def why_lost(self, detector: FastDetector, image: YuvImage, seen: Sequence[MarkerObservation], index: int,
                  paint: Mapping[str, PaintRegion] | None = None) -> Cause:
-        """Why `detector`, which has just returned `seen` of `image`, does not find marker `index` where it is.
+        """Why `detector`, which has just returned `seen` for `image`, does not find marker `index`.
 
-        `paint`: the known markers of the picture by id. Without that of the marker the whole picture is asked: what in
-        it comes nearest to being the marker.
+        `paint`: the known regions of markers in the picture, by id. Without the marker's own region the whole picture
+        is tested for what comes nearest to the marker.
         """
         region = (paint or {}).get(self._markers[index].id)
         self._light.warmth = detector.warmth
@@ -108,13 +108,13 @@ class Explainer:
 
     @staticmethod
     def why_second(seen: Sequence[MarkerObservation], index: int) -> Cause:
-        """Why marker `index` is found, but something else of its colour before it."""
+        """Why marker `index` is found, but another object of its colour is reported before it."""
         first = next(mark for mark in seen if mark.index == index)
         return Cause("rival", f"What is found first is at {first.x:.0f}, {first.y:.0f} and has {_area(first):.0f} px².")
 
     @staticmethod
     def doubt(seen: Sequence[MarkerObservation], index: int) -> Cause | None:
-        """Why marker `index`, which was found, is stated with a flag of doubt; None when it is in plain view."""
+        """Why marker `index`, which was found, has a flag of doubt or rivals; None when it is in plain view."""
         first, *others = [mark for mark in seen if mark.index == index]
         if others:
             other = max(others, key=lambda mark: mark.diameter)
@@ -129,7 +129,7 @@ class Explainer:
         return None
 
     def _blob(self, balanced: YuvImage, index: int, region: PaintRegion | None) -> Blob | None:
-        """The largest blob of the marker's colour, as the search of a whole picture joins them, in its region."""
+        """The largest blob of the marker's colour in `region`, found as in the search of a whole picture."""
         blobs = self._gate.blobs(balanced, [index], 1, SEARCH_STEP)
         if region is not None:
             own = self._gate.labels(balanced) == index + 1
@@ -137,7 +137,7 @@ class Explainer:
         return blobs[int(np.argmax(blobs[:, AREA]))].copy() if len(blobs) else None
 
     def _colour(self, balanced: YuvImage, index: int, region: PaintRegion | None, partly: bool = False) -> Cause | None:
-        """Which test of a single colour refuses the paint, None when most of it passes."""
+        """The colour test that the paint does not pass; None when most of it passes, with `partly` all of it."""
         labels, table = self._gate.labels(balanced), self._gate.table[balanced.u, balanced.v]
         sector, own = self._sector[balanced.u, balanced.v], index + 1
         if region is None:
@@ -156,7 +156,7 @@ class Explainer:
         return self._refusal(code, balanced, index, refused[code], table)
 
     def _refusal(self, code: str, balanced: YuvImage, index: int, where: Mask, labels: Labels) -> Cause:
-        """What a test says of the pixels `where`, in figures."""
+        """The cause `code` with the figures of the pixels `where`."""
         colours, chroma = colours_of(balanced, where), self._markers[index].chroma
         luma, cb, cr = (float(part) for part in np.median(colours, axis=0))
         if code == "luma":
@@ -180,7 +180,7 @@ class Explainer:
 
     def _joined(self, own: Sequence[MarkerObservation], blob: Blob, index: int, region: PaintRegion | None,
                 paint: Mapping[str, PaintRegion]) -> Cause | None:
-        """Whether the blob, or what the window made of it, is more than the marker."""
+        """The cause if the blob, or the observation made of it, is much larger than the marker."""
         if region is None:
             return None
         held = [mark for mark in own if math.hypot(mark.x - 2.0 * blob[SUM_X] / blob[AREA],
@@ -195,10 +195,10 @@ class Explainer:
                      f"{4 * region.area:.0f} px².")
 
     def _rival(self, own: Sequence[MarkerObservation], blob: Blob, index: int, image: YuvImage) -> Cause:
-        """Another blob was taken for the marker: which, and why that one."""
+        """The cause when another blob was taken for the marker: which one, and why."""
         other = own[0]
         if len(own) >= CANDIDATES_MAX:
-            return Cause("crowded", f"{len(own)} other things of its colour are likelier, the first at {other.x:.0f}, "
+            return Cause("crowded", f"{len(own)} other objects of its colour are likelier, the first at {other.x:.0f}, "
                          f"{other.y:.0f}; no more than {CANDIDATES_MAX} are followed.")
         why = "larger" if _area(other) > 4.0 * blob[AREA] else "likelier by its hue and shape"
         cut = " The marker is cut by the picture's border." if _touches_border(blob, image.u.shape) else ""
@@ -242,7 +242,7 @@ def _inside(mark: MarkerObservation, where: Mask) -> bool:
 
 
 def _area(mark: MarkerObservation) -> float:
-    """Luma px^2."""
+    """Area of a marker, luma px^2."""
     return 0.25 * math.pi * mark.diameter**2
 
 

@@ -1,4 +1,4 @@
-"""Which marker has whose colour: two of one colour, one of the colour of skin, one that has what another had."""
+"""Markers with ambiguous colours: two of one colour, one of the colour of skin, one of another's earlier colour."""
 
 from __future__ import annotations
 
@@ -15,18 +15,22 @@ from rhot_node.detect.colour import Colours
 from rhot_node.markers import ChromaModel
 
 SKIN_HUE_DEG, SKIN_REACH_DEG = 134.0, 20.0
-"""Chroma angle of skin of all tones, and how far it reaches (`benchmarks/false_locks.py`)."""
+"""Chroma angle of skin of all tones and its half width, degrees (`benchmarks/false_locks.py`)."""
 SKIN_MAGNITUDE, SKIN_SATURATION = 50.0, 0.45
 """Chroma, grey levels, and chroma per luma that skin does not exceed. The ten tones of the Monk scale have at most
 0.28, by a warm lamp 0.43; orange, brown and red paints have 0.5 to 1.2. The ratio does not change with the strength of
 the light."""
-VIEWS_MOST = 4  # pictures that are asked: those that show most markers
-BESIDE = 0.1  # of what surrounds a marker: a finger fills more of it
+VIEWS_MOST = 4  # pictures that are searched for skin: those with most markers
+BESIDE = 0.1  # share of a marker's surroundings: a finger fills more of them
+
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """`same`: pairs of markers of one colour, with how many degrees their hues are apart. `skin`: markers of the colour
-    of skin, and what shows it, in words. `taken`: (marker, other): the marker has the colour that the other had."""
+    """Markers that may be mistaken for another marker or for skin.
+
+    `same`: pairs of markers of one colour and the difference of their hues, degrees. `skin`: markers of the colour of
+    skin, with the evidence in words. `taken`: (marker, other), where the marker has the colour that the other had.
+    """
 
     same: tuple[tuple[str, str, float], ...]
     skin: Mapping[str, str]
@@ -40,17 +44,17 @@ class Identity:
 
 
 def hues_apart_deg(first: ChromaModel, second: ChromaModel) -> float:
-    """How far two hues are apart, degrees."""
+    """The difference of two hues, degrees, 0 to 180."""
     return abs(math.degrees(math.remainder(first.hue_rad - second.hue_rad, math.tau)))
 
 
 def same_colour(first: ChromaModel, second: ChromaModel) -> bool:
-    """Whether two markers cannot be told apart: each one's hue lies in the other's sector, as of one paint."""
+    """Whether two markers have one colour: each one's hue lies in the other's sector, within SEED_HUE_DEG."""
     return hues_apart_deg(first, second) <= min(first.hue_tolerance_deg, second.hue_tolerance_deg, SEED_HUE_DEG)
 
 
 def pairs_of_one_colour(models: Mapping[str, ChromaModel]) -> tuple[tuple[str, str, float], ...]:
-    """All pairs of markers that cannot be told apart, and how many degrees their hues are apart."""
+    """All pairs of markers of one colour and the difference of their hues, degrees."""
     names = list(models)
     return tuple((first, second, hues_apart_deg(models[first], models[second]))
                  for k, first in enumerate(names) for second in names[k + 1:]
@@ -58,7 +62,7 @@ def pairs_of_one_colour(models: Mapping[str, ChromaModel]) -> tuple[tuple[str, s
 
 
 def has_hue_of_skin(colours: Colours) -> bool:
-    """Whether the median of colours (N, 3) Y, Cb, Cr is where skin is: its hue, and no more colour than skin has."""
+    """Whether the median of colours (N, 3) Y, Cb, Cr has the hue of skin, and no more chroma than skin."""
     luma, cb, cr = (float(part) for part in np.median(colours, axis=0))
     away = math.remainder(math.degrees(math.atan2(cr, cb)) - SKIN_HUE_DEG, 360.0)
     magnitude = math.hypot(cb, cr)
@@ -66,8 +70,7 @@ def has_hue_of_skin(colours: Colours) -> bool:
 
 
 def beside(name: str, colours: Colours, views: Sequence[View]) -> tuple[str, ...]:
-    """The other markers round which the pictures plainly show the colour of `name`: the hand that they are on has it.
-    """
+    """The other markers whose surroundings have the colour of `name`: their hand has it, too."""
     _, cb, cr = (float(part) for part in np.median(colours, axis=0))
     found: list[str] = []
     for view in views:
@@ -80,7 +83,7 @@ def beside(name: str, colours: Colours, views: Sequence[View]) -> tuple[str, ...
 
 
 def skin_shown(name: str, colours: Colours, views: Sequence[View]) -> str:
-    """What shows that a marker's colour is that of skin, in words; empty when nothing does."""
+    """The evidence in words that a marker's colour is that of skin; empty without any."""
     luma, cb, cr = (float(part) for part in np.median(colours, axis=0))
     hue = math.degrees(math.atan2(cr, cb))
     shown = []
@@ -96,9 +99,9 @@ def skin_shown(name: str, colours: Colours, views: Sequence[View]) -> str:
 
 def colours_taken(now: Mapping[str, ChromaModel], before: Mapping[str, Sequence[ChromaModel]],
                   ) -> tuple[tuple[str, str], ...]:
-    """(marker, other) of every marker that now has the colour that another had, and that it had not itself.
+    """(marker, other) of every marker that has another's earlier colour and none of its own earlier ones.
 
-    `before`: earlier colours by marker. An other that still has that colour counts as one of two of one colour instead.
+    `before`: earlier colours by marker. A pair that still shares the colour is not listed: see `pairs_of_one_colour`.
     """
     found = []
     for name, model in now.items():
@@ -113,7 +116,10 @@ def colours_taken(now: Mapping[str, ChromaModel], before: Mapping[str, Sequence[
 
 def identify(samples: Sequence[PaintSamples], views: Sequence[View], models: Mapping[str, ChromaModel],
              before: Sequence[Mapping[str, Sequence[ChromaModel]]]) -> Identity:
-    """Whose colour is whose; `models`: of all markers of the set, `before`: earlier ones, the latest first."""
+    """The ambiguous colours of the sampled markers.
+
+    `models`: of all markers of the set. `before`: earlier colours by marker, the latest first.
+    """
     sampled = {one.name for one in samples}
     shown = {one.name: skin_shown(one.name, one.colours, views) for one in samples}
     taken: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""The one board of this project, as numbers: what is printed, shown, searched and assumed where nobody says otherwise.
+"""The default calibration board, as numbers: it is printed, shown, detected and assumed unless another one is named.
 
 Nothing is imported, so that commands can name it in their help at no cost.
 """
@@ -14,7 +14,7 @@ CHARUCO: Final = "10x7"
 """Squares of the ChArUco board: as large as the chessboard."""
 
 SQUARE_MM: Final = 25.0
-"""Side of a square as drawn: 250 x 175 mm go on A4 and on letter paper. Printers scale, so measure it."""
+"""Side of a square as drawn, mm: 250 x 175 mm fit on A4 and on letter paper. Printers scale, so measure it."""
 
 MARKER_SHARE: Final = 0.75
-"""Of a ChArUco square's side, what its marker fills."""
+"""Side of a ChArUco marker, as a share of its square's side."""

@@ -146,7 +146,8 @@ class Engine:
             return record.t_master_ns
 
     def set_rig(self, rig: Rig) -> None:
-        """Go on with another rig. Ports and sessions stay when the nodes are reached as before.
+        """Go on with another rig. Ports and sessions stay when the nodes are reached as before; where only outputs
+        differ, tracking is not touched.
 
         Raises SourceError (a port is taken), OutputError (an output cannot be) or what the tracker objects to; the old
         rig then stays.
@@ -154,6 +155,9 @@ class Engine:
         with self._lock:
             if self._outputs is not None:
                 self._outputs.check(rig)
+            if msgspec.structs.replace(rig, outputs=self.rig.outputs) == self.rig:
+                self._change_outputs(rig)
+                return
             kept = same_network(self.rig, rig)
             if kept:
                 work = self._work(rig)
@@ -221,6 +225,12 @@ class Engine:
             if new.address != old.address:
                 self._moved.setdefault(old.node_id, old.address)
         self.rig = self._observer.rig = msgspec.structs.replace(self.rig, nodes=nodes)
+
+    def _change_outputs(self, rig: Rig) -> None:
+        """The rig with other outputs: tracker, log and meters go on as they are."""
+        self.rig = self._observer.rig = rig
+        if self._outputs is not None:
+            self._outputs.configure(rig)
 
     def _listen(self) -> None:
         self._source.deliver_to(functools.partial(self._pipeline.take, self._source))

@@ -20,6 +20,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import IO, Final
 
 import msgspec
@@ -28,6 +29,7 @@ import zmq
 from rhot_app.engine.codec import TOPIC_STATE, decode
 from rhot_app.errors import OutputError
 from rhot_app.outputs.outputs import Outputs, check_output
+from rhot_app.outputs.spec import as_run
 from rhot_app.outputs.status import SECRET_VARIABLE, OutputStatus
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.tracking.state import HandState
@@ -72,9 +74,10 @@ class OutputProcess:
     def configure(self, rig: Rig) -> None:
         """Open what the rig asks for and close what it does not; what stays goes on with the rig's hands."""
         with self._lock:
-            self._wanted = self._outputs_of(rig)
+            self._wanted = tuple(dict.fromkeys(map(as_run, self._outputs_of(rig))))
             self._document = msgspec.json.encode(msgspec.structs.replace(rig, outputs=self._wanted)) + b"\n"
             if self._process is not None:
+                self._status = self._of_wanted(self._status)
                 self._tell()
             elif self._wanted:
                 self._start()
@@ -99,7 +102,7 @@ class OutputProcess:
                 self._ended_s = now_s
                 self._failure = (f"The program of the outputs ended (code {process.returncode}) and is started again. "
                                  "If that goes on, leave out one output after the other.")
-                self._status = self._starting()
+                self._status = self._of_wanted(())
                 log.warning("rhot: %s Tracking goes on.", self._failure)
             elif now_s - self._ended_s > RESTART_S:
                 self._start()
@@ -127,13 +130,17 @@ class OutputProcess:
             process.wait()
 
     def _outputs_of(self, rig: Rig) -> tuple[OutputSettings, ...]:
-        return tuple(dict.fromkeys((*self._fixed, *(rig.outputs if self._follow_rig else ()))))
+        of_rig = (settings for settings in rig.outputs if settings.enabled) if self._follow_rig else ()
+        return (*self._fixed, *of_rig)
 
-    def _starting(self) -> tuple[OutputStatus, ...]:
-        return tuple(OutputStatus(settings.spec, settings.kind, "starting") for settings in self._wanted)
+    def _of_wanted(self, told: tuple[OutputStatus, ...]) -> tuple[OutputStatus, ...]:
+        """What was told of the outputs that are wanted now; those not told of yet are starting."""
+        known, fixed = {status.spec: status for status in told}, set(map(as_run, self._fixed))
+        return tuple(replace(known.get(settings.spec) or OutputStatus(settings.spec, settings.kind, "starting"),
+                             fixed=settings in fixed) for settings in self._wanted)
 
     def _start(self) -> None:
-        self._status = self._starting()
+        self._status = self._of_wanted(())
         self._ended_s, self._heard_s = 0.0, time.monotonic()
         self._process = subprocess.Popen([sys.executable, "-m", "rhot_app.engine.output_process", self._endpoint],
                                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=self._environment)
@@ -154,7 +161,8 @@ class OutputProcess:
                 status = decoder.decode(line)
                 with self._lock:
                     if process is self._process and process.poll() is None:
-                        self._status, self._failure, self._heard_s = status, "", time.monotonic()
+                        self._failure, self._heard_s = "", time.monotonic()
+                        self._status = self._of_wanted(status)
 
 
 class OutputProgram:

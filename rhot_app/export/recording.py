@@ -10,7 +10,7 @@ from types import TracebackType
 import numpy as np
 
 from rhot_app.engine.replay_summary import replay_states
-from rhot_app.errors import RecordingError
+from rhot_app.errors import RecordingError, take_losses
 from rhot_app.export.states import HandStates, in_blocks
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, load_rig, with_tracker
@@ -89,8 +89,11 @@ class TrackedLog:
                 yield record
         except RecordingError as exc:
             self.losses.append(str(exc).removeprefix(f"{self.path}: "))
+        if self._reader.losses.damage:
+            self.losses.append(self._reader.losses.damage)
         if self._reader.torn_bytes:
             self.losses.append(f"its last {self._reader.torn_bytes} bytes are torn")
+        take_losses()  # they are said by whoever exports
 
     def _why_nothing(self) -> str:
         read = f" What could be read of it: {'; '.join(self.losses)}." if self.losses else ""

@@ -1,4 +1,4 @@
-"""How paint lies on a fingertip: which part of the last segment's surface, and where its middle is.
+"""The painted part of a fingertip: its extent on the last segment's surface, and its middle.
 
 The last segment is a capsule (`rhot_app.hand.shape`). A point of its surface has three coordinates in the frame of the
 bone's end: `along` the bone (0 at the end of the tip, negative towards the joint), `across` (positive towards the
@@ -19,25 +19,28 @@ from rhot_node.markers import FLAT_PATCHES, Marker, Patch
 Array = NDArray[np.float64]
 
 NAIL_LENGTH_MM, NAIL_EDGE_MM = 11.0, 3.0
-"""A painted fingernail where the marker set gives no length, and how far before the end of the tip it ends: it follows
-the tip's curve down to where it is no longer seen from straight above."""
+"""Length of a painted fingernail where the marker set gives none, and its distance from the end of the tip, mm. The
+nail follows the curve of the tip to where it is no longer visible from straight above."""
 
 NAIL_BREADTH = 0.65
-"""A nail's breadth, of the breadth of its fingertip: 11 mm of an index finger's 17."""
+"""A nail's breadth as a share of its fingertip's: 11 mm of an index finger's 17."""
 
 NAIL_CORNERS, DOT_CORNERS = 4.0, 2.0
 """Exponents p of the outline |x / a|^p + |y / b|^p = 1: a rectangle with round corners, an ellipse."""
 
 DOT_MM, RING_MM = 8.0, 10.0
-"""A dot's diameter and a ring's length where the marker set gives none."""
+"""A dot's diameter and a ring's length where the marker set gives none, mm."""
 
-_GRID = 40  # points per axis by which a patch's middle is found: to some micrometres
+_GRID = 40  # points per axis of the integration over a patch: its middle is exact to some micrometres
 
 
 @dataclass(frozen=True, slots=True)
 class PaintedPatch:
-    """The painted part of a fingertip, m. `middle` and `half`: along the bone; `half_across`: of a flat patch;
-    `corners`: the exponent of its outline; `side`: +1 on the back (nail), -1 on the palmar side (pulp), 0 all round."""
+    """The painted part of a fingertip, m.
+
+    `middle` and `half` length along the bone; `half_across` and `corners`, the exponent of the outline, of a flat
+    patch. `side`: +1 on the back (nail), -1 on the palmar side (pulp), 0 all round.
+    """
 
     middle: float
     half: float
@@ -47,8 +50,10 @@ class PaintedPatch:
 
 
 def segment_axis(model: HandModel, finger: int) -> tuple[float, float]:
-    """Where the last segment's capsule has the middle of its axis, along the bone from its end, and half the axis'
-    length, m: `shape.segments` draws the same."""
+    """Middle of the axis of the last segment's capsule, along the bone from its end, and half the axis' length, m.
+
+    It is the capsule of `shape.segments`.
+    """
     behind = float(model.bones[finger, 2] - model.marker[finger])
     return -behind, max(behind - float(model.radii[finger, 2]), 0.0)
 
@@ -71,13 +76,15 @@ _LENGTHS_MM: dict[Patch, float] = {"nail": NAIL_LENGTH_MM, "pulp": DOT_MM, "ring
 
 
 def paint_middle(marker: Marker, model: HandModel, finger: int) -> tuple[float, float]:
-    """The marker's place on a finger's last segment, m: along the bone from its end, and out of the back of the finger.
+    """The marker's position on a finger's last segment, m: along the bone from its end, and up, out of the back.
 
-    Of paint all round it lies on the bone's axis. Of a nail or a dot it lies in the plane of the patch's rim, under the
-    skin, which bulges: the image of a patch is the area within the image of its rim, so that its centroid is that of
-    the rim's plane from whichever side the whole patch is seen. With the height z of the skin over the patch and a
-    line of sight (v, 0, 1), the centroid is at mean((x - v z) (1 - v z_x)) / mean(1 - v z_x): at mean(x), and going
-    with v as a point at the height mean(z) + cov(x, z_x) does. The skin's two directions are averaged.
+    Paint all round has its position on the bone's axis. A nail or a dot has it in the plane of the patch's rim, under
+    the skin, because the image of a patch is the area within the image of its rim. Its centroid is therefore that of
+    the rim's plane, from whichever side the whole patch is visible.
+
+    Let z be the height of the skin over the patch, and (v, 0, 1) a line of sight. The centroid lies at
+    mean((x - v z) (1 - v z_x)) / mean(1 - v z_x). To first order in v that is the image of a point at mean(x) and at
+    the height mean(z) + cov(x, z_x). The heights of the skin's two directions are averaged.
     """
     along, half_axis = segment_axis(model, finger)
     patch = patch_of(marker, model, finger)
@@ -85,10 +92,10 @@ def paint_middle(marker: Marker, model: HandModel, finger: int) -> tuple[float, 
         return along, 0.0
     steps = (2.0 * np.arange(_GRID) + 1.0) / _GRID - 1.0
     x, y = np.meshgrid(patch.middle + patch.half * steps, patch.half_across * steps, indexing="ij")
-    beyond = np.sign(x - along) * np.maximum(np.abs(x - along) - half_axis, 0.0)  # the capsule's straight part
+    beyond = np.sign(x - along) * np.maximum(np.abs(x - along) - half_axis, 0.0)  # 0 on the capsule's straight part
     height2 = float(model.radii[finger, 2]) ** 2 - beyond**2 - y**2
     inside = (np.abs(steps[:, None]) ** patch.corners + np.abs(steps) ** patch.corners <= 1.0) & (height2 > 0.0)
-    if not inside.any():  # a patch that lies beyond the segment altogether
+    if not inside.any():  # the patch lies beyond the segment
         return along, 0.0
     x, y, beyond, z = x[inside], y[inside], beyond[inside], np.sqrt(height2[inside])
     bulge = 0.5 * (np.mean((x - x.mean()) * beyond / z) + np.mean((y - y.mean()) * y / z))
@@ -96,7 +103,9 @@ def paint_middle(marker: Marker, model: HandModel, finger: int) -> tuple[float, 
 
 
 def gap_middle(marker: Marker, mirror: float) -> float:
-    """Angle about the bone of the middle of a marker's gap, rad: 0 is up, out of the back, pi/2 `across`. `mirror`: +1
-    of a right hand, -1 of a left one, on which the thumb is on the other side."""
+    """Angle about the bone of the middle of a marker's gap, rad: 0 is up, out of the back, pi/2 is `across`.
+
+    `mirror`: +1 of a right hand, -1 of a left one, whose thumb is on the other side.
+    """
     return {"dorsal": 0.0, "radial": 0.5 * math.pi * mirror, "palmar": math.pi,
             "ulnar": -0.5 * math.pi * mirror}[marker.gap_side]

@@ -6,12 +6,11 @@ import importlib
 from collections.abc import Callable
 from typing import Final
 
-import msgspec
-
 from rhot_app.errors import OutputError
 from rhot_app.outputs.joints import JointConverter
 from rhot_app.outputs.output import Output, OutputStatus, Sink
 from rhot_app.outputs.plugins import output_plugins, plugin_sink
+from rhot_app.outputs.spec import as_run
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.tracking.state import HandState
 
@@ -19,8 +18,6 @@ MakeSink = Callable[[OutputSettings], Sink]
 
 _KINDS: Final = {"osc": ("osc", "OscSink"), "vmc": ("vmc", "VmcSink"), "ws": ("ws", "WebSocketSink"),
                  "lsl": ("lsl", "LslSink"), "zenoh": ("zenoh", "ZenohSink"), "web": ("web_view", "WebViewSink")}
-_WEB_RATE_HZ: Final = 60.0  # of most screens
-_OPENXR_ONLY: Final = ("vmc", "web")  # whatever is asked: their messages are made of these joints
 
 
 def make_sink(settings: OutputSettings) -> Sink:
@@ -68,7 +65,7 @@ class Outputs:
         Raises OutputError for an output that cannot be; everything then stays as it was. One that only fails to open
         says so in its status.
         """
-        wanted = tuple(dict.fromkeys(map(_whole, rig.outputs)))
+        wanted = tuple(dict.fromkeys(as_run(settings) for settings in rig.outputs if settings.enabled))
         if not wanted and not self._running:
             return
         converter = JointConverter(rig)
@@ -99,10 +96,3 @@ class Outputs:
         running, self._running = self._running, ()
         for output in running:
             output.stop()
-
-
-def _whole(settings: OutputSettings) -> OutputSettings:
-    """The settings as they are meant."""
-    joints = "openxr" if settings.kind in _OPENXR_ONLY else settings.joints
-    rate_hz = _WEB_RATE_HZ if settings.kind == "web" and settings.rate_hz is None else settings.rate_hz
-    return msgspec.structs.replace(settings, joints=joints, rate_hz=rate_hz)

@@ -26,6 +26,10 @@ HELP: Final = """output specs, KIND:TARGET, each with ?joints=own|openxr|mediapi
 WEB_PORT: Final = 47810
 """Of the web view: beside those of the nodes."""
 
+OPENXR_ONLY: Final = ("vmc", "web")
+"""Kinds that always have these joints, whatever is asked: their messages are made of them."""
+
+_WEB_RATE_HZ: Final = 60.0  # of most screens
 _OPTIONS: Final = {"joints": "joints", "hz": "rate_hz"}
 
 
@@ -59,6 +63,13 @@ def web_settings(text: str) -> OutputSettings:
     settings = OutputSettings("web", target, "openxr")
     host_and_port(settings, "127.0.0.1")
     return settings
+
+
+def as_run(settings: OutputSettings) -> OutputSettings:
+    """The settings that an output runs with, where its kind leaves no choice; its status has their spec."""
+    joints = "openxr" if settings.kind in OPENXR_ONLY else settings.joints
+    rate_hz = _WEB_RATE_HZ if settings.kind == "web" and settings.rate_hz is None else settings.rate_hz
+    return msgspec.structs.replace(settings, joints=joints, rate_hz=rate_hz)
 
 
 def host_and_port(settings: OutputSettings, default_host: str | None = None) -> tuple[str, int]:

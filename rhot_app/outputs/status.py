@@ -25,3 +25,4 @@ class OutputStatus:
     dropped: int = 0
     clients: int | None = None
     url: str = ""
+    fixed: bool = False  # of the command line: no other rig closes it

@@ -1,7 +1,7 @@
-"""Which points of a painted surface have paint, and how bright it is there (numba).
+"""Which points of a solid's surface are painted, and how bright the paint is there (numba).
 
-A point of a surface has coordinates along the solid's axis (m, from a capsule's end a, a cylinder's middle), across,
-and up, out of the back of the hand, m. `paint` (N, PAINT_FIELDS) are the rows that `body.py` describes.
+A point of a surface has three coordinates, m: along the solid's axis (from a capsule's end a, or a cylinder's middle),
+across it, and up, out of the back of the hand. `body.py` describes the rows of `paint` (N, PAINT_FIELDS).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from rhot_app.simulator.body import (
 Array = NDArray[np.float64]
 
 CHIP_M, BLOTCH_M = 2e-3, 8e-3
-"""Worn paint is missing in pieces of this size; uneven paint has one thick and one thin place in so much of it."""
+"""Size of the pieces that are missing from worn paint, and period of the thickness of uneven paint, m."""
 
 
 @njit(cache=True, fastmath=True)
@@ -76,14 +76,14 @@ def is_painted(paint: Array, n: int, along: float, across: float, up: float) -> 
 
 @njit(cache=True, fastmath=True)
 def paint_level(paint: Array, n: int, along: float, across: float, up: float) -> float:
-    """Factor on the brightness of solid `n` at a point: uneven paint is thick here and thin there."""
+    """Factor on the brightness of solid `n` at a point, 1 where its paint is even."""
     turn, phase = 2.0 * math.pi / BLOTCH_M, 1.7 * paint[n, SEED]
     return 1.0 + paint[n, UNEVEN] * math.sin(turn * along + phase) * math.cos(0.6 * turn * (across + up) + 2.9 * phase)
 
 
 @njit(cache=True)
 def _chance(seed: float, along: float, across: float, up: float) -> float:
-    """A number from 0 to 1 that belongs to the chip at a point (a multiply and xor-shift hash)."""
+    """A uniform pseudo-random number in [0, 1) for the chip at a point: a multiply and xor-shift hash of its cell."""
     i, j, k = math.floor(along / CHIP_M), math.floor(across / CHIP_M), math.floor(up / CHIP_M)
     value = (i * 0x9E3779B1 + j * 0x85EBCA6B + k * 0xC2B2AE35 + int(seed) * 0x27D4EB2F) & 0xFFFFFFFFFFFF
     value = ((value ^ (value >> 21)) * 0x2545F491) & 0xFFFFFFFFFFFF

@@ -75,7 +75,7 @@ class ClassicTracker:
         t_s = self._seconds(paired.t_ns)
         clock.lap("pair")
         markers = self._locate(t_s, paired, clock)
-        self._association.note(paired.t_ns, np.where(self._confirmed[:, None], markers.raw, np.nan))
+        self._association.update(paired.t_ns, np.where(self._confirmed[:, None], markers.raw, np.nan))
         hand = self._solve_hand(t_s, markers)
         clock.lap("solve")
         return self._state(t_s, paired, markers, hand, clock)

@@ -294,7 +294,6 @@ class ModelTracker:
                                 Condition.LOST if self._ever else Condition.SEARCHING,
                                 None if self._size is None else self._size.known, newest, begun)
         state = self._told.tell(self._timeline.t_ns, number, newest, begun)
-        self._association.note(state.t_master_ns, np.where(
-            (state.marker_knowledge <= Knowledge.INFERRED)[:, None], state.marker_positions, np.nan))
+        self._association.update(state.t_master_ns, state.marker_positions, state.marker_covariances)
         self._compare(state)
         return state

@@ -30,8 +30,8 @@ class RigArrays:
     `shapes` (M, 3, 3) m^2: the markers' bodies as far as known without the hand's pose, zero for flat ones. `tips`
     (5,): marker index of each finger's tip, -1 without one; `wrist`: the same for the wrist. `band_half_axes`
     (3,) m along the palm's x, y, z; None when the wrist wears no band. `law` (7,): how distance follows from
-    disparity (`estimate.disparity_law`), empty when markers are triangulated. `reach` (M, M) m: how far two markers of
-    the hand are from each other at most, infinite where one is none.
+    disparity (`estimate.disparity_law`), empty when markers are triangulated. `reach` (M, M) m: the greatest
+    distance of two markers of the hand, infinite where either is not on the hand.
     """
 
     camera_names: tuple[str, ...]
@@ -86,7 +86,7 @@ def _reach(rig: Rig) -> Array:
 
 
 def _shape(marker: Marker) -> Array:
-    flat = marker.shape not in _ROUND or marker.patch in FLAT_PATCHES  # a patch is seen where it is
+    flat = marker.shape not in _ROUND or marker.patch in FLAT_PATCHES  # the centroid of a flat patch is its position
     return ball(1e-3 * marker.radius_mm if marker.radius_mm and not flat else 0.0)
 
 

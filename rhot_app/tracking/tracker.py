@@ -15,8 +15,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Candidates:
-    """K observations, each of which may be the marker it is said to be of. `markers` (K,): indices in the rig; the
-    other columns as in `CameraObservations`."""
+    """K further observations of one frame, each of an object of a marker's colour.
+
+    `markers` (K,): index in the rig of the marker that each may be. The other columns are as in `CameraObservations`.
+    """
 
     markers: NDArray[np.intp]
     pixels: Array
@@ -26,7 +28,7 @@ class Candidates:
     flags: NDArray[np.uint16]
 
     def of(self, markers: NDArray[np.intp]) -> Candidates | None:
-        """Those of some markers alone, which are numbered in this order; None without any."""
+        """The candidates of `markers`, ascending indices, renumbered by their place in it; None if there are none."""
         chosen = np.isin(self.markers, markers)
         if not chosen.any():
             return None
@@ -55,7 +57,7 @@ class CameraObservations:
     diameters: Array  # (M,) px
     qualities: Array  # (M,)
     flags: NDArray[np.uint16]  # (M,) MarkerFlag
-    further: Candidates | None = None  # what else may be one of the markers
+    further: Candidates | None = None  # other candidates than those above
 
 
 class Tracker(Protocol):

@@ -29,8 +29,8 @@ PREDICT_S = 0.25
 
 ACCELERATION_SD = 10.0
 VELOCITY_SD = 0.05
-_SIGMAS = 5.0  # of the positions, beyond a hand's reach
-_COMPANIONS = 2
+_REACH_SIGMAS = 5.0  # standard deviations of a distance beyond the hand's reach, as in `_reachable`
+_CONFIRMING_MARKERS = 2  # other accepted markers of the hand that confirm a track
 _VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
 
 # Columns of the memory, one row per marker: time, position, smoothed velocity, last step and its duration, then the
@@ -109,46 +109,50 @@ def judge(t_s: float, positions: Array, covariances: Array, memory: Array, belie
 @njit(cache=True)
 def keep_within_reach(positions: Array, covariances: Array, reach: Array, memory: Array, believed: Mask,
                       restarted: Mask, confirmed: Mask) -> None:
-    """Give up believed markers that are farther from the others than a hand reaches: bones do not stretch.
+    """Reject `believed` markers (M,) that are farther from other ones than the hand's reach allows.
 
-    `positions` (M, 3) m with `covariances` (M, 3, 3); `reach` (M, M) m. The marker that contradicts most others is
-    given up first; of those that contradict as many, the ones whose track is not `confirmed` (M,) or has just
-    `restarted` (M,), and all of them where that does not tell either. What is given up is forgotten.
+    `positions` (M, 3) m with `covariances` (M, 3, 3) m^2; `reach` (M, M) m, the greatest distances. The marker with
+    the most contradictions is rejected first. In a tie those are rejected whose track is not `confirmed` (M,) or has
+    just `restarted` (M,); without any such, all of the tie. A rejected marker's `memory` is cleared.
     """
     count = positions.shape[0]
-    against = np.empty(count, np.int64)
+    contradictions = np.empty(count, np.int64)
     while True:
-        most, some_new = 0, False
+        most, any_new = 0, False
         for m in range(count):
-            against[m] = 0
+            contradictions[m] = 0
             for n in range(count):
                 if believed[m] and believed[n]:
-                    against[m] += _beyond_reach(positions, covariances, reach, m, n)
-            if against[m] > most:
-                most, some_new = against[m], False
-            some_new |= against[m] == most and (restarted[m] or not confirmed[m])
+                    contradictions[m] += _beyond_reach(positions, covariances, reach, m, n)
+            if contradictions[m] > most:
+                most, any_new = contradictions[m], False
+            any_new |= contradictions[m] == most and (restarted[m] or not confirmed[m])
         if most == 0:
             return
         for m in range(count):
-            if against[m] == most and not (some_new and confirmed[m] and not restarted[m]):
+            if contradictions[m] == most and not (any_new and confirmed[m] and not restarted[m]):
                 believed[m] = restarted[m] = confirmed[m] = False
                 memory[m] = math.nan
 
 
 @njit(cache=True)
 def _beyond_reach(positions: Array, covariances: Array, reach: Array, m: int, n: int) -> bool:
+    """Whether markers m and n are certainly farther apart than `reach`."""
     if m == n or not math.isfinite(reach[m, n]):
         return False
-    margin = 0.0
+    variance = 0.0
     for k in range(3):
-        margin += covariances[m, k, k] + covariances[n, k, k]
-    return _distance(positions[m], positions[n]) > reach[m, n] + _SIGMAS * math.sqrt(max(margin, 0.0))
+        variance += covariances[m, k, k] + covariances[n, k, k]
+    return _distance(positions[m], positions[n]) > reach[m, n] + _REACH_SIGMAS * math.sqrt(max(variance, 0.0))
 
 
 @njit(cache=True)
 def confirm(believed: Mask, restarted: Mask, reach: Array, confirmed: Mask) -> None:
-    """Bring up to date which tracks are confirmed (M,) to be markers of the hand: those that were once seen together
-    with two others, or with all that the hand has. Only colour tells a lone marker from a thing."""
+    """Update which tracks are `confirmed` (M,) as markers of the hand; `reach` (M, M) m, infinite off the hand.
+
+    A track is confirmed once two other markers of the hand are accepted with it, or all others if the hand has fewer.
+    A single marker has only its colour to distinguish it from another object. A restarted track starts unconfirmed.
+    """
     for m in range(believed.shape[0]):
         on_hand = together = 0
         for n in range(believed.shape[0]):
@@ -157,7 +161,7 @@ def confirm(believed: Mask, restarted: Mask, reach: Array, confirmed: Mask) -> N
                 together += believed[n]
         if restarted[m]:
             confirmed[m] = False
-        if believed[m] and together >= min(_COMPANIONS, on_hand):
+        if believed[m] and together >= min(_CONFIRMING_MARKERS, on_hand):
             confirmed[m] = True
 
 

@@ -44,6 +44,8 @@ class Actions(QObject):
                                          "window of its own.")
         self.recordings = self._make("Recordings …", "", "All recordings: how long and how well tracked; open, rename, "
                                      "delete.")
+        self.outputs = self._make("Outputs …", "", "Live streams to other programs: OSC, VMC, WebSocket, web view and "
+                                  "others; which run, and how they go.")
         self.save_rig = self._make("Save rig", "Ctrl+S", "Write the rig as it is now to its file; what stood there is "
                                    "kept beside it.")
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
@@ -114,8 +116,8 @@ class MainToolBar(QToolBar):
         self.addSeparator()
         a = actions
         self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.open_recording, a.recordings,
-                                                 a.video, a.bookmark, a.export, None, a.caps.menuAction(), a.save_rig,
-                                                 a.close_rig, None, a.quit])
+                                                 a.video, a.bookmark, a.export, None, a.outputs, a.caps.menuAction(),
+                                                 a.save_rig, a.close_rig, None, a.quit])
         self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
                                                              a.markers, a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now,

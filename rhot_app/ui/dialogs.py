@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from rhot_app.project import Rig
@@ -14,6 +15,7 @@ from rhot_app.ui.export_dialog import ExportDialog
 from rhot_app.ui.guide import GuideViewer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.nodes_dialog import NodesDialog
+from rhot_app.ui.outputs_dialog import OutputsDialog
 from rhot_app.ui.recordings import recordings_folder
 from rhot_app.ui.rig_dialog import RigDialog
 from rhot_app.ui.tracker_dialog import TrackerDialog
@@ -26,6 +28,7 @@ class Dialogs:
         self._parent = parent
         self.guide: GuideViewer | None = None
         self.tracker: TrackerDialog | None = None
+        self.outputs: OutputsDialog | None = None
 
     def choose_rig(self, last_rig: str) -> Path | None:
         """A rig file, looked for beside the one opened last; None when the person thought better of it."""
@@ -67,6 +70,22 @@ class Dialogs:
         self.tracker.raise_()
         self.tracker.activateWindow()
 
+    def show_outputs(self, controller: Controller, scheme: Callable[[], Scheme], actions: Sequence[QAction],
+                     rig_used: Callable[[], None]) -> None:
+        """The live streams to other programs, beside the window; the keys of `actions` work there too."""
+        opened = controller.opened
+        if opened is None:
+            return
+        if self.outputs is None:
+            self.outputs = OutputsDialog(opened, controller.backend.asker, lambda: controller.live.status, scheme,
+                                         self._parent)
+            self.outputs.addActions(actions)
+            self.outputs.rig_used.connect(lambda rig: rig_used())
+            self.outputs.finished.connect(self._forget_outputs)
+        self.outputs.show()
+        self.outputs.raise_()
+        self.outputs.activateWindow()
+
     def follow_rig(self, controller: Controller) -> None:
         """Another rig is open, or none."""
         if self.tracker is not None:
@@ -75,11 +94,21 @@ class Dialogs:
             else:
                 path = controller.opened.rig_path
                 self.tracker.follow(controller.opened.rig, Path(path) if path else None)
+        if self.outputs is not None:
+            if controller.opened is None:
+                self.outputs.close()
+            else:
+                self.outputs.follow(controller.opened)
 
     def _forget_tracker(self) -> None:
         if self.tracker is not None:
             self.tracker.deleteLater()
             self.tracker = None
+
+    def _forget_outputs(self) -> None:
+        if self.outputs is not None:
+            self.outputs.deleteLater()
+            self.outputs = None
 
     def open_guide(self, page: str) -> None:
         """A page of the guide beside the window."""
@@ -94,6 +123,6 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        for window in (self.guide, self.tracker):
+        for window in (self.guide, self.tracker, self.outputs):
             if window is not None:
                 window.close()

@@ -14,8 +14,8 @@ GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide"
 PAGES: tuple[tuple[str, str], ...] = (
     ("start", "Getting started"), ("window", "The window"), ("nodes", "Nodes"), ("markers", "Markers"),
     ("cameras", "Cameras"), ("hand", "The hand"), ("scene", "The scene"), ("plots", "The plots"),
-    ("calibration", "Calibration"), ("tracker", "The tracker"), ("recording", "Recording and replay"),
-    ("troubles", "When something is wrong"), ("keys", "Keys"),
+    ("calibration", "Calibration"), ("tracker", "The tracker"), ("outputs", "Streams to other programs"),
+    ("recording", "Recording and replay"), ("troubles", "When something is wrong"), ("keys", "Keys"),
 )
 """Name of each page's file and its title, in reading order."""
 

@@ -114,6 +114,8 @@ class MainWindow(QMainWindow):
         a.export.triggered.connect(lambda: self.dialogs.export_recording())
         a.open_recording.triggered.connect(self.replays.choose)
         a.recordings.triggered.connect(self.replays.list)
+        a.outputs.triggered.connect(lambda: self.dialogs.show_outputs(
+            c, lambda: self.appearance.scheme, [a.save_rig, a.guide], self.rig_watch.look_soon))
         a.save_rig.triggered.connect(lambda: self.rig_watch.save(self.tell))
         a.close_rig.triggered.connect(c.close_rig)
         a.quit.triggered.connect(self.close)
@@ -292,8 +294,8 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [*a.wizards, a.earlier, a.tracker, a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home, a.names,
-                a.clouds, a.now]
+        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home,
+                a.names, a.clouds, a.now]
 
     def _show_busy(self) -> None:
         if self.controller.opened is None:

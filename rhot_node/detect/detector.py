@@ -12,8 +12,8 @@ class Detector(Protocol):
     """A detector keeps small state between frames (windows, sizes); frames must come in order of time."""
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
-        """The best candidate of every marker, in the order of the marker set, lost markers stated as lost; then further
-        candidates, if any: at most CANDIDATES_MAX of a marker, the best first."""
+        """The best candidate of every marker, in the order of the marker set, lost markers reported as lost; then
+        further candidates, if any: at most CANDIDATES_MAX of a marker in all."""
         ...
 
     def reset(self) -> None:

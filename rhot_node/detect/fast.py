@@ -1,4 +1,4 @@
-"""The fast detector: predicted windows for tracked markers, one pass over the frame for all lost ones.
+"""The fast detector: predicted windows for tracked markers, one search of the frame for all other blobs.
 
 Works on the planes of a YUV420 image as the camera delivers them, in one thread.
 """
@@ -18,11 +18,11 @@ from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
 __all__ = ["DOUBTFUL", "GLANCE", "SEARCH_STEP", "FastDetector"]
 
-SUDDENLY = 2  # markers fewer tracked than found in the last frame: was a lamp switched?
+SUDDENLY = 2  # markers fewer tracked than found in the last frame: a lamp may have been switched
 GUESS_EVERY, GUESS_SELDOM = 20, 200
-"""Frames without all markers tracked until the light is guessed anew; the second while enough are to tell the light."""
-STEADY, STEADY_FEW = 0.7, 0.95  # per frame, of the light is that of the last one; with few markers in plain view
-GLANCE = 8  # frames between looks at the light, and between searches while all markers are followed in plain view
+"""Frames without all markers tracked until the light is guessed anew; the second while MARKERS_LEAST are tracked."""
+STEADY, STEADY_FEW = 0.7, 0.95  # per frame, weight of the last light; with fewer than MARKERS_LEAST in plain view
+GLANCE = 8  # frames between readings of the light, and between searches while all markers are followed in plain view
 _NOT_TRACKED = int(MarkerFlag.LOST | MarkerFlag.ACQUIRED)
 LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a picture of which nothing is known
 
@@ -38,7 +38,7 @@ class FastDetector:
         self._light = Light(markers)
         self._fresh = True  # no picture has been seen yet
         self._until_guess = GUESS_EVERY
-        self._found = 0  # markers in the last frame
+        self._found = 0  # markers found in the last frame
         self._finder = Finder(markers, self._light)
         self._precise = precise
         self._until_glance = 0
@@ -72,8 +72,8 @@ class FastDetector:
         return self._light.warmth
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
-        """The best candidate of every marker, in the order of the marker set, lost ones stated as lost; then the other
-        candidates, at most CANDIDATES_MAX of a marker in all."""
+        """The best candidate of every marker, in the order of the marker set, lost markers reported as lost; then the
+        other candidates, at most CANDIDATES_MAX of a marker in all."""
         self._fit(image)
         if self._fresh:
             seen = self._find_at_first(image)
@@ -108,9 +108,9 @@ class FastDetector:
         return seen if self._read_light(seen, anew=True) < DEAD_ZONE else self._find_in_new_light(image)
 
     def _light_in_doubt(self, seen: tuple[MarkerObservation, ...]) -> bool:
-        """Whether markers were lost together, or some have not been tracked for a while.
+        """Whether several markers were lost at once, or some have not been tracked for a while.
 
-        In another light a paint's hue leaves its sector, so that its track ends.
+        In another light the hue of a paint leaves its sector, and the track ends.
         """
         tracked = sum(not mark.flags.value & _NOT_TRACKED for mark in seen[:len(self._markers)])
         suddenly = self._found - tracked >= SUDDENLY
@@ -125,10 +125,9 @@ class FastDetector:
 
     def _find_in_guessed_light(self, image: YuvImage,
                                seen: tuple[MarkerObservation, ...]) -> tuple[MarkerObservation, ...]:
-        """Find the markers in the light in which most are recognised, if more of them are then in plain view and as
-        strong as paint is in that light.
+        """Find the markers in the light in which most are recognised; `seen`: those found in the last known light.
 
-        `seen`: what was found by the last known light.
+        The guess is kept if more markers are then in plain view, with a chroma as strong as paint has in that light.
         """
         known, before = self._light.warmth, len(self._finder.plainly(seen, lone=False))
         if not guess_light(image, self._light, self._finder.gate, self._set):
@@ -151,12 +150,14 @@ class FastDetector:
         return seen
 
     def _read_light(self, seen: tuple[MarkerObservation, ...], *, anew: bool) -> float:
-        """Take the light from the markers that are plainly seen; returns by how much its warmth changed. `anew`: what
-        was known of it before does not count."""
+        """Read the light from the markers in plain view; returns by how much its warmth changed.
+
+        `anew`: the last known light has no weight, unless few markers are in plain view.
+        """
         self._finder.note_paint()
         plain = self._finder.plainly(seen)
         steady = 0.0 if anew else STEADY**GLANCE
-        if len(plain) < MARKERS_LEAST:  # things of a marker's colour must not tell the light
+        if len(plain) < MARKERS_LEAST:  # other objects of a marker's colour must not set the light
             steady = STEADY_FEW if anew else STEADY_FEW**GLANCE
         return self._light.read(plain, self._finder.paint[plain], steady)
 

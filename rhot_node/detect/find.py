@@ -1,7 +1,7 @@
-"""Find the markers in one picture whose light is known: tracks near where they are expected, all else by a search.
+"""Find the markers in one picture whose light is known: tracks in their predicted windows, other blobs by a search.
 
-A marker has up to CANDIDATES_MAX tracks, one for every thing of its colour: which of them is the marker, the master
-decides. Tracks in plain view are the fast lane's (`followed`); the others are measured carefully.
+A marker has up to CANDIDATES_MAX tracks, one for each object of its colour. The master decides which of them is the
+marker. The fast lane (`followed`) measures tracks in plain view, and `measure` the others.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from rhot_node.wire.messages import CANDIDATES_MAX, NO_FLAGS, MarkerFlag, Marker
 
 NOISE_START, NOISE_START_BLOCKS = 1.5, 20.0  # grey levels of chroma noise, until so many blocks of paint have told
 LARGEST = 0.12  # of the picture: a larger blob is no marker
+TWIN_DISTANCE = 0.5  # of their length: nearer tracks of one marker are of one object
 PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
 PALE = 0.5  # of the least chroma that a search takes for paint: a tracked marker in shade has more
@@ -42,7 +43,7 @@ Blob = list[float]  # a row of a search's blobs
 
 
 class Finder:
-    """The tracks of all markers, and what finds them. Track s is of marker s modulo the number of markers."""
+    """The tracks of all markers, and the search for new ones. Track s is of marker s modulo the number of markers."""
 
     def __init__(self, markers: MarkerSet, light: Light) -> None:
         """`light`: that of the pictures, read and set by the caller."""
@@ -62,14 +63,15 @@ class Finder:
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was measured."""
         self._paint_pixels = np.zeros(self._count)
         self._searches = 0
-        self._tracked = -1  # tracks, when every marker has one; else -1
-        self._balanced: YuvImage | None = None  # the picture in the light of the calibration, once it is needed
+        self._tracked = -1  # number of tracks if every marker has one, else -1
+        self._balanced: YuvImage | None = None  # the picture in the light of the calibration; None until needed
         self.forget()
 
     def find(self, camera_image: YuvImage, *, whole: bool = False) -> tuple[MarkerObservation, ...]:
         """The best candidate of every marker, lost or not, in the order of the set, and then the other candidates.
 
-        `whole`: search all rows, for a picture of which nothing is known; else every eighth, other ones each time.
+        `whole`: search every SEARCH_STEP-th chroma row, for a picture without known tracks. Otherwise every eighth is
+        searched, in the order of INTERLACED.
         """
         seen, self._balanced = self.followed.observations(), None
         for slot in np.flatnonzero(self._states[:, ALIVE]).tolist():
@@ -81,7 +83,7 @@ class Finder:
                     self._follow(camera_image, slot, seen[slot])
                 else:
                     self._lose(slot)
-        for slot in self._not_markers(seen):
+        for slot in self._pale_or_twin(seen):
             del seen[slot]
             self._lose(slot)
         self._search(camera_image, seen, whole)
@@ -90,18 +92,18 @@ class Finder:
         return self._report(seen)
 
     def report_followed(self) -> tuple[MarkerObservation, ...] | None:
-        """The observations of a picture in which no marker was lost and every track was followed; None of any other."""
+        """The observations of a picture in which the fast lane followed every track of all markers; else None."""
         return self._report(self.followed.observations()) if self.followed.count == self._tracked else None
 
     def note_paint(self) -> None:
-        """The colours of the markers that are followed."""
+        """Store the paint's colour of the best tracks that are followed in `paint`."""
         for slot, colour in self.followed.paint():
             if slot == self._best[slot % self._count]:
                 self.paint[slot % self._count] = colour
 
     def plainly(self, seen: tuple[MarkerObservation, ...], *, lone: bool = True) -> list[int]:
-        """Indices of the markers in plain view. Those whose paint's colour can be relied on are `lone`: they have no
-        other candidate."""
+        """Indices of the markers in plain view with enough pixels of paint. `lone`: only markers without a further
+        candidate, whose colour is certainly that of their paint."""
         pixels, rivalled = self._paint_pixels.tolist(), {mark.index for mark in seen[self._count:]} if lone else set()
         return [mark.index for mark in seen[:self._count]
                 if not mark.flags.value & _NOT_PLAIN and pixels[mark.index] >= PAINT_PIXELS_MIN
@@ -135,7 +137,7 @@ class Finder:
     def forget(self) -> None:
         """Forget all tracks."""
         self._tracks = [Track(shape, state) for shape, state in zip(self._shapes, self._states, strict=True)]
-        self._best = list(range(self._count))  # the track of each marker that is stated first
+        self._best = list(range(self._count))  # the track of each marker that is reported first
         self.followed.forget()
 
     def fit(self, image: YuvImage) -> bool:
@@ -150,7 +152,10 @@ class Finder:
         return float(noise_level(self._noise_variance))
 
     def _measure(self, camera_image: YuvImage, slot: int, request: NDArray[np.float64], careful: bool = True) -> bool:
-        """Measure the marker of a track into `self._row`; the paint's noise is learnt on the way."""
+        """Measure the marker of a track into `self._row` and learn the chroma noise from its paint.
+
+        `careful` as in `measure`. Returns False when the window does not show the marker.
+        """
         row, index = self._row, slot % self._count
         if self._balanced is None:
             self._balanced = self._light.balanced(camera_image)
@@ -162,7 +167,7 @@ class Finder:
         return True
 
     def _observe(self, slot: int, flags: MarkerFlag, careful: bool = True) -> MarkerObservation:
-        """Take what was measured into a track."""
+        """Take `self._row` into a track and return it as an observation. `careful`: how it was measured."""
         row, index = self._row, slot % self._count
         if slot == self._best[index]:
             self._paint_pixels[index] = row[m.PAINT_PIXELS]
@@ -172,35 +177,37 @@ class Finder:
         return self._tracks[slot].observe(index, row.tolist(), self._noise, int(flags), floor)
 
     def _follow(self, camera_image: YuvImage, slot: int, seen: MarkerObservation) -> bool:
-        """Follow what was just measured from now on, when it is in plain view; says whether it is."""
+        """Let the fast lane follow the track that was just measured; returns False if it is not in plain view."""
         return not seen.flags & DOUBTFUL and self.followed.start(camera_image, slot, self._row.tolist())
 
     def _lose(self, slot: int) -> None:
         self._states[slot, ALIVE] = 0.0
         self.followed.drop(slot)
 
-    def _not_markers(self, seen: Iterable[int]) -> list[int]:
-        """Tracks that have slid to something too pale, or to where another track of the same marker is."""
+    def _pale_or_twin(self, seen: Iterable[int]) -> list[int]:
+        """Tracks whose chroma is too low for the marker's paint, or that are where another track of the marker is."""
         gone = [slot for slot in seen if self._is_pale(slot, self._tracks[slot].level)]
         for slot in seen:
             if slot != self._best[slot % self._count] and slot not in gone:
-                twin = [other for other in seen if other != slot and other not in gone
-                        and other % self._count == slot % self._count and self._apart(slot, other) < 0.5]
+                twin = [other for other in seen
+                        if other != slot and other not in gone and other % self._count == slot % self._count
+                        and self._relative_distance(slot, other) < TWIN_DISTANCE]
                 gone += [slot] if twin else []
         return gone
 
-    def _apart(self, slot: int, other: int) -> float:
-        """Distance of two tracks, in lengths of the longer one."""
+    def _relative_distance(self, slot: int, other: int) -> float:
+        """Distance of two tracks, as a share of the longer one's length."""
         one, two = self._states[slot], self._states[other]
         return math.hypot(one[TRACK_X] - two[TRACK_X], one[TRACK_Y] - two[TRACK_Y]) / max(one[EXTENT], two[EXTENT], 1.0)
 
     def _is_pale(self, slot: int, level: float) -> bool:
-        """Whether a level of chroma is too low for the marker's paint."""
+        """Whether a level of chroma, grey levels, is too low for the marker's paint."""
         return bool(level < PALE * self._markers[slot % self._count].chroma.magnitude_min)
 
     def _search(self, camera_image: YuvImage, seen: dict[int, MarkerObservation], whole: bool) -> None:
-        """Search for blobs that no track explains. The best blob of a lost marker is its track from now on; of the
-        others one a picture is measured. `seen`: by track; what is found is added."""
+        """Search for blobs without a track. The best blob of a lost marker becomes its track; of the others one in each
+        picture is measured, all if `whole`. New tracks are added to `seen`, which is indexed by track.
+        """
         step, first = (SEARCH_STEP, 0) if whole else (8, INTERLACED[self._searches % len(INTERLACED)])
         self._searches += 1
         image = self._light.balanced(camera_image, step, first)
@@ -215,7 +222,7 @@ class Finder:
             self._measure_rival(camera_image, index, blob, seen)
 
     def _unexplained(self, blobs: list[Blob], seen: Iterable[int]) -> dict[int, list[Blob]]:
-        """The blobs of each marker that are not too large and not where a track of the marker is."""
+        """By marker, the blobs that are not too large and not where a track of the marker is."""
         tracked: list[list[tuple[float, float, float]]] = [[] for _ in self._markers]
         for slot in seen:
             state = self._states[slot].tolist()
@@ -226,35 +233,37 @@ class Finder:
             x, y = blob[SUM_X] / area, blob[SUM_Y] / area
             size = max(blob[X_MAX] - blob[X_MIN], blob[Y_MAX] - blob[Y_MIN]) + 1.0
             if area < LARGEST * self._scratch.mask.size and not any(
-                    math.hypot(x - there_x, y - there_y) < 0.5 * (size + extent)
-                    for there_x, there_y, extent in tracked[index]):
+                    math.hypot(x - track_x, y - track_y) < 0.5 * (size + extent)
+                    for track_x, track_y, extent in tracked[index]):
                 found.setdefault(index, []).append(blob)
         return found
 
     def _acquire(self, camera_image: YuvImage, index: int, own: list[Blob], seen: dict[int, MarkerObservation],
                  careful: bool) -> list[Blob]:
-        """Find a lost marker among its blobs: by motion and size while it is remembered, else the likeliest. Returns
-        the blobs that are left."""
+        """Find a lost marker among its blobs `own` and add it to `seen`; returns the other blobs.
+
+        While the track is remembered, blobs are tried in the order of its motion and size, else in that of `merits`.
+        """
         slot = self._best[index]
         track = self._tracks[slot]
         if len(own) > 1:
             if track.remembered:
-                worth = [-track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
+                scores = [-track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
                          for blob in own]
             else:
-                worth = merits(np.array(own), self._markers[index], self._scratch.mask.shape).tolist()
-            own = [own[k] for k in np.argsort(worth)[::-1]]
+                scores = merits(np.array(own), self._markers[index], self._scratch.mask.shape).tolist()
+            own = [own[k] for k in np.argsort(scores)[::-1]]
         for place, blob in enumerate(own[:CANDIDATES_MAX]):
             if self._measure(camera_image, slot, self._request_of(index, blob), careful) \
                     and not self._is_pale(slot, self._row[m.LEVEL]):
-                self._row[m.RIVAL_COST] = np.inf  # rivals are judged over the whole frame
+                self._row[m.RIVAL_COST] = np.inf  # it was the best blob of the whole frame
                 seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED, careful)
                 return own[:place] + own[place + 1:]
         return []
 
     def _measure_rival(self, camera_image: YuvImage, index: int, blob: Blob,
                        seen: dict[int, MarkerObservation]) -> None:
-        """Measure a further candidate of a marker, and track it from now on."""
+        """Measure a blob as a further candidate of a marker and give it a free track, if there is one."""
         slots = range(index, len(self._shapes), self._count)
         slot = next((slot for slot in slots if slot not in seen and slot != self._best[index]), None)
         if slot is None or not self._measure(camera_image, slot, self._request_of(index, blob)) \
@@ -262,7 +271,7 @@ class Finder:
             return
         self._tracks[slot] = Track(self._shapes[slot], self._states[slot])
         seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED)
-        if slot in self._not_markers(seen):
+        if slot in self._pale_or_twin(seen):
             del seen[slot]
             self._lose(slot)
         else:

@@ -120,8 +120,10 @@ def _learn_noise_inside(u, v, fitted, noise_variance):
 
 @njit(**c.FAST)
 def _soft(u, v, track, look, soft):
-    """Soft coverage summed over the predicted window; False when the frame may cut the outline, or the area is not as
-    expected."""
+    """Sum the soft coverage over the predicted window into `soft`.
+
+    False when the frame's border may cut the outline, or the area is not as expected.
+    """
     speed = math.hypot(track[t.VX], track[t.VY])
     half = 0.6 * track[t.EXTENT] + MARGIN + 0.5 * speed
     px, py = track[t.X] + track[t.VX] + track[t.SAG_X], track[t.Y] + track[t.VY] + track[t.SAG_Y]

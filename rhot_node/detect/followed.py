@@ -1,6 +1,6 @@
-"""The tracks that are followed in plain view: their state, and the way in and out of the compiled lane.
+"""The tracks that are followed in plain view: their state, and the interface to the compiled functions.
 
-Several tracks may be of one marker: track s is of marker s modulo the number of markers.
+A marker may have several tracks: track s is of marker s modulo the number of markers.
 """
 
 from __future__ import annotations
@@ -53,23 +53,25 @@ class Followed:
         self._marks[index, READY] = self._seen[index, DONE] = 0.0
 
     def follow(self, image: YuvImage, precise: bool) -> None:
-        """Look for what is followed in the next picture; `precise` False: by their soft centroids."""
+        """Locate the followed tracks in the next picture; `precise` False: by their soft centroids."""
         self.count = follow(image.y, image.u, image.v, self._tracks, self._looks, self._radii, self._rims, self._marks,
                             self._noise_variance, precise, self._pixels, self._work, self._soft, self._fitted,
                             self._seen)
 
     def observations(self) -> dict[int, MarkerObservation]:
-        """By track: what was seen in the last frame."""
+        """By track: the observations of the last frame."""
         count = self._markers
         return {slot: MarkerObservation(slot % count, x, y, diameter, xx, xy, yy, quality)
                 for slot, (x, y, diameter, xx, xy, yy, quality, done) in enumerate(self._seen.tolist()) if done}
 
     def start(self, image: YuvImage, index: int, row: Sequence[float]) -> bool:
-        """Follow track `index` from now on, which was measured in plain view, with the result `row` of `measure`; says
-        whether its outline was found. A band that never showed its rims is followed by its outline alone."""
+        """Follow track `index`, which was measured in plain view with the result `row` of `measure`.
+
+        Returns whether its outline was found. A band that never showed its rims is followed by its outline alone.
+        """
         band = self._bands[index] and bool(row[p.FIT])
         if self._bands[index] and not band and self._tracks[index, FITTED]:
-            return False  # it is a band, and something hides its rims
+            return False  # its rims have been visible and are now occluded
         self._marks[index, IS_BAND] = band
         self._marks[index, OFF_AXIS] = OFF_AXIS_SD if self._bands[index] and not band else 0.0
         self._marks[index, SAG_VARIANCE] = row[p.SAG_VARIANCE]
@@ -79,7 +81,7 @@ class Followed:
         return bool(self._marks[index, READY])
 
     def paint(self) -> Iterator[tuple[int, tuple[float, float, float]]]:
-        """Track, and Y, Cb and Cr (minus 128) of the paint as the camera showed it, of what was seen last."""
+        """Track, and Y, Cb and Cr (minus 128) of its paint as the camera showed it, of the tracks of the last frame."""
         for index in np.flatnonzero(self._seen[:, DONE]).tolist():
             look = self._looks[index]
             yield index, (look[c.PAINT_Y].item(), look[c.PAINT_U].item() - 128.0, look[c.PAINT_V].item() - 128.0)

@@ -22,8 +22,9 @@ GAUSS_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
 GAUSS_WEIGHT = 0.5 * np.polynomial.legendre.leggauss(4)[1]
 
 # Columns of `marks`: how a marker is followed.
-# LIMB_TAKEN, LIMB_LEFT: `stated.LIMB_OF_SHAPE`. IS_BAND: its rims show, so that it is placed on its axis. OFF_AXIS: of
-# a band whose rims do not show, standard deviation of its centroid about its axis, of its extent.
+# LIMB_TAKEN, LIMB_LEFT: `stated.LIMB_OF_SHAPE`. IS_BAND: a band with visible rims, which give a point on its axis.
+# OFF_AXIS: of a band without visible rims, the standard deviation of its centroid about its axis, as a share of its
+# extent.
 READY, IS_BAND, SAG, SAG_VARIANCE, SAG_ZERO, SAG_FRAMES, LIMB_TAKEN, LIMB_LEFT, OFF_AXIS = range(9)
 MARK_COLUMNS = 9
 

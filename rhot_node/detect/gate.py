@@ -45,8 +45,7 @@ class ColourGate:
               step: int = 1, first: int = 0) -> NDArray[np.float64]:
         """(N, 10) blobs of the markers `indices`, columns as in rhot_node.detect.search; a view, valid until the next.
 
-        A blob has at least `area_min` chroma pixels. Of every `step` chroma rows from `first` on, one stands for the
-        others.
+        A blob has at least `area_min` chroma pixels. Every `step`-th chroma row from `first` on stands for the others.
         """
         self._wanted[:] = False
         for index in indices:
@@ -56,8 +55,9 @@ class ColourGate:
 
 
 def merits(blobs: NDArray[np.float64], marker: Marker, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """(N,) how likely each blob is the marker: as far as it is compact, of the marker's hue and not cut by the border,
-    and the larger the likelier. `shape`: (H/2, W/2) of the chroma planes.
+    """(N,) scores of blobs (N, 10) as the marker; higher is likelier. `shape`: (H/2, W/2) of the chroma planes.
+
+    A score grows with a blob's area, compactness and match of the marker's hue. Half is taken off at the border.
     """
     chroma, area = marker.chroma, blobs[:, AREA]
     box = (blobs[:, X_MAX] - blobs[:, X_MIN] + 1) * (blobs[:, Y_MAX] - blobs[:, Y_MIN] + 1)

@@ -31,7 +31,7 @@ HUE_SIGMA_DEG = 3.0  # how well a paint's hue is known
 HUE_CAP_DEG = 15.0  # a marker that is further off is not itself, and counts no more than this
 INFORMATION_LEAST = 50.0  # 1 / variance of a warmth that is worth as much as the last known one
 INFORMATION_SURE = 300.0  # the same of a warmth known to 0.06
-MARKERS_LEAST = 3  # fewer may be explained by many a light
+MARKERS_LEAST = 3  # the hues of fewer markers agree with several lights
 SWITCHED = 0.12  # of warmth in one frame: no lamp drifts so fast
 STRENGTH_LEAST = 0.3  # of the chroma that a paint should show in this light: less is something else, or deep shade
 MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
@@ -70,8 +70,7 @@ class Light:
     def balanced(self, image: YuvImage, step: int = 1, first: int = 0) -> YuvImage:
         """The picture in the light of the calibration: its chroma corrected; `image` itself when that is the light.
 
-        Only every `step`-th chroma row from `first` on need be valid. The planes of the result are so until the next
-        call.
+        Only every `step`-th chroma row from `first` on is valid, and only until the next call.
         """
         if abs(self.warmth) < DEAD_ZONE:
             return image
@@ -96,9 +95,9 @@ class Light:
     def read(self, indices: list[int], colours: Array, steady: float = 0.0) -> float:
         """Read the light from the paint of the markers `indices`, (N, 3) Y, Cb, Cr as the camera shows them.
 
-        `steady`, 0 to 1: how much the last known light counts; it also counts as far as the colours tell nothing. It
-        does not count when MARKERS_LEAST or more plainly tell of a lamp that was switched. Returns by how much
-        the warmth changed.
+        `steady`, 0 to 1: weight of the last known light, which also replaces what the colours do not determine. It is
+        0 when MARKERS_LEAST or more strong colours show that a lamp was switched. Returns by how much the warmth
+        changed.
         """
         chosen, strong = np.asarray(indices, dtype=np.intp), self.strong(indices, colours)
         if not strong.any():
@@ -133,7 +132,10 @@ def balance_matrix(warmth: float) -> Array:
 
 @njit(cache=True)
 def balance(y, u, v, matrix, step, first, out_u, out_v):
-    """Write the chroma planes of another light, every `step`-th row from `first` on, rounded and clipped to 8 bits."""
+    """Write every `step`-th row from `first` on of the chroma planes in another light, rounded and clipped to 8 bits.
+
+    `matrix` (2, 3) as `balance_matrix` gives it.
+    """
     for row in range(first, u.shape[0], step):
         for column in range(u.shape[1]):
             luma = 0.25 * (np.float64(y[2 * row, 2 * column]) + y[2 * row, 2 * column + 1]

@@ -19,7 +19,7 @@ COMPACT = 0.5  # of the bounding box: a marker fills as much
 RECOGNISED = 0.25  # score of a marker
 ADVANTAGE = 1.0  # markers more than in the last known light
 AREA_MIN = 12  # chroma pixels
-ROW_STEP = 4  # chroma rows: every fourth is enough to guess by
+ROW_STEP = 4  # chroma rows: every fourth is searched
 ALL_THERE = 0.6  # of the greatest score: no other light can be much better
 
 

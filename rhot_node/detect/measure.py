@@ -69,8 +69,8 @@ class Scratch:
 def measure(y, u, v, sector, label, direction, request, scratch, careful, result):
     """Fill `result` (MEASURE_COLUMNS) for the marker `label`; False when the window does not show it.
 
-    `careful` False: by the pixels that are more than half paint, a quarter of the time. Nothing is known then of the
-    paint, its noise and shading, and of a band's sag.
+    `careful` False: by the pixels that are more than half paint, without partial coverage. The columns of the paint,
+    its noise and shading, and of a band's sag are then 0.
     """
     mask, _kind, _colour, _sums, _coverage, _gain, stack, components, own = scratch
     level = request[LEVEL_REF]

@@ -10,9 +10,9 @@ from numba import njit
 
 BLUR_VARIANCE = 0.2  # px^2: point spread of about 0.7 luma px and the 2x2 chroma mean
 BAND_HALF_WIDTH_MIN = 3.5  # px; a narrower band shows no curvature
-SQUARE_LEAST = 0.92
-"""Least independence of a band's width and length: 1 for its four corners, 2/3 for an ellipse, at most 0.84 for a
-capsule of any length."""
+CROSS_MOMENT_MIN = 0.92
+"""Least normalised cross moment E[u^2 w^2] / (E[u^2] E[w^2]) of a band. It is 1 for a rectangle, 2/3 for an ellipse and
+at most 0.84 for a capsule of any length."""
 
 # Columns of the result row.
 X, Y, AREA, COV_XX, COV_XY, COV_YY, VAR_MAJOR, VAR_MINOR, AXIS_X, AXIS_Y, SAG, SAG_VARIANCE, FIT, SOFT = range(14)
@@ -58,8 +58,9 @@ def centroid(region, coverage, gain, result):
 
 @njit(cache=True)
 def mask_centroid(mask, components, own, count, result):
-    """Centroid, area and principal axes of the pixels of the components marked in `own`, numbered in `mask` from 2 on;
-    returns whether they touch the frame's border. Columns of components: see rhot_node.detect.window."""
+    """Fill `result` with centroid, area and principal axes of the components marked in `own`, which `mask` numbers from
+    2 on. Returns whether they touch the frame's border. Columns of components: see rhot_node.detect.window.
+    """
     height, width = mask.shape
     n = s_x = s_y = s_xx = s_xy = s_yy = 0.0
     at_border = False
@@ -139,15 +140,15 @@ def band_center(region, coverage, gain, result):
     residual = (moments[3] - explained) / moments[0]
     if not _is_a_band(moments, residual, length, half_width, solution[2]):
         return False
-    if _independence(region, coverage, half_width, solution, result) < SQUARE_LEAST:
+    if _cross_moment(region, coverage, half_width, solution, result) < CROSS_MOMENT_MIN:
         return False
     _band_result(region, coverage, gain, half_width, inverse, solution, result)
     return True
 
 
 @njit(cache=True)
-def _independence(region, coverage, half_width, solution, result):
-    """E[u^2 w^2] / (E[u^2] E[w^2]) of the coverage across (u) and along (w) the straightened band."""
+def _cross_moment(region, coverage, half_width, solution, result):
+    """E[u^2 w^2] / (E[u^2] E[w^2]) of the coverage, across (u) and along (w) the straightened band."""
     n = uu = ww = uuww = 0.0
     x0, x1, y0, y1 = region
     for row in range(y0, y1 + 1):

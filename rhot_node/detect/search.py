@@ -48,7 +48,7 @@ class Searcher:
              step: int = 1, first: int = 0) -> NDArray[np.float64]:
         """(N, 10) blobs of the wanted labels with at least `area_min` chroma pixels; a view, valid until the next.
 
-        Of every `step` rows from row `first` on, one is looked at and stands for the others.
+        Every `step`-th row from `first` on is searched and stands for the others.
         """
         words_u = words_v = _NO_WORDS
         if u.shape[1] % WORD == 0 and u.strides[1] == v.strides[1] == 1:
@@ -116,7 +116,7 @@ def _mark_bright(words_u, words_v, row, dull, bright):
 def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limits, step, first_row, runs):
     """Fill `runs` with the runs of equal wanted label, each joined to its neighbours above; return how many.
 
-    Of every `step` rows from `first_row` on, one is looked at.
+    Every `step`-th row from `first_row` on is searched.
     Words that are all in the box `dull` (1, 4) are passed over; `words_u` and `words_v` (H/2, W/16) may be empty.
     Scratch: `bright` (W/16,).
     """

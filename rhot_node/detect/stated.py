@@ -31,7 +31,7 @@ LIMB_OF_SHAPE = {"disc": (0.0, 0.0), "blob": (0.0, 1.0), "sphere": (0.8, 0.5), "
 """Share of that shift that is taken off, and share that remains as a standard deviation (other lights and curvatures).
 A disc is flat; a blob may be either, and is left where it is seen."""
 OFF_AXIS_SD = 0.3
-"""Standard deviation, of its extent, of how far the centroid of a band lies off its axis when its rims do not tell."""
+"""Standard deviation of the centroid of a band about its axis, as a share of its extent, when no rims are visible."""
 LIMB_SHADE = 0.2  # share of brightness per radius: with less, as by a lamp beside the camera, as much remains
 SHARP = 0.48  # px: what lens and 2x2 mean leave of an edge (`edge_width`)
 LIMB_LOST = 0.6  # px more, at which an edge is so wide that the limb no longer shows
@@ -42,9 +42,9 @@ SMEAR_AREA = 3.0  # more of such change per px of smear and of the square root o
 
 
 def mask_variance(area: float) -> float:
-    """Luma px^2, per axis: of the centroid of a disc of `area` px^2 whose edge is rounded to whole pixels.
+    """Variance, luma px^2 per axis, of the centroid of a disc of `area` chroma px^2 whose edge is rounded to pixels.
 
-    A pixel of the edge, one per px of it, is wrong by a uniform share with a variance of 1/12.
+    Each of the edge's 2 pi r pixels is wrong by a uniformly distributed share, with a variance of 1/12 px^2.
     """
     return 4.0 / (12.0 * math.sqrt(math.pi * area))
 

@@ -110,8 +110,8 @@ class Track:
                 floor: float = st.FLOOR_VARIANCE) -> MarkerObservation:
         """Judge a measured row by the last frames, state it as an observation and take it into the track.
 
-        `noise`: standard deviation of the chroma noise, grey levels. `flags`: of MarkerFlag. `floor`: luma px^2, the
-        variance of the position without any noise.
+        `noise`: standard deviation of the chroma noise, grey levels. `flags`: bits of MarkerFlag. `floor`: luma px^2,
+        the variance of the position without any noise.
         """
         known = self.remembered and self.area > 0.0
         ratio = row[p.AREA] / self.area if known else 1.0

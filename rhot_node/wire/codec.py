@@ -34,7 +34,7 @@ from rhot_node.wire.seal import TAG_LENGTH, Seal
 
 MAGIC = b"RHOT"
 VERSION = 1
-OBSERVATIONS_VERSION = 2  # of this kind of message; its version 1, without candidates, is still understood
+OBSERVATIONS_VERSION = 2  # of observations; their version 1, without further candidates, is still read
 FLAG_TAGGED = 1  # bit 0 of the header's flags: an authentication tag of TAG_LENGTH bytes ends the datagram
 
 TYPE_OBSERVATIONS = 1
@@ -46,7 +46,7 @@ TYPE_FIND = 6
 TYPE_HERE = 7
 
 MARKERS_MAX = 64
-DATAGRAM_MAX = 1472  # bytes that an Ethernet frame carries by UDP: no datagram is cut in two on its way
+DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
 FLAG_TRUNCATED = 1  # bit 0 of the observations' flags: there were more candidates than fit
 IMAGE_SIZE_MAX = 16384  # px
 FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure

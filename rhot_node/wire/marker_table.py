@@ -27,13 +27,15 @@ Values = NDArray[np.float32]  # (M, 8), of which the first is index and flags
 
 
 class MarkerTable(Sequence[MarkerObservation]):
-    """The markers of a datagram, as `Observations.markers` has them; a sequence of `MarkerObservation` that equals any
-    other such. `marker_count`: markers of the set."""
+    """The markers of a datagram, in the order of `Observations.markers`; it equals any sequence of equal observations.
+
+    `marker_count`: number of markers of the set.
+    """
 
     __slots__ = ("_values", "_words", "marker_count")
 
     def __init__(self, words: Words, values: Values, marker_count: int) -> None:
-        """`words` and `values`: of checked records."""
+        """`words` (N, 16) and `values` (N, 8): two views of the same checked records."""
         self._words, self._values, self.marker_count = words, values, marker_count
 
     def __len__(self) -> int:
@@ -66,23 +68,25 @@ class MarkerTable(Sequence[MarkerObservation]):
                 numbers[6 * count:7 * count], numbers[7 * count:], flags)
 
     def indices(self) -> NDArray[np.intp]:
-        """(N,) which marker each row is of."""
+        """(N,) the index of each row's marker."""
         return self._words[:, 0].astype(np.intp)
 
 
 def marker_table(records: bytes, count: int, width: int, height: int) -> MarkerTable:
-    """One record a marker, lost or not: observations of version 1. `records`: `count` times RECORD_SIZE bytes, of an
-    image of `width` x `height` px.
+    """Read observations of version 1, one record for every marker, lost or not.
 
-    Raises WireError (index, flags or marker) when any of it is not plausible.
+    `records`: `count` times RECORD_SIZE bytes, of an image of `width` x `height` px. Raises WireError (index, flags or
+    marker) when a record is not plausible.
     """
     words, values = _checked(records, count, width, height, False)
     return MarkerTable(words, values, count)
 
 
 def candidate_table(records: bytes, count: int, width: int, height: int) -> MarkerTable:
-    """Up to CANDIDATES_MAX records a marker, the best first, none of a lost one: observations of version 2, of a set of
-    `count` markers. Otherwise as `marker_table`."""
+    """Read observations of version 2, up to CANDIDATES_MAX records of each of `count` markers, the best first.
+
+    A lost marker has no record. `records`, `width`, `height` and errors as in `marker_table`.
+    """
     words, values = _checked(records, count, width, height, True)
     both = np.empty((count + len(words), 16), "<u2")
     rows = both.view("<f4")
@@ -110,7 +114,10 @@ def _checked(records: bytes, count: int, width: int, height: int, found_only: bo
 
 @njit(cache=True)
 def _place_candidates(words: Words, values: Values, count: int, out_words: Words, out_values: Values) -> int:
-    """Write the first record of every marker to its row, or a lost marker's, and the others behind; return how many."""
+    """Write the first record of every marker to its row, a lost one where it has none, and the others behind these.
+
+    Returns the number of rows.
+    """
     for index in range(count):
         out_values[index, :] = 0.0
         out_values[index, 1] = out_values[index, 2] = math.nan
@@ -129,8 +136,10 @@ def _place_candidates(words: Words, values: Values, count: int, out_words: Words
 @njit(cache=True)
 def _first_fault(words: Words, values: Values, count: int, width: int, height: int, found_only: bool,
                  ) -> tuple[int, int]:
-    """Row and kind of the first fault, (0, _SOUND) without one. `found_only`: candidates of `count` markers; else one
-    record of each."""
+    """Row and kind of the first fault, (0, _SOUND) without one.
+
+    `found_only`: candidates of `count` markers (version 2); else one record of each marker (version 1).
+    """
     candidates = np.zeros(count, np.int64)
     x_max, y_max = width - 1 + IMAGE_MARGIN, height - 1 + IMAGE_MARGIN
     diameter_max = 2.0 * max(width, height)

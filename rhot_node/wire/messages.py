@@ -39,8 +39,8 @@ class MarkerFlag(enum.IntFlag):
 
 NO_FLAGS = MarkerFlag(0)
 FLAGS = tuple(MarkerFlag(bits) for bits in range(2 * int(max(MarkerFlag))))
-"""By their bits: to build a MarkerFlag takes a microsecond."""
-CANDIDATES_MAX = 4  # of one marker in one frame
+"""Every MarkerFlag at the index of its bits: building one takes a microsecond."""
+CANDIDATES_MAX = 4  # candidates of one marker in one frame
 
 
 class MarkerObservation(msgspec.Struct, frozen=True, gc=False):
@@ -69,8 +69,10 @@ class MarkerObservation(msgspec.Struct, frozen=True, gc=False):
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """All markers of one frame. `markers`: the best candidate of each, in the order of the set, lost ones among them;
-    then further candidates, at most CANDIDATES_MAX of a marker in all. `truncated`: some did not fit the datagram.
+    """All markers of one frame.
+
+    `markers`: the best candidate of every marker, in the order of the set, lost ones included. Further candidates
+    follow, at most CANDIDATES_MAX of a marker in all. `truncated`: some did not fit the datagram.
 
     `t_frame_node_ns`: mid-exposure of row 0, node clock; a marker at row y is later by y * `row_time_ns`.
     `t_send_node_ns`: when the datagram was handed to the socket. `processing_ns`: from frame available to then.
@@ -93,7 +95,7 @@ class Observations:
 
     @property
     def marker_count(self) -> int:
-        """Markers of the set: so many of `markers` are best candidates."""
+        """Number of markers of the set: as many rows of `markers` are best candidates."""
         return 1 + max((mark.index for mark in self.markers), default=-1)
 
 

@@ -113,7 +113,7 @@ def test_a_likelier_thing_is_named_with_its_place_and_both_sizes() -> None:
     others = [(40.0 + 60.0 * k, 40.0, 20.0, CYAN) for k in range(4)]
     image, ring = scene((*AT, 5.0, CYAN), *others), markers(ring=CYAN)
     cause = why(ring, image, ring=region(*AT, 5.0))
-    assert cause.code == "crowded" and "4 other things of its colour are likelier, the first at" in cause.sentence
+    assert cause.code == "crowded" and "4 other objects of its colour are likelier, the first at" in cause.sentence
     detector = FastDetector(ring)
     seen = detector.detect(scene((*AT, 5.0, CYAN), (220.0, 40.0, 20.0, CYAN)))
     second = Explainer.why_second(seen, 0)

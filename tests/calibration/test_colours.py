@@ -130,7 +130,7 @@ def test_a_marker_behind_four_larger_things_of_its_colour_is_said_to_be_so_and_w
     report = calibrate(picture(clutter=clutter, background=(60, 62, 66)))
     (finding,) = [one for one in report.verdict.findings if one.code == "fails"]
     assert finding.figure == "ring is found in another place in picture 1 itself."
-    assert finding.cause.startswith("4 other things of its colour are likelier, the first at ")
+    assert finding.cause.startswith("4 other objects of its colour are likelier, the first at ")
     assert "plainer background" in finding.remedy and finding.grade is Grade.POOR
     (said,) = {(one["cause"], one["sentence"]) for one in report.to_json()["failures"]
                if one["same_lamp"] and not one["tracked"]}

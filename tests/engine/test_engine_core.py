@@ -16,7 +16,7 @@ from rhot_app.engine.core import Engine
 from rhot_app.engine.replay_summary import replay_states, summarise
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import EngineError, RecordingError, RhotError, RigError
-from rhot_app.project import OneEuroSettings, Rig, load_rig
+from rhot_app.project import OneEuroSettings, OutputSettings, Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.rig_history import versions
 from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
@@ -209,6 +209,17 @@ def test_filter_change_keeps_the_session(rig: Rig, bench: Bench, nodes: list[Syn
     bench.run_until(lambda: len(bench.published) > count + 3)
     assert bench.engine.session == session
     assert bench.trackers[-1].rig.filters == filters
+
+
+def test_other_outputs_leave_tracking_alone(rig: Rig, bench: Bench, nodes: list[SyntheticNode]) -> None:
+    session = bench.engine.start()
+    bench.until_published(4)
+    resets, received = bench.trackers[-1].resets, bench.engine.status().nodes[0].received
+    bench.engine.set_rig(msgspec.structs.replace(rig, outputs=(OutputSettings("osc", "127.0.0.1:9000"),)))
+    assert len(bench.trackers) == 1 and bench.trackers[-1].resets == resets and bench.engine.session == session
+    assert bench.engine.status().nodes[0].received >= received
+    assert bench.engine.rig.outputs
+    bench.until_published(4)
 
 
 def test_fewer_markers_while_streaming(rig: Rig, bench: Bench, nodes: list[SyntheticNode]) -> None:

@@ -136,6 +136,32 @@ def test_a_hanging_output_process_is_started_again(tmp_path: Path, monkeypatch: 
         outputs.close()
 
 
+def test_outputs_are_opened_and_closed_while_others_go_on(tmp_path: Path) -> None:
+    ports = [free_port(), free_port()]
+    one, other = (OutputSettings("ws", str(port)) for port in ports)
+    rig = synthetic_rig()
+    outputs = OutputProcess(f"ipc://{tmp_path}/states.ipc", [OutputSettings("osc", "127.0.0.1:9")])
+
+    def use(*chosen: OutputSettings) -> list[str]:
+        outputs.configure(msgspec.structs.replace(rig, outputs=chosen))
+        return [status.spec for status in outputs.status() if not status.fixed]
+
+    try:
+        use(one)
+        outputs.settle()
+        with connect(f"ws://127.0.0.1:{ports[0]}") as client:
+            assert use(one, other) == [one.spec, other.spec]
+            eventually(lambda: listens(ports[1]))
+            assert use(one, msgspec.structs.replace(other, enabled=False)) == [one.spec]
+            eventually(lambda: not listens(ports[1]))
+            assert [status.spec for status in outputs.status()] == ["osc:127.0.0.1:9", one.spec]
+            client.ping().wait(10.0)
+        assert use() == []
+        eventually(lambda: not listens(ports[0]))
+    finally:
+        outputs.close()
+
+
 def test_a_replay_leaves_the_rigs_outputs_out(tmp_path: Path) -> None:
     rig = msgspec.structs.replace(synthetic_rig(), outputs=(OutputSettings("ws", str(free_port())),))
     outputs = OutputProcess(f"ipc://{tmp_path}/states.ipc", follow_rig=False)

@@ -125,3 +125,15 @@ def test_the_example_file(log: Path, tmp_path: Path) -> None:
     said = run([str(DOCS / "examples" / "pinch.py"), str(log), str(tmp_path)], tmp_path)
     assert "both measured in" in said and "fingertip_index_x_mm" in said
     assert {"pinch.csv", "pinch.glb"} <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_damage_in_the_middle_of_a_log_is_named_and_the_rest_is_exported(log: Path, tmp_path: Path) -> None:
+    damaged = tmp_path / "damaged.rhotlog"
+    data = bytearray(log.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    damaged.write_bytes(data)
+    recording = api.open_recording(damaged)
+    states = recording.states()
+    (loss,) = recording.losses
+    assert "1 damaged place was skipped" in loss
+    assert len(states.times_s) > 0.9 * len(api.open_recording(log).states().times_s)

@@ -24,6 +24,8 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
+from rhot_app.outputs.spec import as_run
+from rhot_app.outputs.status import OutputStatus
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode, parse_rig
 from rhot_app.rig_history import accept
 from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
@@ -87,6 +89,7 @@ class FakeEngine:
         self.log_path = ""
         self.replaying = ""
         self.rig_path = ""
+        self.outputs: dict[str, OutputStatus] = {}  # by spec: outputs that go otherwise than well
         self.refuse_rig = ""  # why the engine takes no other rig
         self.scale = (1.03, 0.017)  # what a floating hand's size is estimated to be
         self.commands: list[tuple[str, dict[str, Any]]] = []
@@ -190,6 +193,8 @@ class FakeEngine:
             latency={stage: LatencySummary(value, 1.4 * value)
                      for stage, value in zip(LATENCY_STAGES, _STAGE_S, strict=True)},
             log_path=self.log_path, log_bytes=120_000 if self.log_path else 0,
+            outputs=tuple(self.outputs.get(one.spec, OutputStatus(one.spec, one.kind, "running", sent=self.sequence))
+                          for one in map(as_run, self.rig.outputs) if one.enabled),
             replaying=self.replaying)
 
     def preview(self, camera: int, t_s: float) -> Preview:
