@@ -272,7 +272,7 @@ def _take_video_answer(peer: _Peer, answer: Answer) -> None:
         peer.video_advice = (Advice("warning", f"The video of node {name} has ended. {message}"),)
     elif isinstance(dropped, int) and dropped > peer.video_dropped:
         peer.video_advice = (Advice("warning", f"Node {name} drops frames of its video, {dropped} so far: its "
-                                    "processor or disk is too slow. Tracking is not disturbed."),)
+                                    "processor or disk is too slow. Detection goes first."),)
     if isinstance(dropped, int):
         peer.video_dropped = dropped
 

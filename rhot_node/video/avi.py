@@ -1,6 +1,6 @@
 """A motion JPEG video as an AVI file whose every picture carries its own number and time. Bytes and files; no threads.
 
-``cv2.VideoWriter`` can write such a file too, but takes eight times as long for a frame, says nothing of a disk that is
+``cv2.VideoWriter`` can write such a file too, but takes eight times as long for a frame (docs/node.md), says nothing of a disk that is
 full, and has no place for times. Layout: "AVI RIFF File Reference" (Microsoft); docs/node.md, Videos, has the comment.
 """
 

@@ -1,7 +1,7 @@
 """Writes a node's frames into videos in a thread of its own, and keeps them until a master has fetched them.
 
 The frame loop only copies a frame into a short queue. When the disk or the encoder is too slow the oldest frame that
-waits is dropped and counted, so that nothing is ever late because of a video.
+waits is dropped and counted: the frame loop never waits for a video.
 """
 
 from __future__ import annotations
