@@ -1,7 +1,7 @@
 """A motion JPEG video as an AVI file whose every picture carries its own number and time. Bytes and files; no threads.
 
-``cv2.VideoWriter`` can write such a file too, but takes eight times as long for a frame (docs/node.md), says nothing of a disk that is
-full, and has no place for times. Layout: "AVI RIFF File Reference" (Microsoft); docs/node.md, Videos, has the comment.
+``cv2.VideoWriter`` can write such a file too, but takes longer for a frame (docs/node.md, Videos), says nothing of a
+disk that is full, and has no place for times. Layout: "AVI RIFF File Reference" (Microsoft).
 """
 
 from __future__ import annotations
