@@ -128,6 +128,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     from rhot_node.requests import Responder, SettingsStore
     from rhot_node.service.notify import ServiceManager
     from rhot_node.trust import trust_state
+    from rhot_node.video.recorder import VideoRecorder, video_folder
 
     clock = settings.clock.clock(time.monotonic_ns())
     store = SettingsStore(options.settings, settings)
@@ -135,12 +136,14 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     trust = _trust(options.settings, settings)
     keys = None if trust is None else LinkKeys()
     choice, health = DetectorChoice(make_detector), HealthMonitor(Machine())
+    videos = VideoRecorder(video_folder(options.settings))
     daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), choice.make,
                         camera_takes_settings=takes_settings(options.camera), loop=options.loop,
-                        troubles=lambda: [*choice.troubles(), *health.troubles()])
+                        troubles=lambda: [*choice.troubles(), *health.troubles()], video=videos.offer)
     manager = ServiceManager()
     boot_id = secrets.randbits(32)
     with contextlib.ExitStack() as stack:
+        stack.callback(videos.close)
         stack.callback(daemon.close)
         link = UdpLink(settings, clock, daemon.sessions, boot_id, lambda: daemon.state, keys)
         stack.callback(link.close)
@@ -155,7 +158,8 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
         link.introduce = introduce
         link.start()
         control.start(Responder(store, daemon.sessions, control.pictures, clock, daemon.report,
-                                lambda: {**daemon.count(), **link.count(), "strangers": control.refused}, keys),
+                                lambda: {**daemon.count(), **link.count(), "strangers": control.refused}, keys,
+                                videos),
                       Reception(trust, offers, lambda: {**daemon.introduce(), **ports}))
         daemon.prepare()
         gc.freeze()

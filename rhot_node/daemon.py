@@ -57,9 +57,10 @@ class NodeDaemon:
 
     def __init__(self, store: SettingsStore, clock: NodeClock, open_camera: OpenCamera, make_detector: MakeDetector,
                  *, camera_takes_settings: bool = True, loop: bool = False,
-                 troubles: Callable[[], list[Check]] = list) -> None:
+                 troubles: Callable[[], list[Check]] = list, video: Callable[[Frame], object] | None = None) -> None:
         """`loop`: a recording that ends begins again. `troubles`: what is wrong with the machine; called by whoever
-        asks for a report. Nothing is opened before `prepare`."""
+        asks for a report. `video` is given every frame, after its observations are sent. Nothing is opened before
+        `prepare`."""
         self.sessions = Sessions()
         self.counters = Counters()
         self._store = store
@@ -70,6 +71,7 @@ class NodeDaemon:
         self._camera_takes_settings = camera_takes_settings
         self._loop = loop
         self._troubles = troubles
+        self._video = video
         self._camera: Camera | None = None
         self._detector: Detector | None = None
         self._prepared = False
@@ -152,6 +154,8 @@ class NodeDaemon:
             else:
                 self._send(frame, markers, stream, sender)
         pictures.offer(frame)
+        if self._video is not None:
+            self._video(frame)
         return True
 
     def _send(self, frame: Frame, markers: tuple[MarkerObservation, ...], stream: Stream,

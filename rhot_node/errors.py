@@ -37,6 +37,10 @@ class TrustError(NodeError):
     """A key file is missing, open to others or broken, or a pairing was refused."""
 
 
+class VideoError(NodeError):
+    """A video cannot be recorded, read or removed."""
+
+
 class WireError(NodeError):
     """A datagram is not one of ours. `reason` is a short key for counting, such as 'magic' or 'length'."""
 

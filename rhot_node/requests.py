@@ -23,6 +23,7 @@ from rhot_node.files import decode_message
 from rhot_node.link_keys import LinkKeys
 from rhot_node.pictures import PictureBox, StillFormat, encode_still
 from rhot_node.session import Sessions
+from rhot_node.video.recorder import READ_MAX, VideoName, VideoRecorder
 
 log = logging.getLogger(__name__)
 
@@ -82,8 +83,39 @@ class StopRequest(_Request, frozen=True, tag="stop"):
     session: Annotated[int, Meta(ge=0)] = 0
 
 
+class VideoStartRequest(_Request, frozen=True, tag="video_start"):
+    """Record the video `name`, or go on with it: repeated every few seconds, or the video ends by itself."""
+
+    name: VideoName
+
+
+class VideoStopRequest(_Request, frozen=True, tag="video_stop"):
+    """End the video `name`, or whichever is recorded."""
+
+    name: str = ""
+
+
+class VideoListRequest(_Request, frozen=True, tag="video_list"):
+    """All videos that the node keeps."""
+
+
+class VideoReadRequest(_Request, frozen=True, tag="video_read"):
+    """Bytes of a finished video, in a second message part."""
+
+    name: VideoName
+    offset: Annotated[int, Meta(ge=0, lt=1 << 32)]
+    length: Annotated[int, Meta(ge=1, le=READ_MAX)]
+
+
+class VideoDeleteRequest(_Request, frozen=True, tag="video_delete"):
+    """Remove a finished video."""
+
+    name: VideoName
+
+
+VideoRequest = VideoStartRequest | VideoStopRequest | VideoListRequest | VideoReadRequest | VideoDeleteRequest
 Request = (StateRequest | CountersRequest | SettingsRequest | SetSettingsRequest | StillRequest | StartRequest
-           | LinkRequest | StopRequest)
+           | LinkRequest | StopRequest | VideoRequest)
 
 _decoder = msgspec.json.Decoder(Request)
 
@@ -117,8 +149,8 @@ class Responder:
     """Answers requests. `state` and `counters` report on the daemon from any thread."""
 
     def __init__(self, store: SettingsStore, sessions: Sessions, pictures: PictureBox, clock: NodeClock,
-                 state: Report, counters: Report, keys: LinkKeys | None) -> None:
-        """`keys` None: the node is open, and no datagram is tagged."""
+                 state: Report, counters: Report, keys: LinkKeys | None, videos: VideoRecorder | None = None) -> None:
+        """`keys` None: the node is open, and no datagram is tagged. `videos` None: it records none."""
         self._store = store
         self._sessions = sessions
         self._pictures = pictures
@@ -126,6 +158,7 @@ class Responder:
         self._state = state
         self._counters = counters
         self._keys = keys
+        self._videos = videos
 
     def answer(self, parts: list[bytes], master: str) -> list[bytes]:
         """The reply's message parts to a request's of the master with this public key (empty: the node is open). Never
@@ -163,12 +196,34 @@ class Responder:
                 return self._link(request, master), b""
             case StopRequest():
                 return {"ok": True, "stopped": self._sessions.stop(request.session)}, b""
+            case _:
+                return self._video(request)
 
     def revoke(self, admits: Callable[[str], bool]) -> None:
         """The masters have changed: forget the keys of those that are not admitted any more, and stop streaming."""
         if self._keys is not None:
             self._keys.forget(admits)
             self._sessions.stop(0)
+            if self._videos is not None:
+                self._videos.stop()
+
+    def _video(self, request: VideoRequest) -> tuple[dict[str, Any], bytes]:
+        videos = self._videos
+        if videos is None:
+            raise NodeError("this node records no videos.")
+        match request:
+            case VideoStartRequest():
+                return {"ok": True, "video": videos.start(request.name)}, b""
+            case VideoStopRequest():
+                return {"ok": True, "stopped": videos.stop(request.name)}, b""
+            case VideoListRequest():
+                return {"ok": True, "videos": videos.videos()}, b""
+            case VideoReadRequest():
+                data = videos.read(request.name, request.offset, request.length)
+                return {"ok": True, "offset": request.offset, "length": len(data)}, data
+            case VideoDeleteRequest():
+                videos.delete(request.name)
+                return {"ok": True}, b""
 
     def _set_settings(self, request: SetSettingsRequest) -> dict[str, Any]:
         if request.settings.get("trust", self._store.current.trust) != self._store.current.trust:

@@ -26,6 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot engine``."""
     parser.add_argument("--rig", type=Path, required=True, metavar="FILE", help="the rig file (rhot-rig, JSON)")
     parser.add_argument("--log", type=Path, metavar="FILE", help="write the raw log of all datagrams to this new file")
+    parser.add_argument("--video", action="store_true",
+                        help="have every node record its frames, too, as long as --log is written; `rhot video "
+                             "collect` fetches them")
     parser.add_argument("--unchecked", action="store_true",
                         help="serve also a rig that `rhot check` refuses, to calibrate it")
     parser.add_argument("--start", action="store_true", help="tell the nodes to stream at once")
@@ -78,10 +81,13 @@ def run(args: argparse.Namespace) -> int:
     """Run the engine until SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.advice import calibration_advice
     from rhot_app.engine.serve import serving
+    from rhot_app.errors import EngineError
     from rhot_app.keys import load_master_keys
     from rhot_app.project import load_rig
     from rhot_app.sources.udp_nodes import UdpNodes
 
+    if args.video and args.log is None:
+        raise EngineError("--video needs --log FILE: the videos belong to a recording.")
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
     rig = load_rig(args.rig)
     if not args.unchecked:
@@ -90,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     source = functools.partial(UdpNodes, own=own)
     with serving(rig, args.rig.absolute(), source, args.directory, own, asked_outputs(args)) as serve:
         if args.log is not None:
-            serve.engine.record(args.log.absolute())
+            serve.engine.record(args.log.absolute(), video=args.video)
         if args.start:
             serve.engine.start()
         if args.json:

@@ -97,7 +97,10 @@ class Commands:
         path = _path(arguments)
         if path is None:
             raise EngineError('record needs the "path" of the log to write.')
-        self._engine.record(path)
+        video = arguments.get("video", False)
+        if not isinstance(video, bool):
+            raise EngineError('"video" of record is true or false.')
+        self._engine.record(path, video=video)
         return {"path": str(path)}
 
     def _record_stop(self, arguments: Arguments) -> Answer:

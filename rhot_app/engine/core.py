@@ -6,6 +6,7 @@ Frames pass through in the source's threads; everything here is called by anothe
 from __future__ import annotations
 
 import functools
+import secrets
 import threading
 import time
 from collections.abc import Callable
@@ -52,6 +53,7 @@ class Engine:
         self.running = False
         self.session = 0
         self.recorder: Recorder | None = None
+        self._video = ""  # what the nodes call the videos of the recording that have them
         self._make_source = make_source
         self._make_tracker = make_tracker
         self._node_message = node_message
@@ -94,19 +96,31 @@ class Engine:
         predicts nothing."""
         return self._pipeline.state_at(t_ns)
 
-    def record(self, path: Path) -> None:
-        """Write the raw log to `path` from now on; raises RecordingError, also when something is recorded already."""
+    @property
+    def video(self) -> str:
+        """Name of the video that every node is to record now; empty for none."""
+        return self._video if self.recorder is not None else ""
+
+    def record(self, path: Path, *, video: bool = False) -> None:
+        """Write the raw log to `path` from now on, and have every node record its frames if `video`; a replay has none.
+
+        Raises RecordingError, EngineError when something is recorded already.
+        """
         with self._lock:
             if self.recorder is not None:
                 raise EngineError(f"already recording to {self.recorder.path}; stop that recording first.")
             self._notice = ""
-            recorder = Recorder(path, self.rig, {"created": datetime.now(UTC).isoformat(timespec="seconds")})
+            now = datetime.now(UTC)
+            video = video and self._source.live
+            name = f"{now:%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}" if video else ""
+            about = {"created": now.isoformat(timespec="seconds"), **({"video": name} if video else {})}
+            recorder = Recorder(path, self.rig, about)
             try:
                 self._source.record_to(recorder)
             except BaseException:
                 recorder.discard()
                 raise
-            self.recorder = recorder
+            self._video, self.recorder = name, recorder
 
     def record_stop(self) -> Path | None:
         """Finish the log; returns its path, or None when nothing was recorded."""

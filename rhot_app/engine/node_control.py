@@ -28,6 +28,8 @@ TIMEOUT_S = 2.7
 
 _FAULT_PERIOD_S = 1.0
 _HEALTH_PERIOD_S = 3.0
+_VIDEO_PERIOD_S = 3.0  # a node ends a video that it was not reminded of for LEASE_S (rhot_node.video.recorder)
+_LAST_WORDS_MS = 200
 
 log = logging.getLogger(__name__)
 
@@ -58,6 +60,10 @@ class _Peer:
     message: str = ""
     health: tuple[Advice, ...] = ()
     asked_s: float = -1e9
+    video: str = ""  # what it was told to record
+    video_told_s: float = -1e9
+    video_dropped: int = 0
+    video_advice: tuple[Advice, ...] = ()
 
 
 class NodeControl:
@@ -115,7 +121,9 @@ class NodeControl:
         for peer in self._peers.values():
             self._send_waiting(peer)
             for asked, answer, attachment in _receive(peer):
-                if asked.client is None:
+                if asked.command == "video":
+                    _take_video_answer(peer, answer)
+                elif asked.client is None:
                     state = answer.get("answer", {})
                     peer.message = printable(str(state.get("message", "")))
                     peer.health = health_advice(peer.node.name, state)
@@ -123,7 +131,10 @@ class NodeControl:
                     done.append((asked.client, (answer, attachment)))
             for asked in [asked for asked in peer.asked.values() if now_s > asked.deadline_s]:
                 del peer.asked[asked.number]
-                if asked.client is not None:
+                if asked.command == "video":
+                    peer.video_advice = (Advice("warning", f"Node {peer.node.name} cannot be told to record its video: "
+                                                "its control channel does not answer."),) if peer.video else ()
+                elif asked.client is not None:
                     error = EngineError(f"node {peer.node.name} does not answer on its control channel "
                                         f"{_endpoints(peer.node)[0]}; is rhot-node running "
                                         "there, and is it paired with this computer?")
@@ -171,9 +182,21 @@ class NodeControl:
                 peer.asked_s = now_s
                 self._put(peer, None, "node", {"request": "state"})
 
+    def record_video(self, name: str) -> None:
+        """Have every node record the video `name`, or none when it is empty. Called often; nodes are reminded."""
+        now_s = time.monotonic()
+        for peer in self._peers.values():
+            if name != peer.video:
+                if peer.video:
+                    self._put(peer, None, "video", {"request": "video_stop", "name": peer.video})
+                peer.video, peer.video_told_s, peer.video_dropped, peer.video_advice = name, -1e9, 0, ()
+            if name and now_s - peer.video_told_s > _VIDEO_PERIOD_S:
+                peer.video_told_s = now_s
+                self._put(peer, None, "video", {"request": "video_start", "name": name})
+
     def advice(self) -> tuple[Advice, ...]:
-        """What the nodes' machines lack, for the operator."""
-        return tuple(advice for peer in self._peers.values() for advice in peer.health)
+        """What the nodes' machines lack, and what their videos do, for the operator."""
+        return tuple(advice for peer in self._peers.values() for advice in (*peer.health, *peer.video_advice))
 
     def message(self, node_id: int) -> str:
         """What the node says about its fault; empty when it has none or did not say yet."""
@@ -181,7 +204,8 @@ class NodeControl:
         return "" if peer is None else peer.message
 
     def close(self) -> None:
-        """Close all sockets. May be called twice."""
+        """End the nodes' videos and close all sockets. May be called twice."""
+        self.record_video("")
         while self._peers:
             _close(self._peers.popitem()[1])
 
@@ -232,6 +256,27 @@ def _receive(peer: _Peer) -> list[tuple[_Asked, Answer, bytes | None]]:
             found.append((asked, *_translate(peer.node.name, asked.command, parts[2:])))
 
 
+def _take_video_answer(peer: _Peer, answer: Answer) -> None:
+    """What there is to say of a node's video."""
+    if not peer.video:
+        return
+    if not answer.get("ok"):
+        peer.video_advice = (Advice("warning", f"No video is recorded: {answer.get('error')}"),)
+        return
+    video = answer.get("answer", {}).get("video")
+    if not isinstance(video, dict):
+        return
+    name, message, dropped = peer.node.name, printable(str(video.get("message", ""))), video.get("dropped")
+    peer.video_advice = ()
+    if message:
+        peer.video_advice = (Advice("warning", f"The video of node {name} has ended. {message}"),)
+    elif isinstance(dropped, int) and dropped > peer.video_dropped:
+        peer.video_advice = (Advice("warning", f"Node {name} drops frames of its video, {dropped} so far: its "
+                                    "processor or disk is too slow. Detection goes first."),)
+    if isinstance(dropped, int):
+        peer.video_dropped = dropped
+
+
 def _translate(name: str, command: str, parts: list[bytes]) -> tuple[Answer, bytes | None]:
     """A node's reply as the engine's answer to its client."""
     try:
@@ -271,6 +316,6 @@ def _reached(node: RigNode) -> tuple[str, ...]:
 
 
 def _close(peer: _Peer) -> None:
-    peer.requests.close()
+    peer.requests.close(_LAST_WORDS_MS if peer.asked else 0)
     if peer.previews is not None:
         peer.previews.close()

@@ -64,6 +64,7 @@ class Server:
     def step(self, timeout_ms: int = _POLL_MS) -> None:
         """Wait for a command or a node's answer, deal with all that wait, publish what is due."""
         self._nodes.follow(self._engine.rig)
+        self._nodes.record_video(self._engine.video)
         if self._poller.poll(timeout_ms):
             self._answer_commands()
         for client, node_answer in self._nodes.answers():

@@ -30,6 +30,8 @@ class Actions(QObject):
         self.start = self._make("Start", "", "Tell the nodes to stream, or to stop (Space).")
         self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it (R).")
         self.bookmark = self._make("Bookmark", "B", "Write a few words about this moment into the recording (B).")
+        self.video = self._make("Record video, too", "", "Each camera writes its own frames as long as the next "
+                                "recording lasts. Rig, Recordings fetches them afterwards.", checkable=True)
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
         self.caps = QMenu("Cover a simulated camera", parent)
         self.caps.setToolTipsVisible(True)
@@ -114,8 +116,8 @@ class MainToolBar(QToolBar):
         self.addSeparator()
         a = actions
         self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.open_recording, a.recordings,
-                                                 a.bookmark, a.export, None, a.outputs, a.caps.menuAction(), a.save_rig,
-                                                 a.close_rig, None, a.quit])
+                                                 a.video, a.bookmark, a.export, None, a.outputs, a.caps.menuAction(),
+                                                 a.save_rig, a.close_rig, None, a.quit])
         self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
                                                              a.markers, a.hand, None, a.files])
         self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now,

@@ -32,6 +32,7 @@ class Appearance(QObject):
         self._actions, self._parts, self._advice = actions, parts, advice
         self.scheme: Scheme = scheme_named(settings.scheme)
         actions.names.toggled.connect(self._show_names)
+        actions.video.toggled.connect(self._choose_video)
         actions.now.toggled.connect(self._show_now)
         for action in (actions.clouds, *actions.cloud_kinds, actions.cloud_sizes[-1]):
             action.toggled.connect(self._choose_ellipsoids)
@@ -44,6 +45,7 @@ class Appearance(QObject):
         (a.light if s.scheme == "light" else a.dark).setChecked(True)
         a.names.setChecked(s.flag("names"))
         self._parts.scene.show_names(s.flag("names"))
+        a.video.setChecked(s.video)
         a.now.setChecked(s.flag("now"))
         self._prediction.wanted = s.flag("now")
         wanted = {name: s.flag(name, default) for name, default in _CLOUD_FLAGS.items()}
@@ -70,6 +72,9 @@ class Appearance(QObject):
     def _show_now(self, on: bool) -> None:
         self._settings.set_flag("now", on)
         self._prediction.wanted = on
+
+    def _choose_video(self, on: bool) -> None:
+        self._settings.video = on
 
     def _choose_ellipsoids(self) -> None:
         a = self._actions

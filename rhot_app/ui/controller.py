@@ -199,9 +199,9 @@ class Controller(QObject):
             else:
                 self.start()
 
-    def record(self, path: Path) -> None:
-        """Write the raw log of all datagrams to `path`."""
-        self.link.command("record", path=str(path))
+    def record(self, path: Path, *, video: bool = False) -> None:
+        """Write the raw log of all datagrams to `path`; with `video` the nodes record their frames."""
+        self.link.command("record", path=str(path), video=video)
 
     def stop_recording(self) -> None:
         """End the log."""

@@ -61,7 +61,7 @@ class MainWindow(QMainWindow):
         self.rig_watch = RigWatch(controller)
         self.wizards = Launcher(controller.backend.asker, controller.backend.client,
                                 lambda: self.appearance.scheme, settings, self)
-        self.replays = ReplayDesk(settings, lambda: self.appearance.scheme, self)
+        self.replays = ReplayDesk(settings, lambda: self.appearance.scheme, self, lambda: controller.rig)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
         scheme = scheme_named(settings.scheme)
@@ -106,7 +106,7 @@ class MainWindow(QMainWindow):
         self.addActions(self.docks.actions)
         a.start.triggered.connect(c.start_or_stop)
         QShortcut(QKeySequence(Qt.Key.Key_Space), self).activated.connect(self._press_space)
-        a.record.triggered.connect(self.recordings.begin_or_end)
+        a.record.triggered.connect(lambda: self.recordings.begin_or_end(video=a.video.isChecked()))
         a.bookmark.triggered.connect(lambda: self.recordings.ask_for_bookmark(self))
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)

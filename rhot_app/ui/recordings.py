@@ -35,20 +35,23 @@ class Recordings:
         self._tell = tell
         self._log_path = ""
         self._finished = Path()
+        self._video = False  # whether what is recorded has video
         self.dialog: BookmarkDialog | None = None
 
-    def begin_or_end(self) -> None:
-        """Begin a log in the documents folder, named by date and time; or end the one that is being written."""
+    def begin_or_end(self, *, video: bool = False) -> None:
+        """Begin a log in the documents folder, named by date and time; or end the one that is being written. `video`:
+        the nodes record their frames, too."""
         if self._controller.recording:
             self._controller.stop_recording()
             return
+        self._video = video
         folder = recordings_folder()
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as exc:
             self._say("error", f"{folder}: cannot be made ({exc.strerror}), so nothing is recorded.")
             return
-        self._controller.record(folder / f"{datetime.now():%Y-%m-%d_%H-%M-%S}{LOG_SUFFIX}")
+        self._controller.record(folder / f"{datetime.now():%Y-%m-%d_%H-%M-%S}{LOG_SUFFIX}", video=video)
 
     def ask_for_bookmark(self, window: QWidget) -> None:
         """Ask for a few words about this moment, and have the engine write them into the log."""
@@ -86,7 +89,8 @@ class Recordings:
         except OSError as exc:
             self._say("error", f"{path}: the recording cannot be found ({exc.strerror}).")
             return
-        self._tell(Notice("info", f"Recorded {size} to {path}.", "Show in folder", SHOW_FOLDER))
+        video = " The cameras keep its videos until Rig, Recordings collects them." if self._video else ""
+        self._tell(Notice("info", f"Recorded {size} to {path}.{video}", "Show in folder", SHOW_FOLDER))
 
     def show_folder(self) -> None:
         """Open the folder of the last recording in the desktop's own file manager."""

@@ -57,6 +57,15 @@ class Settings:
     def motion(self, name: str) -> None:
         self._store.setValue("twin/motion", name)
 
+    @property
+    def video(self) -> bool:
+        """Whether recordings have video."""
+        return self._text("record/video", "no") == "yes"
+
+    @video.setter
+    def video(self, on: bool) -> None:
+        self._store.setValue("record/video", "yes" if on else "no")
+
     def flag(self, name: str, default: bool = True) -> bool:
         """A switch of the View menu."""
         return self._text(f"view/{name}", "yes" if default else "no") == "yes"

@@ -9,17 +9,19 @@ import msgspec
 import pytest
 import zmq
 from fake_tracker import FakeTracker
-from patience import PATIENCE_MS, PATIENCE_S, eventually
+from patience import PATIENCE_MS, PATIENCE_S, eventually, settled
 
+from rhot_app.engine import node_control
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
 from rhot_app.engine.directory import open_directory
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.server import Server, StatePublisher
 from rhot_app.engine.status import EngineStatus, Preview
-from rhot_app.errors import EngineError
+from rhot_app.errors import EngineError, RecordingError
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.bookmarks import Bookmark, read_bookmarks
+from rhot_app.recording.video import video_name
 from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.udp_nodes import UdpNodes
 from rhot_app.tracking.state import HandState
@@ -39,6 +41,7 @@ class ControlPeer:
         self.hold = threading.Event()
         self.hold.set()
         self.subscribed = False
+        self.video: dict[str, object] = {"message": "", "dropped": 0}
         self.ending = False
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
@@ -55,14 +58,15 @@ class ControlPeer:
             if self.subscribed:
                 self.previews.send_multipart([b'{"node_id": 1, "width": 640, "height": 480}', b"\xff\xd8jpeg"])
 
-    @staticmethod
-    def answer(request: dict[str, object]) -> list[bytes]:
+    def answer(self, request: dict[str, object]) -> list[bytes]:
         if request["request"] == "still":
             kind = request.get("format", "png")
             return [f'{{"ok": true, "width": 640, "format": "{kind}"}}'.encode(), b"\x89PNG"]
         if request["request"] == "state":
             return [b'{"ok": true, "state": "fault", "message": "the camera is gone: plug it in.", "health": '
                     b'[{"code": "heat", "level": "error", "text": "Its processor is too hot."}]}']
+        if request["request"] in ("video_start", "video_stop"):
+            return [msgspec.json.encode({"ok": True, "video": self.video})]
         return [b'{"ok": false, "error": "no such request."}']
 
     def close(self) -> None:
@@ -182,6 +186,40 @@ def test_recording_by_command(client: EngineClient, tmp_path: Path) -> None:
     assert read_bookmarks(tmp_path / "b.log") == [Bookmark(5, "earlier"), Bookmark(marked, "the thumb")]
     with pytest.raises(EngineError, match="absolute"):
         client.command("record", path="a.log")
+
+
+def test_video_is_asked_of_the_nodes_as_long_as_the_recording_lasts(
+        client: EngineClient, peer: ControlPeer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def told() -> list[tuple[object, object]]:
+        return [(one["request"], one.get("name")) for one in peer.heard if str(one["request"]).startswith("video")]
+    monkeypatch.setattr(node_control, "_VIDEO_PERIOD_S", 0.1)
+    client.command("record", path=str(tmp_path / "plain.log"))
+    client.command("record_stop")
+    with pytest.raises(EngineError, match="true or false"):
+        client.command("record", path=str(tmp_path / "a.log"), video="yes")
+    assert not told()
+    client.command("record", path=str(tmp_path / "a.log"), video=True)
+    name = video_name(tmp_path / "a.log")
+    eventually(lambda: told().count(("video_start", name)) >= 3)  # reminded, or the node would end it
+    peer.video = {"message": "The node's disk has less than 512 MiB left.", "dropped": 0}
+    status_when(client, lambda status: any("has ended. The node's disk" in one.text for one in status.advice))
+    peer.video = {"message": "", "dropped": 7}
+    status_when(client, lambda status: any("drops frames of its video, 7" in one.text for one in status.advice))
+    client.command("record_stop")
+    eventually(lambda: told()[-1] == ("video_stop", name))
+    assert settled(lambda: told()[-1] == ("video_stop", name))
+    status_when(client, lambda status: not any("video" in one.text for one in status.advice))
+    with pytest.raises(RecordingError, match="without video"):
+        video_name(tmp_path / "plain.log")
+
+
+def test_an_engine_that_ends_ends_the_videos(
+        rig: Rig, peer: ControlPeer, tmp_path: Path) -> None:
+    bench = Bench(rig, tmp_path / "ending")
+    bench.engine.record(tmp_path / "a.log", video=True)
+    eventually(lambda: any(one["request"] == "video_start" for one in peer.heard))
+    bench.close()
+    eventually(lambda: peer.heard[-1]["request"] == "video_stop")
 
 
 @pytest.mark.parametrize(("command", "arguments", "sentence"), [

@@ -16,9 +16,10 @@ MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
 OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot": ("--version", "demo", "engine", "replay", "simulate", "evaluate"),
     "rhot demo": ("--motion", "--seed"),
-    "rhot engine": ("--rig", "--log", "--output", "--web"),
+    "rhot engine": ("--rig", "--log", "--video", "--output", "--web"),
     "rhot replay": ("LOG", "--rig", "--keep", "--smooth"),
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
+    "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),
     "rhot recover": ("LOG", "--out", "--rig"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",
                     "--smooth", "--again"),

@@ -12,6 +12,7 @@ from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.backend.contract import TwinPace
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.passing import PassingNotices
+from rhot_app.ui.settings import Settings
 
 
 def test_r_records_and_says_where_the_file_is(tracking, tmp_path, monkeypatch):
@@ -28,6 +29,25 @@ def test_r_records_and_says_where_the_file_is(tracking, tmp_path, monkeypatch):
     tracking.click(button_of(tracking, "Show in folder"))
     assert opened == [str(path.parent)]
     tracking.until(lambda: any(f"lies in {path.parent}" in text for text in advice.texts))
+
+
+def test_video_is_recorded_when_it_is_switched_on_and_the_switch_is_remembered(tracking):
+    commands, advice, switch = tracking.backend.engine.commands, tracking.window.advice, tracking.window.actions_.video
+
+    def record() -> dict:
+        tracking.press(Qt.Key.Key_R)
+        tracking.until(lambda: tracking.controller.recording)
+        asked = [arguments for name, arguments in commands if name == "record"][-1]
+        tracking.press(Qt.Key.Key_R)
+        tracking.until(lambda: not tracking.controller.recording)
+        return asked
+    assert record()["video"] is False
+    switch.trigger()
+    assert record()["video"] is True
+    tracking.until(lambda: any("Recordings collects them" in text for text in advice.texts))
+    tracking.window.settings.sync()
+    assert Settings(tracking.window.settings.path).video
+    switch.trigger()
 
 
 def button_of(bench, text):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from rhot_app.project import Rig
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.replay.library_window import LibraryWindow
@@ -15,10 +16,13 @@ from rhot_app.ui.settings import Settings
 
 
 class ReplayDesk:
-    """`scheme` gives the colours of the moment. What is open stays beside `parent` and ends with it."""
+    """`scheme` gives the colours of the moment, `rig` the rig that is open. What is open stays beside `parent` and ends
+    with it."""
 
-    def __init__(self, settings: Settings, scheme: Callable[[], Scheme], parent: QWidget) -> None:
+    def __init__(self, settings: Settings, scheme: Callable[[], Scheme], parent: QWidget,
+                 rig: Callable[[], Rig | None] = lambda: None) -> None:
         self._settings, self._scheme, self._parent = settings, scheme, parent
+        self._rig = rig
         self.window: ReplayWindow | None = None
         self.library: LibraryWindow | None = None
 
@@ -40,7 +44,7 @@ class ReplayDesk:
         """The page with all recordings."""
         if self.library is None or not self.library.isVisible():
             self._end_library()
-            self.library = LibraryWindow(self._scheme(), parent=self._parent)
+            self.library = LibraryWindow(self._scheme(), parent=self._parent, rig=self._rig)
             self.library.open_asked.connect(self.open)
             self.library.renamed.connect(self._follow)
         else:

@@ -19,6 +19,7 @@ from rhot_app.progress import Progress, silent
 from rhot_app.project import with_tracker
 from rhot_app.recording.bookmarks import bookmarks_of
 from rhot_app.recording.raw_log import LogReader
+from rhot_app.recording.video import videos_of
 from rhot_app.sources.replay import LogDoor
 from rhot_app.tracking.make import make_tracker
 from rhot_app.ui.recordings import LOG_SUFFIX
@@ -36,13 +37,15 @@ _FORMAT = 1
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One recording in the list. `problem` says why it cannot be read, "" when it can."""
+    """One recording in the list. `problem` says why it cannot be read, "" when it can. `video`: its nodes
+    recorded their frames, too."""
 
     path: Path
     created: datetime
     size: int
     rig_name: str
     problem: str = ""
+    video: bool = False
 
 
 class Summary(msgspec.Struct, frozen=True):
@@ -81,7 +84,7 @@ class Library:
 
     def __init__(self, folder: Path, cache: Path) -> None:
         self.folder, self.cache = folder, cache
-        self._deleted: list[tuple[Path, Path]] = []  # where each was, and where it lies in the trash
+        self._deleted: list[tuple[Path, Path]] = []  # where each log was, and where it lies in the trash
 
     def entries(self) -> list[Entry]:
         """All recordings, the newest first. Reads their headers."""
@@ -124,7 +127,7 @@ class Library:
         _refuse_while_recorded(path)
         if target.exists():
             raise RecordingError(f"there is a recording called {name} already; choose another name.")
-        return _move(path, target)
+        return _move_all(path, target)
 
     def delete(self, path: Path) -> None:
         """Move a recording to the trash. Raises RecordingError."""
@@ -136,10 +139,10 @@ class Library:
             raise RecordingError(f"{trash}: cannot be made ({exc.strerror}), so nothing was deleted.") from exc
         target = trash / path.name
         number = 1
-        while target.exists():
+        while target.exists() or videos_of(target):
             number += 1
             target = trash / f"{path.stem} {number}{LOG_SUFFIX}"
-        self._deleted.append((path, _move(path, target)))
+        self._deleted.append((path, _move_all(path, target)))
 
     @property
     def undoable(self) -> str:
@@ -153,15 +156,16 @@ class Library:
         before, lies_at = self._deleted[-1]
         if before.exists():
             raise RecordingError(f"there is another recording called {before.stem} now; rename it first.")
-        _move(lies_at, before)
+        _move_all(lies_at, before)
         self._deleted.pop()
         return before
 
     def empty_trash(self) -> None:
         """Remove what was deleted, for good."""
         for _, lies_at in self._deleted:
-            with contextlib.suppress(OSError):
-                lies_at.unlink()
+            for path in (lies_at, *videos_of(lies_at)):
+                with contextlib.suppress(OSError):
+                    path.unlink()
         self._deleted.clear()
         with contextlib.suppress(OSError):
             (self.folder / TRASH).rmdir()
@@ -178,7 +182,7 @@ def _entry(path: Path) -> Entry:
     reader.close()
     with contextlib.suppress(ValueError, TypeError):
         written = datetime.fromisoformat(reader.about.get("created", "")).astimezone()
-    return Entry(path, written, facts.st_size, reader.rig.name)
+    return Entry(path, written, facts.st_size, reader.rig.name, video="video" in reader.about)
 
 
 def _refuse_while_recorded(path: Path) -> None:
@@ -187,6 +191,17 @@ def _refuse_while_recorded(path: Path) -> None:
             raise RecordingError(f"{path.stem} is being recorded; stop the recording first.")
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
+
+
+def _move_all(path: Path, target: Path) -> Path:
+    """Move a log and the videos that were collected beside it; returns the log's new path. Raises RecordingError."""
+    videos = videos_of(path)
+    if videos and videos_of(target):
+        raise RecordingError(f"there are videos of another recording called {target.stem} already; move them first.")
+    moved = _move(path, target)
+    for video in videos:
+        _move(video, target.with_name(target.stem + video.name.removeprefix(path.stem)))
+    return moved
 
 
 def _move(path: Path, target: Path) -> Path:

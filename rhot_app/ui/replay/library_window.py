@@ -1,24 +1,33 @@
-"""The recordings as a list: when, which rig, how long, how well tracked; open, rename, delete, undo."""
+"""The recordings as a list: when, which rig, how long, how well tracked; open, rename, delete, undo, their videos."""
 
 from __future__ import annotations
 
+import contextlib
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from platformdirs import user_cache_path
 from PySide6.QtCore import QEvent, Qt, QUrl, Signal
 from PySide6.QtGui import QCloseEvent, QDesktopServices, QKeySequence, QShortcut
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.errors import RhotError
-from rhot_app.ui.job import Job
+from rhot_app.keys import load_master_keys
+from rhot_app.project import Rig
+from rhot_app.recording.raw_log import LogReader
+from rhot_app.recording.video import Collected, collect_videos
+from rhot_app.ui.job import Job, Progress
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.empty_state import EmptyState
 from rhot_app.ui.recordings import recordings_folder
 from rhot_app.ui.replay.library import Entry, Library
 from rhot_app.ui.replay.library_table import RecordingTable
 from rhot_app.ui.replay.summaries import Summaries
+from rhot_app.ui.replay.work_strip import WorkStrip
+from rhot_app.ui.wizards.models.remaining import Remaining
 
 _SIZE = (1080, 560)
 
@@ -29,13 +38,13 @@ def summaries_folder() -> Path:
 
 
 class LibraryWindow(QDialog):
-    """`open_asked` gives a recording's path; `renamed` its path before and after."""
+    """`open_asked` gives a recording's path; `renamed` its path before and after. `rig`: the one that is open."""
 
     open_asked = Signal(object)
     renamed = Signal(object, object)
 
     def __init__(self, scheme: Scheme, folder: Path | None = None, cache: Path | None = None,
-                 parent: QWidget | None = None) -> None:
+                 parent: QWidget | None = None, rig: Callable[[], Rig | None] = lambda: None) -> None:
         super().__init__(parent)
         self.setWindowTitle("Recordings")
         self.setProperty("guide", "recording")
@@ -44,6 +53,8 @@ class LibraryWindow(QDialog):
         self.library = Library(folder or recordings_folder(), cache or summaries_folder())
         self.summaries = Summaries(self.library, self)
         self._listing: Job | None = None
+        self._collecting: Job | None = None
+        self._rig = rig
         self.empty = EmptyState("No recordings yet. Press Record, or R, while a rig is open.")
         self.table = RecordingTable(scheme)
         self.sentence = QLabel()
@@ -53,6 +64,9 @@ class LibraryWindow(QDialog):
         self.delete_button = _button("Delete", "Delete the recording; Undo brings it back until this page is closed "
                                      "(Delete).")
         self.undo_button = _button("Undo", "Bring back the recording that was deleted last (Ctrl+Z).")
+        self.video_button = _button("Collect video", "Fetch the frames that the cameras recorded beside the recording; "
+                                    "they come to lie beside it.")
+        self.strip = WorkStrip()
         self.folder_button = _button("Open folder", "Show the recordings in the desktop's file manager.")
         self.close_button = _button("Close", "Close this page. What was deleted is then gone for good.")
         self._lay_out()
@@ -65,7 +79,7 @@ class LibraryWindow(QDialog):
     def _lay_out(self) -> None:
         buttons = QHBoxLayout()
         for button in (self.open_button, self.rename_button, self.delete_button, self.undo_button,
-                       self.folder_button):
+                       self.video_button, self.folder_button):
             buttons.addWidget(button)
         buttons.addStretch(1)
         buttons.addWidget(self.close_button)
@@ -74,6 +88,7 @@ class LibraryWindow(QDialog):
         layout.setSpacing(12)
         layout.addWidget(self.empty)
         layout.addWidget(self.table, 1)
+        layout.addWidget(self.strip)
         layout.addWidget(self.sentence)
         layout.addLayout(buttons)
 
@@ -86,6 +101,8 @@ class LibraryWindow(QDialog):
         self.rename_button.clicked.connect(self.table.edit_name)
         self.delete_button.clicked.connect(self.delete_chosen)
         self.undo_button.clicked.connect(self.undo)
+        self.video_button.clicked.connect(self.collect_video)
+        self.strip.cancel_asked.connect(self._stop_collecting)
         self.folder_button.clicked.connect(self.open_folder)
         self.close_button.clicked.connect(self.close)
         for key, action in (("Return", self.open_chosen), ("F2", self.table.edit_name),
@@ -134,6 +151,7 @@ class LibraryWindow(QDialog):
         self.open_button.setEnabled(entry is not None and not entry.problem)
         self.rename_button.setEnabled(entry is not None)
         self.delete_button.setEnabled(entry is not None)
+        self.video_button.setEnabled(entry is not None and entry.video and self._collecting is None)
         undoable = self.library.undoable
         self.undo_button.setEnabled(bool(undoable))
         said = [f"Deleted {undoable}. Undo brings it back; it is gone for good when this page is closed."
@@ -185,6 +203,40 @@ class LibraryWindow(QDialog):
         if path is not None:
             self.refresh(lambda: self.table.choose(path))
 
+    def collect_video(self) -> None:
+        """Fetch the videos of the recording that is selected, in a worker."""
+        entry, rig = self.table.chosen, self._rig()
+        if entry is None or self._collecting is not None:
+            return
+        path, remaining = entry.path, Remaining(time.monotonic())
+
+        def end(sentence: str) -> None:
+            self._collecting = None
+            self.strip.show_work("", 0.0, "")
+            self._show_choice()
+            self.sentence.setText(sentence)
+
+        def done(videos: list[Collected]) -> None:
+            dropped = sum(video.info.dropped for video in videos)
+            end(f"Collected {', '.join(video.path.name for video in videos)}."
+                + (f" The cameras' computers were too slow for {dropped} frames." if dropped else ""))
+
+        def show(text: str, fraction: float) -> None:
+            now_s = time.monotonic()
+            remaining.report(fraction, now_s)
+            self.strip.show_work(text, fraction, remaining.text(now_s))
+        self._collecting = Job(lambda progress: _collect(path, rig, progress), done, end, show, self).start()
+        self.strip.show_work("Asking the nodes …", 0.0, "")
+        self._show_choice()
+
+    def _stop_collecting(self) -> None:
+        """What has come stays, and is gone on with the next time."""
+        if self._collecting is not None:
+            self._collecting.cancel()
+            self._collecting = None
+            self.strip.show_work("", 0.0, "")
+            self._show_choice()
+
     def open_folder(self) -> None:
         """Show the folder in the desktop's own file manager."""
         folder = self.library.folder
@@ -205,8 +257,19 @@ class LibraryWindow(QDialog):
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """What was deleted is gone for good now; the work on summaries ends."""
         self.summaries.close()
+        self._stop_collecting()
         self.library.empty_trash()
         super().closeEvent(event)
+
+
+def _collect(log: Path, rig: Rig | None, progress: Progress) -> list[Collected]:
+    """Fetch a log's videos from its own nodes, each where the open `rig` has it if it is one of its nodes."""
+    with contextlib.closing(LogReader(log)) as reader:
+        recorded = reader.rig
+    now = {} if rig is None else {node.node_id: node for node in rig.nodes}
+    nodes = tuple(msgspec.structs.replace(now.get(node.node_id, node), name=node.name) for node in recorded.nodes)
+    return collect_videos(log, msgspec.structs.replace(recorded, nodes=nodes), load_master_keys().own,
+                          progress=progress.report)
 
 
 def _button(text: str, meaning: str) -> QPushButton:

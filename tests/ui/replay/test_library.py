@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from patience import PATIENCE_S
@@ -18,11 +20,13 @@ from PySide6.QtWidgets import QLineEdit, QWidget
 from rhot_app.errors import RecordingError
 from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
+from rhot_app.recording.video import Collected
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.replay.library import BAR_PARTS, TRASH, Library, summarise_log
 from rhot_app.ui.replay.library_table import BAR, LENGTH, NAME, RIG
 from rhot_app.ui.replay.library_window import LibraryWindow
 from rhot_app.ui.replay.run import NO_STATE, TRACKING
+from rhot_node.video.recorder import VideoInfo
 
 
 class Shelf:
@@ -244,3 +248,73 @@ def test_a_recording_made_meanwhile_is_there_when_the_page_is_looked_at_again(sh
     (folder / "new.rhotlog").write_bytes(log.read_bytes())
     shelf.window.activateWindow()
     shelf.until(lambda: "new" in shelf.names)
+
+
+@pytest.fixture
+def filmed(log: Path) -> Path:
+    """A recording whose nodes recorded video, with one of them collected; of its neighbour, too."""
+    path = log.with_name("filmed.rhotlog")
+    path.write_bytes(encode_header(LogReader(log).rig, {"video": "20261124T231500Z-5f3a9c01"}))
+    for name in ("filmed.left.avi", "filmed.left.csv", "filmed.right.avi.part", "filmed.left.too.avi", "filmed.txt"):
+        path.with_name(name).write_bytes(name.encode())
+    return path
+
+
+def test_videos_go_where_their_recording_goes(filmed, tmp_path):
+    library = Library(filmed.parent, tmp_path / "cache")
+    ours = ["left.avi", "left.csv", "right.avi.part"]
+
+    def there(stem: str, folder: Path = filmed.parent) -> list[bool]:
+        return [(folder / f"{stem}.{name}").exists() for name in ours]
+    other = filmed.with_name("taken.left.avi")
+    other.write_bytes(b"of a recording that is gone")
+    with pytest.raises(RecordingError, match="videos of another recording called taken"):
+        library.rename(filmed, "taken")
+    assert other.read_bytes() == b"of a recording that is gone" and there("filmed") == [True] * 3
+    path = library.rename(filmed, "wave")
+    assert there("wave") == [True] * 3 and there("filmed") == [False] * 3
+    assert path.with_name("wave.left.avi").read_bytes() == b"filmed.left.avi"
+    assert filmed.with_name("filmed.left.too.avi").exists() and filmed.with_name("filmed.txt").exists()
+    library.delete(path)
+    assert there("wave") == [False] * 3 and there("wave", filmed.parent / TRASH) == [True] * 3
+    library.undo()
+    assert there("wave") == [True] * 3
+    library.delete(path)
+    library.empty_trash()
+    assert not (filmed.parent / TRASH).exists()
+
+
+def test_videos_are_collected_in_the_background(shelf, filmed, monkeypatch):
+    window, going = shelf.window, threading.Event()
+    asked: list[tuple[Path, str]] = []
+
+    def collect(log: Path, rig: Any, own: Any, *, progress: Any) -> list[Any]:
+        asked.append((log, rig.nodes[0].address))
+        while not going.wait(0.01):
+            progress("video of left", 0.5)
+        info = VideoInfo("a", 10, 3, 100, "")
+        return [Collected("left", log.with_name("filmed.left.avi"), info)]
+    monkeypatch.setattr("rhot_app.ui.replay.library_window.collect_videos", collect)
+    window.refresh()
+    shelf.until(lambda: "filmed" in shelf.names)
+    shelf.choose(GRASP)
+    assert not window.video_button.isEnabled(), "it has none"
+    shelf.choose("filmed")
+    shelf.click(window.video_button)
+    shelf.until(lambda: window.strip.isVisible() and "video of left" in window.strip.label.text())
+    assert not window.video_button.isEnabled()
+    shelf.click(window.strip.cancel_button)
+    shelf.until(lambda: not window.strip.isVisible() and window.video_button.isEnabled())
+    going.set()
+    moved = msgspec.structs.replace(LogReader(filmed).rig.nodes[0], address="10.0.0.7")
+    window._rig = lambda: msgspec.structs.replace(LogReader(filmed).rig, nodes=(moved,))
+    shelf.click(window.video_button)
+    shelf.until(lambda: "Collected filmed.left.avi" in window.sentence.text())
+    assert "3 frames" in window.sentence.text() and not window.strip.isVisible()
+    assert [log for log, _ in asked] == [filmed] * 2 and asked[1][1] == "10.0.0.7"
+
+    def fail(*args: Any, **options: Any) -> None:
+        raise RecordingError("node left does not answer.")
+    monkeypatch.setattr("rhot_app.ui.replay.library_window.collect_videos", fail)
+    shelf.click(window.video_button)
+    shelf.until(lambda: window.sentence.text() == "node left does not answer." and window.video_button.isEnabled())
