@@ -91,7 +91,8 @@ class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
     def __post_init__(self) -> None:
         tip, wrist = (self.role or "").endswith("_tip"), (self.role or "").removeprefix("other_") == "wrist"
         for fault, rule in (
-                (self.patch != "segment" and not tip, f'patch "{self.patch}" is of fingertips; its role is none'),
+                (self.patch != "segment" and not tip,
+                 f'patch "{self.patch}" is for fingertips; give it a role such as "index_tip"'),
                 (self.patch in FLAT_PATCHES and self.shape not in ("disc", "blob"),
                  f'patch "{self.patch}" is flat; give it the shape "disc"'),
                 (self.gap_deg > 0.0 and self.patch != "ring" and not wrist,

@@ -20,7 +20,7 @@ from rhot_app.geometry.camera import project_normalised, undistort_points
 from rhot_app.tracking.locate import GATE_FLOOR_PX
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trust import ACCELERATION_LIMIT, FORGET_S
+from rhot_app.tracking.trust import ACCELERATION_LIMIT, FORGET_S, VELOCITY_TIME_S
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -51,7 +51,10 @@ _COLUMNS = "pixels", "covariances", "diameters", "qualities", "flags"
 
 def assign(predicted: Array, predicted_covariances: Array, pixels: Array, covariances: Array,
            label_costs: Array) -> tuple[Indices, Array]:
-    """The joint assignment of N candidates to M markers with the least sum of squared Mahalanobis distances.
+    """The joint assignment of N candidates to M markers with the greatest likelihood.
+
+    A pair costs its squared Mahalanobis distance and the logarithm of its covariance's determinant. A pair beyond the
+    gate is excluded.
 
     `predicted` (M, 2) px with `predicted_covariances` (M, 2, 2) px^2. `pixels` (N, 2) px with `covariances` (N, 2, 2)
     px^2. `label_costs` (M, N) are added: -2 log of the probability that the marker is reported under the candidate's
@@ -60,8 +63,10 @@ def assign(predicted: Array, predicted_covariances: Array, pixels: Array, covari
     """
     offset = pixels[None] - predicted[:, None]
     total = predicted_covariances[:, None] + covariances[None]
-    costs = np.einsum("mni,mni->mn", offset, np.linalg.solve(total, offset[..., None])[..., 0]) + label_costs
-    costs = np.where(np.isfinite(costs), costs, _FORBIDDEN)
+    distances = np.einsum("mni,mni->mn", offset, np.linalg.solve(total, offset[..., None])[..., 0])
+    volumes = np.log(np.linalg.det(total))  # of two candidates as near, the more certain one is likelier
+    costs = distances + volumes - volumes.min(axis=1, keepdims=True, initial=np.inf) + label_costs
+    costs = np.where(np.isfinite(costs) & (distances < GATE), costs, _FORBIDDEN)
     markers = len(predicted)
     without = np.where(np.eye(markers, dtype=np.bool_), GATE, _FORBIDDEN)
     rows, columns = linear_sum_assignment(np.hstack([costs, without]))
@@ -101,7 +106,7 @@ class MarkerAssociation:
         self._positions, self._velocities = np.full((markers, 3), np.nan), np.zeros((markers, 3))
         self._covariances = np.zeros((markers, 3, 3))
         self._located_ns = np.zeros(markers, dtype=np.int64)  # master time of `_positions`
-        self._chosen = np.full((cameras, markers, 2), np.nan)  # px, in the newest frame of each camera
+        self._chosen = np.full((cameras, markers, 2), np.nan)  # px, where each camera saw it last
         self._frames: list[CameraObservations | None] = [None] * cameras  # newest of each camera, all candidates
 
     def update(self, t_ns: int, positions: Array, covariances: Array | None = None) -> None:
@@ -112,8 +117,10 @@ class MarkerAssociation:
         known = np.isfinite(positions[:, 0])
         dt_s = 1e-9 * (t_ns - self._located_ns)
         steady = known & np.isfinite(self._positions[:, 0]) & (dt_s > 0.0) & (dt_s < FORGET_S)
-        self._velocities[known] = 0.0
-        self._velocities[steady] = (positions[steady] - self._positions[steady]) / dt_s[steady, None]
+        self._velocities[known & ~steady] = 0.0
+        speeds = (positions[steady] - self._positions[steady]) / dt_s[steady, None]
+        weights = dt_s[steady, None] / (dt_s[steady, None] + VELOCITY_TIME_S)
+        self._velocities[steady] += weights * (speeds - self._velocities[steady])
         self._positions[known], self._located_ns[known] = positions[known], t_ns
         floor = POSITION_SD_M**2 * np.eye(3)
         self._covariances[known] = floor if covariances is None else covariances[known] + floor
@@ -127,14 +134,18 @@ class MarkerAssociation:
         """
         self._frames[frame.camera] = frame
         if frame.further is None:
-            self._chosen[frame.camera] = frame.pixels
+            found = np.isfinite(frame.pixels[:, 0])
+            self._chosen[frame.camera][found] = frame.pixels[found]
             return frame
         listed = _list_candidates(frame)
         predicted, covariances = self._predict(frame)
         chosen, rivals = self._choose(listed, predicted, covariances)
         unknown = np.isnan(predicted[:, 0])
         if unknown.any():
-            chosen = np.where(unknown, self._choose_by_rays(frame, listed), chosen)
+            by_rays, undecided = self._choose_by_rays(frame, listed)
+            chosen, rivals = np.where(unknown, by_rays, chosen), np.where(unknown, undecided, rivals)
+        alone = np.bincount(listed.markers, minlength=len(chosen)) == 1  # nothing to choose, as in other frames
+        chosen[alone] = [int(np.flatnonzero(listed.markers == m)[0]) for m in np.flatnonzero(alone)]
         return self._selected(frame, listed, chosen, rivals)
 
     def _predict(self, frame: CameraObservations) -> tuple[Array, Array]:
@@ -145,7 +156,8 @@ class MarkerAssociation:
         points = self._positions + self._velocities * dt_s[:, None]
         spread = self._covariances + ((0.5 * ACCELERATION_SD * dt_s**2) ** 2)[:, None, None] * np.eye(3)
         tracked = np.isfinite(points[:, 0]) & (np.abs(dt_s) < FORGET_S)
-        newest = tracked & self._on_hand & (self._located_ns == np.max(self._located_ns, initial=0, where=tracked))
+        newest = tracked & self._on_hand & (self._located_ns == np.max(
+            self._located_ns, initial=0, where=tracked & self._on_hand))
         # A marker that is not tracked, or whose own prediction is less certain than this, is somewhere on the hand.
         certain = tracked & (np.trace(spread, axis1=1, axis2=2) < 3.0 * self._hand_sd_m**2)
         by_hand = self._on_hand & newest.any() & ~certain
@@ -181,26 +193,31 @@ class MarkerAssociation:
         near = (others[every, rivals] < GATE) & (others[every, rivals] - paid < AMBIGUITY_MARGIN) & (chosen >= 0)
         return chosen, np.where(near, rivals, -1)
 
-    def _choose_by_rays(self, frame: CameraObservations, listed: _CandidateList) -> Indices:
-        """The candidate of each marker (M,) by the rays of two cameras, -1 for none.
+    def _choose_by_rays(self, frame: CameraObservations, listed: _CandidateList) -> tuple[Indices, Indices]:
+        """The candidate of each marker (M,) by the rays of two cameras, and another one where the rays do not tell; -1
+        for none.
 
         The largest set of candidates is chosen whose rays meet at points within reach of one of them. Any other
         marker gets its first reported candidate.
         """
         first = np.full(len(self._rig.marker_ids), -1, dtype=np.intp)
+        second = first.copy()
         for row in range(len(listed.markers) - 1, -1, -1):
-            first[listed.markers[row]] = row
+            second[listed.markers[row]], first[listed.markers[row]] = first[listed.markers[row]], row
         rays = undistort_points(listed.pixels, self._rig.intrinsics[frame.camera])
-        best, best_count = first, 1
+        best, undecided, best_count = first, second, 1
         for other in self._frames:
             if other is None or other.camera == frame.camera or \
                     abs(other.t_row0_master_ns - frame.t_row0_master_ns) > FRAME_SKEW_MAX_NS:
                 continue
             rows, points = self._intersections(frame, listed, rays, other)
-            chosen, count = self._largest_cluster(listed.markers[rows], rows, points, first)
+            cluster = self._largest_cluster(listed.markers[rows], points)
+            count = len(set(listed.markers[rows[cluster]].tolist()))
             if count > best_count:
-                best, best_count = chosen, count
-        return best
+                best, undecided, best_count = first.copy(), second.copy(), count
+                best[listed.markers[rows[cluster]]] = rows[cluster]
+                undecided[listed.markers[rows[cluster]]] = -1
+        return best, undecided
 
     def _intersections(self, frame: CameraObservations, listed: _CandidateList, rays: Array,
                        other: CameraObservations) -> tuple[Indices, Array]:
@@ -226,25 +243,18 @@ class MarkerAssociation:
         meet = in_front & (np.abs(residuals_px).max(axis=(1, 2)) < GATE_FLOOR_PX + moved_px)
         return rows[meet], points[meet]
 
-    def _largest_cluster(self, markers: Indices, rows: Indices, points: Array, first: Indices) -> tuple[Indices, int]:
-        """The largest set of `markers` (H,) with `points` (H, 3) m within reach of one of them, the anchor.
-
-        Returns the candidate of each marker (M,), from `rows` (H,) in the set and from `first` (M,) else, and the
-        number of markers in the set. Of several points of a marker the nearest to the anchor is taken.
-        """
-        if not len(rows):
-            return first, 0
-        distances = np.linalg.norm(points[:, None] - points[None], axis=2)
-        near = distances <= self._rig.reach[markers[:, None], markers[None]]
-        near[np.arange(len(rows)), np.arange(len(rows))] = True
-        near &= (markers[:, None] != markers[None]) | np.eye(len(rows), dtype=np.bool_)
-        counts = np.array([len(set(markers[row].tolist())) for row in near])
-        anchor = int(np.argmax(counts))
-        chosen = first.copy()
-        for h in np.argsort(-distances[anchor]):  # the nearest is written last
-            if near[anchor, h]:
-                chosen[markers[h]] = rows[h]
-        return chosen, int(counts[anchor])
+    def _largest_cluster(self, markers: Indices, points: Array) -> Indices:
+        """Rows of the points (H, 3) m of `markers` (H,) of the hand that are within reach of one of them, which has
+        most markers about it. The nearest to that one comes last of each marker's."""
+        if not len(points):
+            return np.empty(0, dtype=np.intp)
+        apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+        itself = np.eye(len(points), dtype=np.bool_)
+        reach = self._rig.reach[markers[:, None], markers[None]]
+        near = ((apart <= reach) & np.isfinite(reach) & (markers[:, None] != markers[None])) | itself
+        anchor = int(np.argmax([len(set(markers[row].tolist())) for row in near]))
+        order = np.argsort(-apart[anchor])
+        return np.asarray(order[near[anchor, order]])
 
     def _selected(self, frame: CameraObservations, listed: _CandidateList, chosen: Indices,
                   rivals: Indices) -> CameraObservations:
@@ -265,7 +275,7 @@ class MarkerAssociation:
             nearest = own[np.argmin(np.linalg.norm(listed.pixels[own] - before[m], axis=1))]
             if nearest != chosen[m]:
                 flags[m] |= _ACQUIRED
-        self._chosen[frame.camera] = pixels
+        self._chosen[frame.camera][found] = pixels[found]
         return replace(frame, further=None, pixels=pixels, flags=flags,
                        covariances=np.where(found[:, None, None], covariances, np.nan),
                        diameters=np.where(found, listed.diameters[rows], 0.0),

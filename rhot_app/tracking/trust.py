@@ -31,7 +31,7 @@ ACCELERATION_SD = 10.0
 VELOCITY_SD = 0.05
 _REACH_SIGMAS = 5.0  # standard deviations of a distance beyond the hand's reach, as in `_reachable`
 _CONFIRMING_MARKERS = 2  # other accepted markers of the hand that confirm a track
-_VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
+VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
 
 # Columns of the memory, one row per marker: time, position, smoothed velocity, last step and its duration, then the
 # jump that waits for confirmation.
@@ -92,7 +92,7 @@ def judge(t_s: float, positions: Array, covariances: Array, memory: Array, belie
         if fresh:
             row[_V:_STEP_S + 1] = math.nan
         elif dt > 0.0:
-            weight = dt / (dt + _VELOCITY_TIME_S)
+            weight = dt / (dt + VELOCITY_TIME_S)
             row[_STEP_S] = dt
             for k in range(3):
                 row[_STEP + k] = position[k] - row[_X + k]

@@ -87,7 +87,7 @@ class Finder:
             del seen[slot]
             self._lose(slot)
         self._search(camera_image, seen, whole)
-        complete = len({slot % self._count for slot in seen}) == self._count
+        complete = all(slot in seen for slot in self._best)
         self._tracked = int(np.count_nonzero(self._states[:, ALIVE])) if complete else -1
         return self._report(seen)
 
@@ -214,10 +214,13 @@ class Finder:
         left: list[tuple[int, Blob]] = []
         blobs = self.gate.blobs(image, range(self._count), AREA_MIN, step, first).tolist()
         for index, own in self._unexplained(blobs, seen).items():
-            if not any(slot % self._count == index for slot in seen):
+            if self._best[index] not in seen:
                 own = self._acquire(camera_image, index, own, seen, whole)
             left += [(index, blob) for blob in own]
-        left = sorted(left, key=lambda one: -one[1][AREA]) if whole else left[self._searches % max(len(left), 1):][:1]
+        if whole:
+            left.sort(key=lambda one: -one[1][AREA])
+        elif left:  # another one each time that the same rows are searched
+            left = [left[(self._searches + self._searches // len(INTERLACED)) % len(left)]]
         for index, blob in left:
             self._measure_rival(camera_image, index, blob, seen)
 
@@ -259,7 +262,7 @@ class Finder:
                 self._row[m.RIVAL_COST] = np.inf  # it was the best blob of the whole frame
                 seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED, careful)
                 return own[:place] + own[place + 1:]
-        return []
+        return own[CANDIDATES_MAX:]
 
     def _measure_rival(self, camera_image: YuvImage, index: int, blob: Blob,
                        seen: dict[int, MarkerObservation]) -> None:
@@ -270,6 +273,7 @@ class Finder:
                 or self._is_pale(slot, self._row[m.LEVEL]):
             return
         self._tracks[slot] = Track(self._shapes[slot], self._states[slot])
+        self._row[m.RIVAL_COST] = np.inf
         seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED)
         if slot in self._pale_or_twin(seen):
             del seen[slot]
@@ -296,12 +300,13 @@ class Finder:
         first, further = [], []
         for index in range(self._count):
             own = [slot for slot in range(index, len(self._shapes), self._count) if slot in seen]
-            if own and self._best[index] not in own:
-                self._best[index] = max(own, key=lambda slot: seen[slot].diameter)
-            own.sort(key=lambda slot: slot != self._best[index])
-            marks = [seen[slot] for slot in own]
-            if not marks:
-                self._tracks[self._best[index]].lose()
-            first.append(marks[0] if marks else lost_observation(index))
-            further += marks[1:]
-        return (*first, *further)
+            best = self._tracks[self._best[index]]
+            if self._best[index] not in seen:
+                best.lose()
+            own.sort(key=lambda slot: (slot != self._best[index], -seen[slot].diameter))
+            if own and not best.remembered:
+                self._best[index] = own[0]
+            first.append(seen[own[0]] if own else lost_observation(index))
+            further += [(rank, seen[slot]) for rank, slot in enumerate(own[1:])]
+        further.sort(key=lambda one: one[0])  # the second candidates of all markers first
+        return (*first, *(mark for _, mark in further))

@@ -96,7 +96,8 @@ class Observations:
     @property
     def marker_count(self) -> int:
         """Number of markers of the set: as many rows of `markers` are best candidates."""
-        return 1 + max((mark.index for mark in self.markers), default=-1)
+        known: int | None = getattr(self.markers, "marker_count", None)  # of a decoded table
+        return 1 + max((mark.index for mark in self.markers), default=-1) if known is None else known
 
 
 @dataclass(frozen=True, slots=True)

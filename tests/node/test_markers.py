@@ -52,8 +52,8 @@ def test_paint_survives_being_written(fields: dict[str, Any], tmp_path: Path) ->
 
 @pytest.mark.parametrize(("fields", "said"), [
     ({"patch": "toe"}, r"markers\[0\]\.patch: 'toe' is not one of"),
-    ({"patch": "nail", "role": "wrist"}, r"marker 'index': patch \"nail\" is of fingertips"),
-    ({"patch": "nail", "role": None}, "is of fingertips"),
+    ({"patch": "nail", "role": "wrist"}, r"marker 'index': patch \"nail\" is for fingertips"),
+    ({"patch": "nail", "role": None}, "is for fingertips"),
     ({"patch": "pulp", "shape": "capsule"}, r'flat; give it the shape "disc"'),
     ({"gap_deg": 40}, 'gap_deg is of a wrist'),
     ({"patch": "nail", "gap_deg": 40}, 'gap_deg is of a wrist'),

@@ -48,10 +48,13 @@ def test_the_assignment_is_the_cheapest_of_all(seed: int, markers: int, candidat
     chosen, costs = assign(predicted, covariances[:markers], pixels, covariances[markers:],
                            np.zeros((markers, candidates)))
     for m in range(markers):
-        for n in range(candidates):
-            total = covariances[m] + covariances[markers + n]
+        totals = covariances[m] + covariances[markers:]
+        smallest = min((np.linalg.det(total) for total in totals), default=1.0)
+        for n, total in enumerate(totals):
             offset = pixels[n] - predicted[m]
-            assert costs[m, n] == pytest.approx(offset @ np.linalg.inv(total) @ offset, rel=1e-9)
+            distance = offset @ np.linalg.inv(total) @ offset
+            expected = distance + np.log(np.linalg.det(total) / smallest) if distance < GATE else 1e9
+            assert costs[m, n] == pytest.approx(expected, rel=1e-9, abs=1e-9)
     paid = sum(GATE if n < 0 else costs[m, n] for m, n in enumerate(chosen))
     capped = np.hstack([costs, np.full((markers, markers), GATE)])
     rows, columns = linear_sum_assignment(capped)
