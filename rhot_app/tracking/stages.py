@@ -57,7 +57,7 @@ def locate_raw(t_s: float, flags: NDArray[np.int64], live: Mask, pixels: Array, 
     _locate(pixels, covariances, used, intrinsics, cameras, focal, shapes, law, raw, raw_covariances, errors)
     trust.judge(t_s, raw, raw_covariances, memory, believed, restarted)
     trust.keep_within_reach(raw, raw_covariances, reach, memory, believed, restarted, confirmed)
-    trust.confirm(believed, restarted, reach, confirmed)
+    trust.confirm(raw, raw_covariances, memory, believed, doubtful, restarted, reach, confirmed)
     for m in range(raw.shape[0]):
         doubtful[m] |= errors[m] > locate.DOUBT_PX or not confirmed[m]
         if not believed[m]:

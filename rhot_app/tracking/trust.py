@@ -29,18 +29,21 @@ PREDICT_S = 0.25
 
 ACCELERATION_SD = 10.0
 VELOCITY_SD = 0.05
+MOVED_M = 5e-3
+"""Less motion than this, m, may be the calibration's and a shadow's: a track has to move farther to be a hand's."""
+
 _REACH_SIGMAS = 5.0  # standard deviations of a distance beyond the hand's reach, as in `_reachable`
 _CONFIRMING_MARKERS = 2  # other accepted markers of the hand that confirm a track
 VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
 
 # Columns of the memory, one row per marker: time, position, smoothed velocity, last step and its duration, then the
-# jump that waits for confirmation.
-_T, _X, _V, _STEP, _STEP_S, _JUMP_T, _JUMP_X, _JUMPS = 0, 1, 4, 7, 10, 11, 12, 15
-COLUMNS = 16
+# jump that waits for confirmation, and where the track began.
+_T, _X, _V, _STEP, _STEP_S, _JUMP_T, _JUMP_X, _JUMPS, _START = 0, 1, 4, 7, 10, 11, 12, 15, 16
+COLUMNS = 19
 
 
 def empty_memory(markers: int) -> Array:
-    """(M, 16) memory of markers never seen."""
+    """(M, 19) memory of markers never seen."""
     return np.full((markers, COLUMNS), np.nan)
 
 
@@ -91,6 +94,7 @@ def judge(t_s: float, positions: Array, covariances: Array, memory: Array, belie
             fresh = True
         if fresh:
             row[_V:_STEP_S + 1] = math.nan
+            row[_START:_START + 3] = position
         elif dt > 0.0:
             weight = dt / (dt + VELOCITY_TIME_S)
             row[_STEP_S] = dt
@@ -147,21 +151,31 @@ def _beyond_reach(positions: Array, covariances: Array, reach: Array, m: int, n:
 
 
 @njit(cache=True)
-def confirm(believed: Mask, restarted: Mask, reach: Array, confirmed: Mask) -> None:
+def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask, doubtful: Mask, restarted: Mask,
+            reach: Array, confirmed: Mask) -> None:
     """Update which tracks are `confirmed` (M,) as markers of the hand; `reach` (M, M) m, infinite off the hand.
 
-    A track is confirmed once two other markers of the hand are accepted with it, or all others if the hand has fewer.
-    A single marker has only its colour to distinguish it from another object. A restarted track starts unconfirmed.
+    A marker has only its colour to distinguish it from another object, which does not move. A track is confirmed once
+    it has moved and two other tracks of the hand have, or once all markers of the hand are accepted together.
+    `positions` (M, 3) m with `covariances` (M, 3, 3) m^2; a `doubtful` (M,) one does not show motion. A restarted
+    track starts unconfirmed.
     """
-    for m in range(believed.shape[0]):
-        on_hand = together = 0
-        for n in range(believed.shape[0]):
+    count = positions.shape[0]
+    moved = np.empty(count, np.bool_)
+    for m in range(count):
+        variance = max(covariances[m, 0, 0] + covariances[m, 1, 1] + covariances[m, 2, 2], 0.0)
+        moved[m] = believed[m] and not doubtful[m] and (
+            _distance(positions[m], memory[m, _START:_START + 3]) > MOVED_M + _REACH_SIGMAS * math.sqrt(variance))
+    for m in range(count):
+        on_hand = together = together_moved = 0
+        for n in range(count):
             if m != n and math.isfinite(reach[m, n]):
                 on_hand += 1
                 together += believed[n]
+                together_moved += moved[n]
         if restarted[m]:
             confirmed[m] = False
-        if believed[m] and together >= min(_CONFIRMING_MARKERS, on_hand):
+        if believed[m] and (together == on_hand or (moved[m] and together_moved >= _CONFIRMING_MARKERS)):
             confirmed[m] = True
 
 
