@@ -33,7 +33,8 @@ MOVED_M = 5e-3
 """Less motion than this, m, may be the calibration's and a shadow's: a track has to move farther to be a hand's."""
 
 _REACH_SIGMAS = 5.0  # standard deviations of a distance beyond the hand's reach, as in `_reachable`
-_CONFIRMING_MARKERS = 2  # other accepted markers of the hand that confirm a track
+_CONFIRMING_MARKERS = 2  # other tracks of the hand that have moved and confirm one that has
+_STILL_MARKERS = 4  # other markers of the hand that confirm a track without motion: chance does not bring so many
 VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
 
 # Columns of the memory, one row per marker: time, position, smoothed velocity, last step and its duration, then the
@@ -156,7 +157,8 @@ def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask,
     """Update which tracks are `confirmed` (M,) as markers of the hand; `reach` (M, M) m, infinite off the hand.
 
     A marker has only its colour to distinguish it from another object, which does not move. A track is confirmed once
-    it has moved and two other tracks of the hand have, or once all markers of the hand are accepted together.
+    it has moved and two other tracks of the hand have, or once five markers of the hand, or all of a smaller set, are
+    accepted together.
     `positions` (M, 3) m with `covariances` (M, 3, 3) m^2; a `doubtful` (M,) one does not show motion. A restarted
     track starts unconfirmed.
     """
@@ -175,7 +177,8 @@ def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask,
                 together_moved += moved[n]
         if restarted[m]:
             confirmed[m] = False
-        if believed[m] and (together == on_hand or (moved[m] and together_moved >= _CONFIRMING_MARKERS)):
+        if believed[m] and (together >= min(_STILL_MARKERS, on_hand)
+                            or (moved[m] and together_moved >= _CONFIRMING_MARKERS)):
             confirmed[m] = True
 
 
