@@ -33,6 +33,9 @@ MOVED_M = 5e-3
 """Less motion than this, m, may be the calibration's and a shadow's: a track has to move farther to be a hand's."""
 
 _REACH_SIGMAS = 5.0  # standard deviations of a distance beyond the hand's reach, as in `_reachable`
+MEASURED_SD_MAX_M = 0.042
+"""m: half a palm's breadth (ANSUR: 84 mm). A marker with a greater standard deviation could be any finger's."""
+
 _CONFIRMING_MARKERS = 2  # other tracks of the hand that have moved and confirm one that has
 _STILL_MARKERS = 4  # other markers of the hand that confirm a track without motion: chance does not bring so many
 VELOCITY_TIME_S = 0.03  # low-pass of the velocity that predictions use
@@ -159,8 +162,9 @@ def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask,
     A marker has only its colour to distinguish it from another object, which does not move. A track is confirmed once
     it has moved and two other tracks of the hand have, or once five markers of the hand, or all of a smaller set, are
     accepted together.
-    `positions` (M, 3) m with `covariances` (M, 3, 3) m^2; a `doubtful` (M,) one does not show motion. A restarted
-    track starts unconfirmed.
+    `positions` (M, 3) m with `covariances` (M, 3, 3) m^2; a `doubtful` (M,) one does not show motion and is not
+    confirmed itself. One becomes doubtful whose position is not known to MEASURED_SD_MAX_M. A restarted track starts
+    unconfirmed.
     """
     count = positions.shape[0]
     moved = np.empty(count, np.bool_)
@@ -177,8 +181,10 @@ def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask,
                 together_moved += moved[n]
         if restarted[m]:
             confirmed[m] = False
-        if believed[m] and (together >= min(_STILL_MARKERS, on_hand)
-                            or (moved[m] and together_moved >= _CONFIRMING_MARKERS)):
+        variance = covariances[m, 0, 0] + covariances[m, 1, 1] + covariances[m, 2, 2]
+        doubtful[m] |= not variance < MEASURED_SD_MAX_M**2
+        joined = together >= min(_STILL_MARKERS, on_hand) or (moved[m] and together_moved >= _CONFIRMING_MARKERS)
+        if joined and believed[m] and not doubtful[m]:
             confirmed[m] = True
 
 
