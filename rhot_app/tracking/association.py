@@ -140,10 +140,10 @@ class MarkerAssociation:
         listed = _list_candidates(frame)
         predicted, covariances = self._predict(frame)
         chosen, rivals = self._choose(listed, predicted, covariances)
-        unknown = np.isnan(predicted[:, 0])
-        if unknown.any():
+        undetermined = np.isnan(predicted[:, 0]) | (rivals >= 0)  # the prediction does not tell
+        if undetermined.any():
             by_rays, undecided = self._choose_by_rays(frame, listed)
-            chosen, rivals = np.where(unknown, by_rays, chosen), np.where(unknown, undecided, rivals)
+            chosen, rivals = np.where(undetermined, by_rays, chosen), np.where(undetermined, undecided, rivals)
         alone = np.bincount(listed.markers, minlength=len(chosen)) == 1  # nothing to choose, as in other frames
         chosen[alone] = [int(np.flatnonzero(listed.markers == m)[0]) for m in np.flatnonzero(alone)]
         return self._selected(frame, listed, chosen, rivals)
@@ -215,8 +215,11 @@ class MarkerAssociation:
             count = len(set(listed.markers[rows[cluster]].tolist()))
             if count > best_count:
                 best, undecided, best_count = first.copy(), second.copy(), count
-                best[listed.markers[rows[cluster]]] = rows[cluster]
-                undecided[listed.markers[rows[cluster]]] = -1
+                nearest_first = list(dict.fromkeys(rows[cluster][::-1].tolist()))
+                for row in nearest_first[::-1]:  # the nearest of a marker counts, another one is its rival
+                    m = listed.markers[row]
+                    undecided[m] = best[m] if best[m] in nearest_first and best[m] != row else -1
+                    best[m] = row
         return best, undecided
 
     def _intersections(self, frame: CameraObservations, listed: _CandidateList, rays: Array,

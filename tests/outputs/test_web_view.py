@@ -91,7 +91,7 @@ def test_a_headset_is_entered_and_drawn_to(stream: Callable[..., Stream], page: 
 def test_the_page_says_what_is_lost(stream: Callable[..., Stream], page: Page) -> None:
     running, url = view_of(stream)
     page.open(url)
-    page.until("window.rhot && rhot.received > 5 && rhot.hands.right.visible")
+    page.until("window.rhot && rhot.received > 5 && rhot.hands.right?.visible")
     running.state = unknown(running.state)
     page.until("document.getElementById('condition').textContent === 'Lost' && !rhot.hands.right.visible")
     running.outputs.close()

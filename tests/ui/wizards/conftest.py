@@ -55,9 +55,9 @@ class SimulatedRig:
         assert started_processes(self.session._place) == []
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def simulated_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedRig]:
-    """One for all tests: it takes seconds to start, and more where nothing is compiled yet."""
+    """One for all wizards: it takes seconds to start. It ends with them, so that later tests have the processor."""
     rig = SimulatedRig(tmp_path_factory.mktemp("rig"))
     yield rig
     rig.close()

@@ -91,7 +91,7 @@ def test_from_the_board_to_a_saved_rig(hands, scene):
     assert hands.title == "A known length"
     hands.window.page.baseline.setValue(75.0)
     hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=30.0)
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=120.0)
     assert hands.window.frame.verdict.verdict.acceptable
     hands.next()
     scene.place(*TABLE)
@@ -152,7 +152,7 @@ def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(hands, scene):
     hands.until(button.isEnabled)
     assert hands.sentence == "Lengths stay unproven: press Next."
     hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=30.0)
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=120.0)
     assert hands.window.frame.verdict.verdict.codes >= {"lengths_unproven"}
     hands.next()
     hands.next()
@@ -173,7 +173,7 @@ def test_a_wrong_square_size_is_found_by_the_baseline(hands, scene):
     hands.next()
     hands.window.page.baseline.setValue(75.0)
     hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=30.0)
+    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=120.0)
     verdict = hands.window.frame.verdict.verdict
     assert not verdict.acceptable and "baseline" in verdict.codes
     assert not hands.window.frame.next_button.isEnabled()
