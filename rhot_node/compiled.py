@@ -54,7 +54,7 @@ def _compiled_and_imported(texts: dict[str, bytes]) -> set[str]:
 
 
 def use_own_cache() -> None:
-    """Point numba at the folder of the present sources, unless the environment names one. Call before numba loads."""
+    """Point numba at the folder of the present sources, unless the environment names one. Call before compiling any."""
     if VARIABLE in os.environ:
         return
     try:
@@ -68,6 +68,8 @@ def use_own_cache() -> None:
     except OSError:  # no home, or a read-only one: numba then keeps to its own rules
         return
     os.environ[VARIABLE] = str(folder)
+    if "numba" in sys.modules:  # it reads the environment only when it loads, and a caller may have used it before
+        sys.modules["numba"].config.CACHE_DIR = str(folder)
 
 
 def is_complete() -> bool:

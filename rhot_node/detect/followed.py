@@ -73,7 +73,7 @@ class Followed:
         if self._bands[index] and not band and self._tracks[index, FITTED]:
             return False  # its rims have been visible and are now occluded
         self._marks[index, IS_BAND] = band
-        self._marks[index, OFF_AXIS] = OFF_AXIS_SD if self._bands[index] and not band else 0.0
+        self._marks[index, OFF_AXIS] = OFF_AXIS_SD if self._bands[index] and not (band or row[p.ROUND]) else 0.0
         self._marks[index, SAG_VARIANCE] = row[p.SAG_VARIANCE]
         start(image.y, image.u, image.v, row[p.X], row[p.Y], row[p.VAR_MAJOR], row[p.VAR_MINOR], row[p.AXIS_X],
               row[p.AXIS_Y], row[p.AREA], noise_level(self._noise_variance), band, row[p.SAG], self._marks[index],

@@ -15,8 +15,9 @@ CROSS_MOMENT_MIN = 0.92
 at most 0.84 for a capsule of any length."""
 
 # Columns of the result row.
-X, Y, AREA, COV_XX, COV_XY, COV_YY, VAR_MAJOR, VAR_MINOR, AXIS_X, AXIS_Y, SAG, SAG_VARIANCE, FIT, SOFT = range(14)
-RESULT_COLUMNS = 14
+X, Y, AREA, COV_XX, COV_XY, COV_YY, VAR_MAJOR, VAR_MINOR, AXIS_X, AXIS_Y = range(10)
+SAG, SAG_VARIANCE, FIT, SOFT, ROUND = range(10, 15)
+RESULT_COLUMNS = 15
 
 
 @njit(cache=True)
@@ -51,7 +52,7 @@ def centroid(region, coverage, gain, result):
     result[X], result[Y], result[AREA] = center_x, center_y, area
     result[COV_XX], result[COV_XY], result[COV_YY] = v_xx / area**2, v_xy / area**2, v_yy / area**2
     _principal_axes(m_xx / area, m_xy / area, m_yy / area, result)
-    result[SAG] = result[SAG_VARIANCE] = result[FIT] = 0.0
+    result[SAG] = result[SAG_VARIANCE] = result[FIT] = result[ROUND] = 0.0
     result[SOFT] = soft / area
     return True
 
@@ -103,8 +104,11 @@ def band_center(region, coverage, gain, result):
     m(u) = c + k u + s sqrt(1 - u^2), s = R sin(theta): its centroid lies (pi / 4) s off the axis point. Least squares
     of the pixels' axial coordinate on (1, u, sqrt(1 - u^2)), weighted by coverage, is least squares of the column mids
     weighted by column height. Across is the major axis of the second moments, so a band must look wider than long; k
-    mends the axis's error.
+    mends the axis's error. Sets ROUND for what has no straight rims at all, whose centroid is what it is.
     """
+    if _cross_moment(region, coverage, result) < CROSS_MOMENT_MIN:
+        result[ROUND] = 1.0
+        return False
     half_width = np.sqrt(max(3.0 * (result[VAR_MAJOR] - BLUR_VARIANCE), 0.0))
     if half_width < BAND_HALF_WIDTH_MIN:
         return False
@@ -140,15 +144,13 @@ def band_center(region, coverage, gain, result):
     residual = (moments[3] - explained) / moments[0]
     if not _is_a_band(moments, residual, length, half_width, solution[2]):
         return False
-    if _cross_moment(region, coverage, half_width, solution, result) < CROSS_MOMENT_MIN:
-        return False
     _band_result(region, coverage, gain, half_width, inverse, solution, result)
     return True
 
 
 @njit(cache=True)
-def _cross_moment(region, coverage, half_width, solution, result):
-    """E[u^2 w^2] / (E[u^2] E[w^2]) of the coverage, across (u) and along (w) the straightened band."""
+def _cross_moment(region, coverage, result):
+    """E[u^2 w^2] / (E[u^2] E[w^2]) of the coverage, across (u) and along (w); a band's bend raises it."""
     n = uu = ww = uuww = 0.0
     x0, x1, y0, y1 = region
     for row in range(y0, y1 + 1):
@@ -156,9 +158,7 @@ def _cross_moment(region, coverage, half_width, solution, result):
             a = coverage[row, column]
             if a == 0.0:
                 continue
-            across, along = _band_coordinates(column, row, result)
-            u = across / half_width
-            w = along - solution[0] - solution[1] * u - solution[2] * _arc(u, half_width)
+            u, w = _band_coordinates(column, row, result)
             n += a
             uu += a * u * u
             ww += a * w * w

@@ -31,7 +31,8 @@ LIMB_OF_SHAPE = {"disc": (0.0, 0.0), "blob": (0.0, 1.0), "sphere": (0.8, 0.5), "
 """Share of that shift that is taken off, and share that remains as a standard deviation (other lights and curvatures).
 A disc is flat; a blob may be either, and is left where it is seen."""
 OFF_AXIS_SD = 0.3
-"""Standard deviation of the centroid of a band about its axis, as a share of its extent, when no rims are visible."""
+"""Standard deviation of the centroid of a band about its axis, as a share of its extent, when no rims are visible and
+it is not round."""
 LIMB_SHADE = 0.2  # share of brightness per radius: with less, as by a lamp beside the camera, as much remains
 SHARP = 0.48  # px: what lens and 2x2 mean leave of an edge (`edge_width`)
 LIMB_LOST = 0.6  # px more, at which an edge is so wide that the limb no longer shows

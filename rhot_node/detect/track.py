@@ -124,7 +124,7 @@ class Track:
         x, y = row[p.X] - taken * limb_x, row[p.Y] - taken * limb_y
         bias = math.hypot(self._plausible_bias(row, ratio, extent, width, flags), st.smear_bias(width),
                           left * limb)
-        if self.shape == "band" and not row[p.FIT]:
+        if self.shape == "band" and not row[p.FIT] and (self.fitted or not row[p.ROUND]):
             x, y = x - self.sag_x, y - self.sag_y
             stale = SAG_STALE if not flags & PARTIAL else SAG_HIDDEN
             off_axis = stale * math.hypot(self.sag_x, self.sag_y) if self.fitted else st.OFF_AXIS_SD * extent

@@ -99,3 +99,15 @@ def test_a_cache_is_cold_until_anything_was_compiled(tmp_path: Path, monkeypatch
     assert capsys.readouterr().err == ""
     monkeypatch.delenv(VARIABLE)
     assert is_cold()
+
+
+def test_a_program_that_loads_numba_first_uses_the_same_folder() -> None:
+    folders = []
+    for first in ("rhot_node", "numba"):
+        program = f"import {first}; from rhot_node.detect.position import centroid; print(centroid.stats.cache_path)"
+        environment = {name: value for name, value in os.environ.items() if name != VARIABLE}
+        said = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True,
+                              check=True)
+        folders.append(said.stdout)
+    assert folders[0] == folders[1]
+    assert "__pycache__" not in folders[0]
