@@ -162,14 +162,15 @@ def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask,
     A marker has only its colour to distinguish it from another object, which does not move. A track is confirmed once
     it has moved and two other tracks of the hand have, or once five markers of the hand, or all of a smaller set, are
     accepted together.
-    `positions` (M, 3) m with `covariances` (M, 3, 3) m^2; a `doubtful` (M,) one does not show motion and is not
+    `positions` (M, 3) m with `covariances` (M, 3, 3) m^2; a `doubtful` (M,) one neither confirms others nor is
     confirmed itself. One becomes doubtful whose position is not known to MEASURED_SD_MAX_M. A restarted track starts
     unconfirmed.
     """
     count = positions.shape[0]
     moved = np.empty(count, np.bool_)
     for m in range(count):
-        variance = max(covariances[m, 0, 0] + covariances[m, 1, 1] + covariances[m, 2, 2], 0.0)
+        variance = covariances[m, 0, 0] + covariances[m, 1, 1] + covariances[m, 2, 2]
+        doubtful[m] |= not variance < MEASURED_SD_MAX_M**2
         moved[m] = believed[m] and not doubtful[m] and (
             _distance(positions[m], memory[m, _START:_START + 3]) > MOVED_M + _REACH_SIGMAS * math.sqrt(variance))
     for m in range(count):
@@ -177,12 +178,10 @@ def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask,
         for n in range(count):
             if m != n and math.isfinite(reach[m, n]):
                 on_hand += 1
-                together += believed[n]
+                together += believed[n] and not doubtful[n]
                 together_moved += moved[n]
         if restarted[m]:
             confirmed[m] = False
-        variance = covariances[m, 0, 0] + covariances[m, 1, 1] + covariances[m, 2, 2]
-        doubtful[m] |= not variance < MEASURED_SD_MAX_M**2
         joined = together >= min(_STILL_MARKERS, on_hand) or (moved[m] and together_moved >= _CONFIRMING_MARKERS)
         if joined and believed[m] and not doubtful[m]:
             confirmed[m] = True

@@ -150,7 +150,7 @@ def band_center(region, coverage, gain, result):
 
 @njit(cache=True)
 def _cross_moment(region, coverage, result):
-    """E[u^2 w^2] / (E[u^2] E[w^2]) of the coverage, across (u) and along (w); a band's bend raises it."""
+    """E[u^2 w^2] / (E[u^2] E[w^2]) of the coverage, across (u) and along (w); a band's bend raises it. 1 for a line."""
     n = uu = ww = uuww = 0.0
     x0, x1, y0, y1 = region
     for row in range(y0, y1 + 1):
@@ -163,7 +163,7 @@ def _cross_moment(region, coverage, result):
             uu += a * u * u
             ww += a * w * w
             uuww += a * u * u * w * w
-    return uuww * n / (uu * ww)
+    return uuww * n / (uu * ww) if uu * ww > 0.0 else 1.0
 
 
 @njit(cache=True)
