@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QObject, QSize, Qt, QTimer
-from PySide6.QtGui import QAction, QActionGroup, QKeySequence
+from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QPainter
 from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from rhot_app.ui.models.palette import Scheme
@@ -100,6 +100,22 @@ class Actions(QObject):
         return SceneBar(self.clouds, self.cloud_kinds, self.cloud_sizes, [self.names])
 
 
+class _ElidingLabel(QLabel):
+    """One line of text that ends in an ellipsis where the toolbar has no room for all of it."""
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        """No width at all: a toolbar hides its last widgets when the others cannot become narrower."""
+        return QSize(0, super().minimumSizeHint().height())
+
+    def paintEvent(self, event: object) -> None:  # noqa: N802
+        """The text as far as it fits."""
+        text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, self.width())
+        painter = QPainter(self)
+        self.style().drawItemText(painter, self.rect(), Qt.AlignmentFlag.AlignVCenter, self.palette(), self.isEnabled(),
+                                  text, self.foregroundRole())
+        painter.end()
+
+
 class MainToolBar(QToolBar):
     """Start, Record, Rig, Calibrate, View, Guide; at the right the rig's name and the state."""
 
@@ -131,7 +147,7 @@ class MainToolBar(QToolBar):
         self.source_label.clicked.connect(actions.bookmark.trigger)
         self._source_place = self.addWidget(self.source_label)
         self._source_place.setVisible(False)
-        self.rig_label = QLabel("")
+        self.rig_label = _ElidingLabel("")
         self.rig_label.setProperty("muted", True)
         self.addWidget(self.rig_label)
         self.show_rig("", "", edited=False)

@@ -217,3 +217,17 @@ def test_the_window_stays_quick(tracking):
     tracking.window._timer.timeout.disconnect()
     tracking.window._timer.timeout.connect(tick)
     assert sorted(costs)[len(costs) // 2] < 0.05
+
+
+def test_the_state_is_visible_while_recording(tracking):
+    toolbar, engine = tracking.window.toolbar, tracking.backend.engine
+    tracking.window.resize(1280, 800)
+    engine.log_path = "/recordings/a.rhotlog"
+    try:
+        tracking.until(lambda: toolbar.source_label.isVisible()
+                       and tracking.window.actions_.record.text() == "Stop recording")
+        tracking.run(0.3)
+        assert toolbar.badge.isVisible() and toolbar.rig_label.isVisible()
+        assert toolbar.badge.geometry().right() <= toolbar.width()
+    finally:
+        engine.log_path = ""
