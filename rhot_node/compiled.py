@@ -83,9 +83,10 @@ def is_cold() -> bool:
 
 
 def announce_compilation() -> None:
-    """Say on standard error why the first run of all takes long; later ones say nothing."""
-    if is_cold():
-        print("rhot: the numerical code is being compiled, once for these sources; that takes up to two minutes.",
+    """Say on standard error why the first run of all takes long; later ones say nothing. A command that tracks nothing,
+    such as ``rhot simulate``, compiles only what it needs and leaves the tracker for later."""
+    if is_cold() or not (is_complete() or any(Path(os.environ[VARIABLE]).glob("tracking_*/*.nbi"))):
+        print("rhot: the numerical code is being compiled, once for these sources; that takes some minutes.",
               file=sys.stderr, flush=True)
 
 

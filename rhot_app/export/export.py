@@ -58,16 +58,18 @@ def format_of(name: str | None, out: Path | None) -> str:
     """The format that is asked for by name, or by the ending of the file to write. Raises ExportError."""
     if name is not None:
         if name not in FORMATS:
-            raise ExportError(f"there is no format {name!r}; there are {', '.join(FORMATS)}.")
+            raise ExportError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}.")
         if out is not None and out.suffix.lower() not in FORMATS[name].endings:
-            raise ExportError(f"{out}: a {name} file ends in {' or '.join(FORMATS[name].endings)}.")
+            raise ExportError(f"{out}: a {name} file ends in {' or '.join(FORMATS[name].endings)}; change the file's "
+                              "name or the format.")
         return name
     if out is None:
-        raise ExportError(f"say which format to write: --format with one of {', '.join(FORMATS)}.")
+        raise ExportError(f"the format is missing; give --format with one of {', '.join(FORMATS)}.")
     for found, one in FORMATS.items():
         if out.suffix.lower() in one.endings:
             return found
-    raise ExportError(f"{out}: its ending {out.suffix!r} is that of no format; there are {', '.join(FORMATS)}.")
+    endings = ", ".join(ending for one in FORMATS.values() for ending in one.endings)
+    raise ExportError(f"{out}: no format has the ending {out.suffix!r}; give the file one of {endings}.")
 
 
 def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig | Path | None = None,
@@ -104,8 +106,10 @@ def _check_place(log: Path, out: Path, again: bool) -> None:
     """Refuse before anything is tracked."""
     if out.absolute() == log.absolute() or (out.exists() and log.exists() and out.samefile(log)):
         raise ExportError(f"{out} is the recording itself, which is never written over; choose another --out.")
+    if out.parent.exists() and not out.parent.is_dir():
+        raise ExportError(f"{out}: {out.parent} is not a folder; choose another --out.")
     if not out.parent.is_dir():
-        raise ExportError(f"{out.parent} is not a folder; create it first.")
+        raise ExportError(f"{out}: the folder {out.parent} does not exist; create it first.")
     if out.is_dir():
         raise ExportError(f"{out} is a folder; name a file in it.")
     if out.exists() and not again:

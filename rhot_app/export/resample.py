@@ -33,7 +33,7 @@ _LINEAR = tuple(name for name in ARRAYS if name not in ("sequence", "t_master_ns
 def checked_rate(rate_hz: float) -> float:
     """The rate, if it is one. Raises ExportError."""
     if not (math.isfinite(rate_hz) and 0.0 < rate_hz <= MOST_HZ):
-        raise ExportError(f"a rate of {rate_hz:g} Hz is none to export at; give more than 0 and at most {MOST_HZ:g}.")
+        raise ExportError(f"the rate {rate_hz:g} Hz is out of range; give more than 0 and at most {MOST_HZ:g} Hz.")
     return rate_hz
 
 

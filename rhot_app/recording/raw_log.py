@@ -293,9 +293,11 @@ def _parse_header(file: BinaryIO, at: int) -> tuple[int, int, dict[str, Any]] | 
 def _why_no_header(file: BinaryIO, path: Path) -> str:
     file.seek(0)
     head = file.read(_PREFIX.size)
+    if not head:
+        return f"{path}: the file is empty, so there is nothing to read or to recover; choose another log."
     if not head.startswith(MAGIC):
-        return (f"{path}: this is not a raw log of this program. If it was one, `rhot recover` with --rig may still "
-                "read it.")
+        return (f"{path}: this is not a raw log of this program. If it was one, `rhot recover LOG --rig FILE --out "
+                "CLEAN` may still read it.")
     version = _PREFIX.unpack(head)[1] if len(head) == _PREFIX.size else VERSION
     if version not in (1, VERSION):
         return (f"{path}: version {version} of the raw log is not supported; this program reads versions 1 and "

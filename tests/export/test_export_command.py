@@ -45,16 +45,17 @@ def test_the_file_is_named_as_the_log(log: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (("--format", "fbx"), "there is no format 'fbx'; there are csv, trc"),
-    ((), "say which format to write"),
-    (("--out", "a.xlsx"), "its ending '.xlsx' is that of no format"),
+    (("--format", "fbx"), "there is no format 'fbx'; choose one of csv, trc"),
+    ((), "the format is missing"),
+    (("--out", "a.xlsx"), "no format has the ending '.xlsx'; give the file one of .csv"),
     (("--out", "a.csv", "--format", "trc"), "a trc file ends in .trc"),
-    (("--out", "a.csv", "--rate", "0"), "a rate of 0 Hz is none to export at"),
-    (("--out", "a.csv", "--rate", "nan"), "a rate of nan Hz is none"),
+    (("--out", "a.csv", "--rate", "0"), "the rate 0 Hz is out of range"),
+    (("--out", "a.csv", "--rate", "nan"), "the rate nan Hz is out of range"),
     (("--out", "a.csv", "--smooth"), "no tracker smooths yet"),
     (("--out", "a.glb", "--units", "mm"), "gltf files are in m"),
     (("--out", "a.bvh", "--hand", "other_hand"), "has no other_hand to export"),
-    (("--out", "nowhere/a.csv"), "nowhere is not a folder"),
+    (("--out", "nowhere/a.csv"), "nowhere/a.csv: the folder nowhere does not exist"),
+    (("--out", "/dev/null/a.csv"), "/dev/null is not a folder"),
     (("--out", "a.csv", "--rig", "no.json"), "no.json: no such file"),
 ])
 def test_mistakes_are_sentences(arguments: tuple[str, ...], words: str, log: Path, tmp_path: Path,
@@ -70,11 +71,13 @@ def test_logs_that_are_none(log: Path, tmp_path: Path, capsys: pytest.CaptureFix
     later = log.read_bytes().replace(MAGIC + struct.pack("<H", VERSION), MAGIC + struct.pack("<H", 9))
     (tmp_path / "later.rhotlog").write_bytes(later)
     (tmp_path / "foreign.rhotlog").write_bytes(b"something else")
+    (tmp_path / "nothing.rhotlog").touch()
     reader = LogReader(log)
     (tmp_path / "empty.rhotlog").write_bytes(encode_header(reader.rig, {}))
     before = left(tmp_path)
     for name, words in (("no", "cannot be read"), ("later", "version 9 of the raw log is not supported"),
-                        ("foreign", "this is not a raw log"), ("empty", "it holds no observations")):
+                        ("foreign", "this is not a raw log"), ("nothing", "the file is empty"),
+                        ("empty", "it holds no observations")):
         arguments = ["export", str(tmp_path / f"{name}.rhotlog"), "--format", "csv", "--tracker", "classic"]
         assert main(arguments) == 2
         assert words in capsys.readouterr().err

@@ -96,6 +96,10 @@ def test_a_cache_is_cold_until_anything_was_compiled(tmp_path: Path, monkeypatch
     (tmp_path / "detect_1" / "kernel.py311.nbi").touch()
     assert not is_cold()
     announce_compilation()
+    assert "being compiled" in capsys.readouterr().err, "the tracker is not compiled yet"
+    (tmp_path / "tracking_2").mkdir()
+    (tmp_path / "tracking_2" / "tracker.py311.nbi").touch()
+    announce_compilation()
     assert capsys.readouterr().err == ""
     monkeypatch.delenv(VARIABLE)
     assert is_cold()

@@ -80,7 +80,7 @@ def test_a_cancelled_export_leaves_nothing(dialog: ExportDialog, qtbot: Any, tmp
 
 def test_what_stands_against_it_is_a_sentence(dialog: ExportDialog, qtbot: Any, tmp_path: Path) -> None:
     dialog.export(tmp_path / "nowhere" / "a.csv")
-    qtbot.waitUntil(lambda: "nowhere is not a folder" in dialog.sentence.text(), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: "nowhere does not exist" in dialog.sentence.text(), timeout=PATIENCE_MS)
     (tmp_path / "other.rhotlog").write_bytes(b"something else")
     dialog.show_log(tmp_path / "other.rhotlog")
     qtbot.waitUntil(lambda: "this is not a raw log" in dialog.sentence.text(), timeout=PATIENCE_MS)
