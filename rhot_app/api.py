@@ -1,6 +1,6 @@
-"""RHOT from Python: recordings as arrays, live states, calibration and export. docs/api.md shows it at work.
+"""RHOT from Python: recordings as arrays, live states, calibration and export. docs/api.md has examples.
 
-What stands here stays as it is between versions; the rooms behind it may change.
+This interface stays the same between versions; the packages that it uses may change.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 PATIENCE_S = 5.0
-"""An engine says ten times a second that it is there; after this long without a word there is none."""
+"""An engine publishes its status ten times a second; after this long without a message there is none."""
 
 
 @dataclass(slots=True)
@@ -152,8 +152,8 @@ def calibrate_stereo(pictures: Mapping[str, Sequence[str | Path]], board: Board,
 
     `pictures`: files by the camera's name in `rig`; those of one moment have the same number in their names. `board`:
     `Chessboard(cols, rows, square_m)` or a `CharucoBoard`. `intrinsics`: files of calibrated lenses by camera; others
-    are found from the same pictures. `baseline_m`: the distance of the first two cameras as measured by hand, which
-    alone tells a wrong size of the squares. Nothing is written: `save_rig` does that.
+    are found from the same pictures. `baseline_m`: the distance of the first two cameras as measured by hand. Only this
+    length shows a wrong size of the squares. Nothing is written: `save_rig` does that.
 
     Raises CalibrationError when the pictures cannot be put together. The command is ``rhot calibrate stereo``.
     """

@@ -156,7 +156,7 @@ class _Sums:
 
 def run_batch(jobs: Sequence[Job], folder: Path, *, workers: int = 1, scheduler: str | None = None, again: bool = False,
               told: Told = lambda outcome: None) -> list[Outcome]:
-    """Do all jobs and return what came of them, in their order; `told` of each as it ends.
+    """Do all jobs and return what came of them, in their order; `told` is called with each as it ends.
 
     `workers` processes here (1: this one), or those of a Dask cluster whose `scheduler` has this address and whose
     workers see the same files. Raises ExportError when the folder or the cluster cannot be used.
@@ -259,7 +259,7 @@ def _by_pool(jobs: Sequence[Job], workers: int) -> Ends:
     try:
         yield from _ended(pool.submit(_interruptible, job) for job in jobs)
     except BaseException:
-        for child in multiprocessing.active_children():  # whoever interrupts may have told this process alone
+        for child in multiprocessing.active_children():  # an interrupt may have reached this process alone
             with contextlib.suppress(ProcessLookupError):
                 os.kill(child.pid or 0, signal.SIGINT)
         raise

@@ -1,7 +1,7 @@
 """The hand as a skeleton of turning joints, as animation formats have it: BVH and glTF share it.
 
 The rest pose is the hand at zero angles in the palm frame, with every joint's axes parallel to the palm's. So a joint's
-rotation is the turn of its bone out of the rest pose, told in its parent's turned axes.
+rotation is the turn of its bone out of the rest pose, expressed in its parent's rotated axes.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from rhot_app.project import Rig
 @dataclass(frozen=True, slots=True)
 class Format:
     """A format: its writer as module:class, the endings of its files (the first one is given to new ones), the unit of
-    length unless told otherwise, whether another can be chosen, and whether it has a rate instead of times."""
+    length by default, whether another can be chosen, and whether it has a rate instead of times."""
 
     writer: str
     endings: tuple[str, ...]
@@ -127,7 +127,7 @@ def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path) ->
             writer.finish()
         finally:
             if writer is not None:
-                with contextlib.suppress(OSError):  # a full disk has been told of already
+                with contextlib.suppress(OSError):  # a full disk has been reported already
                     writer.close()
     return writer.notes
 

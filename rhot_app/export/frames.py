@@ -1,4 +1,4 @@
-"""Where positions are told: in the rig frame or in the wrist's own, along the axes that a format's readers expect."""
+"""The frame of positions: the rig frame or the wrist's own, along the axes that a format's readers expect."""
 
 from __future__ import annotations
 

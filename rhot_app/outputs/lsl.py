@@ -16,7 +16,7 @@ _TURNS = ("qx", "qy", "qz", "qw")
 
 
 class LslSink:
-    """An outlet per hand, made when the hand is first told of."""
+    """An outlet per hand, made when the hand is first reported."""
 
     def __init__(self, settings: OutputSettings) -> None:
         """Nothing is opened yet."""

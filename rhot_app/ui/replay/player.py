@@ -17,7 +17,7 @@ _LEAST_LOOP_S = 0.05
 
 
 class Player:
-    """Plays N states at `times_s` (N,), s since the first one, growing. `advance` is told the time by the caller.
+    """Plays N states at `times_s` (N,), s since the first one, growing. The caller passes the time to `advance`.
 
     `loop` is the range that is repeated, s, None for none.
     """
