@@ -1,6 +1,6 @@
 """Output specs, as typed behind ``--output``: ``KIND[:TARGET][?joints=SET&hz=RATE]``. No sockets here.
 
-What a rig is imported when it is needed, so that ``--help`` is there at once.
+The rig's types are imported inside the functions, so that ``--help`` stays fast.
 """
 
 from __future__ import annotations
@@ -61,7 +61,11 @@ def web_settings(text: str) -> OutputSettings:
     from rhot_app.project import OutputSettings
     target = text if re.search(r"(^|:)\d+$", text) and not text.endswith("]") else f"{text or '127.0.0.1'}:{WEB_PORT}"
     settings = OutputSettings("web", target, "openxr")
-    host_and_port(settings, "127.0.0.1")
+    try:
+        host_and_port(settings, "127.0.0.1")
+    except OutputError as exc:
+        raise OutputError(f"--web {text}: this is not [HOST:]PORT with a port of 1 to 65535, such as 47810 or "
+                          "0.0.0.0:47810.") from exc
     return settings
 
 

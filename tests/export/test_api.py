@@ -118,7 +118,8 @@ def test_the_ten_lines_of_the_page(log: Path, tmp_path: Path) -> None:
     (tmp_path / "take.rhotlog").write_bytes(log.read_bytes())
     drawn, shown = run(["-c", found[1]], tmp_path).splitlines()
     times, values, fastest = map(float, drawn.strip("[]").split(","))
-    assert shown == "shown" and times == values > 100 and 0.02 < fastest < 20.0
+    assert shown == "shown" and times == values > 60
+    assert 0.02 < fastest < 1.0, "m/s; a difference over the few ms between two cameras is noise"
 
 
 def test_the_example_file(log: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import msgspec
@@ -37,6 +38,12 @@ def test_targets(text: str, host: str, port: int) -> None:
     ("", "127.0.0.1:47810"), ("8080", "8080"), ("0.0.0.0", "0.0.0.0:47810"), ("192.168.1.5:8080", "192.168.1.5:8080")])
 def test_web_addresses(text: str, target: str) -> None:
     assert web_settings(text) == OutputSettings("web", target, "openxr")
+
+
+@pytest.mark.parametrize("text", ["host:abc", "1.2.3.4:99999", "0", "x y"])
+def test_a_bad_web_address_is_named_as_typed(text: str) -> None:
+    with pytest.raises(OutputError, match=rf"^--web {re.escape(text)}: this is not \[HOST:\]PORT"):
+        web_settings(text)
 
 
 @pytest.mark.parametrize(("text", "sentence"), [
