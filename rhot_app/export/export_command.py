@@ -19,14 +19,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", type=Path, metavar="LOG", help="a raw log written by rhot engine --log or the app")
     parser.add_argument("--out", type=Path, metavar="FILE",
                         help="file to write (default: named as the log, beside it)")
-    add_export_arguments(parser)
+    add_export_arguments(parser, "default: by the ending of --out")
     parser.add_argument("--again", action="store_true", help="write over a file that exists")
 
 
-def add_export_arguments(parser: argparse.ArgumentParser) -> None:
-    """What ``rhot export`` and ``rhot batch`` have in common."""
+def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -> None:
+    """What ``rhot export`` and ``rhot batch`` have in common; `without_format` says what holds without --format."""
     parser.add_argument("--format", default=None, metavar="F",
-                        help="csv, trc, c3d, bvh, gltf, npz, parquet or mcap (default: by the ending of --out)")
+                        help=f"csv, trc, c3d, bvh, gltf, npz, parquet or mcap ({without_format})")
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
     parser.add_argument("--tracker", choices=("classic", "model"), default=None,

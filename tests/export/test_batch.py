@@ -52,6 +52,13 @@ def test_files_are_those_of_one_by_one_and_a_bad_log_stops_nobody(folder: Path,
         assert (folder / "out" / f"{name}.csv").read_bytes() == alone.read_bytes()
 
 
+def test_a_missing_log_is_reported_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert batch(folder, "nothere") == 2
+    said = capsys.readouterr()
+    assert (said.out + said.err).count("nothere.rhotlog: cannot be read") == 1
+    assert "1 log: 0 whole, 0 read with losses, 1 failed" in said.out
+
+
 def test_only_what_changed_is_done_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert batch(folder, "a torn") == 3
     first = results(folder)
@@ -84,7 +91,7 @@ def test_tracking_sums_up(folder: Path) -> None:
 @pytest.mark.parametrize(("more", "words"), [
     (("--workers", "0"), "--workers is 1 or more"),
     (("--scheduler", "tcp://127.0.0.1:1", "--workers", "2"), "leave one of them out"),
-    (("--rate", "0"), "a rate of 0 Hz"),
+    (("--rate", "0"), "the rate 0 Hz is out of range"),
     (("--smooth",), "no tracker smooths yet"),
 ])
 def test_mistakes_are_sentences(more: tuple[str, ...], words: str, folder: Path,
