@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
             report.add_log(log)
         write_atomically(args.out, report.to_zip())
     except OSError as exc:
-        raise EngineError(f"{args.out}: cannot be written ({exc.strerror}).") from exc
+        raise EngineError(f"{args.out}: cannot be written ({exc.strerror}); choose another --out.") from exc
     _tell(args.out, report)
     return 0
 

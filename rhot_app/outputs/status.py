@@ -1,4 +1,4 @@
-"""What an engine tells its clients of its outputs. Apart, because clients load neither sinks nor the hand's model."""
+"""The status of outputs that an engine publishes; apart, because clients load neither sinks nor the hand."""
 
 from __future__ import annotations
 

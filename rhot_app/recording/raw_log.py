@@ -123,7 +123,7 @@ class LogReader:
         try:
             self._file: BinaryIO = open_input(path)
         except OSError as exc:
-            raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
+            raise RecordingError(f"{path}: cannot be read ({exc.strerror}); name a raw log that you may read.") from exc
         try:
             header = _read_header(self._file)
             if header is None and rig is None:

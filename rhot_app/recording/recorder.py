@@ -46,7 +46,8 @@ class Recorder:
         except FileExistsError as exc:
             raise RecordingError(f"{path}: exists already; a log is never written over. Choose another name.") from exc
         except OSError as exc:
-            raise RecordingError(f"{path}: cannot be written ({exc.strerror}).") from exc
+            raise RecordingError(f"{path}: cannot be written ({exc.strerror}); name a file in a folder that exists and "
+                                 "that you may write to.") from exc
         try:
             with contextlib.suppress(OSError):  # some network file systems have no locks
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody appends to it meanwhile
@@ -54,7 +55,8 @@ class Recorder:
         except OSError as exc:
             self._file.close()
             path.unlink(missing_ok=True)
-            raise RecordingError(f"{path}: cannot be written ({exc.strerror}).") from exc
+            raise RecordingError(f"{path}: cannot be written ({exc.strerror}); make room, or choose another "
+                                 "place.") from exc
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
         self._thread.start()
 

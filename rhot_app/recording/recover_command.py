@@ -34,7 +34,8 @@ def run(args: argparse.Namespace) -> int:
                     file.write(data)
                     count += 1
         except OSError as exc:
-            raise RecordingError(f"{args.out}: cannot be written ({exc.strerror}); nothing was.") from exc
+            raise RecordingError(f"{args.out}: cannot be written ({exc.strerror}). Nothing was left of it; choose "
+                                 "another --out.") from exc
     losses = reader.losses
     torn = f" A torn record of {losses.torn_bytes} bytes at the end was left out." if losses.torn_bytes else ""
     print(f"{args.out}: {count} record{'' if count == 1 else 's'}.{torn}")

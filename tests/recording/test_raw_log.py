@@ -182,7 +182,7 @@ def test_recorder_writes_everything_and_nothing_over(tmp_path: Path) -> None:
     assert recorder.bytes_written == path.stat().st_size
     with pytest.raises(RecordingError, match="exists already"):
         Recorder(path, synthetic_rig())
-    with pytest.raises(RecordingError, match="cannot be written"):
+    with pytest.raises(RecordingError, match=r"cannot be written \(.*\); name a file in a folder that exists"):
         Recorder(tmp_path / "no" / "a.log", synthetic_rig())
 
 
@@ -275,6 +275,14 @@ def test_recover_writes_a_clean_log_of_what_is_sound(tmp_path: Path, capsys: pyt
     assert reader.about == {"created": "today"}
     assert main(["recover", str(path), "--out", str(clean)]) == 2
     assert "exists already" in capsys.readouterr().err
+
+
+def test_recover_into_a_missing_folder_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = tmp_path / "a.log", tmp_path / "no" / "b.log"
+    write_log(path)
+    assert main(["recover", str(path), "--out", str(out)]) == 2
+    assert f"{out}: cannot be written" in (said := capsys.readouterr().err) and "choose another --out" in said
+
 
 
 def test_recover_with_a_rig_reads_a_log_without_a_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

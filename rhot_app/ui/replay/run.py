@@ -173,7 +173,7 @@ class ReadableLog:
 
 
 class _Collected:
-    """Takes states in their order and keeps what `Tracked` tells of them."""
+    """Takes states in their order and keeps what `Tracked` needs of them."""
 
     def __init__(self, rig: Rig) -> None:
         self.times_ns: list[int] = []
