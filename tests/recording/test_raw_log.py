@@ -284,7 +284,6 @@ def test_recover_into_a_missing_folder_is_a_sentence(tmp_path: Path, capsys: pyt
     assert f"{out}: cannot be written" in (said := capsys.readouterr().err) and "choose another --out" in said
 
 
-
 def test_recover_with_a_rig_reads_a_log_without_a_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, clean, rig = tmp_path / "a.log", tmp_path / "clean.log", tmp_path / "rig.json"
     path.write_bytes(bytes(500) + write_log(path)[HEADER_SIZE + 30:])
