@@ -81,7 +81,8 @@ def main() -> int:
 
 def learnt(group: People, rig: Rig, wearing: Wearing, rng: np.random.Generator) -> tuple[float, float, float]:
     """Of one person: the logarithm of the size, its standard deviation, and the truth."""
-    log_scale, size = USUAL_SD * rng.normal(), HandSize(wearing)
+    log_scale, size = USUAL_SD * rng.normal(), HandSize(
+        wearing.worn.dh, wearing.limits, wearing.natural, wearing.bias_variance)
     hand = person(rig.hand, group.bones, rng)
     worn = compile_wearing(msgspec.structs.replace(rig, hand=hand)).worn.dh
     spread = np.linalg.cholesky(np.linalg.inv(wearing.natural.information))

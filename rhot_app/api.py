@@ -55,13 +55,14 @@ class Recording:
                progress: Progress = silent) -> HandStates:
         """Track the whole log: what an engine would have published. `tracker` None is the rig's own.
 
-        `rate_hz` gives states at equal intervals instead of their own times. `smooth` is refused: no tracker smooths
-        yet. Raises RecordingError when nothing can be tracked, RigError when the rig does not suit the tracker.
+        `rate_hz` gives states at equal intervals instead of their own times. `smooth`: every state uses
+        the whole recording, not only what came before it; the model tracker alone can.
+
+        Raises RecordingError when nothing can be tracked, RigError when the rig does not suit the tracker, ExportError
+        when the tracker does not smooth.
         """
-        if smooth:
-            raise ExportError("no tracker smooths yet: a state uses what came before it alone.")
         rate = None if rate_hz is None else checked_rate(rate_hz)
-        with TrackedLog(self.path, self.rig, tracker, progress) as tracked:
+        with TrackedLog(self.path, self.rig, tracker, progress, smooth=smooth) as tracked:
             states = joined(list(tracked.blocks()))
             self.losses = tuple(tracked.losses)
             if rate is not None:
@@ -69,19 +70,19 @@ class Recording:
         return states
 
     def to_dataframe(self, tracker: Tracker | None = None, *, rate_hz: float | None = None,
-                     units: Units = "mm") -> pandas.DataFrame:
+                     units: Units = "mm", smooth: bool = False) -> pandas.DataFrame:
         """Track the whole log into a table with one row per state; columns as of a CSV export (docs/export.md).
 
         Raises as `states` does, and ExportError when pandas is not installed (the extra `export` has it).
         """
-        return self.states(tracker, rate_hz=rate_hz).to_dataframe(units=units)
+        return self.states(tracker, rate_hz=rate_hz, smooth=smooth).to_dataframe(units=units)
 
     def export(self, out: str | Path, *, format: str | None = None, tracker: Tracker | None = None,
                rate_hz: float | None = None, frame: Frame = "rig", units: Units | None = None, hand: Hand = "hand",
-               again: bool = False, progress: Progress = silent) -> Exported:
+               smooth: bool = False, again: bool = False, progress: Progress = silent) -> Exported:
         """Write the tracked log as a file for other programs; see `export`."""
         done = export(self.path, out, rig=self.rig, format=format, tracker=tracker, rate_hz=rate_hz, frame=frame,
-                      units=units, hand=hand, again=again, progress=progress)
+                      units=units, hand=hand, smooth=smooth, again=again, progress=progress)
         self.losses = done.losses
         return done
 
@@ -97,7 +98,7 @@ def open_recording(path: str | Path, rig: Rig | str | Path | None = None) -> Rec
 
 def export(log: str | Path, out: str | Path, *, rig: Rig | None = None, format: str | None = None,
            tracker: Tracker | None = None, rate_hz: float | None = None, frame: Frame = "rig",
-           units: Units | None = None, hand: Hand = "hand", again: bool = False,
+           units: Units | None = None, hand: Hand = "hand", smooth: bool = False, again: bool = False,
            progress: Progress = silent) -> Exported:
     """Track a raw log and write it as csv, trc, c3d, bvh, gltf, npz, parquet or mcap: `format`, or the ending of `out`.
 
@@ -105,7 +106,7 @@ def export(log: str | Path, out: str | Path, *, rig: Rig | None = None, format: 
     file is written over only `again`. Raises ExportError, RecordingError or RigError.
     """
     return export_log(Path(log), Path(out), format_name=format, rig=rig, again=again, progress=progress,
-                      options=ExportOptions(tracker, rate_hz, frame, units, hand))
+                      options=ExportOptions(tracker, rate_hz, frame, units, hand, smooth))
 
 
 def load_rig(path: str | Path) -> Rig:

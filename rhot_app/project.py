@@ -128,16 +128,20 @@ class DepthSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("k and z belong together; give both or neither")
 
 
+TrackerKind = Literal["classic", "model", "estimator"]
+TRACKER_KINDS: tuple[TrackerKind, ...] = ("classic", "model", "estimator")
+
+
 class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which tracker makes a hand of the markers, and what it may assume.
 
     `kind`: `classic` is the thesis's (pair, triangulate, 1-euro, palm fit, FABRIK); `model` estimates one hand from
-    every image position. The other fields are the model tracker's. `variant`: `full` (27 degrees of freedom) or
-    `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT 2.2 to 2.4). `float_scale`: estimate the
-    hand's size as it moves.
+    every image position. `estimator` does so by a simpler filter, which will replace it. The other fields are theirs.
+    `variant`: `full` (27 degrees of freedom) or `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT
+    2.2 to 2.4). `float_scale`: estimate the hand's size as it moves.
     """
 
-    kind: Literal["classic", "model"] = "classic"
+    kind: TrackerKind = "classic"
     variant: Literal["full", "coupled"] = "full"
     limits: Literal["anatomical", "thesis"] = "anatomical"
     float_scale: bool = False
@@ -248,7 +252,7 @@ def model_tracker_obstacle(rig: Rig) -> Obstacle | None:
     return None
 
 
-def with_tracker(rig: Rig, kind: Literal["classic", "model"]) -> Rig:
+def with_tracker(rig: Rig, kind: TrackerKind) -> Rig:
     """The rig with another kind of tracker, which may assume what the one before might."""
     return msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, kind=kind))
 

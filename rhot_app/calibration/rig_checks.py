@@ -56,7 +56,7 @@ def _camera_findings(rig: Rig, lenses: tuple[LensFigures, ...], pairs: tuple[Pai
 
 
 def _tracker_findings(rig: Rig) -> list[Finding]:
-    if rig.tracker.kind != "model":
+    if rig.tracker.kind == "classic":
         return []
     obstacle = model_tracker_obstacle(rig)
     if obstacle is not None:

@@ -104,7 +104,7 @@ def moved_advice(rig: Rig, moved: Mapping[int, str]) -> list[Advice]:
 
 def hands_advice(rig: Rig) -> list[Advice]:
     """One sentence when the rig has a hand that its tracker does not follow."""
-    if rig.other_hand is None or rig.tracker.kind == "model":
+    if rig.other_hand is None or rig.tracker.kind != "classic":
         return []
     return [Advice("info", "The classic tracker follows the first hand only and takes the markers of the other one "
                            "for free points. Choose the model tracker for two hands at once.")]

@@ -15,6 +15,7 @@ from rhot_app.errors import RecordingError
 from rhot_node.compiled import announce_compilation
 
 if TYPE_CHECKING:
+    from rhot_app.engine.core import MakeTracker
     from rhot_app.engine.serve import Serving
     from rhot_app.project import Rig
     from rhot_app.sources.replay import LogReplay
@@ -28,12 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", type=Path, metavar="LOG", help="a raw log written by rhot engine --log or the app")
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
-    parser.add_argument("--tracker", choices=("classic", "model"), default=None,
+    parser.add_argument("--tracker", choices=("classic", "model", "estimator"), default=None,
                         help="track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="N",
                         help="times real time, or max for as fast as possible (default 1)")
     parser.add_argument("--smooth", action="store_true",
-                        help="reserved for a pass that also uses what comes after each instant; refused as yet")
+                        help="let every state use what comes after it as well (model tracker); the whole log is "
+                             "tracked before the replay begins")
     parser.add_argument("--json", action="store_true",
                         help="serve nothing: replay at once and print a summary as one JSON object")
     parser.add_argument("--keep", action="store_true",
@@ -45,24 +47,32 @@ def run(args: argparse.Namespace) -> int:
     """Replay; with clients to serve, until the log's end, SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.replay_summary import summarise
     from rhot_app.engine.serve import serving
+    from rhot_app.engine.smoothed_replay import SmoothedReplay
+    from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogReplay
     from rhot_app.tracking.make import make_tracker
+    from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
 
-    if args.smooth:
-        raise RecordingError("--smooth is reserved: there is no pass yet that uses what comes after an instant. "
-                             "Leave it out, and choose --tracker model for the smoothest states.")
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
     reader = LogReader(args.path)
     rig = load_rig(args.rig) if args.rig is not None else reader.rig
     if args.tracker is not None:
         rig = with_tracker(rig, args.tracker)
+    if args.smooth and rig.tracker.kind != "estimator":
+        raise RecordingError(NOT_SMOOTHED)
     if args.json:
         announce_compilation()
-        print(json.dumps(summarise(reader, rig, make_tracker(rig))))
+        print(json.dumps(summarise(reader, rig, SmoothedTracker(rig) if args.smooth else make_tracker(rig))))
         return 0
     reader.close()
+    trackers: MakeTracker = make_tracker
+    if args.smooth:
+        announce_compilation()
+        line = ProgressLine(f"smoothing {args.path.name}")
+        trackers = SmoothedReplay(args.path, rig, line.report).for_rig
+        line.finish()
     rig_path = None if args.rig is None else args.rig.absolute()
     replays: list[LogReplay] = []  # another one whenever a client changes to other nodes
 
@@ -71,7 +81,8 @@ def run(args: argparse.Namespace) -> int:
         return replays[-1]
 
     outputs = asked_outputs(args)
-    with serving(rig, rig_path, replay, args.directory, outputs=outputs, rig_outputs=False) as serve:
+    with serving(rig, rig_path, replay, args.directory, outputs=outputs, rig_outputs=False,
+                 trackers=trackers) as serve:
         print(f"replaying {args.path} for clients (the app, or EngineClient). Ctrl+C ends it. For a summary: --json",
           file=sys.stderr, flush=True)
         print_addresses(serve)

@@ -3,15 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogDoor
+from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.state import HandState, Knowledge
-from rhot_app.tracking.tracker import Tracker
+from rhot_app.tracking.tracker import CameraObservations, Tracker
+
+
+class FrameSmoother(Protocol):
+    """What `smoothed_states` asks of a `SmoothedTracker`, or of what stands before one."""
+
+    def reset(self) -> None:
+        """A new session, or a clock was set."""
+        ...
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in."""
+        ...
+
+    def states(self) -> Iterator[HandState]:
+        """The states that have become final."""
+        ...
+
+    def finish(self) -> Iterator[HandState]:
+        """The rest of them."""
+        ...
 
 
 def replay_states(records: Iterable[Record], door: LogDoor, tracker: Tracker) -> Iterator[HandState]:
@@ -30,20 +51,38 @@ def replay_states(records: Iterable[Record], door: LogDoor, tracker: Tracker) ->
             yield state
 
 
-def summarise(reader: LogReader, rig: Rig, tracker: Tracker) -> dict[str, Any]:
+def smoothed_states(records: Iterable[Record], door: LogDoor, tracker: FrameSmoother) -> Iterator[HandState]:
+    """The states of these records by all of them, in the order of time; they come some seconds late."""
+    changes = door.changes
+    for record in records:
+        frame = door.feed(record)
+        if frame is None:
+            continue
+        if door.changes != changes:
+            changes = door.changes
+            tracker.reset()
+        tracker.ingest(frame)
+        yield from tracker.states()
+    yield from tracker.finish()
+
+
+def summarise(reader: LogReader, rig: Rig, tracker: Tracker | SmoothedTracker) -> dict[str, Any]:
     """What a log holds and what the tracker makes of it; every key ends in its unit.
 
     Raises RecordingError when not one record of the log can be read.
     """
     door = LogDoor(rig)
     times = _Span()
-    states = list(replay_states(times.watch(reader), door, tracker))
+    records = times.watch(reader)
+    states = list(smoothed_states(records, door, tracker) if isinstance(tracker, SmoothedTracker)
+                  else replay_states(records, door, tracker))
     duration_s = 1e-9 * (states[-1].t_master_ns - states[0].t_master_ns) if len(states) > 1 else 0.0
     return {
         "log": str(reader.path), "duration_s": times.duration_s, "torn_bytes": reader.torn_bytes,
         "damaged_places": reader.losses.places, "skipped_bytes": reader.losses.skipped_bytes,
         "damaged_header_bytes": reader.losses.header_bytes,
         "missed_records": door.gaps, "unknown_node_records": door.unknown_nodes,
+        "smoothed": isinstance(tracker, SmoothedTracker),
         "states": len(states), "state_rate_hz": (len(states) - 1) / duration_s if duration_s else 0.0,
         "nodes": {link.node.name: {
             "received": link.door.received, "accepted": link.door.accepted, "lost": link.door.sequence.lost,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import zmq
 
-from rhot_app.engine.core import Engine, MakeSource
+from rhot_app.engine.core import Engine, MakeSource, MakeTracker
 from rhot_app.engine.directory import EngineDirectory, EngineLock, open_directory
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.output_process import OutputProcess
@@ -40,9 +40,10 @@ class Serving:
 @contextlib.contextmanager
 def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory: Path | None,
             own: KeyPair | None = None, outputs: Iterable[OutputSettings] = (),
-            rig_outputs: bool = True) -> Iterator[Serving]:
+            rig_outputs: bool = True, trackers: MakeTracker = make_tracker) -> Iterator[Serving]:
     """An engine in its directory, warmed up, frames passing; the caller runs the server. `own`: the master's keys.
-    `outputs`: opened besides those of the rig; these are left out without `rig_outputs`.
+    `outputs`: opened besides those of the rig; these are left out without `rig_outputs`. `trackers`: makes
+    the tracker of a rig.
 
     Raises EngineError when another engine holds the directory, SourceError when a port is taken, OutputError for an
     output that cannot be.
@@ -58,7 +59,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory:
         nodes = NodeControl(context, own)
         streams = OutputProcess(place.states, outputs, follow_rig=rig_outputs)
         stack.callback(streams.close)
-        engine = Engine(rig, rig_path, make_source, make_tracker, publish, nodes.message, GarbageMan(), streams)
+        engine = Engine(rig, rig_path, make_source, trackers, publish, nodes.message, GarbageMan(), streams)
         stack.callback(engine.close)
         server = Server(context, place, engine, nodes)
         stack.callback(server.close)

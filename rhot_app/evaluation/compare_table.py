@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from rhot_app.errors import SimulatorError
 from rhot_app.evaluation.accuracy import Figures, ratio
 from rhot_app.evaluation.compare import Comparison, Run
 from rhot_app.evaluation.honesty import DEGREES, band
+from rhot_node.files import read_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +79,35 @@ def honesty_table(comparison: Comparison) -> str:
             cells = "".join(f"{cell(one.average, '.2f'):>8}{cell(one.inside, '.2f'):>7}{cell(one.within, '.3f'):>7}"
                             for one in found.values())
             lines.append(f"{motion:<{margin}}{tracker[:7]:<8}{cells}")
+    return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """Figures kept of an earlier tracker, by motion; `name` says which."""
+
+    name: str
+    motions: dict[str, Figures]
+
+
+def read_baseline(path: Path) -> Baseline:
+    """Raises SimulatorError for a file that keeps no figures by motion."""
+    document = read_json(path, SimulatorError)
+    kept = document.get("motions") if isinstance(document, dict) else None
+    if not isinstance(kept, dict) or not all(isinstance(figures, dict) for figures in kept.values()):
+        raise SimulatorError(f"{path}: not a baseline, which has figures by motion; see benchmarks/baselines.")
+    return Baseline(f"{path.name}: {document.get('tracker', 'unnamed')}", kept)
+
+
+def baseline_table(comparison: Comparison, baseline: Baseline) -> str:
+    """The last tracker's figures over those of the baseline, by motion."""
+    tracker, columns = comparison.trackers()[-1], [column for column in COLUMNS if column.form != ".0f"]
+    lines = [f"{tracker} over the baseline ({baseline.name})",
+             " " * 8 + "".join(f"{column.heading:>19}" for column in columns)]
+    for motion in comparison.motions():
+        now, before = comparison.together(motion, tracker), baseline.motions.get(motion, {})
+        lines.append(f"{motion:<8}" + "".join(
+            f"{cell(ratio(now[column.key], before.get(column.key)), '.2f'):>19}" for column in columns))
     return "\n".join(lines)
 
 

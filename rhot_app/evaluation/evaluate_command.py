@@ -12,7 +12,7 @@ from pathlib import Path
 from rhot_app.simulator.simulate_command import SECONDS_MAX, add_scene_arguments, scene_of
 from rhot_node.compiled import announce_compilation
 
-_OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs")
+_OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs", "baseline")
 _JUDGED_S = 0.1  # shorter is no run
 _OF_PICTURES = ("background", "worn", "uneven", "glove", "lamp", "kelvin", "mains")
 
@@ -42,6 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="which trackers (default classic,model); the ratio is the last one's to the first one's")
     group.add_argument("--sketched", action="store_true", default=None,
                        help="logs without pictures: exact outlines, noise and bias put on, hidden parts counted; fast")
+    group.add_argument("--baseline", type=Path, metavar="FILE", default=None,
+                       help="print the last tracker's ratios to the figures kept in FILE (benchmarks/baselines)")
     group.add_argument("--logs", type=Path, metavar="DIR", default=None,
                        help="where logs are kept and found again (default ~/.cache/rhot/takes)")
 
@@ -100,7 +102,7 @@ def _motions_of(args: argparse.Namespace, usual: Sequence[str]) -> list[str]:
 def _compare(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
     from rhot_app.evaluation.compare import MOTIONS, TRACKERS, as_fields, compare, orders
-    from rhot_app.evaluation.compare_table import LEGEND, honesty_table, table
+    from rhot_app.evaluation.compare_table import LEGEND, baseline_table, honesty_table, read_baseline, table
     from rhot_app.evaluation.report import SETTLE_S
     from rhot_app.evaluation.takes import takes_folder
     from rhot_app.progress import ProgressLine
@@ -127,6 +129,7 @@ def _compare(args: argparse.Namespace) -> int:
     motions = _motions_of(args, MOTIONS)
     wanted = orders(scene_of(args), motions, range(args.seed, args.seed + seeds), seconds,
                     network=Network(loss=args.loss), sketched=bool(args.sketched))
+    baseline = None if args.baseline is None else read_baseline(args.baseline)
     folder = args.logs or takes_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -142,6 +145,8 @@ def _compare(args: argparse.Namespace) -> int:
     if result.outdated:
         print(f"{result.outdated} logs in {folder} were filmed with another detector or twin than today's; "
               "remove them, or choose another --logs, to film anew.", file=sys.stderr)
-    print(json.dumps(as_fields(result)) if args.json else
-          f"{table(result)}\n\n{LEGEND}\n\n{honesty_table(result)}")
+    tables = [table(result), LEGEND, honesty_table(result)]
+    if baseline is not None:
+        tables.append(baseline_table(result, baseline))
+    print(json.dumps(as_fields(result)) if args.json else "\n\n".join(tables))
     return 0

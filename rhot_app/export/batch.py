@@ -106,12 +106,12 @@ def run_job(job: Job) -> Outcome:
 def _summarise(job: Job) -> tuple[int, tuple[str, ...]]:
     """Write what the tracker makes of a log as one JSON object; every key ends in its unit."""
     sums = _Sums()
-    with TrackedLog(job.log, job.rig, job.options.tracker) as tracked:
+    with TrackedLog(job.log, job.rig, job.options.tracker, smooth=job.options.smooth) as tracked:
         for block in tracked.blocks():
             sums.add(block.t_master_ns, block.marker_raw_positions, block.marker_knowledge == Knowledge.MEASURED)
         figures: dict[str, Any] = {
             "log": str(job.log), "created": tracked.created, "rig": tracked.rig.name,
-            "tracker": tracked.rig.tracker.kind, "states": tracked.count,
+            "tracker": tracked.rig.tracker.kind, "smoothed": job.options.smooth, "states": tracked.count,
             "tracked_fraction": tracked.tracked / tracked.count, "camera_rate_hz": tracked.camera_rate_hz,
             "losses": tracked.losses, **sums.figures(tracked.rig.markers.ids)}
         write_atomically(job.out, json.dumps(figures, indent=1).encode() + b"\n")

@@ -18,6 +18,7 @@ from rhot_app.export.resample import Resampler, checked_rate
 from rhot_app.export.states import HandStates
 from rhot_app.progress import Progress, silent, within
 from rhot_app.project import Rig
+from rhot_app.tracking.smoothing import NOT_SMOOTHED
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +84,7 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
     name = format_of(format_name, out)
     check_options(name, options)
     _check_place(log, out, again)
-    with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98)) as tracked:
+    with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98), smooth=options.smooth) as tracked:
         notes = _write(tracked, name, options, out)
         if not tracked.tracked:
             notes.append(f"the hand is tracked in none of the {tracked.count} states")
@@ -93,8 +94,8 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
 
 def check_options(name: str | None, options: ExportOptions) -> None:
     """Refuse what no log could be exported with; `name` None is no format. Raises ExportError."""
-    if options.smooth:
-        raise ExportError("no tracker smooths yet: a state uses what came before it alone. Leave --smooth out.")
+    if options.smooth and options.tracker == "classic":
+        raise ExportError(NOT_SMOOTHED)
     if options.rate_hz is not None:
         checked_rate(options.rate_hz)
     chosen = None if name is None else FORMATS[name]
@@ -151,7 +152,7 @@ def _prepared(tracked: TrackedLog, name: str, options: ExportOptions,
             rate_hz = options.rate_hz or max(float(round(camera_hz)), 1.0)
             resampler = Resampler(rate_hz, 1.0 / camera_hz) if uniform else None
             plan = Plan(path, tracked.rig, options.frame, options.units or FORMATS[name].units, options.hand,
-                        rate_hz if uniform else None, tracked.path.name, tracked.created, first_ns)
+                        rate_hz if uniform else None, tracked.path.name, tracked.created, first_ns, options.smooth)
         for states in held:
             given = states if resampler is None else resampler.take(states)
             if given is not None:

@@ -29,7 +29,7 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
                         help=f"csv, trc, c3d, bvh, gltf, npz, parquet or mcap ({without_format})")
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
-    parser.add_argument("--tracker", choices=("classic", "model"), default=None,
+    parser.add_argument("--tracker", choices=("classic", "model", "estimator"), default=None,
                         help="track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--rate", type=float, default=None, metavar="HZ",
                         help="states at equal intervals (default: each at its own time; trc, c3d and bvh: the cameras' "
@@ -40,7 +40,8 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
                         help="unit of length (default: what the format's readers expect)")
     parser.add_argument("--hand", choices=("hand", "other_hand"), default="hand",
                         help="which of a rig's two hands a bvh file gets (default hand)")
-    parser.add_argument("--smooth", action="store_true", help="no tracker offers this yet")
+    parser.add_argument("--smooth", action="store_true",
+                        help="let every state use what came after it as well (model tracker)")
 
 
 def run(args: argparse.Namespace) -> int:

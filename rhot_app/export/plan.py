@@ -13,7 +13,7 @@ from rhot_app.export.states import HandStates
 from rhot_app.project import Rig
 
 Units = Literal["mm", "m"]
-Tracker = Literal["classic", "model"]
+Tracker = Literal["classic", "model", "estimator"]
 Hand = Literal["hand", "other_hand"]
 
 
@@ -21,7 +21,8 @@ Hand = Literal["hand", "other_hand"]
 class ExportOptions:
     """How a recording is exported. None leaves a choice to the rig (`tracker`) or to the format (`rate_hz`, `units`).
 
-    `hand`: which of the rig's hands a format gets that holds a single one (BVH).
+    `hand`: which of the rig's hands a format gets that holds a single one (BVH). `smooth`: every state uses the whole
+    recording, not only what came before it; the model tracker alone can.
     """
 
     tracker: Tracker | None = None
@@ -45,6 +46,7 @@ class Plan:
     log: str  # name of the log
     created: str  # when it was begun, UTC
     first_ns: int  # master's time of the first state
+    smooth: bool = False  # whether states use what came after them
 
     @property
     def scale(self) -> float:
@@ -54,7 +56,8 @@ class Plan:
     def about(self) -> dict[str, str]:
         """What formats with room for it say of themselves."""
         return {"log": self.log, "created": self.created, "rig": self.rig.name, "tracker": self.rig.tracker.kind,
-                "frame": self.frame, "up": self.rig.up, "units": self.units, "first_t_master_ns": str(self.first_ns)}
+                "frame": self.frame, "up": self.rig.up, "units": self.units, "smoothed": "yes" if self.smooth else "no",
+                "first_t_master_ns": str(self.first_ns)}
 
 
 class Writer(Protocol):

@@ -79,7 +79,7 @@ def _export(there: Connection, log: Path, out: Path, format_name: str, options: 
 def first_states(log: Path, format_name: str, options: ExportOptions, count: int) -> HandStates:
     """The first `count` states or fewer as they would be exported. Raises as `export_log` does."""
     check_options(format_name, options)
-    with TrackedLog(log, None, options.tracker) as tracked:
+    with TrackedLog(log, None, options.tracker, smooth=options.smooth) as tracked:
         (block, *_) = itertools.islice(tracked.blocks(), 1)
         if options.rate_hz is not None:
             resampler = Resampler(options.rate_hz, 1.0 / (tracked.camera_rate_hz or options.rate_hz))

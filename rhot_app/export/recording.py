@@ -9,15 +9,16 @@ from types import TracebackType
 
 import numpy as np
 
-from rhot_app.engine.replay_summary import replay_states
-from rhot_app.errors import RecordingError, take_losses
+from rhot_app.engine.replay_summary import replay_states, smoothed_states
+from rhot_app.errors import ExportError, RecordingError, take_losses
 from rhot_app.export.states import HandStates, in_blocks
 from rhot_app.progress import Progress, silent
-from rhot_app.project import Rig, load_rig, with_tracker
+from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.observation_table import why_none
 from rhot_app.recording.raw_log import LogReader, Record
 from rhot_app.sources.replay import LogDoor
 from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations, Tracker
 
 RATE_AFTER_S = 5.0
@@ -33,11 +34,13 @@ class TrackedLog:
     `rig`: what it is tracked with. `losses`: sentences about what could not be read, complete after the pass.
     """
 
-    def __init__(self, path: Path, rig: Rig | Path | None = None, tracker: str | None = None,
-                 progress: Progress = silent) -> None:
-        """Open the log; `rig` and `tracker` replace those that it was recorded with.
+    def __init__(self, path: Path, rig: Rig | Path | None = None, tracker: TrackerKind | None = None,
+                 progress: Progress = silent, *, smooth: bool = False) -> None:
+        """Open the log; `rig` and `tracker` replace those that it was recorded with. `smooth`: every state uses the
+        whole log, not only what came before it.
 
-        Raises RecordingError when it is no log, RigError when the rig is none or does not suit the tracker.
+        Raises RecordingError when it is no log, RigError when the rig is none or does not suit the tracker, ExportError
+        when the tracker does not smooth.
         """
         self.path = path
         self.losses: list[str] = []
@@ -47,14 +50,16 @@ class TrackedLog:
         self._reader = LogReader(path)
         try:
             own = self._reader.rig if rig is None else load_rig(rig) if isinstance(rig, Path) else rig
-            self.rig = own if tracker is None else with_tracker(own, "model" if tracker == "model" else "classic")
+            self.rig = own if tracker is None else with_tracker(own, tracker)
+            if smooth and self.rig.tracker.kind != "estimator":
+                raise ExportError(NOT_SMOOTHED)
             self.tracker = make_tracker(self.rig)
+            self._frames = _FrameCount(SmoothedTracker(self.rig) if smooth else self.tracker, len(self.rig.nodes))
         except BaseException:
             self._reader.close()
             raise
         self._door = LogDoor(self.rig)
         self._size = max(path.stat().st_size, 1)
-        self._frames = _FrameCount(self.tracker, len(self.rig.nodes))
 
     @property
     def created(self) -> str:
@@ -68,7 +73,9 @@ class TrackedLog:
 
     def blocks(self) -> Iterator[HandStates]:
         """The states, some hundred at a time. Raises RecordingError when there is none."""
-        for block in in_blocks(replay_states(self._records(), self._door, self._frames)):
+        frames, records = self._frames, self._records()
+        for block in in_blocks(smoothed_states(records, self._door, frames) if frames.smooths
+                               else replay_states(records, self._door, frames)):
             self.count += len(block)
             self.tracked += int(np.count_nonzero(block.tracked))
             yield block
@@ -118,11 +125,14 @@ class TrackedLog:
 class _FrameCount:
     """A tracker whose frames are noted, to tell the cameras' rate."""
 
-    def __init__(self, tracker: Tracker, cameras: int) -> None:
+    def __init__(self, tracker: Tracker | SmoothedTracker, cameras: int) -> None:
         self.count = 0
-        self.solve = tracker.solve
+        self.smooths = isinstance(tracker, SmoothedTracker)
         self.reset = tracker.reset
-        self.newest_frames = tracker.newest_frames
+        if isinstance(tracker, SmoothedTracker):
+            self.states, self.finish = tracker.states, tracker.finish
+        else:
+            self.solve, self.newest_frames = tracker.solve, tracker.newest_frames
         self._take: Callable[[CameraObservations], None] = tracker.ingest
         self._times_ns: list[list[int]] = [[] for _ in range(cameras)]  # of the first seconds
 

@@ -15,8 +15,9 @@ from itertools import chain, combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.limits import NaturalPose
 from rhot_app.hand.size_evidence import Posture, implausibility
-from rhot_app.tracking.kalman.wearing import Wearing
 from rhot_app.tracking.model_start import Located
 
 Array = NDArray[np.float64]
@@ -57,10 +58,11 @@ _ANEW_NS = 1_000_000_000
 class HandSize:
     """The logarithm of a hand's scale, from what its markers show when it moves."""
 
-    def __init__(self, wearing: Wearing) -> None:
-        self._posture = Posture(wearing.worn.dh, wearing.limits, wearing.natural.mean, wearing.natural.information)
-        self._doubt = (wearing.bias_variance + _PLACE_SD_M**2)[:, None, None] * np.eye(3)
-        self._pairs = np.array(list(combinations(range(len(wearing.roles)), 2))).reshape(-1, 2).T
+    def __init__(self, dh: DhArrays, limits: Array, natural: NaturalPose, paint_variance: Array) -> None:
+        """`dh`: the hand's table with M markers as points; `limits` (21, 2) rad; `paint_variance` (M,) m^2."""
+        self._posture = Posture(dh, limits, natural.mean, natural.information)
+        self._doubt = (paint_variance + _PLACE_SD_M**2)[:, None, None] * np.eye(3)
+        self._pairs = np.array(list(combinations(range(len(paint_variance)), 2))).reshape(-1, 2).T
         self.reset()
 
     def reset(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, model_tracker_obstacle
 from rhot_app.tracking.classic import ClassicTracker
+from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.model_tracker import ModelTracker
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.two_hands import TwoHands
@@ -15,7 +16,13 @@ def make_tracker(rig: Rig) -> Tracker:
     nodes."""
     if rig.tracker.kind == "classic":
         return ClassicTracker(rig)
+    require_estimator(rig)
+    one_hand = ModelTracker if rig.tracker.kind == "model" else Estimator
+    return one_hand(rig) if rig.other_hand is None else TwoHands(rig, one_hand)
+
+
+def require_estimator(rig: Rig) -> None:
+    """Raises RigError when neither the model tracker nor the estimator can work with the rig's cameras or nodes."""
     obstacle = model_tracker_obstacle(rig)
     if obstacle is not None:
         raise RigError(f"rig {rig.name!r}: {obstacle.why} {obstacle.remedy}")
-    return ModelTracker(rig) if rig.other_hand is None else TwoHands(rig)

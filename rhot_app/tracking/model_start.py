@@ -85,7 +85,7 @@ class Starter:
     def _locate(self, paired: Paired) -> Located:
         rig, count = self._rig, len(self._rig.marker_ids)
         positions, covariances, clear = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count, np.bool_)
-        _locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
+        locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
                       rig.focal, rig.shapes, positions, covariances, clear)
         return Located(paired.t_ns, positions, covariances, clear)
 
@@ -158,7 +158,7 @@ class Starter:
 
 
 @njit(cache=True)
-def _locate_clear(flags: NDArray[np.int64], live: NDArray[np.bool_], pixels: Array, covariances: Array,
+def locate_clear(flags: NDArray[np.int64], live: NDArray[np.bool_], pixels: Array, covariances: Array,
                   intrinsics: Array, cameras: Array, focal: Array, shapes: Array, positions: Array,
                   position_covariances: Array, clear: NDArray[np.bool_]) -> None:
     """Fill what `Located` holds of one instant; arrays as in `Paired` and `RigArrays`."""

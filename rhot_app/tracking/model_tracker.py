@@ -86,7 +86,10 @@ class ModelTracker:
         self._rig, self._wearing = compile_rig(rig), compile_wearing(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
         self._hand = HandFilter(self._wearing.outfit, self._wearing.habits, self._wearing.limits)
-        self._size = HandSize(self._wearing) if rig.tracker.float_scale else None
+        self._size: HandSize | None = None
+        if rig.tracker.float_scale:
+            self._size = HandSize(self._wearing.worn.dh, self._wearing.limits, self._wearing.natural,
+                                  self._wearing.bias_variance)
         self._timeline = Timeline(self._hand)
         self._starter = Starter(self._rig, self._wearing)
         self._sights = Sights(cameras, markers)

@@ -6,7 +6,7 @@ confirmed within each hand, and a hand that is lost does not disturb the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.project import OTHER_HAND, FilterSettings, Rig
 from rhot_app.tracking.model_tracker import ModelTracker
 from rhot_app.tracking.state import Condition, HandState
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraObservations, PredictingTracker
 from rhot_node.markers import Marker
 
 Indices = NDArray[np.intp]
@@ -40,16 +40,16 @@ class TwoHands:
     The arrays of a state's markers are those of the whole rig; its `other` has its own markers only.
     """
 
-    def __init__(self, rig: Rig) -> None:
-        """Raises RigError as `ModelTracker` does."""
+    def __init__(self, rig: Rig, one_hand: Callable[[Rig], PredictingTracker] = ModelTracker) -> None:
+        """`one_hand` makes the tracker of each hand. Raises RigError as it does."""
         assert rig.other_hand is not None
         markers = rig.markers.markers
         others = [(marker.role or "").startswith(OTHER_HAND) for marker in markers]
         self._ids = rig.markers.ids
         self._own: tuple[Indices, Indices] = np.flatnonzero(np.logical_not(others)), np.flatnonzero(others)
         self._order = np.argsort(np.concatenate(self._own))
-        self._hand = ModelTracker(rig_of_hand(rig, rig.hand, [markers[m] for m in self._own[0]]))
-        self._other = ModelTracker(rig_of_hand(rig, rig.other_hand, [markers[m] for m in self._own[1]]))
+        self._hand = one_hand(rig_of_hand(rig, rig.hand, [markers[m] for m in self._own[0]]))
+        self._other = one_hand(rig_of_hand(rig, rig.other_hand, [markers[m] for m in self._own[1]]))
         self._sequence = 0
         self._newest: list[CameraObservations | None] = [None] * len(rig.nodes)
         self._last: tuple[HandState, HandState] | None = None
@@ -114,7 +114,7 @@ def rig_of_hand(rig: Rig, hand: HandAnatomy, markers: Sequence[Marker]) -> Rig:
                                    other_hand=None, filters=FilterSettings())
 
 
-def _at(t_ns: int, state: HandState, tracker: ModelTracker) -> HandState:
+def _at(t_ns: int, state: HandState, tracker: PredictingTracker) -> HandState:
     """The newest `state` of a hand, brought to `t_ns` where another hand was seen a little later."""
     if _is_there(state) and state.t_master_ns < t_ns:
         return tracker.state_at(t_ns) or state

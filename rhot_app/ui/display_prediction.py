@@ -30,7 +30,7 @@ class DisplayPrediction:
         """What to draw of the `newest` state when it will be seen `ahead_s` from now: the hand predicted to then, else
         that state."""
         now_ns, client, rig = time.monotonic_ns(), self._controller.link.client, self._controller.rig
-        if (not self.wanted or newest is None or client is None or rig is None or rig.tracker.kind != "model"
+        if (not self.wanted or newest is None or client is None or rig is None or rig.tracker.kind == "classic"
                 or newest.condition not in (Condition.TRACKING, Condition.PARTIAL)
                 or abs(now_ns - newest.t_master_ns) > _FRESH_NS or 1e-9 * now_ns < self._not_before_s):
             return newest

@@ -8,6 +8,7 @@ from typing import Any
 from PySide6.QtCore import QTimer
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
     QDialog,
     QDoubleSpinBox,
@@ -39,7 +40,8 @@ _SIZE = (860, 600)
 _FORMATS = {"csv": "CSV: a table", "parquet": "Parquet: a table for analysis", "npz": "NPZ: NumPy's arrays",
             "trc": "TRC: points, for OpenSim", "c3d": "C3D: points, motion capture", "bvh": "BVH: a moving skeleton",
             "gltf": "glTF: an animated hand", "mcap": "MCAP: for Foxglove"}
-_TRACKERS = (("as recorded", None), ("classic", "classic"), ("model", "model"))
+_TRACKERS = (("as recorded", None), ("classic", "classic"), ("model", "model"),
+             ("estimator", "estimator"))
 _FRAMES = (("rig", "rig"), ("wrist, along the palm's axes", "wrist"))
 _UNITS: tuple[tuple[str, Units], ...] = (("mm", "mm"), ("m", "m"))
 
@@ -63,6 +65,8 @@ class ExportDialog(QDialog):
         self.tracker_box = _box(_TRACKERS, "Which tracker makes a hand of the recorded datagrams.")
         self.frame_box = _box(_FRAMES, "Where positions are told: in the rig frame, or relative to the wrist joint.")
         self.units_box = _box(_UNITS, "Unit of length, where the format leaves a choice.")
+        self.smooth_box = QCheckBox("Smooth")
+        self.smooth_box.setToolTip("Every state uses what came after it as well. Only the model tracker can.")
         self.rate_box = QDoubleSpinBox()
         self.rate_box.setRange(0.0, MOST_HZ)
         self.rate_box.setDecimals(1)
@@ -98,7 +102,8 @@ class ExportDialog(QDialog):
         form = QFormLayout()
         form.setSpacing(8)
         for words, part in (("Recording", source), ("Format", self.format_box), ("Tracker", self.tracker_box),
-                            ("Rate", self.rate_box), ("Positions in", self.frame_box), ("Lengths in", self.units_box)):
+                            ("", self.smooth_box), ("Rate", self.rate_box), ("Positions in", self.frame_box),
+                            ("Lengths in", self.units_box)):
             form.addRow(words, part)
         buttons = QHBoxLayout()
         buttons.addWidget(self.bar, 1)
@@ -119,6 +124,7 @@ class ExportDialog(QDialog):
         for box in (self.format_box, self.tracker_box, self.frame_box, self.units_box):
             box.currentIndexChanged.connect(self._timer.start)
         self.rate_box.valueChanged.connect(self._timer.start)
+        self.smooth_box.toggled.connect(self._timer.start)
         self._timer.timeout.connect(self._preview)
         self.export_button.clicked.connect(self._export_or_cancel)
         self.close_button.clicked.connect(self.close)
@@ -134,7 +140,8 @@ class ExportDialog(QDialog):
         """The other choices."""
         rate = self.rate_box.value()
         units: Units | None = self.units_box.currentData() if FORMATS[self.format].units_free else None
-        return ExportOptions(self.tracker_box.currentData(), rate or None, self.frame_box.currentData(), units)
+        return ExportOptions(self.tracker_box.currentData(), rate or None, self.frame_box.currentData(), units,
+                             smooth=self.smooth_box.isChecked())
 
     def show_log(self, log: Path | None) -> None:
         """Export another recording."""

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.hand.anthropometry import scaled_hand
-from rhot_app.project import Rig, TrackerSettings, model_tracker_obstacle
+from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, model_tracker_obstacle
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.job import Job
@@ -128,11 +128,14 @@ class TrackerDialog(QDialog):
 
     # -- what is done ----------------------------------------------------------------------------------------------
 
+    def _kind(self) -> TrackerKind:
+        return next((kind for kind in TRACKER_KINDS if self.kinds[kind].isChecked()), "classic")
+
     @property
     def chosen(self) -> TrackerSettings:
         """What the form says."""
         return TrackerSettings(
-            kind="model" if self.kinds["model"].isChecked() else "classic", variant=self.variant_box.currentData(),
+            kind=self._kind(), variant=self.variant_box.currentData(),
             limits=self.limits_box.currentData(), float_scale=self.size_check.isChecked())
 
     def _choose(self) -> None:
@@ -214,7 +217,7 @@ class TrackerDialog(QDialog):
         obstacle = model_tracker_obstacle(self._rig)
         self.obstacle_label.setText("" if obstacle is None else f"{obstacle.why} {obstacle.remedy}")
         self.obstacle_label.setVisible(bool(self.obstacle_label.text()))
-        self.details.setVisible(settings.kind == "model")
+        self.details.setVisible(settings.kind != "classic")
         self._enable()
         self.look()
         self._fit()
@@ -232,7 +235,8 @@ class TrackerDialog(QDialog):
         resting = self._job is None
         possible = not self.obstacle_label.text()
         self.kinds["classic"].setEnabled(resting)
-        self.kinds["model"].setEnabled(resting and possible)
+        for kind in ("model", "estimator"):
+            self.kinds[kind].setEnabled(resting and possible)
         self.details.setEnabled(resting and possible)
         self.undo_button.setEnabled(resting and bool(self._made))
         self.close_button.setEnabled(resting)

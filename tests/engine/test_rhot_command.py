@@ -53,7 +53,7 @@ def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
         (("replay", str(tmp_path / "foreign.log"), "--json"), "foreign.log: this is not a raw log"),
         (("engine", "--rig", str(tmp_path / "foreign.log")), "foreign.log: not valid JSON"),
         (("engine", "--rig", str(tmp_path / "binary.log")), "binary.log: this is no text, so no rhot-rig file"),
-        (("replay", str(tmp_path / "foreign.log"), "--smooth"), "--smooth is reserved"),
+        (("replay", str(tmp_path / "foreign.log"), "--smooth"), "foreign.log: this is not a raw log"),
         (("replay", str(tmp_path / "foreign.log"), "--speed", "fast"), "fast is neither a number nor max"),
         (("replay", str(tmp_path / "foreign.log"), "--jsn"), "there is no '--jsn' here; did you mean --json?"),
         (("dance",), "dance"),
@@ -92,6 +92,11 @@ def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
     by_model = json.loads(rhot("replay", str(log_path), "--json", "--tracker", "model").stdout)
     summary = json.loads(rhot("replay", str(log_path), "--json").stdout)
     assert by_model["states"] > 1.5 * summary["states"], "one per frame, not one per pair"
+    smoothed = json.loads(rhot("replay", str(log_path), "--json", "--tracker", "estimator", "--smooth").stdout)
+    assert smoothed["states"] == pytest.approx(by_model["states"], rel=0.1)
+    assert (smoothed["smoothed"], by_model["smoothed"]) == (True, False)
+    refused = rhot("replay", str(log_path), "--smooth", "--tracker", "classic")
+    assert refused.returncode == 2 and "only the estimator does" in refused.stderr
     assert summary["states"] > 20
     assert summary["markers"]["wrist"]["measured_fraction"] > 0.9
     ended = rhot("replay", str(log_path), "--speed", "max", "--directory", str(place))

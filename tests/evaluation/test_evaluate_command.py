@@ -33,6 +33,21 @@ def test_a_comparison_prints_tables_and_json(tmp_path: Path, capsys: pytest.Capt
     assert found["honesty"]["rest"]["classic"]["tips"]["average"] is None
 
 
+def test_ratios_to_a_baseline_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    kept = {motion: trackers[list(trackers)[-1]] for motion, trackers in found["motions"].items()}
+    baseline = tmp_path / "baseline.json"
+    baseline.write_text(json.dumps({"tracker": "the same", "motions": kept}))
+    assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--baseline", str(baseline)]) == 0
+    rest = next(line for line in capsys.readouterr().out.split("over the baseline")[1].splitlines()
+                if line.startswith("rest"))
+    assert rest.split()[1] == "1.00"
+    baseline.write_text("[]")
+    assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--baseline", str(baseline)]) == 2
+    assert "not a baseline" in capsys.readouterr().err
+
+
 def test_a_recording_of_a_motions_name_is_another_motion(tmp_path: Path) -> None:
     recording = shutil.copy(RAMP, tmp_path / "pinch.json")
     wanted = [Order(make_scene(twin_defaults(), 1), motion, 1.6, sketched=True) for motion in ("pinch", str(recording))]

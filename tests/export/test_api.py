@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,19 @@ def test_a_recording_is_tracked_as_an_engine_would(log: Path, states: HandStates
     assert np.array_equal(found.joint_positions, states.joint_positions, equal_nan=True)
     assert found.conditions == states.conditions and recording.losses == ()
     assert recording.rig == LogReader(log).rig
-    with pytest.raises(api.ExportError, match="no tracker smooths yet"):
-        recording.states(smooth=True)
+    with pytest.raises(api.ExportError, match="only the estimator does"):
+        recording.states("classic", smooth=True)
+
+
+def test_smoothed_states(log: Path, states_by: Callable[[str], HandStates], tmp_path: Path) -> None:
+    filtered, recording = states_by("estimator"), api.open_recording(log)
+    found = recording.states("estimator", smooth=True)
+    assert len(found) == pytest.approx(len(filtered), abs=2) and (np.diff(found.t_master_ns) >= 0).all()
+    assert (np.diff(found.sequence) == 1).all()
+    assert np.nanmedian(found.angle_sd) < 0.95 * np.nanmedian(filtered.angle_sd)
+    frame = recording.to_dataframe("estimator", rate_hz=25.0, units="m", smooth=True)
+    done = recording.export(tmp_path / "a.csv", tracker="estimator", rate_hz=25.0, units="m", smooth=True)
+    assert len(frame) == pytest.approx(45, abs=2) and done.states == len(found)
 
 
 def test_states_at_a_rate(log: Path, states: HandStates) -> None:

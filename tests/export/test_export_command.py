@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pandas
 import pytest
 
@@ -17,6 +18,7 @@ from rhot_app.__main__ import main
 from rhot_app.errors import ExportError
 from rhot_app.export.export import FORMATS, export_log
 from rhot_app.export.plan import ExportOptions
+from rhot_app.project import save_rig, with_tracker
 from rhot_app.recording.raw_log import MAGIC, VERSION, LogReader, RecordKind, encode_header, encode_record
 
 
@@ -36,6 +38,26 @@ def test_every_format_by_its_ending(name: str, log: Path, tmp_path: Path, capsys
     assert left(tmp_path) == [out.name] and out.stat().st_size > 10_000
 
 
+def test_smoothed_states_are_exported_and_the_file_says_so(log: Path, tmp_path: Path,
+                                                           capsys: pytest.CaptureFixture[str]) -> None:
+    for name, more in (("a", ()), ("b", ("--smooth",))):
+        assert main(["export", str(log), "--out", str(tmp_path / f"{name}.npz"), "--tracker", "estimator", *more]) == 0
+    with np.load(tmp_path / "a.npz") as filtered, np.load(tmp_path / "b.npz") as smoothed:
+        assert (filtered["about_smoothed"], smoothed["about_smoothed"]) == ("no", "yes")
+        assert (np.diff(smoothed["t_master_ns"]) >= 0).all()
+        _, own, other = np.intersect1d(filtered["t_master_ns"], smoothed["t_master_ns"], return_indices=True)
+        assert len(own) > 0.95 * len(filtered["t_master_ns"])
+        before, after = filtered["fingertip_covariances"][own], smoothed["fingertip_covariances"][other]
+        assert np.nanmedian(np.trace(after, axis1=2, axis2=3) / np.trace(before, axis1=2, axis2=3)) < 0.8
+    classic = with_tracker(LogReader(log).rig, "classic")
+    save_rig(tmp_path / "classic.json", classic)
+    capsys.readouterr()
+    rig = ["--rig", str(tmp_path / "classic.json")]
+    assert main(["export", str(log), "--out", str(tmp_path / "c.npz"), *rig, "--smooth"]) == 2
+    assert "only the estimator does" in capsys.readouterr().err
+    assert left(tmp_path) == ["a.npz", "b.npz", "classic.json"]
+
+
 def test_the_file_is_named_as_the_log(log: Path, tmp_path: Path) -> None:
     copy = tmp_path / "grasp.rhotlog"
     copy.write_bytes(log.read_bytes())
@@ -51,7 +73,7 @@ def test_the_file_is_named_as_the_log(log: Path, tmp_path: Path) -> None:
     (("--out", "a.csv", "--format", "trc"), "a trc file ends in .trc"),
     (("--out", "a.csv", "--rate", "0"), "the rate 0 Hz is out of range"),
     (("--out", "a.csv", "--rate", "nan"), "the rate nan Hz is out of range"),
-    (("--out", "a.csv", "--smooth"), "no tracker smooths yet"),
+    (("--out", "a.csv", "--smooth", "--tracker", "classic"), "only the estimator does"),
     (("--out", "a.glb", "--units", "mm"), "gltf files are in m"),
     (("--out", "a.bvh", "--hand", "other_hand"), "has no other_hand to export"),
     (("--out", "nowhere/a.csv"), "nowhere/a.csv: the folder nowhere does not exist"),

@@ -37,6 +37,17 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_log(tmp_path_factory.mktemp("both") / "both.rhotlog", rig, frames)
 
 
+def test_both_are_smoothed(both: Path) -> None:
+    states, smoothed = states_of_log(both, "estimator"), states_of_log(both, "estimator", smooth=True)
+    assert states.other is not None and smoothed.other is not None
+    assert len(smoothed) == pytest.approx(len(states), abs=2)
+    assert np.array_equal(smoothed.t_master_ns, smoothed.other.t_master_ns)
+    assert (np.diff(smoothed.t_master_ns) > 0).all() and smoothed.marker_ids == states.marker_ids
+    for before, after in ((states, smoothed), (states.other, smoothed.other)):
+        assert after.tracked.mean() > before.tracked.mean() - 0.05
+        assert np.nanmedian(after.fingertip_covariances) < np.nanmedian(before.fingertip_covariances)
+
+
 def test_tables_and_points_have_both(both: Path, tmp_path: Path) -> None:
     states = states_of_log(both, "model")
     assert states.other is not None and states.other.tracked.mean() > 0.5

@@ -8,6 +8,6 @@ from rhot_app.export.recording import TrackedLog
 from rhot_app.export.states import HandStates, joined
 
 
-def states_of_log(path: Path, tracker: str = "classic") -> HandStates:
-    with TrackedLog(path, tracker=tracker) as tracked:
+def states_of_log(path: Path, tracker: str = "classic", *, smooth: bool = False) -> HandStates:
+    with TrackedLog(path, tracker=tracker, smooth=smooth) as tracked:
         return joined(list(tracked.blocks()))

@@ -12,7 +12,7 @@ from pathlib import Path
 NODE_BASE = ("rhot_node.errors", "rhot_node.files", "rhot_node.clock", "rhot_node.markers", "resources")
 APP_BASE = ("rhot_node", "resources", "rhot_app.errors", "rhot_app.progress", "rhot_app.project",
             "rhot_app.rig_history", "rhot_app.keys", "rhot_app.lean")
-MODELS = ("rhot_app.geometry", "rhot_app.filters")
+MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects", "rhot_app.barehand")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
 BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.tracking", *ENGINE_SIDE)
@@ -35,6 +35,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy"),
     "rhot_app.geometry": APP_BASE,
     "rhot_app.filters": APP_BASE,
+    "rhot_app.estimation": (),
     "rhot_app.hand": (*APP_BASE, *MODELS),
     "rhot_app.calibration": (*APP_BASE, *MODELS, "rhot_app.hand"),
     "rhot_app.calibration.commands": BELOW_ENGINE,  # they read logs

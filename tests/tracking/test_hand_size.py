@@ -16,6 +16,10 @@ NOISE_M = 5e-4
 INDEX, LITTLE = 1, 4
 
 
+def size_of_nobody():
+    return HandSize(WEARING.worn.dh, WEARING.limits, WEARING.natural, WEARING.bias_variance)
+
+
 def natural_poses(count, seed):
     """(count, 21) rad, drawn from the natural pose within the limits, about."""
     rng, poses = np.random.default_rng(seed), []
@@ -49,7 +53,7 @@ def show(size, seen, angles):
 
 
 def learnt(poses, scale, seed=0):
-    size, rng = HandSize(WEARING), np.random.default_rng(seed)
+    size, rng = size_of_nobody(), np.random.default_rng(seed)
     for angles in poses:
         show(size, located(angles, scale, rng), angles)
     size.settle()
@@ -88,20 +92,20 @@ def test_nothing_is_believed_of_fingers_in_exchange_of_markers_in_doubt_and_of_t
     few = seen.clear.copy()
     few[:2] = False
     for wrong in (seen._replace(positions=swapped), seen._replace(clear=few)):
-        size = HandSize(WEARING)
+        size = size_of_nobody()
         show(size, wrong, angles)
         assert size.known == (0.0, USUAL_SD**2)
     astray = seen.positions.copy()
     astray[INDEX] += 0.05
     doubtful = np.arange(MARKERS) != INDEX
-    one, other = HandSize(WEARING), HandSize(WEARING)
+    one, other = size_of_nobody(), size_of_nobody()
     show(one, seen._replace(positions=astray, clear=doubtful), angles)
     show(other, seen._replace(clear=doubtful), angles)
     assert one.known == other.known != (0.0, USUAL_SD**2)
 
 
 def test_the_size_is_followed_slowly_and_what_it_lags_is_doubt():
-    size, rng = HandSize(WEARING), np.random.default_rng(6)
+    size, rng = size_of_nobody(), np.random.default_rng(6)
     size.follow(0)
     for angles in natural_poses(8, 6):
         show(size, located(angles, 1.1, rng), angles)

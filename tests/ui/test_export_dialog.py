@@ -55,7 +55,11 @@ def test_the_first_rows_follow_the_choices(dialog: ExportDialog, qtbot: Any) -> 
     assert cells(dialog, "time_s")[1] == "0.0200"
     choose(dialog.format_box, "gltf")
     assert dialog.units_box.currentData() == "m" and not dialog.units_box.isEnabled()
-    assert dialog.options().units is None
+    assert dialog.options().units is None and not dialog.options().smooth
+    choose(dialog.tracker_box, "classic")
+    dialog.smooth_box.setChecked(True)
+    assert dialog.options().smooth
+    qtbot.waitUntil(lambda: "only the estimator does" in dialog.sentence.text(), timeout=PATIENCE_MS)
 
 
 def test_a_file_is_written_in_a_process_of_its_own(dialog: ExportDialog, qtbot: Any, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ def hand_names(rig: Rig | None) -> tuple[str, ...]:
 
     A hand that is alone needs no name: it is called "".
     """
-    if rig is None or rig.other_hand is None or rig.tracker.kind != "model":
+    if rig is None or rig.other_hand is None or rig.tracker.kind == "classic":
         return ("",)
     sides = rig.hand.side, rig.other_hand.side
     return sides if sides[0] != sides[1] else (f"first {sides[0]}", f"other {sides[1]}")

@@ -15,6 +15,8 @@ KINDS: Final = {
     "model": ("Model", "One hand estimated from everything that every camera sees, at the time it was seen. A marker "
               "that one camera sees counts, hidden fingers are carried on, and every joint says how well it is known. "
               "Needs calibrated cameras with clocks."),
+    "estimator": ("Estimator", "The same by a simpler filter, which will replace the model tracker. It can smooth "
+                  "recordings. Needs calibrated cameras with clocks."),
 }
 VARIANTS: Final = {
     "full": ("full: every joint by itself", "27 degrees of freedom. The default."),
@@ -61,7 +63,7 @@ def scale_text(state: HandState, *, known: bool = True) -> str:
 
 def size_text(state: HandState | None, rig: Rig) -> str:
     """The estimated size in words; what to do when there is none yet."""
-    if not rig.tracker.float_scale or rig.tracker.kind != "model":
+    if not rig.tracker.float_scale or rig.tracker.kind == "classic":
         return ""
     if state is None or not size_known(state):
         return "No size yet: start, and show the hand."

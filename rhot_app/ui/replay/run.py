@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rhot_app.engine.codec import TOPIC_STATE, decode, encode
 from rhot_app.engine.observer import condition_of
-from rhot_app.engine.replay_summary import replay_states
+from rhot_app.engine.replay_summary import replay_states, smoothed_states
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import RecordingError
 from rhot_app.progress import Progress, silent
@@ -30,6 +30,7 @@ from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogDoor
 from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
 from rhot_app.tracking.state import Condition, HandState
 from rhot_app.ui.models.jitter import JitterWindow
 
@@ -68,11 +69,15 @@ class Tracked:
     bookmarks: tuple[Bookmark, ...] = ()  # of the log, by time
 
 
-def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) -> Tracked:
-    """Track the whole log with `rig` and write all states to `out`. An error or a cancel leaves no file.
+def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress: Progress = silent) -> Tracked:
+    """Track the whole log with `rig` and write all states to `out`. `smooth`: every state uses the whole log, not only
+    what came before it. An error or a cancel leaves no file.
 
-    Raises RecordingError when the log is none or holds nothing that can be tracked, RigError as the tracker does.
+    Raises RecordingError when the log is none, holds nothing that can be tracked, or the rig's tracker does not smooth;
+    RigError as the tracker does.
     """
+    if smooth and rig.tracker.kind != "estimator":
+        raise RecordingError(NOT_SMOOTHED)
     reader = LogReader(log)
     try:
         tracker = make_tracker(rig)
@@ -81,7 +86,9 @@ def track_log(log: Path, rig: Rig, out: Path, *, progress: Progress = silent) ->
         records = ReadableLog(reader, progress)
         collected = _Collected(rig)
         with out.open("wb", buffering=0) as file:
-            for state in replay_states(iter(records), LogDoor(rig), tracker):
+            door = LogDoor(rig)
+            for state in (smoothed_states(iter(records), door, SmoothedTracker(rig)) if smooth
+                          else replay_states(iter(records), door, tracker)):
                 _write(file, collected.take(state), out)
         if not collected.times_ns:
             raise RecordingError(f"{log}: {_why_nothing(records)}")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
     QDialog,
     QFileDialog,
@@ -19,7 +20,8 @@ from PySide6.QtWidgets import (
 
 from rhot_app.ui.replay.session import Choice
 
-_TRACKERS = (("as the rig says", ""), ("classic", "classic"), ("model", "model"))
+_TRACKERS = (("as the rig says", ""), ("classic", "classic"), ("model", "model"),
+             ("estimator", "estimator"))
 _WIDTH_PX = 480
 
 
@@ -75,6 +77,8 @@ class RunDialog(QDialog):
             self.tracker_box.addItem(text, kind)
         self.rig_choice = FileChoice("Track with a rig file", "as recorded")
         self.hand_choice = FileChoice("Track with a hand file", "the rig's hand")
+        self.smooth_box = QCheckBox("Smooth")
+        self.smooth_box.setToolTip("Every state uses what came after it as well. Only the model tracker can.")
         self.start_button, close = QPushButton("Track"), QPushButton("Cancel")
         self.start_button.setDefault(True)
         self.start_button.clicked.connect(self._choose)
@@ -83,7 +87,7 @@ class RunDialog(QDialog):
         form.setColumnStretch(1, 1)
         form.setVerticalSpacing(8)
         for row, (name, part) in enumerate((("Tracker", self.tracker_box), ("Rig", self.rig_choice),
-                                            ("Hand", self.hand_choice))):
+                                            ("Hand", self.hand_choice), ("", self.smooth_box))):
             form.addWidget(QLabel(name), row, 0)
             form.addWidget(part, row, 1)
         buttons.addStretch(1)
@@ -98,5 +102,5 @@ class RunDialog(QDialog):
 
     def _choose(self) -> None:
         self.chosen.emit(Choice(self.tracker_box.currentData(), self.rig_choice.path, self.hand_choice.path,
-                                self._beside))
+                                self._beside, self.smooth_box.isChecked()))
         self.accept()

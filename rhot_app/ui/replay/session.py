@@ -26,10 +26,11 @@ _PLOT_SPACING_NS = 50_000_000  # thirty seconds of a plot are 600 rows then
 class Choice:
     """How a recording is to be tracked: as it was recorded, or with another tracker, rig file or hand file."""
 
-    tracker: Literal["", "classic", "model"] = ""
+    tracker: Literal["", "classic", "model", "estimator"] = ""
     rig: Path | None = None
     hand: Path | None = None
     beside: bool = False  # compared with the run that is shown, instead of in its place
+    smooth: bool = False  # every state uses what came after it as well
 
     def rig_for(self, log: Path) -> Rig:
         """The rig that the log is tracked with. Raises RigError or RecordingError naming the file."""
@@ -48,6 +49,7 @@ class Choice:
         """In words, e.g. "model tracker, desk.json"."""
         parts = [f"{self.tracker} tracker"] if self.tracker else []
         parts += [path.name for path in (self.rig, self.hand) if path is not None]
+        parts += ["smoothed"] if self.smooth else []
         return ", ".join(parts) or "as recorded"
 
 

@@ -83,7 +83,7 @@ class TrackingWork(QObject):
         rig = choice.rig_for(log)
         out = new_run_path(self._folder, next(_COUNT))
         try:
-            tracked: Tracked = self.solver.run(track_log, (log, rig, out), progress.report)
+            tracked: Tracked = self.solver.run(track_log, (log, rig, out, choice.smooth), progress.report)
             run = Run(tracked, out)
         except StoppedError as exc:
             out.unlink(missing_ok=True)

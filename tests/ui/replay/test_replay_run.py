@@ -170,3 +170,13 @@ def test_a_recording_under_way_is_played_so_far(grasp_log, tmp_path):
         reader.close()
     assert len(run) > 100 and "still being recorded" in run.tracked.note
     assert tracked(recorder.path, reader.rig, tmp_path / "a").tracked.note == ""
+
+
+def test_a_smoothed_run_has_the_same_instants_and_the_classic_tracker_is_refused(grasp_log, tmp_path):
+    rig = with_tracker(rig_of(grasp_log), "model")
+    filtered, smoothed = (track_log(grasp_log, rig, tmp_path / str(smooth), smooth) for smooth in (False, True))
+    assert np.isin(smoothed.times_ns, filtered.times_ns).mean() > 0.95
+    roughness = [np.nanstd(np.diff(run.fingertips, 3, axis=0)) for run in (filtered, smoothed)]
+    assert len(smoothed.times_ns) == pytest.approx(len(filtered.times_ns), abs=2) and roughness[1] < roughness[0]
+    with pytest.raises(RecordingError, match="only the estimator does"):
+        track_log(grasp_log, with_tracker(rig, "classic"), tmp_path / "c", True)

@@ -1,0 +1,199 @@
+"""An iterated extended Kalman filter on a manifold, with a buffer for out-of-sequence observations.
+
+At every observation time the state is the minimum of the prior and all residuals, found by Gauss-Newton steps (Bell and
+Cathey 1993). Observations that arrive late are put in their place, and the knots after them are solved again.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.estimation.residual import Process, Residual, stack
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 3
+"""Gauss-Newton steps of an update, at most."""
+
+CONVERGED = 0.1
+"""Standard deviations of the prior: a shorter last step changes nothing that matters."""
+
+KNOTS = 12
+"""Knots kept for observations that arrive late."""
+
+
+@dataclass(slots=True)
+class Knot:
+    """One instant, s: the estimate after its `residuals`, and the `weights` (G,) that the kernels gave to their
+    observations in the last step."""
+
+    t_s: float
+    state: Array
+    covariance: Array
+    residuals: list[Residual] = field(default_factory=list)
+    weights: Array = field(default_factory=lambda: np.empty(0))
+
+
+class IteratedFilter:
+    """The newest knots of an estimate."""
+
+    def __init__(self, process: Process, knots: int = KNOTS) -> None:
+        self.process, self._most = process, knots
+        self.knots: list[Knot] = []
+
+    @property
+    def newest(self) -> Knot:
+        """The newest knot; IndexError before `start`."""
+        return self.knots[-1]
+
+    def start(self, t_s: float, state: Array, covariance: Array) -> None:
+        """Begin anew with a prior."""
+        self.knots = [Knot(t_s, state.copy(), covariance.copy())]
+
+    def predict(self, t_s: float) -> tuple[Array, Array]:
+        """State and covariance at `t_s` by everything before it; of the oldest knot for an earlier time."""
+        place = max(bisect_right(self.knots, t_s, key=lambda knot: knot.t_s) - 1, 0)
+        knot = self.knots[place]
+        return self.process.predict(knot.state, knot.covariance, max(t_s - knot.t_s, 0.0))
+
+    def add(self, t_s: float, residuals: Sequence[Residual],
+            prediction: tuple[Array, Array] | None = None) -> Knot:
+        """Take in `residuals` of the instant `t_s` and return its knot.
+
+        `prediction`: what `predict(t_s)` returned, to save doing it again. An observation from before the oldest knot
+        enters that one.
+        """
+        place = bisect_right(self.knots, t_s, key=lambda knot: knot.t_s)
+        if place == 0:
+            oldest = self.knots[0]
+            prior = oldest.state, oldest.covariance
+            self.knots[0] = update(self.process, oldest.t_s, prior, residuals)
+            place = 1
+        else:
+            prior = self.predict(t_s) if prediction is None else prediction
+            self.knots.insert(place, update(self.process, t_s, prior, residuals))
+            place += 1
+        added = self.knots[place - 1]
+        for later in range(place, len(self.knots)):
+            before, knot = self.knots[later - 1], self.knots[later]
+            prior = self.process.predict(before.state, before.covariance, knot.t_s - before.t_s)
+            self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals)
+        del self.knots[:-self._most]
+        return added
+
+
+def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: Sequence[Residual]) -> Knot:
+    """The posterior of a `prior` (state, covariance) and residuals.
+
+    `away` is the present state less the prior's, in the tangent space of the present state. Whenever the state moves,
+    the covariance is transported: errors that no residual saw at the old state are seen by none at the new one.
+    Linearised anew without that, a filter soon believes to know what nothing observes (Huang, Mourikis and Roumeliotis
+    2010).
+    """
+    state, covariance = prior
+    away, weights, distance, before = np.zeros(process.size), np.empty(0), 0.0, np.inf
+    cross, root, last, seen = np.empty((process.size, 0)), np.empty((0, 0)), (state, away), None
+    for iteration in range(ITERATIONS):
+        error, jacobian, variances, cost, weights = stack(
+            [residual.linearise(state) for residual in residuals], process.size, weigh=iteration > 0)
+        if not len(error):
+            break
+        if iteration > 1 and cost + distance > before:  # the step was too long: half of it
+            state, away, distance = process.retract(last[0], 0.5 * last[1]), away - 0.5 * last[1], 0.5 * distance
+            continue
+        before = cost + distance
+        if seen is not None:
+            covariance, away = _transport(covariance, away, seen, jacobian, process.stationary)
+        cross, root, reached, distance, moved = _solve(covariance, jacobian, error, variances, away)
+        last, seen = (state, reached - away), jacobian
+        state, away = process.retract(state, reached - away), reached
+        if iteration and moved < CONVERGED**2:
+            break
+    return Knot(t_s, state, _reduce(covariance, cross, root), list(residuals), weights)
+
+
+@njit(cache=True)
+def _transport(covariance: Array, away: Array, old: Array, new: Array, stationary: Array) -> tuple[Array, Array]:
+    """Covariance (n, n) and vector (n,) after the Jacobian of the whitened rows changed from `old` to `new` (K, n).
+
+    S(H) = 1 - G H with G = C H' (1 + H C H')^-1 projects on the errors that H does not see, C the `stationary`
+    covariance. The map is 1 + (S(new) - S(old)) S(old): what was not seen stays so, and the rest is left as it is.
+    """
+    gain, new_gain = _gain(old, stationary), _gain(new, stationary)
+    count = old.shape[0]
+    left = np.empty((covariance.shape[0], count + new.shape[0]))
+    left[:, :count], left[:, count:] = gain, -new_gain
+    right = np.empty((count + new.shape[0], covariance.shape[0]))
+    right[:count] = old - np.dot(np.dot(old, gain), old)
+    right[count:] = new - np.dot(np.dot(new, gain), old)
+    out = covariance + np.dot(left, np.dot(right, covariance))
+    return out + np.dot(np.dot(out, right.T), left.T), away + np.dot(left, np.dot(right, away))
+
+
+@njit(cache=True)
+def _gain(jacobian: Array, stationary: Array) -> Array:
+    cross = np.dot(stationary, jacobian.T)
+    total = np.dot(jacobian, cross)
+    for k in range(total.shape[0]):
+        total[k, k] += 1.0
+    return np.ascontiguousarray(np.linalg.solve(total, cross.T).T)
+
+
+@njit(cache=True)
+def _solve(covariance: Array, jacobian: Array, error: Array, variances: Array, step: Array) \
+        -> tuple[Array, Array, Array, float, float]:
+    """One Gauss-Newton step from `step` (n,), the present state relative to the prior.
+
+    Returns covariance times jacobian transposed (n, K), the Cholesky factor of the innovation covariance (K, K), the
+    new step, its squared Mahalanobis distance under the prior, and that of the change in observation space."""
+    count = error.shape[0]
+    cross = np.dot(covariance, jacobian.T)
+    reduced = np.dot(jacobian, cross)
+    innovation = error + np.dot(jacobian, step)
+    total = reduced.copy()
+    for k in range(count):
+        total[k, k] += variances[k]
+    root = np.linalg.cholesky(total)
+    solution = innovation.copy()
+    for i in range(count):
+        for j in range(i):
+            solution[i] -= root[i, j] * solution[j]
+        solution[i] /= root[i, i]
+    for i in range(count - 1, -1, -1):
+        for j in range(i + 1, count):
+            solution[i] -= root[j, i] * solution[j]
+        solution[i] /= root[i, i]
+    new = np.dot(cross, solution)
+    distance = np.dot(solution, np.dot(reduced, solution))
+    change = np.dot(jacobian, new - step)
+    moved = 0.0
+    for k in range(count):
+        moved += change[k] * change[k] / total[k, k]
+    return cross, root, new, distance, moved
+
+
+@njit(cache=True)
+def _reduce(covariance: Array, cross: Array, root: Array) -> Array:
+    """Covariance after the update, symmetric."""
+    if cross.shape[1] == 0:
+        return covariance.copy()
+    count = root.shape[0]
+    whitened = cross.T.copy()
+    for i in range(count):
+        for j in range(i):
+            whitened[i] -= root[i, j] * whitened[j]
+        whitened[i] /= root[i, i]
+    out = covariance - np.dot(whitened.T, whitened)
+    size = out.shape[0]
+    for i in range(size):
+        for j in range(i):
+            mean = 0.5 * (out[i, j] + out[j, i])
+            out[i, j] = mean
+            out[j, i] = mean
+    return out

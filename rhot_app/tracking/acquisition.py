@@ -1,0 +1,114 @@
+"""Where a hand is when nothing is known of it: from one instant's triangulated markers."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.geometry.transforms import fit_rigid
+from rhot_app.hand.finger_ik import solve_fingers
+from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.model import neutral_pose
+from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
+from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
+from rhot_app.tracking import schedule
+from rhot_app.tracking.marker_model import MarkerModel
+from rhot_app.tracking.model_start import (
+    FLATTEST_M2,
+    LEAST_MARKERS,
+    UNFIT_M,
+    Located,
+    count_apart,
+    locate_clear,
+)
+from rhot_app.tracking.pairing import Paired, Pairing
+from rhot_app.tracking.rig_arrays import RigArrays
+from rhot_app.tracking.tracker import CameraObservations
+
+Array = NDArray[np.float64]
+
+_TARGET_SD_M = 1e-3
+_WAITING = schedule.FRAMES  # frames of each camera; those before would tell nothing more of an instant
+
+
+class Starter:
+    """Collects frames until one instant shows enough of the hand; they are paired when that is asked for."""
+
+    def __init__(self, rig: RigArrays, markers: MarkerModel) -> None:
+        self._rig, self._markers = rig, markers
+        self._pairing = Pairing(len(rig.cameras), len(rig.marker_ids))
+        self._waiting: deque[CameraObservations] = deque(maxlen=_WAITING * len(rig.cameras))
+        self._tips = [markers.marker_of(role) for role in TIP_ROLES]
+        self._wrist = markers.marker_of(WRIST_ROLE)
+        self._on_palm = np.flatnonzero(markers.finger < 0)
+
+    def reset(self) -> None:
+        """Forget the frames."""
+        self._waiting.clear()
+        self._pairing.reset()
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in."""
+        self._waiting.append(observations)
+
+    def locate(self) -> Located | None:
+        """Where the markers were at the newest instant; None: none is due."""
+        for observations in self._waiting:
+            self._pairing.ingest(observations)
+        self._waiting.clear()
+        paired = self._pairing.due()
+        return None if paired is None else self._locate(paired)
+
+    def _locate(self, paired: Paired) -> Located:
+        rig, count = self._rig, len(self._rig.marker_ids)
+        positions, covariances, clear = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count, np.bool_)
+        locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
+                      rig.focal, rig.shapes, positions, covariances, clear)
+        return Located(paired.t_ns, positions, covariances, clear)
+
+    def pose_of(self, markers: Array, scale: float = 1.0) -> HandPose | None:
+        """The hand, `scale` times as large as its file says, whose `markers` (M, 3) m, NaN where not located, are
+        enough to find it.
+
+        None when they are not, or are where no hand has them: two that change names in one camera seem far away.
+        """
+        if scale != 1.0 and np.isfinite(markers).any():
+            centre = np.nanmean(markers, axis=0)
+            pose = self.pose_of(centre + (markers - centre) / scale)
+            if pose is not None:
+                pose.world_from_palm[:3, 3] = centre + (pose.world_from_palm[:3, 3] - centre) * scale
+            return pose
+        pose = self._fitted(markers)
+        return pose if pose is not None and count_apart(markers, self._worn_at(pose), UNFIT_M) == 0 else None
+
+    def _tips_and_wrist(self, markers: Array) -> tuple[Array, Array]:
+        """(5, 3) m of the fingertips and (3,) m of the wrist, NaN where not located."""
+        nowhere = np.full(3, np.nan)
+        return (np.array([markers[m] if m >= 0 else nowhere for m in self._tips]),
+                markers[self._wrist] if self._wrist >= 0 else nowhere)
+
+    def _worn_at(self, pose: HandPose) -> Array:
+        """(M, 3) m where a hand in `pose` has its markers."""
+        dh, out = self._markers.dh, np.empty((len(self._rig.marker_ids), 3))
+        forward_arrays(dh, pose.world_from_palm, pose.angles, empty_frames(dh), out)
+        return out
+
+    def _fitted(self, markers: Array) -> HandPose | None:
+        """The hand that comes nearest to them; None when they are too few."""
+        located = np.isfinite(markers[:, 0])
+        if np.count_nonzero(located) < min(LEAST_MARKERS, len(markers)):
+            return None
+        tips, wrist = self._tips_and_wrist(markers)
+        on_palm = self._on_palm[located[self._on_palm]]
+        if len(on_palm) >= 3:
+            own = np.array([self._markers.places[m].point for m in on_palm])
+            if np.linalg.norm(np.cross(own[1] - own[0], own[2] - own[0])) > 2.0 * FLATTEST_M2:
+                pose = neutral_pose(fit_rigid(own, markers[on_palm]))
+                solution = solve_fingers(self._markers.model, pose, tips, target_sd=_TARGET_SD_M)
+                return HandPose(pose.world_from_palm, solution.angles)
+        if not np.isfinite(wrist[0]) and np.count_nonzero(np.isfinite(tips[:, 0])) < TIPS_WITHOUT_WRIST:
+            return None
+        fit = fit_palm(self._markers.model, wrist, tips, None, 0.0)
+        return None if fit is None else fit.pose

@@ -1,0 +1,258 @@
+"""The estimator: one hand from every marker that any camera sees, each at its own time.
+
+Rehg's idea (1995, chapter 2): one kinematic model, every observation a residual on it. Cameras need no synchronisation,
+a marker that one camera sees counts, and what no marker shows is known as well as the natural pose tells. Here are
+association, loss and re-acquisition; the estimation itself is in `rhot_app.estimation`.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.estimation.filter import IteratedFilter
+from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
+from rhot_app.project import Rig
+from rhot_app.tracking.acquisition import Located, Starter
+from rhot_app.tracking.association import GATE, MarkerAssociation, assign
+from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
+from rhot_app.tracking.hand_process import ANGLES, VELOCITY, HandProcess
+from rhot_app.tracking.hand_size import HandSize
+from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
+from rhot_app.tracking.marker_residual import JointLimits, MarkerFrame, triangulation_covariance
+from rhot_app.tracking.rig_arrays import compile_rig
+from rhot_app.tracking.state import Condition, HandState
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.wire.messages import MarkerFlag
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+PALM_SPREAD = np.array([0.2, 0.6])
+"""m and rad: how far a palm moves and turns within one correlation time."""
+
+SLOWEST, FASTEST = np.array([1.5, 3.0, 2.5]), 15.0
+"""1/s: rates of a hand at rest (palm translation, palm rotation, angles), and of the fastest one."""
+
+BIAS_S = 1.0
+"""s: correlation time of the paint biases: hands turn so that other paint shows."""
+
+START_SD = 0.03, 0.5
+"""m and rad: standard deviation of the palm's pose as it is first found."""
+
+CONFUSION = 0.01
+"""Probability that a node reports a marker under another one's colour."""
+
+REJECTIONS = 2
+"""Observations rejected in a row that are no outliers: of one in ten mistaken, two in a row have a chance of 1 %."""
+
+LOST_AFTER_NS, LOST_AFTER_PERIODS = 500_000_000, 5.0
+"""No accepted observation for this long, or for so many frame periods: the hand is lost."""
+
+WRONG_AFTER_NS, WRONG_AFTER_PERIODS = 100_000_000, 3.0
+"""Most observations rejected for this long, or for so many frame periods: the estimate is wrong."""
+
+FARTHEST_AHEAD_S = 0.1
+"""s: predictions go no farther ahead."""
+
+_JUMP_NS = 1_000_000_000  # frames farther apart are of different sessions
+_PENDING = 16
+
+
+class Estimator:
+    """Implements `PredictingTracker`: a state after every frame."""
+
+    def __init__(self, rig: Rig) -> None:
+        """Raises RigError when a marker has no place on the hand."""
+        self._rig, self._markers = compile_rig(rig), compile_markers(rig)
+        self._file_size, natural = self._markers, self._markers.natural
+        self._size: HandSize | None = None
+        if rig.tracker.float_scale:
+            self._size = HandSize(self._markers.dh, self._markers.limits, natural, self._markers.paint_variance)
+        covariance = np.asarray(np.linalg.inv(natural.information), dtype=np.float64)
+        self._process = HandProcess(natural.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
+                                    np.zeros((len(self._rig.marker_ids), 3, 3)), BIAS_S)
+        self._filter = IteratedFilter(self._process)
+        self._limits = JointLimits(self._markers.limits)
+        self._starter = Starter(self._rig, self._markers)
+        self._association = MarkerAssociation(self._rig)  # without a prediction, by rays
+        self._sightings = Sightings(self._rig, self._markers)
+        self._states = EstimatorStates(self._rig, self._markers, self._sightings)
+        self._sequence = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything but the count of states."""
+        self._pending: list[CameraObservations] = []
+        self._starter.reset()
+        self._association.reset()
+        self._sightings.reset()
+        if self._size is not None:
+            self._size.reset()
+            self._resize(*self._size.known)
+        self._tracking = self._ever = False
+        self._epoch_ns = self._accepted_ns = self._plausible_ns = 0
+        self._rejected = np.zeros(len(self._rig.marker_ids), np.int64)
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in; it is weighed by the next `solve`."""
+        self._pending = [*self._pending[1 - _PENDING:], observations]
+
+    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
+        """Each camera's newest frame, None before its first."""
+        return tuple(self._sightings.newest)
+
+    def solve(self) -> HandState | None:
+        """The state after the frames since the last one, None without any."""
+        pending, self._pending = self._pending, []
+        begun = time.perf_counter()
+        taken = [observations for observations in pending if self._take(observations)]
+        if not taken:
+            return None
+        if self._size is not None:
+            self._size.work()
+            self._resize(*self._size.follow(taken[-1].t_row0_master_ns))
+        self._sequence += 1
+        if not self._tracking:
+            return self._states.none(self._sequence - 1, Condition.LOST if self._ever else Condition.SEARCHING,
+                                     taken[-1], begun)
+        knot = self._filter.newest
+        return self._states.describe(self._time_ns(knot.t_s), knot.state, knot.covariance, self._sequence - 1,
+                                     taken[-1], begun)
+
+    def state_at(self, t_ns: int) -> HandState | None:
+        """The hand predicted to master time `t_ns`, at most FARTHEST_AHEAD_S ahead; None while there is no hand."""
+        newest = max((frame for frame in self._sightings.newest if frame is not None),
+                     key=lambda frame: frame.t_receive_ns, default=None)
+        if not self._tracking or newest is None:
+            return None
+        begun, since_s = time.perf_counter(), self._filter.newest.t_s
+        t_s = min(max(self._seconds(t_ns), since_s), since_s + FARTHEST_AHEAD_S)
+        if self._seconds(t_ns) - since_s > 1e-9 * LOST_AFTER_NS:
+            return None
+        state, covariance = self._filter.predict(t_s)
+        return self._states.describe(self._time_ns(t_s), state, covariance, self._sequence - 1, newest, begun)
+
+    def _seconds(self, t_ns: int) -> float:
+        return 1e-9 * (t_ns - self._epoch_ns)
+
+    def _time_ns(self, t_s: float) -> int:
+        return self._epoch_ns + round(1e9 * t_s)
+
+    def _take(self, observations: CameraObservations) -> bool:
+        """Weigh one frame; False when it came before."""
+        frame = MarkerFrame(self._markers, observations)
+        if self._tracking and abs(frame.t_ns - self._time_ns(self._filter.newest.t_s)) > _JUMP_NS:
+            self._give_up()
+            self._sightings.reset()
+        too_late = self._tracking and self._seconds(frame.t_ns) < self._filter.knots[0].t_s
+        if too_late or not self._sightings.enter(frame):
+            return False
+        self._starter.ingest(self._association.select(observations))
+        if not self._tracking:
+            located = self._starter.locate()
+            scale = 1.0 if self._size is None else self._size.scale
+            pose = None if located is None else self._starter.pose_of(located.positions, scale)
+            if located is not None and pose is not None:
+                self._start(located, pose)
+            return True
+        self._update(frame)
+        if self._size is not None and (located := self._starter.locate()) is not None:
+            state = self._filter.newest.state
+            self._size.look(located, np.vstack([state[:ANGLES].reshape(3, 4), np.eye(4)[3]]), state[ANGLES:VELOCITY])
+        newest_ns = self._time_ns(self._filter.newest.t_s)
+        period_ns = 1e9 * self._sightings.shortest_period_s
+        if (newest_ns - self._accepted_ns > max(LOST_AFTER_NS, LOST_AFTER_PERIODS * period_ns)
+                or newest_ns - self._plausible_ns > max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns)):
+            self._give_up()
+        return True
+
+    def _start(self, located: Located, pose: HandPose) -> None:
+        """Start at a pose and weigh again what was seen since."""
+        self._epoch_ns = located.t_ns
+        if self._size is not None:
+            self._size.settle()
+            self._size.look(located, pose.world_from_palm, pose.angles)
+            self._resize(*self._size.known)
+        self._note_bias(self._process.start(pose.world_from_palm, pose.angles, START_SD)[0])
+        self._filter.start(0.0, *self._process.start(pose.world_from_palm, pose.angles, START_SD))
+        self._tracking = self._ever = True
+        self._accepted_ns = self._plausible_ns = located.t_ns
+        for frame in self._sightings.recent(located.t_ns):
+            self._update(frame)
+
+    def _resize(self, log_scale: float, variance: float) -> None:
+        """Let the hand be exp(`log_scale`) times as large as its file says, with `variance` of the logarithm."""
+        self._markers = self._file_size.scaled(math.exp(log_scale))
+        self._states.resize(math.exp(log_scale), math.sqrt(variance))
+
+    def _give_up(self) -> None:
+        self._tracking = False
+        self._starter.reset()
+
+    def _update(self, frame: MarkerFrame) -> None:
+        """Associate a frame with the prediction, and weigh it."""
+        t_s = self._seconds(frame.t_ns)
+        candidates = np.count_nonzero(frame.seen)
+        prediction = self._filter.predict(t_s)
+        pixels, covariances = frame.predict_pixels(*prediction)
+        distances = _distances(frame, pixels, covariances)
+        frame = self._associate(frame, pixels, covariances, distances)
+        self._note_bias(prediction[0])
+        self._sightings.note_sizes(frame, prediction[0])
+        try:
+            knot = self._filter.add(t_s, [frame, self._limits], prediction)
+        except np.linalg.LinAlgError:  # the estimate contradicts itself
+            self._give_up()
+            return
+        inliers = self._sightings.accept(frame, knot.state, knot.weights)
+        self._weighed(frame)
+        self._reacquire(frame, inliers, distances)
+        accepted = np.count_nonzero(inliers)
+        if accepted:
+            self._accepted_ns = max(self._accepted_ns, frame.t_ns)
+        if 2 * accepted >= candidates:
+            self._plausible_ns = max(self._plausible_ns, frame.t_ns)
+
+    def _weighed(self, frame: MarkerFrame) -> None:
+        """A frame has its knot; covariances are not inflated yet. A recording is smoothed from here (`smoothing`)."""
+
+    def _reacquire(self, frame: MarkerFrame, accepted: Mask, distances: Array) -> None:
+        """Inflate the covariance of a finger, or of the palm, whose marker is rejected REJECTIONS times in a row:
+        outliers do not last. `distances` (M,): squared Mahalanobis distances, 2 on average."""
+        self._rejected[accepted] = 0
+        self._rejected[self._reported(frame) & ~accepted] += 1
+        for m in np.flatnonzero((self._rejected >= REJECTIONS) & (distances > GATE)):
+            finger, knot = self._markers.finger[m], self._filter.newest
+            angles = ANGLE_SLICES[finger]
+            chosen = slice(6 + angles.start, 6 + angles.stop) if finger >= 0 else slice(0, 6)
+            self._process.inflate(knot.covariance, chosen, 0.5 * distances[m])
+            self._filter.start(knot.t_s, knot.state, knot.covariance)  # so that no late frame undoes it
+
+    def _reported(self, frame: MarkerFrame) -> Mask:
+        observations = frame.observations
+        return ((observations.flags & int(MarkerFlag.LOST)) == 0) & np.isfinite(observations.pixels[:, 0])
+
+    def _associate(self, frame: MarkerFrame, pixels: Array, covariances: Array, distances: Array) -> MarkerFrame:
+        """The frame with the blob of each marker, predicted at `pixels` (M, 2) with `covariances` (M, 2, 2) px^2."""
+        if frame.observations.further is None and not np.any(distances > GATE):
+            return frame
+        return frame.associated(lambda listed, listed_covariances, own: assign(
+            np.nan_to_num(pixels), np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2)), listed,
+            listed_covariances, np.where(own, 0.0, -2.0 * np.log(CONFUSION)))[0])
+
+    def _note_bias(self, state: Array) -> None:
+        m, bias = self._markers, np.empty((len(self._markers.finger), 3, 3))
+        triangulation_covariance(state, m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX, m.paint_variance, bias)
+        self._process.set_bias(bias)
+
+
+def _distances(frame: MarkerFrame, pixels: Array, covariances: Array) -> Array:
+    """(M,) squared Mahalanobis distances of a frame's markers from their predictions."""
+    offset, total = frame.pixels - pixels, covariances + frame.covariances
+    a, b, c = total[:, 0, 0], total[:, 0, 1], total[:, 1, 1]
+    x, y = offset[:, 0], offset[:, 1]
+    return np.where(frame.seen, (c * x * x - 2.0 * b * x * y + a * y * y) / (a * c - b * b), np.nan)

@@ -1,0 +1,301 @@
+"""What the estimator publishes: places with covariances, how each is known, and the cameras' own triangulation."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
+from rhot_app.tracking import stages
+from rhot_app.tracking.association import GATE
+from rhot_app.tracking.hand_process import ANGLES, BIAS, POSE, VELOCITY
+from rhot_app.tracking.locate import locate_all
+from rhot_app.tracking.marker_model import MarkerModel, project_marker, scaled_table
+from rhot_app.tracking.marker_residual import SIZE_S, SIZE_SD, MarkerFrame
+from rhot_app.tracking.rig_arrays import RigArrays
+from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracks import DOUBTFUL
+from rhot_node.wire.messages import MarkerFlag
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MEASURED_M, INFERRED_M = 3e-3, 12e-3
+"""m: standard deviation (root of the trace) up to which a place counts as measured, and as inferred."""
+
+MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
+"""rad: the same of angles and of the palm's rotation."""
+
+SIZE_FRAMES = 10
+"""Frames in which a fingertip's size is learnt before it is used."""
+
+_SIZE_MEMORY = 200  # frames over which a fingertip's size is averaged
+_SAME_FRAME_NS = 1_000_000
+_RECENT = 12
+_PERIODS, _LEARN = 1.5, 0.1
+_FRESH_NS = 60_000_000  # before a camera's second frame
+_SLOWEST_NS = 400_000_000
+_SLOWEST_CLEAR_NS = 150_000_000
+_LOST = int(MarkerFlag.LOST)
+_NEVER = -(1 << 62)
+
+_INLIER_WEIGHT = 6.0 / (4.0 + GATE)  # of the centroids' kernel, at the gate
+
+_MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED), int(Knowledge.GUESSED)
+_FIRST_TIP, _FIRST_MARKER = 21, 26
+_FINGER_OF_JOINT = np.array([-1] + [finger for finger, rows in enumerate(JOINT_SLICES)
+                                    for _ in range(rows.stop - rows.start)])
+_FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICES)
+                             for _ in range(columns.stop - columns.start)])
+
+
+class Sightings:
+    """The last accepted observation of each of M markers by each of C cameras, and the cameras' frames.
+
+    `newest`: each camera's newest frame. `times` (C, M) ns; `residuals` (C, M, 2) px, observed less predicted;
+    `covariances` (C, M, 2, 2) px^2; `doubtful` (C, M).
+    """
+
+    def __init__(self, rig: RigArrays, markers: MarkerModel) -> None:
+        self._shape = len(rig.camera_names), len(rig.marker_ids)
+        self._markers = markers
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all."""
+        cameras, markers = shape = self._shape
+        self.times, self.residuals = np.full(shape, _NEVER, np.int64), np.zeros((*shape, 2))
+        self.covariances, self.doubtful = np.tile(np.eye(2), (*shape, 1, 1)), np.zeros(shape, np.bool_)
+        self.fresh_ns, self.periods_s = np.full(cameras, _FRESH_NS), [1e-9 * _FRESH_NS / _PERIODS] * cameras
+        self._paced = [False] * cameras
+        self.newest: list[CameraObservations | None] = [None] * cameras
+        self.pixels, self.flags = np.full((*shape, 2), np.nan), np.full(shape, _LOST, np.uint16)
+        self._frames: list[MarkerFrame] = []
+        self._log_width, self._sized = np.zeros(markers), np.zeros(markers)
+
+    @property
+    def shortest_period_s(self) -> float:
+        """Frame period of the quickest camera, s."""
+        return min((period for period, frame in zip(self.periods_s, self.newest, strict=True) if frame is not None),
+                   default=1e-9 * _FRESH_NS)
+
+    def enter(self, frame: MarkerFrame) -> bool:
+        """Take a frame in; False when it came before."""
+        observations = frame.observations
+        camera, begin = observations.camera, observations.t_row0_master_ns
+        if any(other.camera == camera and abs(other.observations.t_row0_master_ns - begin) < _SAME_FRAME_NS
+               for other in self._frames):
+            return False
+        self._frames = [*self._frames[1 - _RECENT:], frame]
+        last = self.newest[camera]
+        since = begin - last.t_row0_master_ns if last is not None else _SLOWEST_NS
+        if since > 0 or since < -_SLOWEST_NS:
+            if 0 < since < _SLOWEST_NS:
+                share = _LEARN if self._paced[camera] else 1.0
+                self._paced[camera] = True
+                self.periods_s[camera] += share * (1e-9 * since - self.periods_s[camera])
+                self.fresh_ns[camera] = round(1e9 * _PERIODS * self.periods_s[camera])
+            self.newest[camera] = observations
+            self.pixels[camera], self.flags[camera] = observations.pixels, observations.flags
+        return True
+
+    def recent(self, since_ns: int) -> list[MarkerFrame]:
+        """The frames of the last moments that are not earlier than `since_ns`, in the order of time."""
+        return sorted((frame for frame in self._frames if frame.t_ns >= since_ns), key=lambda frame: frame.t_ns)
+
+    def note_sizes(self, frame: MarkerFrame, state: Array) -> None:
+        """Learn how wide the fingertips are that another camera sees too; of the others, let the frame use that."""
+        widths = frame.widths(state)
+        others = np.delete(self.times, frame.camera, axis=0).max(axis=0, initial=_NEVER)
+        both = frame.t_ns - others < 2 * self.fresh_ns.max()
+        learn = np.isfinite(widths) & both
+        self._sized[learn] = np.minimum(self._sized[learn] + 1.0, _SIZE_MEMORY)
+        self._log_width[learn] += (widths[learn] - self._log_width[learn]) / self._sized[learn]
+        use = np.isfinite(widths) & ~both & (self._sized >= SIZE_FRAMES)
+        frame.log_width = np.where(use, self._log_width, np.nan)
+        frame.size_sd = SIZE_SD * math.sqrt(max(SIZE_S / self.periods_s[frame.camera], 1.0))
+
+    def accept(self, frame: MarkerFrame, state: Array, weights: Array) -> Mask:
+        """Note the observations of a frame, after which the hand is in `state`; returns which are inliers (M,)."""
+        inlier = np.zeros(len(frame.seen), np.bool_)
+        camera = frame.camera
+        _accept(frame.t_ns, frame.expected(state), frame.pixels, frame.covariances, frame.flags, frame.seen, weights,
+                self.times[camera], self.residuals[camera], self.covariances[camera], self.doubtful[camera], inlier)
+        return inlier
+
+
+class EstimatorStates:
+    """Makes states of estimates."""
+
+    def __init__(self, rig: RigArrays, markers: MarkerModel, sightings: Sightings) -> None:
+        self._rig, self._markers, self._sightings = rig, markers, sightings
+        one, other = markers.model.dh, markers.dh
+        self._file_size = self._dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
+                                point_offset=np.concatenate([one.point_offset, other.point_offset]))
+        self._tips = np.array([markers.marker_of(role) for role in TIP_ROLES])
+        self._wrist = markers.marker_of(WRIST_ROLE)
+        self._shapes = rig.shapes.copy()
+        self._scale, self._scale_sd = 1.0, 0.0
+
+    def resize(self, scale: float, sd: float) -> None:
+        """Describe a hand `scale` times as large as its file says, with a standard deviation of the logarithm."""
+        self._dh, self._scale, self._scale_sd = scaled_table(self._file_size, scale), scale, sd
+
+    def describe(self, t_ns: int, state: Array, covariance: Array, sequence: int, newest: CameraObservations,
+                 begun: float) -> HandState:
+        """The state of master time `t_ns`; work on it began at `begun`, s of `time.perf_counter`."""
+        solved, rig, sightings, m = time.perf_counter(), self._rig, self._sightings, self._markers
+        count = len(rig.marker_ids)
+        points, covariances = np.empty((_FIRST_MARKER + count, 3)), np.empty((_FIRST_MARKER + count, 3, 3))
+        age = np.abs(t_ns - sightings.times)
+        fresh = age <= sightings.fresh_ns[:, None]
+        clear = fresh & ~sightings.doubtful & (sightings.fresh_ns[:, None] <= _SLOWEST_CLEAR_NS)
+        shown = np.count_nonzero(clear, axis=0) >= 2
+        raw, raw_covariances, errors = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count)
+        markers, joints, angles = np.empty(count, np.uint8), np.empty(21, np.uint8), np.empty(21, np.uint8)
+        angle_sd = np.empty(21)
+        aligned = np.empty((*fresh.shape, 2))
+        _place(state, covariance, self._dh, m.half_axes, m.poses, m.intrinsics, sightings.residuals, points,
+               covariances, aligned)
+        if rig.band_half_axes is not None:
+            world = np.eye(4)
+            world[:3] = state[:ANGLES].reshape(3, 4)
+            stages.turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
+        locate_all(aligned, sightings.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
+                   rig.cameras, rig.focal, self._shapes, raw, raw_covariances, errors)
+        palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
+        in_sight = (np.count_nonzero(age <= 2 * sightings.fresh_ns[:, None], axis=0) > 1).all()
+        world = np.eye(4)
+        world[:3] = state[:ANGLES].reshape(3, 4)
+        return HandState(
+            sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
+            condition=Condition.TRACKING if in_sight else Condition.PARTIAL,
+            marker_ids=rig.marker_ids, marker_positions=points[_FIRST_MARKER:], marker_raw_positions=raw,
+            marker_covariances=covariances[_FIRST_MARKER:], marker_knowledge=markers,
+            camera_names=rig.camera_names, camera_pixels=sightings.pixels.copy(), camera_flags=sightings.flags.copy(),
+            joint_positions=points[:_FIRST_TIP], joint_knowledge=joints,
+            fingertip_positions=points[_FIRST_TIP:_FIRST_MARKER], angles=state[ANGLES:VELOCITY].copy(),
+            angle_knowledge=angles, world_from_palm=world, palm_knowledge=Knowledge(palm), epipolar_error_px=errors,
+            joint_covariances=covariances[:_FIRST_TIP], angle_sd=angle_sd,
+            fingertip_covariances=covariances[_FIRST_TIP:_FIRST_MARKER],
+            palm_covariance=covariance[:6, :6].copy(), hand_scale=self._scale,
+            hand_scale_sd=self._scale_sd,
+            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
+                       "filter": solved - begun, "solve": time.perf_counter() - solved})
+
+    def none(self, sequence: int, condition: Condition, newest: CameraObservations, begun: float) -> HandState:
+        """No hand: what the cameras see is all there is."""
+        rig, markers = self._rig, len(self._rig.marker_ids)
+        unknown = int(Knowledge.UNKNOWN)
+        return HandState(
+            sequence=sequence, t_master_ns=newest.t_row0_master_ns, t_receive_ns=newest.t_receive_ns,
+            condition=condition, marker_ids=rig.marker_ids, marker_positions=np.full((markers, 3), np.nan),
+            marker_raw_positions=np.full((markers, 3), np.nan), marker_covariances=np.full((markers, 3, 3), np.nan),
+            marker_knowledge=np.full(markers, unknown, np.uint8), camera_names=rig.camera_names,
+            camera_pixels=self._sightings.pixels.copy(), camera_flags=self._sightings.flags.copy(),
+            joint_positions=np.full((21, 3), np.nan), joint_knowledge=np.full(21, unknown, np.uint8),
+            fingertip_positions=np.full((5, 3), np.nan), angles=np.full(21, np.nan),
+            angle_knowledge=np.full(21, unknown, np.uint8), world_from_palm=np.full((4, 4), np.nan),
+            palm_knowledge=Knowledge.UNKNOWN, epipolar_error_px=np.full(markers, np.nan),
+            **UNESTIMATED | {"hand_scale": self._scale, "hand_scale_sd": self._scale_sd},
+            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
+                       "filter": time.perf_counter() - begun, "solve": 0.0})
+
+
+@njit(cache=True)
+def _accept(t_ns, expected, pixels, pixel_covariances, flags, seen, weights, times, residuals, covariances, doubtful,
+            inlier):
+    """Take one camera's inliers over into its row of the sightings; `weights` are those of the seen markers."""
+    count = 0
+    for m in range(seen.shape[0]):
+        if not seen[m] or math.isnan(expected[m, 0]):
+            continue
+        inlier[m] = weights[count] > _INLIER_WEIGHT
+        count += 1
+        if inlier[m] and t_ns >= times[m]:
+            times[m] = t_ns
+            residuals[m] = pixels[m] - expected[m]
+            covariances[m] = pixel_covariances[m]
+            doubtful[m] = (flags[m] & DOUBTFUL) != 0
+
+
+@njit(cache=True)
+def _place(state, covariance, dh, half_axes, poses, intrinsics, residuals, points, covariances, aligned):
+    """Fill points (26 + M, 3) m with covariances, and `aligned` (C, M, 2) px: each camera's last observation of a
+    marker, carried on to the state's instant."""
+    count = points.shape[0]
+    frames, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3, POSE))
+    world = np.eye(4)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    forward_arrays(dh, world, state[ANGLES:VELOCITY], frames, points)
+    jacobian_arrays(dh, world, frames, points, jacobian)
+    columns, product = np.empty(POSE, np.int64), np.empty((POSE, 3))
+    for p in range(count):
+        used = 0
+        for j in range(POSE):
+            if jacobian[p, 0, j] != 0.0 or jacobian[p, 1, j] != 0.0 or jacobian[p, 2, j] != 0.0:
+                columns[used] = j
+                used += 1
+        for a in range(used):
+            for i in range(3):
+                product[a, i] = 0.0
+                for b in range(used):
+                    product[a, i] += covariance[columns[a], columns[b]] * jacobian[p, i, columns[b]]
+        for i in range(3):
+            for j in range(3):
+                covariances[p, i, j] = 0.0
+                for a in range(used):
+                    covariances[p, i, j] += jacobian[p, i, columns[a]] * product[a, j]
+    place, slope = np.empty(3), np.empty((2, 3))
+    for camera in range(poses.shape[0]):
+        for m in range(half_axes.shape[0]):
+            for i in range(3):
+                place[i] = points[_FIRST_MARKER + m, i] + state[BIAS + 3 * m + i]
+            if project_marker(place, world, half_axes[m], poses[camera], intrinsics[camera], aligned[camera, m],
+                              slope):
+                aligned[camera, m, 0] += residuals[camera, m, 0]
+                aligned[camera, m, 1] += residuals[camera, m, 1]
+            else:
+                aligned[camera, m] = math.nan
+
+
+@njit(cache=True)
+def _conclude(covariance, covariances, shown, finger, markers, joints, angles, angle_sd):
+    """How each value is known; returns that of the palm.
+
+    What is measured, the images alone determine; what they determine through the pose prior is inferred. A fingertip
+    needs its marker, an inner joint two markers on its finger, the palm's rotation three on the palm, an angle two on
+    its finger beside those.
+    """
+    count = np.zeros(6, np.int64)  # markers measured on the palm, then on each finger
+    for m in range(finger.shape[0]):
+        markers[m] = _know(_sd(covariances[_FIRST_MARKER + m]), shown[m], MEASURED_M, INFERRED_M)
+        count[finger[m] + 1] += markers[m] == _MEASURED
+    turn = count[0] >= 3
+    for joint in range(21):
+        needed = 2 if _FINGER_OF_JOINT[joint] >= 0 and (joint - 1) % 4 < 3 else 1
+        joints[joint] = _know(_sd(covariances[joint]), count[_FINGER_OF_JOINT[joint] + 1] >= needed, MEASURED_M,
+                              INFERRED_M)
+    for angle in range(21):
+        angle_sd[angle] = math.sqrt(max(covariance[6 + angle, 6 + angle], 0.0))
+        angles[angle] = _know(angle_sd[angle], turn and count[_FINGER_OF_ANGLE[angle] + 1] >= 2, MEASURED_RAD,
+                              INFERRED_RAD)
+    return _know(_sd(covariance[3:6, 3:6]), turn, MEASURED_RAD, INFERRED_RAD)
+
+
+@njit(cache=True)
+def _know(sd, shown, measured, inferred):
+    if sd <= measured and shown:
+        return _MEASURED
+    return _INFERRED if sd <= inferred else _GUESSED
+
+
+@njit(cache=True)
+def _sd(covariance):
+    return math.sqrt(max(covariance[0, 0] + covariance[1, 1] + covariance[2, 2], 0.0))

@@ -1,0 +1,168 @@
+"""The markers of a rig as the estimator measures them: where they ride on the hand, and what cameras see of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.errors import RigError
+from rhot_app.geometry.camera import CameraModel, distort
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.limits import NaturalPose
+from rhot_app.hand.model import HandModel, build_model
+from rhot_app.hand.places import Place, place_of, with_markers
+from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
+from rhot_app.hand.variants import VariantName, limit_set, make_variant
+from rhot_app.project import Rig
+from rhot_app.tracking.rig_arrays import band_axes
+from rhot_node.markers import FLAT_PATCHES, Marker
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+PAINT_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3}
+"""m: standard deviation of a marker's centre about the place that the hand file gives it, by its shape: paint, its
+shading and the skin under it (`python benchmarks/sight_errors.py`). A blob is paint that nobody measured."""
+
+LASTING_PX = 0.01
+"""px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/sight_errors.py`)."""
+
+NEAREST_M = 0.02
+"""m: nearer to a camera's plane than its housing, nothing is seen."""
+
+_COUPLED_SD_RAD = math.radians(0.02)  # as good as exact
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerModel:
+    """M markers on a hand before C cameras. Read-only.
+
+    `dh`: the hand's table with one point per marker. `finger` (M,): the finger, -1 on the palm. `half_axes` (M, 3) m of
+    their bodies along the palm's axes, zero for flat ones. `slender` (M,): visible area of a fingertip from its side
+    over that from its end, less 1; negative where the size says nothing of the distance. `paint_variance` (M,) m^2.
+    `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 9) as `CameraModel`. `limits` (21, 2) rad.
+    """
+
+    model: HandModel
+    dh: DhArrays
+    finger: Indices
+    half_axes: Array
+    slender: Array
+    paint_variance: Array
+    poses: Array
+    intrinsics: Array
+    natural: NaturalPose
+    limits: Array
+    roles: tuple[str, ...]
+    places: tuple[Place, ...]
+
+    def scaled(self, factor: float) -> MarkerModel:
+        """The markers on a hand `factor` times as large."""
+        return replace(self, dh=scaled_table(self.dh, factor))
+
+    def marker_of(self, role: str) -> int:
+        """The index of the marker with a role, -1 without."""
+        return self.roles.index(role) if role in self.roles else -1
+
+
+def compile_markers(rig: Rig) -> MarkerModel:
+    """The arrays of a validated rig. Raises RigError when a marker has no place on the hand, or another one's."""
+    worn_by: dict[str | None, str] = {}
+    for marker in rig.markers.markers:
+        if marker.role is not None and marker.role in worn_by:
+            raise RigError(f"markers {worn_by[marker.role]!r} and {marker.id!r} both have the role {marker.role!r}; "
+                           "give each a place of its own.")
+        worn_by[marker.role] = marker.id
+    model = with_markers(build_model(rig.hand), rig.markers)
+    places = tuple(place_of(marker, model) for marker in rig.markers.markers)
+    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+    return MarkerModel(
+        model, points_on(model.dh, places), np.array([place.finger for place in places], dtype=np.int64),
+        np.array([_half_axes(marker, model) for marker in rig.markers.markers]),
+        np.array([_slenderness(marker, model) for marker in rig.markers.markers]),
+        np.array([PAINT_SD_M[marker.shape] ** 2 for marker in rig.markers.markers]),
+        np.array([camera.camera_from_world[:3] for camera in cameras]),
+        np.array([camera.intrinsics for camera in cameras]),
+        natural_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
+        tuple(marker.role or "" for marker in rig.markers.markers), places)
+
+
+def scaled_table(dh: DhArrays, factor: float) -> DhArrays:
+    """The table with all lengths times `factor`."""
+    return dh._replace(a=factor * dh.a, d=factor * dh.d, point_offset=factor * dh.point_offset)
+
+
+def points_on(dh: DhArrays, places: tuple[Place, ...]) -> DhArrays:
+    """The same table with the places as its points."""
+    return dh._replace(point_row=np.array([place.row for place in places], dtype=np.int64),
+                       point_offset=np.array([place.point for place in places]).reshape(-1, 3))
+
+
+def _half_axes(marker: Marker, model: HandModel) -> Array:
+    if marker.shape == "band" and marker.role == WRIST_ROLE:
+        return band_axes(marker, model.anatomy)
+    flat = marker.shape not in ("sphere", "capsule", "band") or marker.patch in FLAT_PATCHES
+    return np.full(3, 1e-3 * marker.radius_mm if marker.radius_mm and not flat else 0.0)
+
+
+def _slenderness(marker: Marker, model: HandModel) -> float:
+    """The area of a capsule with ends of radius r, l apart, is pi r^2 + 2 r l sin(angle of view)."""
+    if (marker.role not in TIP_ROLES or marker.shape not in ("capsule", "sphere") or marker.patch != "segment"
+            or marker.gap_deg > 0.0):
+        return -1.0
+    if marker.shape == "sphere":
+        return 0.0
+    finger = TIP_ROLES.index(marker.role)
+    radius = float(model.radii[finger, 2])
+    apart = 2.0 * max(float(model.bones[finger, 2] - model.marker[finger]) - radius, 0.0)
+    return 2.0 * apart / (math.pi * radius)
+
+
+def natural_of(model: HandModel, variant: VariantName) -> NaturalPose:
+    """The natural pose with the variant's couplings, these as good as exactly."""
+    chosen = make_variant(variant, model.anatomy.couplings)
+    basis = chosen.basis
+    bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
+    bound = bound[np.abs(bound).max(axis=1) > 1e-9]
+    return model.natural.and_also(bound, bound @ chosen.mean)
+
+
+@njit(cache=True)
+def project_marker(point, world, half_axes, camera, intrinsics, pixel, slope):
+    """Where the silhouette of a marker at `point` (3,) has its centre: `pixel` (2,) px and `slope` (2, 3) px/m.
+
+    `world` (3, 4): the palm's pose, along whose axes the body lies. False when it is not before the camera.
+    `geometry.silhouette` has the formula; its slope is that of a point.
+    """
+    local = np.empty(3)
+    for i in range(3):
+        local[i] = (camera[i, 3] + camera[i, 0] * point[0] + camera[i, 1] * point[1] + camera[i, 2] * point[2])
+    if not local[2] > NEAREST_M:
+        return False
+    xz, yz, zz = 0.0, 0.0, 0.0
+    if half_axes[0] > 0.0:
+        for axis in range(3):
+            a, b, c = 0.0, 0.0, 0.0
+            for k in range(3):
+                a += camera[0, k] * world[k, axis]
+                b += camera[1, k] * world[k, axis]
+                c += camera[2, k] * world[k, axis]
+            square = half_axes[axis] * half_axes[axis]
+            xz += square * a * c
+            yz += square * b * c
+            zz += square * c * c
+    depth = local[2] * local[2] - zz
+    x, y = (local[0] * local[2] - xz) / depth, (local[1] * local[2] - yz) / depth
+    xd, yd, xx, xy, yx, yy = distort(x, y, intrinsics[4:9])
+    pixel[0] = intrinsics[0] * xd + intrinsics[2]
+    pixel[1] = intrinsics[1] * yd + intrinsics[3]
+    for k in range(3):
+        dx = (camera[0, k] - x * camera[2, k]) / local[2]
+        dy = (camera[1, k] - y * camera[2, k]) / local[2]
+        slope[0, k] = intrinsics[0] * (xx * dx + xy * dy)
+        slope[1, k] = intrinsics[1] * (yx * dx + yy * dy)
+    return True

@@ -1,0 +1,279 @@
+"""States of a recording that use what comes after each instant as well: the estimator, then a pass back over its knots.
+
+There is one state for every frame, at the frame's own time, in the order of time. A hand that is lost ends a segment;
+nothing of one segment tells of another.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from rhot_app.estimation.filter import Knot
+from rhot_app.estimation.smoother import ChunkedSmoother, Estimate
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.project import Rig
+from rhot_app.tracking.acquisition import Located
+from rhot_app.tracking.estimator import Estimator
+from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
+from rhot_app.tracking.hand_process import HandProcess
+from rhot_app.tracking.make import require_estimator
+from rhot_app.tracking.marker_residual import MarkerFrame
+from rhot_app.tracking.state import Condition, HandState
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.two_hands import TwoHands
+
+Kept = TypeVar("Kept")
+
+NOT_SMOOTHED = "only the estimator smooths. Choose it (tracker.kind, or --tracker estimator), or do not smooth."
+"""Why states of another tracker are not smoothed, and what to do."""
+
+_RECENT = 16  # frames: those that an estimator weighs again when it starts are fewer
+_STEP_BACK_NS = 1_000_000_000  # times that are farther back are of another session
+
+_Key = tuple[int, int]  # camera, time of row 0
+
+
+@dataclass(slots=True, eq=False)
+class Instant:
+    """What is kept of one frame. `none`: the state without a hand. `filtered`: the knot. `sightings`, `scale` and
+    `process` are as they were after it. `estimate`: smoothed."""
+
+    number: int
+    observations: CameraObservations
+    t_ns: int
+    none: HandState | None = None
+    sightings: Sightings | None = None
+    scale: tuple[float, float] = (1.0, math.nan)
+    process: HandProcess | None = None
+    filtered: Knot | None = None
+    estimate: Estimate | None = None
+
+
+class RecordingEstimator(Estimator):
+    """An estimator that smooths what it has found. Give it one frame before each `solve`."""
+
+    def __init__(self, rig: Rig) -> None:
+        """Raises RigError as `Estimator` does."""
+        self._count = 0  # of frames
+        self._instants: dict[_Key, Instant] = {}  # that are not final yet, in the order of arrival
+        self._final: list[Instant] = []
+        self._buffered: list[Knot] = []  # late frames may still change them
+        self._scale = 1.0, math.nan
+        self._smoother: ChunkedSmoother | None = None
+        super().__init__(rig)
+
+    def reset(self) -> None:
+        """Forget everything but the states that are not taken yet."""
+        self.conclude()
+        super().reset()
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in."""
+        self._instants.setdefault(_key(observations), Instant(self._count, observations, observations.t_row0_master_ns))
+        self._count += 1
+        super().ingest(observations)
+
+    def solve(self) -> HandState | None:
+        """The filtered state after the frame, None when it came before."""
+        state = super().solve()
+        newest = next(reversed(self._instants.values()), None)
+        if newest is not None and newest.number == self._count - 1 and newest.sightings is None:
+            if state is not None and state.condition in (Condition.SEARCHING, Condition.LOST):
+                newest.none = state
+            else:  # it came before, or is older than the first knot
+                del self._instants[_key(newest.observations)]
+        if self._smoother is None:
+            self._release(self._count - _RECENT)
+        return state
+
+    def smoothed(self) -> Iterator[HandState]:
+        """The states that have become final, in the order of time. Their `sequence` is 0."""
+        for instant in self.taken():
+            yield self.describe(instant, instant.t_ns)
+
+    def taken(self) -> list[Instant]:
+        """The instants that have become final, in the order of time."""
+        final, self._final = self._final, []
+        return final
+
+    def conclude(self) -> None:
+        """The recording, or a part of it, is over: all instants are final."""
+        self._end_segment()
+        self._release(self._count)
+
+    def describe(self, instant: Instant, t_ns: int) -> HandState:
+        """The smoothed state of an instant, predicted to `t_ns` if that is later."""
+        if instant.none is not None:
+            return replace(instant.none, sequence=0)
+        estimate, knot, sightings = instant.estimate, instant.filtered, instant.sightings
+        assert estimate is not None and knot is not None and sightings is not None
+        states, begun = EstimatorStates(self._rig, self._file_size, sightings), time.perf_counter()
+        states.resize(*instant.scale)
+        state, covariance, later_ns = estimate.state, estimate.covariance, max(t_ns - instant.t_ns, 0)
+        if later_ns:
+            state, covariance = estimate.process.predict(state, covariance, 1e-9 * later_ns)
+        # The cameras' last observations are carried on by the estimate that they were compared with.
+        own = states.describe(instant.t_ns, knot.state, knot.covariance, 0, instant.observations, begun)
+        out = states.describe(instant.t_ns + later_ns, state, covariance, 0, instant.observations, begun)
+        return replace(out, marker_raw_positions=own.marker_raw_positions, epipolar_error_px=own.epipolar_error_px)
+
+    # -- what the estimator does -----------------------------------------------------------------------------------
+
+    def _resize(self, log_scale: float, variance: float) -> None:
+        super()._resize(log_scale, variance)
+        self._scale = math.exp(log_scale), math.sqrt(variance)
+
+    def _start(self, located: Located, pose: HandPose) -> None:
+        self._end_segment()
+        self._smoother = ChunkedSmoother()
+        super()._start(located, pose)
+        self._release(self._count)
+
+    def _give_up(self) -> None:
+        super()._give_up()
+        self._end_segment()
+
+    def _weighed(self, frame: MarkerFrame) -> None:
+        instant = self._instants.get(_key(frame.observations))
+        if instant is not None:
+            instant.none, instant.scale = None, self._scale
+            instant.sightings, instant.process = _copied(self._sightings), _copied(self._process)
+        before, knots = self._buffered, list(self._filter.knots)
+        if before and not knots[0].residuals and knots[0] is not before[0]:  # begun anew from the newest one
+            before[-1] = replace(before[-1], state=knots[0].state, covariance=knots[0].covariance)
+            self._smooth_buffered()
+        elif before and len(knots) <= len(before) and [knot.t_s for knot in knots] != [knot.t_s for knot in before]:
+            self._smooth(before[0])
+        self._buffered = knots
+
+    # -- what is final ---------------------------------------------------------------------------------------------
+
+    def _smooth(self, knot: Knot) -> None:
+        """Take a knot that no late frame can change any more."""
+        frame = next((residual for residual in knot.residuals if isinstance(residual, MarkerFrame)), None)
+        if frame is None or self._smoother is None:
+            return
+        instant = self._instants.get(_key(frame.observations))
+        process = None if instant is None else instant.process
+        if instant is not None:
+            instant.filtered, instant.t_ns = knot, self._time_ns(knot.t_s)
+        self._conclude(self._smoother.add(Estimate(
+            knot.t_s, knot.state, knot.covariance, _copied(self._process) if process is None else process, instant)))
+
+    def _smooth_buffered(self) -> None:
+        for knot in self._buffered:
+            self._smooth(knot)
+        self._buffered = []
+
+    def _conclude(self, estimates: list[Estimate]) -> None:
+        for estimate in estimates:
+            if isinstance(estimate.label, Instant):
+                estimate.label.estimate = replace(estimate, label=None)
+                self._final.append(estimate.label)
+                self._instants.pop(_key(estimate.label.observations), None)
+
+    def _end_segment(self) -> None:
+        if self._smoother is None:
+            return
+        self._smooth_buffered()
+        self._conclude(self._smoother.finish())
+        self._smoother = None
+        for key in [key for key, one in self._instants.items() if one.sightings is not None]:
+            del self._instants[key]  # so late that they have no knot of their own
+
+    def _release(self, number: int) -> None:
+        """The frames before `number` that show no hand are final."""
+        for key, one in list(self._instants.items()):
+            if one.number < number and one.none is not None:
+                self._final.append(self._instants.pop(key))
+
+
+class TwoRecordingEstimators(TwoHands):
+    """Two hands, each of whose estimators smooths what it has found."""
+
+    def __init__(self, rig: Rig) -> None:
+        """Raises RigError as `Estimator` does."""
+        super().__init__(rig, RecordingEstimator)
+        self._waiting: tuple[dict[int, Instant], dict[int, Instant]] = {}, {}  # for the same frame of the other hand
+
+    def smoothed(self) -> Iterator[HandState]:
+        """The states of both hands that have become final, in the order of time."""
+        hands = self._recording
+        for tracker, waiting in zip(hands, self._waiting, strict=True):
+            waiting.update((instant.number, instant) for instant in tracker.taken())
+        one, other = self._waiting
+        for number in [number for number in one if number in other]:
+            pair = one.pop(number), other.pop(number)
+            t_ns = max([instant.t_ns for instant in pair if instant.none is None] or [pair[0].t_ns])
+            yield self._merge(*(replace(tracker.describe(instant, t_ns), t_master_ns=t_ns)
+                                for tracker, instant in zip(hands, pair, strict=True)))
+            for waiting in self._waiting:  # what is so far behind has no counterpart
+                for late in [late for late in waiting if late < number - _RECENT]:
+                    del waiting[late]
+
+    def conclude(self) -> None:
+        """The recording is over: all instants are final."""
+        for tracker in self._recording:
+            tracker.conclude()
+
+    @property
+    def _recording(self) -> tuple[RecordingEstimator, RecordingEstimator]:
+        assert isinstance(self._hand, RecordingEstimator) and isinstance(self._other, RecordingEstimator)
+        return self._hand, self._other
+
+
+class SmoothedTracker:
+    """Takes the frames of a recording in the order of arrival, and gives smoothed states in the order of time."""
+
+    def __init__(self, rig: Rig) -> None:
+        """Raises RigError as `make_tracker` does; the rig's tracker must be the estimator."""
+        assert rig.tracker.kind == "estimator"
+        require_estimator(rig)
+        self._tracker = RecordingEstimator(rig) if rig.other_hand is None else TwoRecordingEstimators(rig)
+        self._sequence = 0
+        self._last_ns: int | None = None
+
+    def reset(self) -> None:
+        """Forget everything but the states that are not taken yet: a new session, or a clock was set."""
+        self._tracker.reset()
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame in."""
+        self._tracker.ingest(observations)
+        self._tracker.solve()
+
+    def states(self) -> Iterator[HandState]:
+        """The states that have become final."""
+        for state in self._tracker.smoothed():
+            before_ns, self._last_ns = self._last_ns, state.t_master_ns
+            if before_ns is not None and 0 < before_ns - state.t_master_ns < _STEP_BACK_NS:
+                self._last_ns = before_ns
+                continue  # a frame without a hand that was late
+            other = None if state.other is None else replace(state.other, sequence=self._sequence)
+            yield replace(state, sequence=self._sequence, other=other)
+            self._sequence += 1
+
+    def finish(self) -> Iterator[HandState]:
+        """The rest of the states."""
+        self._tracker.conclude()
+        yield from self.states()
+
+
+def _key(observations: CameraObservations) -> _Key:
+    return observations.camera, observations.t_row0_master_ns
+
+
+def _copied(original: Kept) -> Kept:
+    """A copy with arrays of its own."""
+    out = copy.copy(original)
+    for name, value in vars(original).items():
+        if isinstance(value, np.ndarray):
+            setattr(out, name, value.copy())
+    return out

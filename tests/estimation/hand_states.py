@@ -1,0 +1,82 @@
+"""A hand before two cameras, states of it, and derivatives by central differences."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from synthetic_rig import WIDE, make_rig
+
+from rhot_app.hand.kinematics import forward_arrays
+from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY, HandProcess
+from rhot_app.tracking.marker_model import compile_markers
+
+SPREAD = np.array([0.2, 0.6])
+SLOWEST, FASTEST = np.array([2.0, 4.0, 3.0]), 25.0
+BIAS_S = 1.0
+
+
+@cache
+def markers(bodies=False):
+    """The markers of the rig without images: points, or bodies with a silhouette."""
+    return compile_markers(make_rig(WIDE, bodies=bodies))
+
+
+def make_process(bodies=False, slowest=SLOWEST, fastest=FASTEST):
+    model = markers(bodies)
+    natural = model.natural
+    return HandProcess(model.dh, natural.mean, np.linalg.inv(natural.information), SPREAD, slowest, fastest,
+                       np.tile(1e-6 * np.eye(3), (len(model.finger), 1, 1)), BIAS_S)
+
+
+def natural_state(rng, distance_m=0.6):
+    """A hand at rest in a natural pose, turned any way."""
+    natural, state = markers().natural, np.zeros(BIAS + 3 * len(markers().finger))
+    world = np.eye(4)
+    world[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+    world[:3, 3] = rng.normal([0.03, 0.0, distance_m], 0.02)
+    state[:ANGLES] = world[:3].ravel()
+    state[ANGLES:VELOCITY] = rng.multivariate_normal(natural.mean, np.linalg.inv(natural.information))
+    return state
+
+
+def moving_state(rng, speed=1.0):
+    """A natural pose that moves and turns as a waving hand; paint biases of a millimetre."""
+    state = natural_state(rng)
+    unit = speed * np.repeat([0.3, 2.0, 2.0], [3, 3, 21])
+    state[VELOCITY:ACCELERATION] = unit * rng.normal(size=POSE)
+    state[ACCELERATION:BIAS] = 10.0 * unit * rng.normal(size=POSE)
+    state[BIAS:] = rng.normal(0.0, 1e-3, len(state) - BIAS)
+    return state
+
+
+def world_of(state):
+    """world_from_palm (4, 4)."""
+    return np.vstack([state[:ANGLES].reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
+
+
+def points_of(dh, state):
+    """(P, 3) m, the table's points of the hand in `state`, without biases."""
+    frames, points = np.empty((len(dh.parent), 3, 4)), np.empty((len(dh.point_row), 3))
+    forward_arrays(dh, world_of(state), state[ANGLES:VELOCITY], frames, points)
+    return points
+
+
+def tangent_size(state):
+    return len(state) - BIAS + MOTION
+
+
+def slopes(process, look, state, step=1e-6):
+    """(..., n) central differences of what `look` says of a state by its tangent."""
+    columns = []
+    for unit in np.eye(tangent_size(state)):
+        columns.append((look(process.retract(state, step * unit)) - look(process.retract(state, -step * unit)))
+                       / (2.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+def assert_jacobian(process, residual, state, **tolerance):
+    """The rows' Jacobian is the change of the predicted value, so minus the change of the error."""
+    expected = -slopes(process, lambda moved: residual.linearise(moved).error, state)
+    np.testing.assert_allclose(residual.linearise(state).jacobian, expected, **tolerance)
