@@ -58,6 +58,12 @@ def warm_model_tracker(rig: Rig) -> None:
         rehearse_tracker(make_tracker(chosen), chosen)
 
 
+def warm_estimator(rig: Rig) -> None:
+    """The same with the estimator."""
+    chosen = msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", float_scale=True))
+    rehearse_tracker(make_tracker(chosen), chosen)
+
+
 def warm_twin(_rig: Rig) -> None:
     """Compile what the digital twin draws with."""
     scene = make_scene(twin_defaults(), seed=1)
@@ -93,7 +99,8 @@ def warm_outputs(rig: Rig) -> None:
 
 
 STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker,
-                                           "model tracker": warm_model_tracker, "twin": warm_twin,
+                                           "model tracker": warm_model_tracker, "estimator": warm_estimator,
+                                           "twin": warm_twin,
                                            "boards": warm_boards, "calibrations": warm_calibrations,
                                            "outputs": warm_outputs}
 

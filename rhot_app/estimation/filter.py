@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 ITERATIONS = 3
 """Gauss-Newton steps of an update, at most."""
 
-CONVERGED = 0.1
+CONVERGED = 1e-2
 """Standard deviations of the prior: a shorter last step changes nothing that matters."""
 
 KNOTS = 12

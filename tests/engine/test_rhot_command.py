@@ -96,7 +96,7 @@ def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
     assert smoothed["states"] == pytest.approx(by_model["states"], rel=0.1)
     assert (smoothed["smoothed"], by_model["smoothed"]) == (True, False)
     refused = rhot("replay", str(log_path), "--smooth", "--tracker", "classic")
-    assert refused.returncode == 2 and "only the estimator does" in refused.stderr
+    assert refused.returncode == 2 and "only the estimator smooths" in refused.stderr
     assert summary["states"] > 20
     assert summary["markers"]["wrist"]["measured_fraction"] > 0.9
     ended = rhot("replay", str(log_path), "--speed", "max", "--directory", str(place))

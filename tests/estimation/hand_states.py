@@ -26,7 +26,7 @@ def markers(bodies=False):
 def make_process(bodies=False, slowest=SLOWEST, fastest=FASTEST):
     model = markers(bodies)
     natural = model.natural
-    return HandProcess(model.dh, natural.mean, np.linalg.inv(natural.information), SPREAD, slowest, fastest,
+    return HandProcess(natural.mean, np.linalg.inv(natural.information), SPREAD, slowest, fastest,
                        np.tile(1e-6 * np.eye(3), (len(model.finger), 1, 1)), BIAS_S)
 
 

@@ -29,7 +29,7 @@ def test_a_recording_is_tracked_as_an_engine_would(log: Path, states: HandStates
     assert np.array_equal(found.joint_positions, states.joint_positions, equal_nan=True)
     assert found.conditions == states.conditions and recording.losses == ()
     assert recording.rig == LogReader(log).rig
-    with pytest.raises(api.ExportError, match="only the estimator does"):
+    with pytest.raises(api.ExportError, match="only the estimator smooths"):
         recording.states("classic", smooth=True)
 
 

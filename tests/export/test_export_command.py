@@ -54,7 +54,7 @@ def test_smoothed_states_are_exported_and_the_file_says_so(log: Path, tmp_path: 
     capsys.readouterr()
     rig = ["--rig", str(tmp_path / "classic.json")]
     assert main(["export", str(log), "--out", str(tmp_path / "c.npz"), *rig, "--smooth"]) == 2
-    assert "only the estimator does" in capsys.readouterr().err
+    assert "only the estimator smooths" in capsys.readouterr().err
     assert left(tmp_path) == ["a.npz", "b.npz", "classic.json"]
 
 
@@ -73,7 +73,7 @@ def test_the_file_is_named_as_the_log(log: Path, tmp_path: Path) -> None:
     (("--out", "a.csv", "--format", "trc"), "a trc file ends in .trc"),
     (("--out", "a.csv", "--rate", "0"), "the rate 0 Hz is out of range"),
     (("--out", "a.csv", "--rate", "nan"), "the rate nan Hz is out of range"),
-    (("--out", "a.csv", "--smooth", "--tracker", "classic"), "only the estimator does"),
+    (("--out", "a.csv", "--smooth", "--tracker", "classic"), "only the estimator smooths"),
     (("--out", "a.glb", "--units", "mm"), "gltf files are in m"),
     (("--out", "a.bvh", "--hand", "other_hand"), "has no other_hand to export"),
     (("--out", "nowhere/a.csv"), "nowhere/a.csv: the folder nowhere does not exist"),

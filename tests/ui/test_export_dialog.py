@@ -59,7 +59,7 @@ def test_the_first_rows_follow_the_choices(dialog: ExportDialog, qtbot: Any) -> 
     choose(dialog.tracker_box, "classic")
     dialog.smooth_box.setChecked(True)
     assert dialog.options().smooth
-    qtbot.waitUntil(lambda: "only the estimator does" in dialog.sentence.text(), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: "only the estimator smooths" in dialog.sentence.text(), timeout=PATIENCE_MS)
 
 
 def test_a_file_is_written_in_a_process_of_its_own(dialog: ExportDialog, qtbot: Any, tmp_path: Path) -> None:

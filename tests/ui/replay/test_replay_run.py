@@ -178,5 +178,5 @@ def test_a_smoothed_run_has_the_same_instants_and_the_classic_tracker_is_refused
     assert np.isin(smoothed.times_ns, filtered.times_ns).mean() > 0.95
     roughness = [np.nanstd(np.diff(run.fingertips, 3, axis=0)) for run in (filtered, smoothed)]
     assert len(smoothed.times_ns) == pytest.approx(len(filtered.times_ns), abs=2) and roughness[1] < roughness[0]
-    with pytest.raises(RecordingError, match="only the estimator does"):
+    with pytest.raises(RecordingError, match="only the estimator smooths"):
         track_log(grasp_log, with_tracker(rig, "classic"), tmp_path / "c", True)
