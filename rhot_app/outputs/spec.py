@@ -64,7 +64,7 @@ def web_settings(text: str) -> OutputSettings:
     try:
         host_and_port(settings, "127.0.0.1")
     except OutputError as exc:
-        raise OutputError(f"--web {text}: this is not [HOST:]PORT with a port of 1 to 65535, such as 47810 or "
+        raise OutputError(f"web view on {text}: this is not [HOST:]PORT with a port of 1 to 65535, such as 47810 or "
                           "0.0.0.0:47810.") from exc
     return settings
 

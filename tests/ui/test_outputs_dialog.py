@@ -111,7 +111,7 @@ def test_the_first_one_is_added_by_two_keys_and_removed_and_taken_back(page):
 @pytest.mark.parametrize(("kind", "target", "sentence"), [
     ("osc", "127.0.0.1:99999", "Output 'osc:127.0.0.1:99999': there is no port 99999; ports are 1 to 65535."),
     ("osc", "9000", "is not HOST:PORT, such as osc:192.168.1.20:9000."),
-    ("ws", "here", "is not [HOST:]PORT"), ("web", "127.0.0.1:0", "there is no port 0"),
+    ("ws", "here", "is not [HOST:]PORT"), ("web", "127.0.0.1:0", "not [HOST:]PORT with a port of 1 to 65535"),
     ("zenoh", "router", "is not HOST:PORT"), ("ws", "127.0.0.1:9001", "is in the list already")])
 def test_what_cannot_be_is_refused_with_a_sentence(page, kind, target, sentence):
     desk = page(msgspec.structs.replace(WS, joints="own", rate_hz=None))

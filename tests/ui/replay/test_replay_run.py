@@ -173,7 +173,7 @@ def test_a_recording_under_way_is_played_so_far(grasp_log, tmp_path):
 
 
 def test_a_smoothed_run_has_the_same_instants_and_the_classic_tracker_is_refused(grasp_log, tmp_path):
-    rig = with_tracker(rig_of(grasp_log), "model")
+    rig = with_tracker(rig_of(grasp_log), "estimator")
     filtered, smoothed = (track_log(grasp_log, rig, tmp_path / str(smooth), smooth) for smooth in (False, True))
     assert np.isin(smoothed.times_ns, filtered.times_ns).mean() > 0.95
     roughness = [np.nanstd(np.diff(run.fingertips, 3, axis=0)) for run in (filtered, smoothed)]
