@@ -42,7 +42,7 @@ def engine(folder: Path, *arguments: str) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize(("arguments", "sentence"), [
     (["--output", "pigeon:coop"], "there is no output 'pigeon'"), (["--output", "osc:9000"], "is not HOST:PORT"),
-    (["--output", "ws:9001?hz=0"], "not a rate above 0"), (["--web", "127.0.0.1:99999"], "99999: this is not [HOST:]PORT"),
+    (["--output", "ws:9001?hz=0"], "not a rate above 0"), (["--web", "127.0.0.1:99999"], "99999: this is not ["),
     ([], "'pager:x'")])
 def test_what_cannot_be_is_refused(tmp_path: Path, arguments: list[str], sentence: str) -> None:
     rig = synthetic_rig()
