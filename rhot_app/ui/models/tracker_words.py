@@ -15,8 +15,8 @@ KINDS: Final = {
     "model": ("Model", "One hand estimated from everything that every camera sees, at the time it was seen. A marker "
               "that one camera sees counts, hidden fingers are carried on, and every joint says how well it is known. "
               "Needs calibrated cameras with clocks."),
-    "estimator": ("Estimator", "The same by a simpler filter, which will replace the model tracker. It can smooth "
-                  "recordings. Needs calibrated cameras with clocks."),
+    "estimator": ("Estimator", "On trial: the same by a simpler filter. It alone smooths recordings; the model "
+                  "tracker is nearer in a grasp. Needs calibrated cameras with clocks."),
 }
 VARIANTS: Final = {
     "full": ("full: every joint by itself", "27 degrees of freedom. The default."),
