@@ -42,7 +42,7 @@ def test_web_addresses(text: str, target: str) -> None:
 
 @pytest.mark.parametrize("text", ["host:abc", "1.2.3.4:99999", "0", "x y"])
 def test_a_bad_web_address_is_named_as_typed(text: str) -> None:
-    with pytest.raises(OutputError, match=rf"^--web {re.escape(text)}: this is not \[HOST:\]PORT"):
+    with pytest.raises(OutputError, match=rf"^web view on {re.escape(text)}: this is not \[HOST:\]PORT"):
         web_settings(text)
 
 
