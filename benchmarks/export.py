@@ -1,5 +1,7 @@
 """What an export costs: times real time and memory, by format and tracker; and what a second worker saves a batch.
 
+The batch is run by rhot's own workers and, with the extra [cluster], by the workers of a Dask cluster on this machine.
+
     python benchmarks/export.py [--seconds 600] [--formats csv,c3d] [--trackers classic,model] [--batch 8] [--json F]
 
 The log is a sketched grasp of two cameras, 40 frames/s each (kept in ~/.cache/rhot/takes; sketching it takes a third
@@ -77,21 +79,28 @@ def exports(log: Path, seconds: float, trackers: list[str], formats: list[str]) 
 
 
 def batches(log: Path, count: int) -> dict[str, float]:
-    """The same logs with one worker and with two."""
+    """The same logs with one worker and with two, by rhot's own workers and by a Dask cluster's."""
+    from distributed import LocalCluster
+
+    found = {}
     with tempfile.TemporaryDirectory() as folder:
         logs = [Path(folder) / f"log{number}.rhotlog" for number in range(count)]
         for path in logs:
             shutil.copy(log, path)
-        names = [str(path) for path in logs]
-        found = {}
+
+        def batch(out: str, *options: str) -> float:
+            return measured(["batch", *map(str, logs), "--do", "export", "--format", "npz", "--tracker", "classic",
+                             "--out", str(Path(folder) / out), *options])[0]
+
         for workers in (1, 2):
-            out = Path(folder) / f"out{workers}"
-            wall_s, _, _ = measured(["batch", *names, "--do", "export", "--format", "npz", "--tracker", "classic",
-                                     "--out", str(out), "--workers", str(workers)])
-            found[f"workers_{workers}_s"] = wall_s
-    found["gain"] = found["workers_1_s"] / found["workers_2_s"]
-    print(f"{count} logs: 1 worker {found['workers_1_s']:.1f} s, 2 workers {found['workers_2_s']:.1f} s, "
-          f"{found['gain']:.2f} times as fast (goal 1.7)")
+            found[f"workers_{workers}_s"] = batch(f"own{workers}", "--workers", str(workers))
+            with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
+                found[f"dask_{workers}_s"] = batch(f"dask{workers}", "--scheduler", cluster.scheduler_address)
+    for kind, name in (("workers", "own workers"), ("dask", "Dask cluster")):
+        one_s, two_s = found[f"{kind}_1_s"], found[f"{kind}_2_s"]
+        found[f"{kind}_gain"] = one_s / two_s
+        print(f"{count} logs, {name}: 1 worker {one_s:.1f} s, 2 workers {two_s:.1f} s, {one_s / two_s:.2f} times as "
+              f"fast (goal 1.7)")
     return found
 
 
