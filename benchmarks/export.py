@@ -1,6 +1,6 @@
 """What an export costs: times real time and memory, by format and tracker; and what a second worker saves a batch.
 
-The batch is run by rhot's own workers and, with the extra [cluster], by the workers of a Dask cluster on this machine.
+The batch is run by rhot's own workers, and by those of a Dask cluster on this machine (extra [cluster]).
 
     python benchmarks/export.py [--seconds 600] [--formats csv,c3d] [--trackers classic,model] [--batch 8] [--json F]
 
@@ -20,6 +20,8 @@ import tempfile
 import time
 from pathlib import Path
 from typing import Any
+
+from distributed import LocalCluster
 
 from rhot_app.evaluation.takes import LOG_NAME, Order, take, takes_folder
 from rhot_app.export.export import FORMATS
@@ -80,8 +82,6 @@ def exports(log: Path, seconds: float, trackers: list[str], formats: list[str]) 
 
 def batches(log: Path, count: int) -> dict[str, float]:
     """The same logs with one worker and with two, by rhot's own workers and by a Dask cluster's."""
-    from distributed import LocalCluster
-
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         logs = [Path(folder) / f"log{number}.rhotlog" for number in range(count)]

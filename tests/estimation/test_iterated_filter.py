@@ -257,3 +257,47 @@ def test_iterating_gets_nearer_to_the_mode_of_a_nonlinear_observation(truth):
     curvature = np.linalg.inv(np.linalg.inv(covariance)
                               + np.diag([np.exp(mode[0]) ** 2 / residual.sd**2, 0.0]))
     assert iterated.covariance[0, 0] == pytest.approx(curvature[0, 0], rel=0.3)
+
+
+class Resting:
+    """A point of a plane that stays where it is; implements `Process`."""
+
+    size = 2
+    stationary = np.eye(2)
+
+    def retract(self, state, step):
+        return state + step
+
+    def difference(self, state, origin):
+        return state - origin
+
+    def predict(self, state, covariance, dt_s):
+        return state.copy(), covariance.copy()
+
+    def transition(self, state, dt_s):
+        return np.eye(2)
+
+
+class Polar:
+    """Distance from the origin and direction, rad, of the point."""
+
+    def __init__(self, distance, direction):
+        self.values = np.array([distance, direction])
+
+    def linearise(self, state):
+        x, y = state
+        r = np.hypot(x, y)
+        return Rows(self.values - [r, np.arctan2(y, x)], np.array([[x / r, y / r], [-y / r**2, x / r**2]]),
+                    np.array([1e-4, 0.5]) ** 2)
+
+
+@pytest.mark.xfail(strict=True, reason="the transport of the covariance does not cover weakly observed directions")
+def test_what_only_weak_observations_show_is_known_no_better_than_they_show_it():
+    """Each sharp distance is linearised in another direction, as the weakly observed one moves the estimate."""
+    rng, estimate, count = np.random.default_rng(3), IteratedFilter(Resting()), 60
+    estimate.start(0.0, np.array([1.0, 0.0]), np.diag([0.1, 0.3]) ** 2)
+    for k in range(count):
+        estimate.add(0.01 * (k + 1), [Polar(1.0 + 1e-4 * rng.normal(), 0.5 * rng.normal())])
+    x, y = estimate.newest.state
+    sideways = np.array([-y, x])
+    assert np.sqrt(sideways @ estimate.newest.covariance @ sideways) > 0.7 * 0.5 / np.sqrt(count)
