@@ -6,7 +6,7 @@ import contextlib
 import importlib
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -85,7 +85,7 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
     check_options(name, options)
     _check_place(log, out, again)
     with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98), smooth=options.smooth) as tracked:
-        notes = _write(tracked, name, options, out)
+        notes = _write(tracked, name, options, out, lambda: progress(f"writing {out.name}", 0.99))
         if not tracked.tracked:
             notes.append(f"the hand is tracked in none of the {tracked.count} states")
         progress(f"exported {log.name}", 1.0)
@@ -117,8 +117,8 @@ def _check_place(log: Path, out: Path, again: bool) -> None:
         raise ExportError(f"{out} exists already; choose another --out, or write over it with --again.")
 
 
-def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path) -> list[str]:
-    with _whole_file(out) as path:
+def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, ready: Callable[[], None]) -> list[str]:
+    with _whole_file(out, ready) as path:
         writer: Writer | None = None
         try:
             for plan, states in _prepared(tracked, name, options, path):
@@ -173,9 +173,9 @@ def _writer(name: str, plan: Plan) -> Writer:
 
 
 @contextlib.contextmanager
-def _whole_file(out: Path) -> Iterator[Path]:
-    """A hidden file that becomes `out` when the block ends, or vanishes when it fails. Raises ExportError where the
-    disk refuses."""
+def _whole_file(out: Path, ready: Callable[[], None]) -> Iterator[Path]:
+    """A hidden file that becomes `out` when the block ends, or vanishes when it fails, or when `ready` raises, which is
+    asked last. Raises ExportError where the disk refuses."""
     path: Path | None = None
     try:
         handle, hidden = tempfile.mkstemp(dir=out.parent, prefix=f".{out.stem}.", suffix=out.suffix)
@@ -185,6 +185,7 @@ def _whole_file(out: Path) -> Iterator[Path]:
         with path.open("rb+") as file:
             os.fsync(file.fileno())
         path.chmod(0o644)
+        ready()
         path.replace(out)
     except OSError as exc:
         raise ExportError(f"{out}: cannot be written ({exc.strerror or exc}). Nothing was left of it; make room, or "

@@ -9,7 +9,6 @@ import os
 import signal
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
 
 from rhot_app.errors import ExportError, RhotError
 from rhot_app.export.export import Exported, check_options, export_log
@@ -52,6 +51,7 @@ def export_apart(log: Path, out: Path, format_name: str, options: ExportOptions,
     except EOFError as exc:
         raise ExportError(f"{out}: the export's process died; is there enough memory?") from exc
     except BaseException:
+        here.close()  # the other process asks before it renames its file; an interrupt alone can be lost in an import
         with contextlib.suppress(ProcessLookupError):
             os.kill(child.pid or 0, signal.SIGINT)
         raise
@@ -63,17 +63,18 @@ def export_apart(log: Path, out: Path, format_name: str, options: ExportOptions,
 
 def _export(there: Connection, log: Path, out: Path, format_name: str, options: ExportOptions) -> None:
     """The other process."""
-    def say(kind: str, value: Any) -> None:
-        with contextlib.suppress(BrokenPipeError):
-            there.send((kind, value))
+    def report(text: str, fraction: float) -> None:
+        try:
+            there.send(("progress", (text, fraction)))
+        except BrokenPipeError:
+            raise KeyboardInterrupt from None
 
-    try:
-        say("done", export_log(log, out, format_name=format_name, options=options, again=True,
-                               progress=lambda text, fraction: say("progress", (text, fraction))))
-    except (RhotError, OSError) as exc:
-        say("failed", str(exc))
-    except KeyboardInterrupt:
-        return
+    with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
+        try:
+            exported = export_log(log, out, format_name=format_name, options=options, again=True, progress=report)
+            there.send(("done", exported))
+        except (RhotError, OSError) as exc:
+            there.send(("failed", str(exc)))
 
 
 def first_states(log: Path, format_name: str, options: ExportOptions, count: int) -> HandStates:

@@ -18,6 +18,7 @@ from rhot_app.__main__ import main
 from rhot_app.errors import ExportError
 from rhot_app.export.export import FORMATS, export_log
 from rhot_app.export.plan import ExportOptions
+from rhot_app.export.process import export_apart
 from rhot_app.project import save_rig, with_tracker
 from rhot_app.recording.raw_log import MAGIC, VERSION, LogReader, RecordKind, encode_header, encode_record
 
@@ -181,6 +182,17 @@ def test_an_interrupt_at_the_last_moment_leaves_nothing(name: str, log: Path, tm
     monkeypatch.setattr(os, "fsync", interrupted)
     with pytest.raises(KeyboardInterrupt):
         export_log(log, tmp_path / f"a{ending(name)}", options=ExportOptions(tracker="classic"))
+    assert left(tmp_path) == []
+
+
+def test_a_cancel_whose_interrupt_is_lost_leaves_nothing(log: Path, tmp_path: Path,
+                                                         monkeypatch: pytest.MonkeyPatch) -> None:
+    def cancelled(text: str, fraction: float) -> None:
+        raise InterruptedError
+
+    monkeypatch.setattr("rhot_app.export.process.os.kill", lambda *args: None)
+    with pytest.raises(InterruptedError):
+        export_apart(log, tmp_path / "a.csv", "csv", ExportOptions(tracker="classic"), cancelled)
     assert left(tmp_path) == []
 
 
