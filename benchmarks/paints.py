@@ -99,14 +99,14 @@ def rows(name: str, args: argparse.Namespace, folder: Path) -> list[dict[str, An
 def table(figures: list[dict[str, Any]]) -> str:
     """The rows of each side, whole segments first."""
     lines = []
-    heads = "".join(f"{name:>18}" for name in ("measured", "tips mm", "angles deg"))
-    kinds = "".join(f"{tracker:>9}" for tracker in TRACKERS) * 3
+    heads = "".join(f"{name:>{10 * len(TRACKERS)}}" for name in ("measured", "tips mm", "angles deg"))
+    kinds = "".join(f"{tracker:>10}" for tracker in TRACKERS) * 3
     for side in BOTH:
         rows = [row for row in figures if row["side"] == side]
         if rows:
             lines += [f"{side + ' to the cameras':24}{'in view':>9}{'tips seen':>11}{heads}", f"{'':44}{kinds}"]
         for row in rows:
-            cells = "".join(f"{_cell(row[tracker][key]):>9}"
+            cells = "".join(f"{_cell(row[tracker][key]):>10}"
                             for key in ("measured_share", "tip_measured_mm", "angles_deg")
                             for tracker in TRACKERS)
             note = "  the paint is on the other side" if row["tips_seen"] < 0.5 else ""
