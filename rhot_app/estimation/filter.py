@@ -91,14 +91,11 @@ class IteratedFilter:
 def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: Sequence[Residual]) -> Knot:
     """The posterior of a `prior` (state, covariance) and residuals.
 
-    `away` is the present state less the prior's, in the tangent space of the present state. Whenever the state moves,
-    the covariance is transported: errors that no residual saw at the old state are seen by none at the new one.
-    Linearised anew without that, a filter soon believes to know what nothing observes (Huang, Mourikis and Roumeliotis
-    2010).
+    `away` is the present state less the prior's, in the tangent space of the present state.
     """
     state, covariance = prior
     away, weights, distance, before = np.zeros(process.size), np.empty(0), 0.0, np.inf
-    cross, root, last, seen = np.empty((process.size, 0)), np.empty((0, 0)), (state, away), None
+    cross, root, last = np.empty((process.size, 0)), np.empty((0, 0)), (state, away)
     for iteration in range(ITERATIONS):
         error, jacobian, variances, cost, weights = stack(
             [residual.linearise(state) for residual in residuals], process.size, weigh=iteration > 0)
@@ -108,41 +105,12 @@ def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: 
             state, away, distance = process.retract(last[0], 0.5 * last[1]), away - 0.5 * last[1], 0.5 * distance
             continue
         before = cost + distance
-        if seen is not None:
-            covariance, away = _transport(covariance, away, seen, jacobian, process.stationary)
         cross, root, reached, distance, moved = _solve(covariance, jacobian, error, variances, away)
-        last, seen = (state, reached - away), jacobian
+        last = (state, reached - away)
         state, away = process.retract(state, reached - away), reached
         if iteration and moved < CONVERGED**2:
             break
     return Knot(t_s, state, _reduce(covariance, cross, root), list(residuals), weights)
-
-
-@njit(cache=True)
-def _transport(covariance: Array, away: Array, old: Array, new: Array, stationary: Array) -> tuple[Array, Array]:
-    """Covariance (n, n) and vector (n,) after the Jacobian of the whitened rows changed from `old` to `new` (K, n).
-
-    S(H) = 1 - G H with G = C H' (1 + H C H')^-1 projects on the errors that H does not see, C the `stationary`
-    covariance. The map is 1 + (S(new) - S(old)) S(old): what was not seen stays so, and the rest is left as it is.
-    """
-    gain, new_gain = _gain(old, stationary), _gain(new, stationary)
-    count = old.shape[0]
-    left = np.empty((covariance.shape[0], count + new.shape[0]))
-    left[:, :count], left[:, count:] = gain, -new_gain
-    right = np.empty((count + new.shape[0], covariance.shape[0]))
-    right[:count] = old - np.dot(np.dot(old, gain), old)
-    right[count:] = new - np.dot(np.dot(new, gain), old)
-    out = covariance + np.dot(left, np.dot(right, covariance))
-    return out + np.dot(np.dot(out, right.T), left.T), away + np.dot(left, np.dot(right, away))
-
-
-@njit(cache=True)
-def _gain(jacobian: Array, stationary: Array) -> Array:
-    cross = np.dot(stationary, jacobian.T)
-    total = np.dot(jacobian, cross)
-    for k in range(total.shape[0]):
-        total[k, k] += 1.0
-    return np.ascontiguousarray(np.linalg.solve(total, cross.T).T)
 
 
 @njit(cache=True)

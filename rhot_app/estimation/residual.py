@@ -82,14 +82,9 @@ class Residual(Protocol):
 
 
 class Process(Protocol):
-    """How a state moves. A state is a flat array; its tangent space has `size` numbers.
-
-    `stationary` (n, n): a covariance of a state of which nothing was observed; the metric in which directions that are
-    observed are told from those that are not.
-    """
+    """How a state moves. A state is a flat array; its tangent space has `size` numbers."""
 
     size: int
-    stationary: Array
 
     def retract(self, state: Array, step: Array) -> Array:
         """The state moved by `step` (n,) of its tangent space."""

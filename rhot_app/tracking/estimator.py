@@ -22,7 +22,7 @@ from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
 from rhot_app.tracking.hand_process import ANGLES, VELOCITY, HandProcess
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
-from rhot_app.tracking.marker_residual import JointLimits, MarkerFrame, triangulation_covariance
+from rhot_app.tracking.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
@@ -31,11 +31,12 @@ from rhot_node.wire.messages import MarkerFlag
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-PALM_SPREAD = np.array([0.2, 0.6])
-"""m and rad: how far a palm moves and turns within one correlation time."""
+PALM_SPREAD = np.array([0.055, 0.25])
+"""m and rad: how far a palm moves and turns within one correlation time (`python benchmarks/process_prior.py`)."""
 
-SLOWEST, FASTEST = np.array([1.5, 3.0, 2.5]), 15.0
-"""1/s: rates of a hand at rest (palm translation, palm rotation, angles), and of the fastest one."""
+SLOWEST, FASTEST = np.full(3, 3.4), 15.0
+"""1/s: rates of a hand at rest (palm translation, palm rotation, angles; `python benchmarks/process_prior.py`), and of
+the fastest one."""
 
 BIAS_S = 1.0
 """s: correlation time of the paint biases: hands turn so that other paint shows."""
@@ -73,10 +74,9 @@ class Estimator:
         if rig.tracker.float_scale:
             self._size = HandSize(self._markers.dh, self._markers.limits, natural, self._markers.paint_variance)
         covariance = np.asarray(np.linalg.inv(natural.information), dtype=np.float64)
-        self._process = HandProcess(natural.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
-                                    np.zeros((len(self._rig.marker_ids), 3, 3)), BIAS_S)
+        self._process = HandProcess(self._markers.dh, self._markers.limits, natural.mean, covariance, PALM_SPREAD,
+                                    SLOWEST, FASTEST, np.zeros((len(self._rig.marker_ids), 3, 3)), BIAS_S)
         self._filter = IteratedFilter(self._process)
-        self._limits = JointLimits(self._markers.limits)
         self._starter = Starter(self._rig, self._markers)
         self._association = MarkerAssociation(self._rig)  # without a prediction, by rays
         self._sightings = Sightings(self._rig, self._markers)
@@ -95,7 +95,7 @@ class Estimator:
             self._resize(*self._size.known)
         self._tracking = self._ever = False
         self._epoch_ns = self._accepted_ns = self._plausible_ns = 0
-        self._rejected = np.zeros(len(self._rig.marker_ids), np.int64)
+        self._rejected = np.zeros((len(self._rig.cameras), len(self._rig.marker_ids)), np.int64)
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
@@ -187,6 +187,7 @@ class Estimator:
     def _resize(self, log_scale: float, variance: float) -> None:
         """Let the hand be exp(`log_scale`) times as large as its file says, with `variance` of the logarithm."""
         self._markers = self._file_size.scaled(math.exp(log_scale))
+        self._process.dh = self._markers.dh
         self._states.resize(math.exp(log_scale), math.sqrt(variance))
 
     def _give_up(self) -> None:
@@ -198,13 +199,13 @@ class Estimator:
         t_s = self._seconds(frame.t_ns)
         candidates = np.count_nonzero(frame.seen)
         prediction = self._filter.predict(t_s)
+        self._sightings.note_sizes(frame, prediction[0])
         pixels, covariances = frame.predict_pixels(*prediction)
         distances = _distances(frame, pixels, covariances)
         frame = self._associate(frame, pixels, covariances, distances)
         self._note_bias(prediction[0])
-        self._sightings.note_sizes(frame, prediction[0])
         try:
-            knot = self._filter.add(t_s, [frame, self._limits], prediction)
+            knot = self._filter.add(t_s, [frame], prediction)
         except np.linalg.LinAlgError:  # the estimate contradicts itself
             self._give_up()
             return
@@ -221,11 +222,12 @@ class Estimator:
         """A frame has its knot; covariances are not inflated yet. A recording is smoothed from here (`smoothing`)."""
 
     def _reacquire(self, frame: MarkerFrame, accepted: Mask, distances: Array) -> None:
-        """Inflate the covariance of a finger, or of the palm, whose marker is rejected REJECTIONS times in a row:
-        outliers do not last. `distances` (M,): squared Mahalanobis distances, 2 on average."""
-        self._rejected[accepted] = 0
-        self._rejected[self._reported(frame) & ~accepted] += 1
-        for m in np.flatnonzero((self._rejected >= REJECTIONS) & (distances > GATE)):
+        """Inflate the covariance of a finger, or of the palm, whose marker one camera rejects REJECTIONS times in
+        a row: outliers do not last. `distances` (M,): squared Mahalanobis distances, 2 on average."""
+        rejected = self._rejected[frame.camera]
+        rejected[accepted] = 0
+        rejected[self._reported(frame) & ~accepted] += 1
+        for m in np.flatnonzero((rejected >= REJECTIONS) & (distances > GATE)):
             finger, knot = self._markers.finger[m], self._filter.newest
             angles = ANGLE_SLICES[finger]
             chosen = slice(6 + angles.start, 6 + angles.stop) if finger >= 0 else slice(0, 6)

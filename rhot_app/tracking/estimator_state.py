@@ -35,6 +35,10 @@ MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
 SIZE_FRAMES = 10
 """Frames in which a fingertip's size is learnt before it is used."""
 
+SIZE_FLOOR = 0.005
+"""Standard deviation of the logarithm of a fingertip's width by what the pose and the light change about it, at least
+(`python benchmarks/sight_errors.py`)."""
+
 _SIZE_MEMORY = 200  # frames over which a fingertip's size is averaged
 _SAME_FRAME_NS = 1_000_000
 _RECENT = 12
@@ -77,7 +81,8 @@ class Sightings:
         self.newest: list[CameraObservations | None] = [None] * cameras
         self.pixels, self.flags = np.full((*shape, 2), np.nan), np.full(shape, _LOST, np.uint16)
         self._frames: list[MarkerFrame] = []
-        self._log_width, self._sized = np.zeros(markers), np.zeros(markers)
+        self._log_width, self._width_variance = np.zeros(markers), np.full(markers, SIZE_SD**2)
+        self._sized = np.zeros(markers)
 
     @property
     def shortest_period_s(self) -> float:
@@ -110,16 +115,14 @@ class Sightings:
         return sorted((frame for frame in self._frames if frame.t_ns >= since_ns), key=lambda frame: frame.t_ns)
 
     def note_sizes(self, frame: MarkerFrame, state: Array) -> None:
-        """Learn how wide the fingertips are that another camera sees too; of the others, let the frame use that."""
+        """Learn how wide each fingertip is, and how much that varies, while another camera sees it too. The frame uses
+        it for the others. A fingertip that looks smaller is partly hidden, and its centroid is less certain."""
         widths = frame.widths(state)
-        others = np.delete(self.times, frame.camera, axis=0).max(axis=0, initial=_NEVER)
-        both = frame.t_ns - others < 2 * self.fresh_ns.max()
-        learn = np.isfinite(widths) & both
-        self._sized[learn] = np.minimum(self._sized[learn] + 1.0, _SIZE_MEMORY)
-        self._log_width[learn] += (widths[learn] - self._log_width[learn]) / self._sized[learn]
-        use = np.isfinite(widths) & ~both & (self._sized >= SIZE_FRAMES)
-        frame.log_width = np.where(use, self._log_width, np.nan)
-        frame.size_sd = SIZE_SD * math.sqrt(max(SIZE_S / self.periods_s[frame.camera], 1.0))
+        frame.covariances = frame.covariances.copy()
+        frame.log_width, frame.size_sd = np.full(len(widths), np.nan), np.empty(len(widths))
+        _note_sizes(frame.camera, frame.t_ns, self.times, 2 * self.fresh_ns.max(), widths, frame.diameters,
+                    max(SIZE_S / self.periods_s[frame.camera], 1.0), self._sized, self._log_width,
+                    self._width_variance, frame.log_width, frame.size_sd, frame.covariances)
 
     def accept(self, frame: MarkerFrame, state: Array, weights: Array) -> Mask:
         """Note the observations of a frame, after which the hand is in `state`; returns which are inliers (M,)."""
@@ -151,6 +154,8 @@ class EstimatorStates:
                  begun: float) -> HandState:
         """The state of master time `t_ns`; work on it began at `begun`, s of `time.perf_counter`."""
         solved, rig, sightings, m = time.perf_counter(), self._rig, self._sightings, self._markers
+        state = state.copy()
+        state[ANGLES:VELOCITY] = np.minimum(np.maximum(state[ANGLES:VELOCITY], m.limits[:, 0]), m.limits[:, 1])
         count = len(rig.marker_ids)
         points, covariances = np.empty((_FIRST_MARKER + count, 3)), np.empty((_FIRST_MARKER + count, 3, 3))
         age = np.abs(t_ns - sightings.times)
@@ -206,6 +211,32 @@ class EstimatorStates:
             **UNESTIMATED | {"hand_scale": self._scale, "hand_scale_sd": self._scale_sd},
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": time.perf_counter() - begun, "solve": 0.0})
+
+
+@njit(cache=True)
+def _note_sizes(camera, t_ns, times, fresh_ns, widths, diameters, correlated, sized, log_width, variance, out, out_sd,
+                pixel_covariances):
+    """`correlated`: frames that count as one observation."""
+    for m in range(widths.shape[0]):
+        out_sd[m] = math.sqrt((variance[m] + SIZE_FLOOR**2) * correlated)
+        if math.isnan(widths[m]):
+            continue
+        both = False
+        for other in range(times.shape[0]):
+            both |= other != camera and t_ns - times[other, m] < fresh_ns
+        known = sized[m] >= SIZE_FRAMES
+        if not both:
+            out[m] = log_width[m] if known else math.nan
+            continue
+        wider = widths[m] - log_width[m]
+        if known and wider < -SIZE_SD:  # a cap of the disc is hidden; its centroid moves so far, in any direction
+            moved_px2 = 0.5 * (wider * diameters[m]) ** 2
+            pixel_covariances[m, 0, 0] += moved_px2
+            pixel_covariances[m, 1, 1] += moved_px2
+        sized[m] = min(sized[m] + 1.0, _SIZE_MEMORY)
+        log_width[m] += wider / sized[m]
+        if sized[m] > 1.0:
+            variance[m] += (wider * wider - variance[m]) / sized[m]
 
 
 @njit(cache=True)

@@ -3,6 +3,10 @@
 Angles are a Matérn 5/2 process about the natural pose, with its covariance. The palm's velocity is a Matérn 3/2 process
 without a preferred place. Paint biases are a first-order process. The rates of the processes follow the hand: the
 faster it is estimated to move, the shorter is the correlation time.
+
+The past is remembered by the places of the markers only. What these leave open of the pose, of its velocity and of its
+acceleration is drawn anew from the pose prior at every prediction. A filter that linearises anew with every frame
+would otherwise believe to know it (Huang, Mourikis and Roumeliotis 2010).
 """
 
 from __future__ import annotations
@@ -14,7 +18,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.gauss_markov import integrated, integrated_noise, matern52, matern52_noise
-from rhot_app.hand.kinematics import move, rotation_vector
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, move, rotation_vector
+from rhot_app.hand.skeleton import ANGLE_SLICES
 
 Array = NDArray[np.float64]
 
@@ -28,21 +34,31 @@ WORLD, ANGLES, VELOCITY, ACCELERATION, BIAS = 0, 12, 33, 60, 87
 """Where a state's numbers begin: world_from_palm (3, 4), angles (21,), velocity (27,), acceleration (27,), and the
 paint biases (M, 3) m along the world's axes."""
 
+REMEMBERED_M = 0.3e-3
+"""m: how well a marker's place is remembered; paint is not known better (`marker_model.PAINT_SD_M`)."""
+
+LIMIT_SD_RAD = math.radians(0.5)
+"""rad: how far joints go beyond their passive limits."""
+
+_PALM_INFORMATION = 0.1  # 1/m^2 and 1/rad^2: the prior says nothing of the palm, which may be metres away
+_STEPS, _TRIAL_STEPS = 2, 6  # of Gauss-Newton, and from another bend
+_SURELY = 2.0  # of -2 log probability: another bend is taken that is e times as probable
+_FIRST_ANGLE = np.array([angles.start for angles in ANGLE_SLICES] + [21])
 _GROUPS = np.array([0] * 3 + [1] * 3 + [2] * 21)
 
 
 class HandProcess:
     """Implements `estimation.residual.Process`; M markers.
 
-    `mean` (21,) rad and `covariance` (21, 21) of the natural pose. `spread` (2,): standard deviations of the palm's
-    translation, m, and rotation, rad, over one correlation time. `slowest` (3,) and `fastest` 1/s: limits of the rates
-    of translation, rotation and angles. `bias_s`: correlation time of the paint biases. `bias` (M, 3, 3) m^2: their
-    covariances.
+    `dh` has a point for each marker; `limits` (21, 2) rad. `mean` (21,) rad and `covariance` (21, 21) of the natural
+    pose. `spread` (2,): standard deviations of the palm's translation, m, and rotation, rad, over one correlation time.
+    `slowest` (3,) and `fastest` 1/s: limits of the rates of translation, rotation and angles. `bias` (M, 3, 3) m^2:
+    covariances of the paint biases, and `bias_s` their correlation time.
     """
 
-    def __init__(self, mean: Array, covariance: Array, spread: Array, slowest: Array, fastest: float, bias: Array,
-                 bias_s: float) -> None:
-        self.mean = mean
+    def __init__(self, dh: DhArrays, limits: Array, mean: Array, covariance: Array, spread: Array, slowest: Array,
+                 fastest: float, bias: Array, bias_s: float) -> None:
+        self.dh, self._limits, self.mean = dh, limits, mean
         self._angles, self._information = covariance, np.linalg.inv(covariance)
         self._spread, self._slowest, self._fastest, self._bias_s = spread, slowest, fastest, bias_s
         self.size = MOTION + 3 * len(bias)
@@ -89,15 +105,20 @@ class HandProcess:
     def predict(self, state: Array, covariance: Array, dt_s: float) -> tuple[Array, Array]:
         """See `Process`. Long times are taken in steps in which the rates change little."""
         state, covariance = state.copy(), covariance.copy()
-        _predict(state, covariance, dt_s, self.mean, self._angles, self._information, self._spread, self._slowest,
-                 self._fastest, self._bias, self._bias_s)
+        if dt_s > 0.0:
+            rate = _predict(state, covariance, dt_s, self.mean, self._angles, self._information, self._spread,
+                            self._slowest, self._fastest, self._bias, self._bias_s)
+            kept, drawn = _redraw(state, self.dh, self._limits, self.mean, self._information)
+            _draw(covariance, kept, drawn, rate)
         return state, covariance
 
     def transition(self, state: Array, dt_s: float) -> Array:
         """See `Process`."""
-        out, before = np.eye(self.size), state.copy()
-        _transition(before, out, dt_s, self.mean, self._angles, self._information, self._spread, self._slowest,
-                    self._fastest, self._bias, self._bias_s)
+        out, after = np.eye(self.size), state.copy()
+        if dt_s > 0.0:
+            _transition(after, out, dt_s, self.mean, self._information, self._spread, self._slowest, self._fastest,
+                        self._bias_s)
+            _map_rows(_redraw(after, self.dh, self._limits, self.mean, self._information)[0], out)
         return out
 
     def rates(self, state: Array) -> Array:
@@ -177,10 +198,11 @@ def _predict(state, covariance, dt, mean, pose_covariance, information, spread, 
                     for j in range(21):
                         covariance[POSE * a + 6 + i, POSE * b + 6 + j] += noise[2, a, b] * pose_covariance[i, j]
     _forget_bias(state, covariance, math.exp(-dt / bias_s), bias)
+    return rate[2]
 
 
 @njit(cache=True)
-def _transition(state, out, dt, mean, pose_covariance, information, spread, slowest, fastest, bias, bias_s):
+def _transition(state, out, dt, mean, information, spread, slowest, fastest, bias_s):
     blocks, turn, rate = np.empty((3, 3, 3)), np.empty((3, 3)), np.empty(3)
     left = dt
     while left > 0.0:
@@ -253,3 +275,115 @@ def _forget_bias(state, covariance, kept, bias):
         for i in range(3):
             for j in range(3):
                 covariance[MOTION + 3 * m + i, MOTION + 3 * m + j] += (1.0 - kept * kept) * bias[m, i, j]
+
+
+@njit(cache=True)
+def _redraw(state, dh, limits, mean, information):
+    """Draw what the markers leave open anew: move `state` to the pose that is most probable by the pose prior and by
+    the markers' places.
+
+    A finger at its limits may be bent the other way: a thumb has two modes. The descent is tried from its natural bend
+    too, and the more probable pose taken. Returns the share (27, 27) of a deviation that is kept, and the covariance
+    (27, 27) of what is drawn.
+    """
+    world, angles = np.eye(4), state[ANGLES:VELOCITY].copy()
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    places, first = np.empty((dh.point_row.shape[0], 3)), np.empty((3 * dh.point_row.shape[0], POSE))
+    _place_markers(dh, world, angles, places, first)
+    inverse, prior, rows, cost = _descend(dh, limits, mean, information, places, world, angles, _STEPS)
+    for finger in range(5):
+        own = slice(_FIRST_ANGLE[finger], _FIRST_ANGLE[finger + 1])
+        if np.all(angles[own] >= limits[own, 0]) and np.all(angles[own] <= limits[own, 1]):
+            continue
+        other_world, other = world.copy(), angles.copy()
+        other[own] = mean[own]
+        found = _descend(dh, limits, mean, information, places, other_world, other, _TRIAL_STEPS)
+        if found[3] < cost - _SURELY:
+            inverse, prior, rows, cost = found
+            world, angles = other_world, other
+    state[:ANGLES], state[ANGLES:VELOCITY] = world[:3].copy().reshape(12), angles
+    kept = np.dot(inverse, np.dot(rows.T, first))
+    state[VELOCITY:ACCELERATION] = np.dot(kept, state[VELOCITY:ACCELERATION])
+    state[ACCELERATION:BIAS] = np.dot(kept, state[ACCELERATION:BIAS])
+    return kept, np.dot(inverse, np.dot(prior, inverse))
+
+
+@njit(cache=True)
+def _place_markers(dh, world, angles, points, rows):
+    """Fill `points` (M, 3) m and their Jacobian, in the standard deviations with which places are remembered."""
+    frames, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((points.shape[0], 3, POSE))
+    forward_arrays(dh, world, angles, frames, points)
+    jacobian_arrays(dh, world, frames, points, jacobian)
+    rows[:] = jacobian.reshape(rows.shape) / REMEMBERED_M
+
+
+@njit(cache=True)
+def _descend(dh, limits, mean, information, places, world, angles, steps):
+    """Move `world` and `angles` by Gauss-Newton steps to the most probable pose. An angle that would go beyond its
+    limit is drawn to the limit as well.
+
+    Returns the inverse of the information (27, 27), the part of it that is the prior's, the Jacobian of the markers,
+    and -2 log probability, up to a constant.
+    """
+    count = dh.point_row.shape[0]
+    frames, points, rows = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((3 * count, POSE))
+    moved, inverse, prior = np.empty((4, 4)), np.eye(POSE), np.eye(POSE)
+    pull, target = np.empty(21), np.empty(21)
+    for _ in range(steps):
+        _place_markers(dh, world, angles, points, rows)
+        memory = np.dot(rows.T, rows)
+        prior[:] = _PALM_INFORMATION * np.eye(POSE)
+        prior[6:, 6:] = information
+        inverse = np.ascontiguousarray(np.linalg.inv(memory + prior))
+        slope = _slope(rows, places, points, information, mean, angles)
+        after = angles + np.dot(inverse, slope)[6:]
+        pull[:] = 0.0
+        for i in range(21):
+            if after[i] < limits[i, 0] or after[i] > limits[i, 1]:
+                pull[i] = 1.0 / LIMIT_SD_RAD**2
+                target[i] = limits[i, 0] if after[i] < limits[i, 0] else limits[i, 1]
+                prior[6 + i, 6 + i] += pull[i]
+        if pull.max() > 0.0:
+            inverse = np.ascontiguousarray(np.linalg.inv(memory + prior))
+        slope = _slope(rows, places, points, information, mean, angles)
+        for i in range(21):
+            if pull[i] > 0.0:
+                slope[6 + i] += pull[i] * (target[i] - angles[i])
+        move(world, angles, np.dot(inverse, slope), moved, angles)
+        world[:] = moved
+        forward_arrays(dh, world, angles, frames, points)
+    away, cost = mean - angles, np.sum(((places - points) / REMEMBERED_M) ** 2)
+    for i in range(21):
+        cost += (max(angles[i] - limits[i, 1], limits[i, 0] - angles[i], 0.0) / LIMIT_SD_RAD) ** 2
+    return inverse, prior, rows, cost + np.dot(away, np.dot(information, away))
+
+
+@njit(cache=True)
+def _slope(rows, places, points, information, mean, angles):
+    """(27,) what draws a pose to the markers' places and to the natural pose."""
+    slope = np.dot(rows.T, (places - points).ravel() / REMEMBERED_M)
+    slope[6:] += np.dot(information, mean - angles)
+    return slope
+
+
+@njit(cache=True)
+def _draw(covariance, kept, drawn, rate):
+    """The covariance after a draw, whose velocity and acceleration are those of a Matérn 5/2 process."""
+    _map_rows(kept, covariance)
+    _transpose(covariance)
+    _map_rows(kept, covariance)
+    square = rate * rate
+    for i in range(POSE):
+        for j in range(POSE):
+            covariance[i, j] += drawn[i, j]
+            covariance[POSE + i, POSE + j] += square / 3.0 * drawn[i, j]
+            covariance[2 * POSE + i, 2 * POSE + j] += square * square * drawn[i, j]
+            covariance[i, 2 * POSE + j] -= square / 3.0 * drawn[i, j]
+            covariance[2 * POSE + i, j] -= square / 3.0 * drawn[i, j]
+
+
+@njit(cache=True)
+def _map_rows(kept, matrix):
+    """Multiply pose, velocity and acceleration of `matrix` (n, C) by `kept` from the left."""
+    for first in range(0, MOTION, POSE):
+        matrix[first:first + POSE] = np.dot(kept, matrix[first:first + POSE])

@@ -1,4 +1,4 @@
-"""Residuals of a hand: marker centroids and apparent sizes in one camera's frame, and joint limits."""
+"""Residuals of a hand: marker centroids and apparent sizes in one camera's frame."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.estimation.residual import GAUSSIAN, UNIT, Rows, student
+from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.hand.kinematics import direction_jacobian, forward_arrays, jacobian_arrays
 from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
 from rhot_app.tracking.marker_model import MarkerModel, project_marker
@@ -31,9 +31,6 @@ SIZE_SD = 0.02
 
 SIZE_S = 0.2
 """s: correlation time of that error. Within it, all frames together count as one observation."""
-
-LIMIT_SD_RAD = math.radians(0.1)
-"""rad: how far angles go beyond their limits."""
 
 _END_ON = 0.03  # sine of the least angle between a fingertip and the line of sight
 _STRETCH_MAX = 0.5  # of a marker's height by its motion along the rows
@@ -58,7 +55,7 @@ class MarkerFrame:
         self.late_s = np.where(self.seen, (rows - mean_row) * self.row_s, 0.0)
         self.pixels, self.covariances = observations.pixels, observations.covariances
         self.diameters, self.flags = observations.diameters, observations.flags
-        self.log_width, self.size_sd = np.full(len(rows), np.nan), SIZE_SD
+        self.log_width, self.size_sd = np.full(len(rows), np.nan), np.full(len(rows), SIZE_SD)
 
     def linearise(self, state: Array) -> Rows:
         """Two rows, px, for each marker that is seen, then one for each apparent size, by standard deviations."""
@@ -114,24 +111,6 @@ class MarkerFrame:
         row0_s = 1e-9 * (self.observations.t_row0_master_ns - self.t_ns)
         out.late_s = np.where(found, row0_s + out.pixels[:, 1] * self.row_s, 0.0)
         return out
-
-
-class JointLimits:
-    """Angles beyond their limits (21, 2) rad, each one row; implements `estimation.residual.Residual`."""
-
-    def __init__(self, limits: Array) -> None:
-        self._limits = limits
-
-    def linearise(self, state: Array) -> Rows:
-        """A row for every violated limit."""
-        angles = state[ANGLES:VELOCITY]
-        over = np.minimum(np.maximum(angles, self._limits[:, 0]), self._limits[:, 1]) - angles
-        beyond = over.nonzero()[0]
-        if not len(beyond):
-            return Rows(np.empty(0), np.empty((0, len(state) - BIAS + MOTION)), UNIT)
-        jacobian = np.zeros((len(beyond), len(state) - BIAS + MOTION))
-        jacobian[range(len(beyond)), 6 + beyond] = 1.0
-        return Rows(over[beyond], jacobian, np.full(len(beyond), LIMIT_SD_RAD**2), GAUSSIAN)
 
 
 @njit(cache=True)
@@ -203,7 +182,7 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
         shown = -0.5 * slender[m] / (1.0 + slender[m] * side) * along / side
         expected = log_width[m] + _log_shown(slender[m], side)
         size = math.log(diameters[m] * _metres_per_px(slope)) + 0.5 * math.log(_still(state, slope, jacobian, m, row_s))
-        error[used] = (size - expected) / size_sd
+        error[used] = (size - expected) / size_sd[m]
         depth = pose[2, 3]
         for i in range(3):
             depth += pose[2, i] * points[m, i]
@@ -215,7 +194,7 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
             for i in range(3):
                 turned += line[i] * turning[i, j] + bone[i] * (jacobian[m, i, j] - farther * line[i]) / distance
             # a pixel's size grows with depth^1.5 / distance^0.5
-            out[used, j] = (shown * turned - 1.5 * deeper / depth + 0.5 * farther / distance) / size_sd
+            out[used, j] = (shown * turned - 1.5 * deeper / depth + 0.5 * farther / distance) / size_sd[m]
         first[observations] = used
         used, observations = used + 1, observations + 1
     return used, observations

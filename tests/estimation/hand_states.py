@@ -26,8 +26,8 @@ def markers(bodies=False):
 def make_process(bodies=False, slowest=SLOWEST, fastest=FASTEST):
     model = markers(bodies)
     natural = model.natural
-    return HandProcess(natural.mean, np.linalg.inv(natural.information), SPREAD, slowest, fastest,
-                       np.tile(1e-6 * np.eye(3), (len(model.finger), 1, 1)), BIAS_S)
+    return HandProcess(model.dh, model.limits, natural.mean, np.linalg.inv(natural.information), SPREAD, slowest,
+                       fastest, np.tile(1e-6 * np.eye(3), (len(model.finger), 1, 1)), BIAS_S)
 
 
 def natural_state(rng, distance_m=0.6):

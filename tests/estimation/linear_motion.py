@@ -13,7 +13,6 @@ class ConstantVelocity:
     """A place and its velocity, driven by white acceleration; implements `Process`."""
 
     size = 2
-    stationary = 100.0 * np.eye(2)
 
     def __init__(self, density=0.5):
         self.density = density

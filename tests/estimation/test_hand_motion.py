@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_states import BIAS_S, make_process, moving_state, natural_state, slopes, world_of
+from hand_states import BIAS_S, make_process, markers, moving_state, natural_state, points_of, slopes, world_of
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
@@ -47,47 +48,72 @@ def test_a_step_turns_the_palm_about_itself_in_world_axes():
     np.testing.assert_allclose(after[:3, 3], before[:3, 3] + step[:3], atol=1e-12)
 
 
+def settled(process, seed):
+    """A hand at rest in the most probable pose that its markers leave, well within its limits."""
+    state, nothing = natural_state(np.random.default_rng(seed)), np.zeros((process.size, process.size))
+    state[ANGLES:VELOCITY] = process.mean
+    for _ in range(20):
+        state = process.predict(state, nothing, 1e-9)[0]
+    return state
+
+
 @pytest.mark.parametrize("dt", [0.0125, 0.1])
-def test_the_transition_of_a_hand_at_rest_is_the_slope_of_its_prediction(dt):
+def test_the_transition_of_a_hand_at_rest_is_the_slope_of_where_its_markers_go(dt):
     process = make_process()
-    state, covariance = natural_state(np.random.default_rng(2)), np.zeros((process.size, process.size))
-    after = process.predict(state, covariance, dt)[0]
-    expected = slopes(process, lambda moved: process.difference(process.predict(moved, covariance, dt)[0], after),
-                      state)
-    np.testing.assert_allclose(process.transition(state, dt), expected, atol=1e-4)
+    state, nothing = settled(process, 2), np.zeros((process.size, process.size))
+    after = process.predict(state, nothing, dt)[0]
+    expected = slopes(process, lambda moved: process.difference(process.predict(moved, nothing, dt)[0], after), state)
+    got, seen = process.transition(state, dt), places_by_pose(after)
+    for columns in (slice(0, POSE), slice(POSE, 2 * POSE)):
+        np.testing.assert_allclose(seen @ got[:POSE, columns], seen @ expected[:POSE, columns],
+                                   atol=2e-2 * np.abs(seen @ expected[:POSE, columns]).max())
 
 
-@pytest.mark.parametrize("dt", [0.0125, 0.05])
-def test_the_transition_of_a_moving_hand_is_the_slope_of_its_prediction(dt):
-    """At constant rates: how these follow the state is no part of it. An error of the angular velocity turns with half
-    of the palm's turn, which the transition may take for all or none of it."""
-    process = make_process(slowest=np.full(3, 6.0), fastest=6.0)
-    state, covariance = moving_state(np.random.default_rng(3)), np.zeros((process.size, process.size))
-    after = process.predict(state, covariance, dt)[0]
-    turn = np.linalg.norm(process.difference(after, state)[3:6])
-    assert turn > 0.01
-    expected = slopes(process, lambda moved: process.difference(process.predict(moved, covariance, dt)[0], after),
-                      state)
-    got = process.transition(state, dt)
-    for order in (1, 2):
-        columns = slice(POSE * order + 3, POSE * order + 6)
-        np.testing.assert_allclose(got[3:6, columns], expected[3:6, columns],
-                                   atol=turn * np.abs(expected[3:6, columns]).max())
-        got[3:6, columns] = expected[3:6, columns]
-    np.testing.assert_allclose(got, expected, atol=1e-5)
+def places_by_pose(state, step=1e-6):
+    """(3 M, 27) slope of the markers' places, m, by the pose."""
+    process = make_process()
+    return slopes(process, lambda moved: points_of(markers().dh, moved).ravel(), state, step)[:, :POSE]
 
 
-def test_a_prediction_is_the_same_in_one_step_as_in_many():
-    process = make_process(slowest=np.full(3, 6.0), fastest=6.0)
-    state = moving_state(np.random.default_rng(4), 0.5)
-    covariance = 1e-6 * np.eye(process.size)
-    steps = state, covariance
-    for _ in range(8):
-        steps = process.predict(*steps, 0.01)
-    once = process.predict(state, covariance, 0.08)
-    moved = process.difference(once[0], state)[:POSE]
-    np.testing.assert_allclose(process.difference(steps[0], once[0])[:POSE], 0.0, atol=0.05 * np.abs(moved).max())
-    np.testing.assert_allclose(np.sqrt(np.diag(steps[1])), np.sqrt(np.diag(once[1])), rtol=0.05)
+def open_directions(state):
+    """(27, K) of the pose: what moves no marker."""
+    _, values, directions = np.linalg.svd(places_by_pose(state))
+    return directions[np.sum(values > 1e-9 * values[0]):].T
+
+
+def test_a_hand_that_rests_keeps_its_markers_where_they_are():
+    process = make_process()
+    state = natural_state(np.random.default_rng(4))
+    state[ANGLES:VELOCITY] = np.clip(state[ANGLES:VELOCITY], *markers().limits.T)
+    after = process.predict(state, np.zeros((process.size, process.size)), 1e-9)[0]
+    moved = points_of(markers().dh, after) - points_of(markers().dh, state)
+    assert np.linalg.norm(process.difference(after, state)[6:POSE]) > 0.05  # what they leave open is drawn anew
+    assert np.linalg.norm(moved, axis=1).max() < 1e-3
+
+
+def test_what_markers_leave_open_is_known_as_well_as_the_natural_pose_tells():
+    process = make_process()
+    state = settled(process, 5)
+    covariance = process.predict(state, 1e-12 * np.eye(process.size), 1e-9)[1][:POSE, :POSE]
+    free = open_directions(state)
+    natural = np.linalg.inv(free[6:].T @ markers().natural.information @ free[6:])
+    np.testing.assert_allclose(free.T @ covariance @ free, natural, atol=0.05 * np.abs(natural).max())
+
+
+def test_a_thumb_at_its_limits_is_bent_the_other_way_when_that_is_more_probable():
+    """Its tip is where a thumb has it that is bent forwards; the estimate has bent it backwards."""
+    process, nothing = make_process(), np.zeros((make_process().size, make_process().size))
+    forwards = np.radians([-25.0, -7.0, -1.0, 34.0, 35.0])
+    state = settled(process, 6)
+    state[ANGLES:ANGLES + 5] = forwards
+    tip = points_of(markers().dh, state)[0]
+    found = least_squares(lambda angles: 1e3 * (points_of(markers().dh, np.concatenate(
+        [state[:ANGLES], angles, state[ANGLES + 5:]]))[0] - tip), np.radians([-28.0, 20.0, -25.0, -15.0, -20.0])).x
+    state[ANGLES:ANGLES + 5] = found
+    assert found[4] < 0.0
+    after = process.predict(state, nothing, 1e-9)[0]
+    assert after[ANGLES + 4] > np.radians(20.0)
+    assert np.linalg.norm(points_of(markers().dh, after)[0] - tip) < 2e-3
 
 
 def test_predicting_by_nothing_changes_nothing_and_leaves_its_arguments():
@@ -129,14 +155,13 @@ def test_without_observations_the_covariance_stays_symmetric_and_positive(step_s
 
 @pytest.mark.parametrize("step_s", [1.0 / 200.0, 1.0 / 40.0, 10.0])
 def test_without_observations_the_angles_return_to_the_natural_pose(step_s):
-    """However long the steps are: mean, standard deviations and correlations."""
+    """However long the steps are."""
     process = make_process()
     *_, (state, covariance) = unobserved(process, 10.0, step_s, 1.0)
-    np.testing.assert_allclose(state[ANGLES:VELOCITY], process.mean, atol=1e-3)
-    np.testing.assert_allclose(state[VELOCITY + 6:ACCELERATION], 0.0, atol=1e-3)
+    np.testing.assert_allclose(state[ANGLES:VELOCITY], process.mean, atol=2e-2)
+    np.testing.assert_allclose(state[VELOCITY + 6:ACCELERATION], 0.0, atol=1e-2)
     sd = np.sqrt(np.diag(process.stationary[6:27, 6:27]))
-    np.testing.assert_allclose(covariance[6:POSE, 6:POSE] / np.outer(sd, sd),
-                               process.stationary[6:27, 6:27] / np.outer(sd, sd), atol=0.05)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)[6:POSE]) / sd, 1.0, atol=0.4)
 
 
 def test_without_observations_the_palm_may_be_anywhere_and_the_paint_bias_returns_to_its_prior():

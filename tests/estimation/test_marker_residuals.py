@@ -12,11 +12,10 @@ from hand_states import (
     natural_state,
     points_of,
     slopes,
-    tangent_size,
 )
 
-from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
-from rhot_app.tracking.marker_residual import JointLimits, MarkerFrame
+from rhot_app.tracking.hand_process import BIAS, MOTION, POSE, VELOCITY
+from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
@@ -165,27 +164,3 @@ def test_predicted_pixels_have_the_covariance_of_the_centroids_rows(seed):
     np.testing.assert_allclose(pixels, frame.expected(state), atol=1e-9)
     slope = slopes(process, frame.expected, state)
     np.testing.assert_allclose(spread, slope @ covariance @ slope.swapaxes(1, 2), rtol=1e-4, atol=1e-6)
-
-
-def test_angles_within_their_limits_have_no_rows():
-    state, model = natural_state(np.random.default_rng(12)), markers()
-    state[ANGLES:VELOCITY] = model.limits.mean(axis=1)
-    rows = JointLimits(model.limits).linearise(state)
-    assert len(rows.error) == 0
-    assert rows.jacobian.shape == (0, tangent_size(state))
-
-
-def test_angles_beyond_their_limits_have_a_row_each_that_leads_back():
-    process, state, model = make_process(), moving_state(np.random.default_rng(13)), markers()
-    state[ANGLES:VELOCITY] = model.limits.mean(axis=1)
-    state[ANGLES + 3] = model.limits[3, 1] + 0.2
-    state[ANGLES + 17] = model.limits[17, 0] - 0.3
-    residual = JointLimits(model.limits)
-    rows = residual.linearise(state)
-    np.testing.assert_allclose(rows.error, [-0.2, 0.3], atol=1e-12)
-    assert_jacobian(process, residual, state, atol=1e-6)
-    step = np.zeros(process.size)
-    step += rows.jacobian.T @ rows.error
-    assert len(residual.linearise(process.retract(state, 1.001 * step)).error) == 0
-    assert np.all(rows.noise > 0.0)
-    assert np.all(state[ACCELERATION:BIAS] == process.retract(state, step)[ACCELERATION:BIAS])

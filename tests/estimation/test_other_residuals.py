@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from rhot_app.estimation.filter import IteratedFilter, update
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.tracking.hand_process import POSE
-from rhot_app.tracking.marker_residual import JointLimits, MarkerFrame
+from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
 
 PHALANGES = [(first, first + 1) for finger in range(5) for first in range(1 + 4 * finger, 4 + 4 * finger)]
@@ -125,16 +125,16 @@ def test_the_errors_are_consistent_with_the_stated_covariance(kind):
 
 
 def test_kinds_mix_with_the_markers_of_a_frame_in_any_order():
-    """And with limits: one update of all of them is better than that of the markers alone."""
+    """One update of all of them is better than that of the markers alone."""
     rng, process = np.random.default_rng(4), make_process()
     alone, together = [], []
     for _ in range(20):
         truth = natural_state(rng)
         prior = prior_of(process, truth, rng)
-        frame, limits = seen_by_markers(truth, rng), JointLimits(np.tile([-np.pi, np.pi], (21, 1)))
+        frame = seen_by_markers(truth, rng)
         others = [*contacts(truth, rng), *landmarks(truth, rng)]
         few, one, other = (update(process, 0.0, prior, residuals) for residuals in
-                           ([frame, limits], [frame, limits, *others], [*others[::-1], limits, frame]))
+                           ([frame], [frame, *others], [*others[::-1], frame]))
         np.testing.assert_allclose(process.difference(one.state, other.state), 0.0, atol=1e-6)
         alone.append(joints_of(few.state) - joints_of(truth))
         together.append(joints_of(one.state) - joints_of(truth))

@@ -21,7 +21,6 @@ from rhot_app.tracking.state import Condition
 from rhot_node.wire.messages import MarkerFlag
 
 PROCESS = ConstantVelocity()
-PROCESS.stationary = 1e4 * np.eye(2)  # the filter asks for it
 SECONDS = 4.0
 HERE = Condition.TRACKING, Condition.PARTIAL
 
