@@ -2,7 +2,7 @@
 
 The batch is run by rhot's own workers, and by those of a Dask cluster on this machine (extra [cluster]).
 
-    python benchmarks/export.py [--seconds 600] [--formats csv,c3d] [--trackers classic,model] [--batch 8] [--json F]
+    python benchmarks/export.py [--seconds 600] [--formats csv,c3d] [--trackers classic] [--batch 8] [--json F]
 
 The log is a sketched grasp of two cameras, 40 frames/s each (kept in ~/.cache/rhot/takes; sketching it takes a third
 of its length). Every export is a process of its own: start, replay, tracking and writing. `x` is the log's length by
@@ -27,7 +27,7 @@ from rhot_app.evaluation.takes import LOG_NAME, Order, take, takes_folder
 from rhot_app.export.export import FORMATS
 from rhot_app.simulator.scene import make_scene, twin_defaults
 
-GOALS = {"classic": 20.0, "model": 5.0}
+GOALS = {"classic": 20.0, "estimator": 5.0}
 GOAL_MB = 500.0
 
 
@@ -109,7 +109,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--formats", default=",".join(FORMATS), help="which formats; none: the batch alone")
-    parser.add_argument("--trackers", default="classic,model")
+    parser.add_argument("--trackers", default="classic,estimator")
     parser.add_argument("--batch", type=int, default=8, metavar="N", help="logs in the batch, 0: no batch (default 8)")
     parser.add_argument("--logs", type=Path, default=None, help="where logs are kept (default ~/.cache/rhot/takes)")
     parser.add_argument("--json", type=Path, metavar="FILE")

@@ -1,6 +1,6 @@
 """How often a missing marker is reported as measured: the twin's hand with paint missing, through the whole chain.
 
-    python benchmarks/false_locks.py [--frames N] [--trackers classic,model] [--json FILE]
+    python benchmarks/false_locks.py [--frames N] [--trackers classic,estimator] [--json FILE]
 
 The hand has no paint at all, or lacks one marker. It is before cloth, or before a cluttered desk with objects in
 saturated colours. Rendered pictures go through the nodes' detector, the wire and each tracker. A false lock is a marker
@@ -76,7 +76,7 @@ def main() -> int:
     """Run, print what was measured, write the JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", type=int, default=10_000)
-    parser.add_argument("--trackers", default="classic,model")
+    parser.add_argument("--trackers", default="classic,estimator")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
     kinds = options.trackers.split(",")

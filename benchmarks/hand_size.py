@@ -25,9 +25,9 @@ from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.project import Rig
 from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.hand_size import GRID, USUAL_SD, HandSize
-from rhot_app.tracking.kalman.wearing import Wearing, compile_wearing
-from rhot_app.tracking.model_start import Located
+from rhot_app.tracking.marker_model import MarkerModel, compile_markers
 
 Array = NDArray[np.float64]
 
@@ -61,11 +61,11 @@ def main() -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     rig, lines = synthetic_rig(), []
-    wearing = compile_wearing(rig)
+    markers = compile_markers(rig)
     print(f"{'shapes':>6} {'bones':>6} {'habit':>6} {'within':>6}   error, worst, stated, %   in SD, worst")
     for group in GROUPS:
         rng = np.random.default_rng(args.seed)
-        found = np.array([learnt(group, rig, wearing, rng) for _ in range(args.people)])
+        found = np.array([learnt(group, rig, markers, rng) for _ in range(args.people)])
         error, stated = found[:, 0] - found[:, 2], found[:, 1]
         line = {"shapes": group.shapes, "bones": group.bones, "habit": group.habit, "within": group.within,
                 "error_percent": 100.0 * rms(error), "worst_percent": float(100.0 * np.abs(error).max()),
@@ -79,16 +79,16 @@ def main() -> int:
     return 0
 
 
-def learnt(group: People, rig: Rig, wearing: Wearing, rng: np.random.Generator) -> tuple[float, float, float]:
+def learnt(group: People, rig: Rig, markers: MarkerModel, rng: np.random.Generator) -> tuple[float, float, float]:
     """Of one person: the logarithm of the size, its standard deviation, and the truth."""
     log_scale, size = USUAL_SD * rng.normal(), HandSize(
-        wearing.worn.dh, wearing.limits, wearing.natural, wearing.bias_variance)
+        markers.dh, markers.limits, markers.natural, markers.paint_variance)
     hand = person(rig.hand, group.bones, rng)
-    worn = compile_wearing(msgspec.structs.replace(rig, hand=hand)).worn.dh
-    spread = np.linalg.cholesky(np.linalg.inv(wearing.natural.information))
-    mean = np.clip(wearing.natural.mean + group.habit * (spread @ rng.normal(size=21)), *wearing.limits.T)
+    worn = compile_markers(msgspec.structs.replace(rig, hand=hand)).dh
+    spread = np.linalg.cholesky(np.linalg.inv(markers.natural.information))
+    mean = np.clip(markers.natural.mean + group.habit * (spread @ rng.normal(size=21)), *markers.limits.T)
     for _ in range(group.shapes):
-        angles, points = pose(mean, group.within * spread, wearing.limits, rng), np.empty((len(wearing.roles), 3))
+        angles, points = pose(mean, group.within * spread, markers.limits, rng), np.empty((len(markers.roles), 3))
         forward_arrays(worn, np.eye(4), angles, empty_frames(worn), points)
         points = math.exp(log_scale) * points + NOISE_M * rng.normal(size=points.shape)
         size.look(Located(0, points, np.tile(NOISE_M**2 * np.eye(3), (len(points), 1, 1)),

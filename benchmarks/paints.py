@@ -2,7 +2,7 @@
 
     python benchmarks/paints.py [--motion tap] [--seconds 4] [--seed 1] [--only NAME ...] [--logs DIR] [--json FILE]
 
-The twin's hand at 0.6 m is rendered and goes through the nodes' detector, the classic and the model tracker. Each
+The twin's hand at 0.6 m is rendered and goes through the nodes' detector, the classic and the estimator. Each
 paint is rendered from the sides of the hand that `PAINTS` names: `palm` or `back` towards the cameras. Each
 side has a table:
 

@@ -4,8 +4,8 @@
 
 The takes of `rhot evaluate --compare`, sights without flags only. `common` is what both cameras see alike: half the sum
 of two sights that are nearest in time; `own` is each camera's alone: half their difference, as an rms of one camera.
-`share` is own squared in parts of the stated variance, and what constants of the model tracker rest on
-(`kalman/partial.py`, `tracking/known.py`); `lasts`: correlation of own errors 0.1 s apart, 0 for noise.
+`share` is own squared in parts of the stated variance; constants of `tracking/marker_model.py` and
+`tracking/marker_residual.py` rest on it. `lasts`: correlation of own errors 0.1 s apart, 0 for noise.
 """
 
 from __future__ import annotations
@@ -26,8 +26,7 @@ from rhot_app.progress import ProgressLine
 from rhot_app.simulator.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogDoor
-from rhot_app.tracking.kalman.markers import project_marker
-from rhot_app.tracking.kalman.wearing import Wearing, compile_wearing
+from rhot_app.tracking.marker_model import MarkerModel, compile_markers, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
@@ -45,7 +44,7 @@ class Errors:
     stated: Array
 
 
-def errors_of(one: Take, wearing: Wearing) -> list[Errors]:
+def errors_of(one: Take, markers: MarkerModel) -> list[Errors]:
     """Every camera's errors after the first second."""
     door, frames = LogDoor(one.rig), [[] for _ in one.rig.nodes]
     for record in one.records():
@@ -54,18 +53,18 @@ def errors_of(one: Take, wearing: Wearing) -> list[Errors]:
             times_s = 1e-9 * (seen.t_row0_master_ns - T0_MASTER_NS
                               + np.nan_to_num(seen.pixels[:, 1]) * seen.row_time_ns)
             if times_s.min() > SETTLE_S and times_s.max() < one.seconds:
-                frames[seen.camera].append((times_s.mean(), _off(one, wearing, seen, times_s),
+                frames[seen.camera].append((times_s.mean(), _off(one, markers, seen, times_s),
                                             0.5 * np.trace(seen.covariances, axis1=1, axis2=2)))
     return [Errors(*(np.array(column) for column in zip(*of_camera, strict=True))) for of_camera in frames]
 
 
-def _off(one: Take, wearing: Wearing, seen: CameraObservations, times_s: Array) -> Array:
+def _off(one: Take, markers: MarkerModel, seen: CameraObservations, times_s: Array) -> Array:
     """(M, 2) px: one frame's sights less where the true hand's silhouettes were at their rows' times."""
     places, palms = one.truth.markers_at(times_s), one.truth.palm_at(times_s)
     out, pixel, slope = np.full(seen.pixels.shape, np.nan), np.empty(2), np.empty((2, 3))
     for m in np.flatnonzero((seen.flags == 0) & np.isfinite(seen.pixels).all(axis=1)):
-        if project_marker(places[m, m], np.ascontiguousarray(palms[m]), wearing.worn.half_axes[m],
-                          wearing.cameras.pose[seen.camera], wearing.cameras.intrinsics[seen.camera], pixel, slope):
+        if project_marker(places[m, m], np.ascontiguousarray(palms[m]), markers.half_axes[m],
+                          markers.poses[seen.camera], markers.intrinsics[seen.camera], pixel, slope):
             out[m] = seen.pixels[m] - pixel
     return out
 
@@ -107,9 +106,9 @@ def main() -> int:
             takes = [take(order, takes_folder(), lambda title: ProgressLine(f"filming {title}")) for order in orders(
                 make_scene(twin_defaults(), 1), [motion], range(1, args.seeds + 1), args.seconds,
                 sketched=args.sketched)]
-            wearing = compile_wearing(takes[0].rig)
+            markers = compile_markers(takes[0].rig)
             print(motion)
-            print("\n".join(table([errors_of(one, wearing) for one in takes], wearing.roles)), flush=True)
+            print("\n".join(table([errors_of(one, markers) for one in takes], markers.roles)), flush=True)
     except RhotError as exc:
         print(exc, file=sys.stderr)
         return 2

@@ -1,4 +1,4 @@
-"""Trackers in trouble, side by side: the same raw logs of the twin, altered, through the classic and the model tracker.
+"""Trackers in trouble, side by side: the same raw logs of the twin, altered, through the classic and the estimator.
 
     python benchmarks/trackers.py [--only NAME ...] [--seeds 5] [--motion grasp] [--markers rhot6]
                                   [--sketched] [--json FILE]
@@ -139,7 +139,7 @@ def curve(bench: Bench) -> Results:
 def scale(bench: Bench) -> Results:
     """A hand file 10 % too long and too short, corrected while a hand moves."""
     floating = {name: msgspec.structs.replace(settings, float_scale=True) for name, settings in TRACKERS.items()
-                if settings.kind == "model"}
+                if settings.kind == "estimator"}
     results: Results = {}
     for wrong in WRONG_SCALES:
         def trial(one: Take, rig: Rig, wrong: float = wrong) -> Figures:
@@ -184,7 +184,7 @@ TRIALS: dict[str, Callable[[Bench], Results]] = {
 
 def main() -> int:
     """Run the trials, print a table of each as it is done, write JSON."""
-    parser = argparse.ArgumentParser(description="The classic and the model tracker in trouble, on the same raw logs.")
+    parser = argparse.ArgumentParser(description="The classic and the estimator in trouble, on the same raw logs.")
     parser.add_argument("--only", nargs="+", metavar="NAME", choices=tuple(TRIALS), default=tuple(TRIALS),
                         help=f"trials: {', '.join(TRIALS)}")
     parser.add_argument("--seeds", type=int, default=5, help="how many people, cameras and motions (default 5)")

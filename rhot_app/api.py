@@ -25,6 +25,7 @@ from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, save_rig
 from rhot_app.project import load_rig as _load_rig
+from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.state import Condition, HandState, Knowledge
 
 if TYPE_CHECKING:
@@ -32,9 +33,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ANGLES", "FINGERS", "JOINTS", "CalibrationError", "CharucoBoard", "Chessboard", "Condition", "EngineClient",
-    "EngineError", "ExportError", "Exported", "HandState", "HandStates", "Knowledge", "Recording", "RecordingError",
-    "RhotError", "Rig", "RigError", "StereoCalibration", "calibrate_stereo", "export", "live", "load_rig",
-    "open_recording", "save_rig",
+    "EngineError", "ExportError", "Exported", "Extrapolator", "HandState", "HandStates", "Knowledge", "Recording",
+    "RecordingError", "RhotError", "Rig", "RigError", "StereoCalibration", "calibrate_stereo", "export", "live",
+    "load_rig", "open_recording", "save_rig",
 ]
 
 PATIENCE_S = 5.0
@@ -56,7 +57,7 @@ class Recording:
         """Track the whole log: what an engine would have published. `tracker` None is the rig's own.
 
         `rate_hz` gives states at equal intervals instead of their own times. `smooth`: every state uses
-        the whole recording, not only what came before it; the model tracker alone can.
+        the whole recording, not only what came before it; the estimator alone can.
 
         Raises RecordingError when nothing can be tracked, RigError when the rig does not suit the tracker, ExportError
         when the tracker does not smooth.

@@ -128,15 +128,17 @@ class DepthSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("k and z belong together; give both or neither")
 
 
-TrackerKind = Literal["classic", "model", "estimator"]
-TRACKER_KINDS: tuple[TrackerKind, ...] = ("classic", "model", "estimator")
+TrackerKind = Literal["classic", "estimator", "model"]
+"""`model` is an earlier tracker in old files; the estimator takes its place."""
+
+TRACKER_KINDS: tuple[TrackerKind, ...] = ("classic", "estimator")
 
 
 class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which tracker makes a hand of the markers, and what it may assume.
 
-    `kind`: `classic` is the thesis's (pair, triangulate, 1-euro, palm fit, FABRIK); `model` estimates one hand from
-    every image position. `estimator` does so by a simpler filter, which will replace it. The other fields are theirs.
+    `kind`: `classic` is the thesis's (pair, triangulate, 1-euro, palm fit, FABRIK); `estimator` estimates one hand
+    from every image position. The other fields are the estimator's.
     `variant`: `full` (27 degrees of freedom) or `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT
     2.2 to 2.4). `float_scale`: estimate the hand's size as it moves.
     """
@@ -145,6 +147,10 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     variant: Literal["full", "coupled"] = "full"
     limits: Literal["anatomical", "thesis"] = "anatomical"
     float_scale: bool = False
+
+    def __post_init__(self) -> None:
+        if self.kind == "model":
+            msgspec.structs.force_setattr(self, "kind", "estimator")
 
 
 class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -235,18 +241,18 @@ class Obstacle(NamedTuple):
     remedy: str
 
 
-def model_tracker_obstacle(rig: Rig) -> Obstacle | None:
-    """Why the model tracker cannot work with a rig, None when nothing is known to stand in its way.
+def estimator_obstacle(rig: Rig) -> Obstacle | None:
+    """Why the estimator cannot work with a rig, None when nothing is known to stand in its way.
 
     A marker that sits nowhere on the hand is refused by the tracker itself.
     """
     if rig.depth.mode == "disparity":
-        return Obstacle("The model tracker needs calibrated cameras; this rig takes distance from disparity alone "
+        return Obstacle("The estimator needs calibrated cameras; this rig takes distance from disparity alone "
                         "(depth.mode).",
                         "Use Calibrate, Put the cameras together, or the classic tracker (tracker.kind).")
     text = next((node.name for node in rig.nodes if node.text_datagrams), None)
     if text is not None:
-        return Obstacle(f"The model tracker needs the time of every picture; node {text} sends text datagrams, which "
+        return Obstacle(f"The estimator needs the time of every picture; node {text} sends text datagrams, which "
                         "carry none.", "Run rhot-node there and take text_datagrams out of the rig file, or use the "
                         "classic tracker (tracker.kind).")
     return None

@@ -49,19 +49,13 @@ def warm_tracker(rig: Rig) -> None:
     rehearse_tracker(make_tracker(rig), rig)
 
 
-def warm_model_tracker(rig: Rig) -> None:
-    """The same with the model tracker, which begins in another way when markers on the palm show how it is turned, and
+def warm_estimator(rig: Rig) -> None:
+    """The same with the estimator, which begins in another way when markers on the palm show how it is turned, and
     with the search for the hand's size."""
     for markers in ("rhot6", "rhot8"):
         chosen = msgspec.structs.replace(rig, markers=load_markers(resource_path("markers", f"{markers}.json")),
-                                         tracker=TrackerSettings(kind="model", float_scale=True))
+                                         tracker=TrackerSettings(kind="estimator", float_scale=True))
         rehearse_tracker(make_tracker(chosen), chosen)
-
-
-def warm_estimator(rig: Rig) -> None:
-    """The same with the estimator."""
-    chosen = msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", float_scale=True))
-    rehearse_tracker(make_tracker(chosen), chosen)
 
 
 def warm_twin(_rig: Rig) -> None:
@@ -99,8 +93,7 @@ def warm_outputs(rig: Rig) -> None:
 
 
 STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker,
-                                           "model tracker": warm_model_tracker, "estimator": warm_estimator,
-                                           "twin": warm_twin,
+                                           "estimator": warm_estimator, "twin": warm_twin,
                                            "boards": warm_boards, "calibrations": warm_calibrations,
                                            "outputs": warm_outputs}
 

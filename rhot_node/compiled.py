@@ -20,7 +20,7 @@ from pathlib import Path
 VARIABLE = "NUMBA_CACHE_DIR"
 _KEPT = 3  # states of the sources: today's, and those of a checkout or two beside it
 _PACKAGES = ("rhot_node", "rhot_app")
-_COMPILERS = (b"numba", b"rhot_app.lean")
+_COMPILER = b"numba"
 _IMPORTS = re.compile(r"^from ([\w.]+) import ([^()\n]+|\([^)]*)", re.MULTILINE)
 _COMPLETE = "complete"
 
@@ -42,7 +42,7 @@ def sources_hash(folders: Sequence[Path]) -> str:
 def _compiled_and_imported(texts: dict[str, bytes]) -> set[str]:
     """Of modules, by their dotted names, those that are compiled and all that they import, directly or not."""
     found: set[str] = set()
-    waiting = [module for module, text in texts.items() if any(compiler in text for compiler in _COMPILERS)]
+    waiting = [module for module, text in texts.items() if _COMPILER in text]
     while waiting:
         module = waiting.pop()
         if module in found or module not in texts:

@@ -11,7 +11,7 @@ from rhot_app.api import FINGERS, Knowledge, open_recording
 log = Path(sys.argv[1])
 folder = Path(sys.argv[2] if len(sys.argv) > 2 else ".")
 recording = open_recording(log)
-states = recording.states(tracker="model")
+states = recording.states(tracker="estimator")
 print(f"{len(states)} states in {states.times_s[-1]:.1f} s, tracked with the rig {recording.rig.name!r}")
 for loss in recording.losses:
     print("could not be read:", loss)
@@ -25,7 +25,7 @@ print(f"both measured in {100 * measured.mean():.0f} % of the states: "
       f"{1e3 * aperture_m[measured].min():.0f} to {1e3 * aperture_m[measured].max():.0f} mm apart")
 
 # %% How fast the index finger moves: at equal intervals, since a difference over 2 ms would be mostly noise
-even = recording.states(tracker="model", rate_hz=40)
+even = recording.states(tracker="estimator", rate_hz=40)
 index = even.fingertip_positions[:, FINGERS.index("index")]
 speed = np.linalg.norm(np.gradient(index, even.times_s, axis=0), axis=1)
 print(f"the index fingertip moves at {np.nanpercentile(speed, 95):.2f} m/s or less in 95 % of the states")
@@ -36,4 +36,4 @@ print(table.loc[measured, ["time_s", "fingertip_index_x_mm", "angle_index_pip_fl
 
 # %% And as files for other programs
 for name in ("pinch.csv", "pinch.glb"):
-    print(recording.export(folder / name, tracker="model", again=True).path)
+    print(recording.export(folder / name, tracker="estimator", again=True).path)

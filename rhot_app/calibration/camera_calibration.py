@@ -33,7 +33,7 @@ def calibration_finding(rig: Rig) -> HealthFinding | None:
         return None
     nominal = [node.name for node in rig.nodes if node.intrinsics.nominal]
     if nominal:
-        exact = " The model tracker takes them as exact." if rig.tracker.kind != "classic" else ""
+        exact = " The estimator takes them as exact." if rig.tracker.kind != "classic" else ""
         return HealthFinding("lens", Finding(
             "nominal", Grade.FAIR, NOT_CALIBRATED, f"The lenses of {' and '.join(nominal)} are nominal.{exact}",
             "Find each lens, then put the cameras together."))

@@ -16,7 +16,7 @@ from rhot_app.calibration.rig_camera_checks import (
 from rhot_app.calibration.rig_setup_checks import filter_findings, hand_findings, link_findings, marker_findings
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.hand.places import ROLES
-from rhot_app.project import OTHER_HAND, Rig, model_tracker_obstacle
+from rhot_app.project import OTHER_HAND, Rig, estimator_obstacle
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +58,12 @@ def _camera_findings(rig: Rig, lenses: tuple[LensFigures, ...], pairs: tuple[Pai
 def _tracker_findings(rig: Rig) -> list[Finding]:
     if rig.tracker.kind == "classic":
         return []
-    obstacle = model_tracker_obstacle(rig)
+    obstacle = estimator_obstacle(rig)
     if obstacle is not None:
         return [Finding("tracker", Grade.POOR, obstacle.why, remedy=obstacle.remedy)]
     homeless = [marker.id for marker in rig.markers.markers
                 if (marker.role or "").removeprefix(OTHER_HAND) not in ROLES]
-    return [Finding("tracker", Grade.POOR, f"The model tracker needs a place on the hand for marker {name}.",
+    return [Finding("tracker", Grade.POOR, f"The estimator needs a place on the hand for marker {name}.",
                     remedy="Give it a role, or use the classic tracker (tracker.kind).") for name in homeless]
 
 

@@ -107,7 +107,7 @@ def hands_advice(rig: Rig) -> list[Advice]:
     if rig.other_hand is None or rig.tracker.kind != "classic":
         return []
     return [Advice("info", "The classic tracker follows the first hand only and takes the markers of the other one "
-                           "for free points. Choose the model tracker for two hands at once.")]
+                           "for free points. Choose the estimator for two hands at once.")]
 
 
 def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:

@@ -18,6 +18,7 @@ from rhot_app.engine.codec import TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, Publ
 from rhot_app.engine.directory import EngineDirectory, default_directory
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import EngineError
+from rhot_app.project import Rig, parse_rig
 from rhot_app.tracking.state import HandState
 from rhot_node.files import decode_message
 
@@ -99,18 +100,10 @@ class EngineClient:
             socket.close()
         return _read_answer(frames)
 
-    def predict(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
-        """The hand as it should be at this time of the master's monotonic clock (`time.monotonic_ns()` there), by all
-        that the engine has seen until now; at most 0.1 s ahead. None while there is no hand.
-
-        Raises EngineError as `command` does, and when the rig's tracker predicts nothing (the classic one).
-        """
-        encoded = self.command("predict", timeout_s=timeout_s, t_master_ns=t_master_ns).get("state")
-        if encoded is None:
-            return None
-        state = decode(TOPIC_STATE, encoded)
-        assert isinstance(state, HandState)
-        return state
+    def rig(self, *, timeout_s: float = 3.0) -> Rig:
+        """The engine's rig. Raises EngineError as `command` does."""
+        document = self.command("rig", timeout_s=timeout_s)["document"]
+        return parse_rig(msgspec.json.encode(document), "the engine's rig")
 
     def close(self) -> None:
         """Disconnect. May be called twice."""

@@ -11,7 +11,6 @@ from typing import Any
 
 import msgspec
 
-from rhot_app.engine.codec import encode
 from rhot_app.engine.core import Engine
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import parse_rig
@@ -54,7 +53,7 @@ class Commands:
             "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
             "record": self._record, "record_stop": self._record_stop, "bookmark": self._bookmark, "rig": self._rig,
             "set_rig": self._set_rig, "save_rig": self._save_rig, "preview": self._set_preview,
-            "predict": self._predict, "quit": self._end,
+            "quit": self._end,
         }
 
     @property
@@ -133,10 +132,6 @@ class Commands:
             raise EngineError('preview needs "on": true or false.')
         self._preview(on)
         return {}
-
-    def _predict(self, arguments: Arguments) -> Answer:
-        state = self._engine.state_at(_time_ns(arguments, "predict"))
-        return {} if state is None else {"attachment": "state", "state": encode(state)}
 
     def _end(self, arguments: Arguments) -> Answer:
         self._quit()

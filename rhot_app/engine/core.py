@@ -30,7 +30,6 @@ from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
 from rhot_app.sources.source import ObservationSource, same_network
-from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import Tracker
 
 MakeSource = Callable[[Rig], ObservationSource]
@@ -90,11 +89,6 @@ class Engine:
             self._source.stop()
             self.running = False
             self.session = 0
-
-    def state_at(self, t_ns: int) -> HandState | None:
-        """The hand predicted to master time `t_ns`; None while there is none. Raises EngineError when the rig's tracker
-        predicts nothing."""
-        return self._pipeline.state_at(t_ns)
 
     @property
     def video(self) -> str:

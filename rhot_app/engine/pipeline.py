@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from rhot_app.engine.codec import encode
 from rhot_app.engine.meters import LatencyMeter, RateMeter
-from rhot_app.errors import EngineError
 from rhot_app.sources.source import ObservationSource
 from rhot_app.tracking.state import HandState
-from rhot_app.tracking.tracker import CameraObservations, PredictingTracker, Tracker
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 
 PublishState = Callable[[bytes], None]
 AfterState = Callable[[], None]
@@ -89,19 +88,6 @@ class Pipeline:
                 return
             if state is not None:
                 self._after_state()
-
-    def state_at(self, t_ns: int) -> HandState | None:
-        """The hand predicted to master time `t_ns`; None while there is none. Raises EngineError when the tracker
-        predicts nothing."""
-        with self._lock:
-            tracker = self._work.tracker
-            if not isinstance(tracker, PredictingTracker):
-                raise EngineError("this rig's tracker predicts nothing; choose the model tracker (tracker.kind).")
-            try:
-                return tracker.state_at(t_ns)
-            except Exception as exc:
-                log.exception("the tracker failed to predict")
-                raise EngineError(f"the tracker failed to predict ({type(exc).__name__}: {exc}).") from exc
 
     def _process(self, work: Work, frames: list[CameraObservations]) -> HandState | None:
         if work.source.changes != self._changes:

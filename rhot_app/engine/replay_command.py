@@ -29,12 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", type=Path, metavar="LOG", help="a raw log written by rhot engine --log or the app")
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
-    parser.add_argument("--tracker", choices=("classic", "model", "estimator"), default=None,
+    parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,
                         help="track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="N",
                         help="times real time, or max for as fast as possible (default 1)")
     parser.add_argument("--smooth", action="store_true",
-                        help="let every state use what comes after it as well (model tracker); the whole log is "
+                        help="let every state use what comes after it as well (estimator); the whole log is "
                              "tracked before the replay begins")
     parser.add_argument("--json", action="store_true",
                         help="serve nothing: replay at once and print a summary as one JSON object")

@@ -74,7 +74,7 @@ class Report:
         with EngineClient(place.path, states=False, events=False) as client:
             try:
                 status = client.command("status")["status"]
-                rig = msgspec.convert(client.command("rig")["document"], Rig)
+                rig = client.rig()
             except (EngineError, msgspec.ValidationError) as exc:
                 self.notes.append(f"rig, status and nodes of the engine ({exc})")
                 return None

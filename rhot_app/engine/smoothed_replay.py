@@ -29,7 +29,7 @@ class SmoothedReplay:
     """Implements `Tracker` for the frames of one log, in any number of passes. Its states lie in a temporary file."""
 
     def __init__(self, path: Path, rig: Rig, progress: Progress = silent) -> None:
-        """Smooth the log with the rig's tracker, the model tracker. Raises RecordingError when nothing comes of it or
+        """Smooth the log with the rig's tracker, the estimator. Raises RecordingError when nothing comes of it or
         when the disk is full, RigError as `make_tracker` does."""
         self._path, self._rig = path, rig
         self._newest: list[CameraObservations | None] = [None] * len(rig.nodes)

@@ -11,8 +11,9 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.hand.places import ROLES, place_of
 from rhot_app.project import OTHER_HAND, Rig, RigNode
-from rhot_app.tracking.kalman.wearing import points_on
-from rhot_app.tracking.tracker import CameraObservations, PredictingTracker, Tracker
+from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_app.tracking.marker_model import points_on
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_node.wire.codec import decode as decode_datagram
 from rhot_node.wire.codec import encode as encode_datagram
 from rhot_node.wire.marker_table import MarkerTable
@@ -30,7 +31,7 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
 
     Compiled code is read from numba's cache where it can be written, else it is compiled here: seconds, once.
     """
-    points_m = _worn_points(rig)
+    points_m, extrapolator = _worn_points(rig), Extrapolator(rig) if rig.tracker.kind == "estimator" else None
     for frame in range(FRAMES):
         moved_m = points_m + np.array([0.002 * frame, 0.0, 0.0])
         for camera, node in enumerate(rig.nodes):
@@ -38,8 +39,8 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
             state = tracker.solve()
             if state is not None:
                 encode(state)
-                if isinstance(tracker, PredictingTracker):
-                    tracker.state_at(state.t_master_ns + _PERIOD_NS)
+                if extrapolator is not None:
+                    extrapolator.at(state, state.t_master_ns + _PERIOD_NS)  # windows find it compiled
     tracker.reset()
     _read_one(rig)
 

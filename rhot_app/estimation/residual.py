@@ -102,6 +102,10 @@ class Process(Protocol):
         """(n, n) Jacobian of `predict`'s state by `state`."""
         ...
 
+    def remembered(self, state: Array) -> Array:
+        """(n, n) the part of a deviation from `state` that `predict` carries on: a projection, or 1."""
+        ...
+
 
 def stack(rows: Sequence[Rows], size: int, weigh: bool) -> tuple[Array, Array, Array, float, Array]:
     """All rows whitened: error (K,), jacobian (K, n), variances (K,), the robust cost, and the weights (G,).

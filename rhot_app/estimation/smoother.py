@@ -58,13 +58,19 @@ def smooth(filtered: Sequence[Estimate], count: int | None = None) -> list[Estim
 
 
 def _step_back(here: Estimate, after: Estimate, state: Array, covariance: Array) -> tuple[Array, Array]:
-    """Smoothed state and covariance at `here`; `state` and `covariance` are those at `after`."""
+    """Smoothed state and covariance at `here`; `state` and `covariance` are those at `after`.
+
+    A later estimate says nothing of what a prediction does not carry on; a linearised gain would correct it all the
+    same. The covariance is in Joseph's form, which holds for every gain.
+    """
     process, dt_s = here.process, after.t_s - here.t_s
     predicted, predicted_covariance = process.predict(here.state, here.covariance, dt_s)
-    cross = here.covariance @ process.transition(here.state, dt_s).T
+    move = process.transition(here.state, dt_s)
+    noise = predicted_covariance - move @ here.covariance @ move.T
     step = process.difference(state, predicted)
-    gain = _divide(cross, predicted_covariance)
-    smoothed = here.covariance + gain @ (covariance - predicted_covariance) @ gain.T
+    gain = process.remembered(here.state) @ _divide(here.covariance @ move.T, predicted_covariance)
+    left = np.eye(process.size) - gain @ move
+    smoothed = left @ here.covariance @ left.T + gain @ (noise + covariance) @ gain.T
     return process.retract(here.state, gain @ step), 0.5 * (smoothed + smoothed.T)
 
 

@@ -18,8 +18,7 @@ from rhot_app.simulator.node_log import CABLE, Network
 from rhot_app.simulator.scene import Scene, make_scene
 
 MOTIONS = ("rest", "wave", "grasp", "pinch", "fast")
-TRACKERS = {"classic": TrackerSettings(kind="classic"), "model": TrackerSettings(kind="model"),
-            "estimator": TrackerSettings(kind="estimator")}
+TRACKERS = {"classic": TrackerSettings(kind="classic"), "estimator": TrackerSettings(kind="estimator")}
 
 
 @dataclass(frozen=True, slots=True)

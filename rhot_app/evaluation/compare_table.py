@@ -44,7 +44,7 @@ Root mean squares over all states after the first second; ratio: the last tracke
   palm turn  between the palm and the true one
   swaps      states that show one fingertip where another one is, once each time it happens
   measured   part of what both cameras see that the tracker calls measured
-  states/s   states per second: the classic tracker makes one per pair of frames, the model tracker one per frame
+  states/s   states per second: the classic tracker makes one per pair of frames, the estimator one per frame
 NEES is 1 where covariances are true, more where they are too small, less where they are too large."""
 
 

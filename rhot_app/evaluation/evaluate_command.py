@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--seeds", type=int, default=None, metavar="N",
                        help="how many seeds, beginning with --seed (default 5)")
     group.add_argument("--trackers", metavar="T,T,...", default=None,
-                       help="which trackers (default classic,model); the ratio is the last one's to the first one's")
+                       help="which trackers (default classic,estimator); the ratio is the last one's to the first's")
     group.add_argument("--sketched", action="store_true", default=None,
                        help="logs without pictures: exact outlines, noise and bias put on, hidden parts counted; fast")
     group.add_argument("--baseline", type=Path, metavar="FILE", default=None,
@@ -114,7 +114,7 @@ def _compare(args: argparse.Namespace) -> int:
                              "them.")
     if args.frames is not None or args.detector != "fast":
         raise SimulatorError("--compare films its own logs with the fast detector: leave out --frames and --detector.")
-    names = [name.strip() for name in ("classic,model" if args.trackers is None else args.trackers).split(",")]
+    names = [name.strip() for name in ("classic,estimator" if args.trackers is None else args.trackers).split(",")]
     seeds = 5 if args.seeds is None else args.seeds
     unknown = [name for name in names if name not in TRACKERS]
     if unknown:

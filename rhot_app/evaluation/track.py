@@ -18,9 +18,10 @@ from rhot_app.project import Rig, TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.simulator.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogDoor
+from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import HandState
-from rhot_app.tracking.tracker import PredictingTracker, Tracker
+from rhot_app.tracking.tracker import Tracker
 
 Array = NDArray[np.float64]
 
@@ -99,17 +100,18 @@ def tracked(records: Iterable[Record], rig: Rig, tracker: Tracker | None = None)
     """
     chosen = make_tracker(rig) if tracker is None else tracker
     warm_up(chosen, rig)
-    display = Display(records, chosen) if isinstance(chosen, PredictingTracker) else None
+    states: list[HandState] = []
+    display = Display(records, rig, states) if rig.tracker.kind == "estimator" else None
     timed = Timed(records if display is None else display)
-    states = list(replay_states(timed, LogDoor(rig), chosen))
+    states.extend(replay_states(timed, LogDoor(rig), chosen))  # one by one, as they come
     return track_of(states, np.array(timed.compute_s), None if display is None else display.predicted())
 
 
 class Display:
-    """Records that pass, and a display that asks the tracker at each of its ticks where the hand is now."""
+    """Records that pass, and a display that predicts the newest of the `states` to each of its ticks."""
 
-    def __init__(self, records: Iterable[Record], tracker: PredictingTracker) -> None:
-        self._records, self._tracker = records, tracker
+    def __init__(self, records: Iterable[Record], rig: Rig, states: Sequence[HandState]) -> None:
+        self._records, self._extrapolator, self._states = records, Extrapolator(rig), states
         self._times_s: list[float] = []
         self._tips: list[Array] = []
         self._covariances: list[Array] = []
@@ -123,7 +125,8 @@ class Display:
             yield record
 
     def _ask(self, now_s: float) -> None:
-        state = self._tracker.state_at(T0_MASTER_NS + round(1e9 * now_s))
+        newest = self._states[-1] if self._states else None
+        state = None if newest is None else self._extrapolator.at(newest, T0_MASTER_NS + round(1e9 * now_s))
         self._times_s.append(now_s)
         self._tips.append(np.full((5, 3), np.nan) if state is None else state.fingertip_positions)
         self._covariances.append(np.full((5, 3, 3), np.nan) if state is None else state.fingertip_covariances)

@@ -29,7 +29,7 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
                         help=f"csv, trc, c3d, bvh, gltf, npz, parquet or mcap ({without_format})")
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
-    parser.add_argument("--tracker", choices=("classic", "model", "estimator"), default=None,
+    parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,
                         help="track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--rate", type=float, default=None, metavar="HZ",
                         help="states at equal intervals (default: each at its own time; trc, c3d and bvh: the cameras' "
@@ -41,7 +41,7 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
     parser.add_argument("--hand", choices=("hand", "other_hand"), default="hand",
                         help="which of a rig's two hands a bvh file gets (default hand)")
     parser.add_argument("--smooth", action="store_true",
-                        help="let every state use what came after it as well (model tracker)")
+                        help="let every state use what came after it as well (estimator)")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ from rhot_app.export.states import HandStates
 from rhot_app.project import Rig
 
 Units = Literal["mm", "m"]
-Tracker = Literal["classic", "model", "estimator"]
+Tracker = Literal["classic", "estimator"]
 Hand = Literal["hand", "other_hand"]
 
 
@@ -22,7 +22,7 @@ class ExportOptions:
     """How a recording is exported. None leaves a choice to the rig (`tracker`) or to the format (`rate_hz`, `units`).
 
     `hand`: which of the rig's hands a format gets that holds a single one (BVH). `smooth`: every state uses the whole
-    recording, not only what came before it; the model tracker alone can.
+    recording, not only what came before it; the estimator alone can.
     """
 
     tracker: Tracker | None = None

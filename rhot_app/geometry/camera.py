@@ -13,7 +13,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.geometry.transforms import rigid, rotation_from_quaternion
-from rhot_app.lean import lean
 from rhot_app.project import CameraPose, Intrinsics
 
 Array = NDArray[np.float64]
@@ -22,7 +21,7 @@ _ITERATIONS = 30
 _TOLERANCE = 1e-12  # normalised units: 1e-9 px at any focal length in use
 
 
-@lean
+@njit(cache=True)
 def distort(x: float, y: float, distortion: Array) -> tuple[float, float, float, float, float, float]:
     """Distorted normalised coordinates and their derivatives: (xd, yd, dxd/dx, dxd/dy, dyd/dx, dyd/dy)."""
     k1, k2, p1, p2, k3 = distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]
@@ -37,7 +36,7 @@ def distort(x: float, y: float, distortion: Array) -> tuple[float, float, float,
     return xd, yd, xx, cross, cross, yy
 
 
-@lean
+@njit(cache=True)
 def undistort_point(u: float, v: float, intrinsics: Array) -> tuple[float, float, float, float, float, float]:
     """One raw pixel to normalised coordinates: (x, y) and d(x, y)/d(u, v) row by row; NaN where there is no answer.
 
@@ -73,7 +72,7 @@ def undistort_point(u: float, v: float, intrinsics: Array) -> tuple[float, float
     return x, y, yy / determinant / fx, -xy / determinant / fy, -yx / determinant / fx, xx / determinant / fy
 
 
-@lean
+@njit(cache=True)
 def _before_turn(x: float, y: float, distortion: Array) -> bool:
     """Whether the radial polynomial still rises everywhere between the optical axis and (x, y)."""
     k1, k2, k3 = distortion[0], distortion[1], distortion[4]

@@ -12,8 +12,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.lean import lean
-
 Array = NDArray[np.float64]
 
 _STEPS = 2  # Gauss-Newton converges quadratically; the linear start is within pixels
@@ -29,7 +27,7 @@ class Outcome(enum.IntEnum):
     BEHIND = 3  # the rays meet behind a camera
 
 
-@lean
+@njit(cache=True)
 def solve_symmetric3(a: Array, b: Array, x: Array, inverse: Array) -> bool:
     """Solve a x = b for a symmetric positive definite (3, 3) `a` and invert it; False when it is not one."""
     c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[1, 2]

@@ -9,12 +9,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.lean import lean, room
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def empty_frames(dh: DhArrays) -> Array:
     return np.empty((len(dh.parent), 3, 4))
 
 
-@lean
+@njit(cache=True)
 def forward_arrays(dh: DhArrays, world_from_root: Array, angles: Array, frames: Array, points: Array) -> None:
     """Fill `frames` (R, 3, 4) world_from_row and `points` (P, 3) m, for `world_from_root` (4, 4) and `angles`."""
     for row in range(dh.parent.shape[0]):
@@ -77,7 +77,7 @@ def forward_arrays(dh: DhArrays, world_from_root: Array, angles: Array, frames: 
             points[point, i] = base[i, 3] + base[i, 0] * offset[0] + base[i, 1] * offset[1] + base[i, 2] * offset[2]
 
 
-@lean
+@njit(cache=True)
 def jacobian_arrays(dh: DhArrays, world_from_root: Array, frames: Array, points: Array, out: Array) -> None:
     """Fill `out` (P, 3, 6 + angles) from what `forward_arrays` filled; columns as `jacobian` says.
 
@@ -97,7 +97,7 @@ def jacobian_arrays(dh: DhArrays, world_from_root: Array, frames: Array, points:
         add_angle_columns(dh, world_from_root, frames, point, px, py, pz, TWIST, out[point])
 
 
-@lean
+@njit(cache=True)
 def add_angle_columns(dh: DhArrays, world_from_root: Array, frames: Array, point: int, px: float, py: float, pz: float,
                       first: int, out: Array) -> None:
     """Add to `out` (3, first + angles) how the point at (px, py, pz) follows every angle that moves it."""
@@ -112,7 +112,7 @@ def add_angle_columns(dh: DhArrays, world_from_root: Array, frames: Array, point
         row = parent
 
 
-@lean
+@njit(cache=True)
 def direction_jacobian(dh: DhArrays, world_from_root: Array, frames: Array, point: int, direction: Array,
                        out: Array) -> None:
     """Fill `out` (3, 6 + angles): how a unit vector (3,), world, follows that is fixed to a point's body. Columns as
@@ -132,7 +132,7 @@ def direction_jacobian(dh: DhArrays, world_from_root: Array, frames: Array, poin
         row = parent
 
 
-@lean
+@njit(cache=True)
 def add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float, ry: float, rz: float) -> None:
     """Add axis x lever to a column: the velocity of a point at `lever` from an axis of unit angular speed."""
     out[0, column] += ay * rz - az * ry
@@ -140,7 +140,7 @@ def add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float
     out[2, column] += ax * ry - ay * rx
 
 
-@lean
+@njit(cache=True)
 def move(world: Array, angles: Array, step: Array, out_world: Array, out_angles: Array) -> None:
     """Apply a step of twist (rotation on the manifold, in world axes) and angles."""
     for i in range(4):
@@ -162,10 +162,10 @@ def move(world: Array, angles: Array, step: Array, out_world: Array, out_angles:
         out_angles[i] = angles[i] + step[TWIST + i]
 
 
-@lean
+@njit(cache=True)
 def rotation_vector(to: Array, origin: Array) -> tuple[float, float, float]:
     """The turn, rad in world axes, that takes the rotation of `origin` (4, 4) to that of `to` (4, 4)."""
-    r = room((3, 3))
+    r = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
             r[i, j] = to[i, 0] * origin[j, 0] + to[i, 1] * origin[j, 1] + to[i, 2] * origin[j, 2]

@@ -8,12 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.lean import lean
-
 Array = NDArray[np.float64]
 
 
-@lean
+@njit(cache=True)
 def factorise(matrix: Array) -> None:
     """Cholesky factor of a positive definite (n, n) matrix, in place in its lower triangle."""
     for i in range(matrix.shape[0]):
@@ -24,7 +22,7 @@ def factorise(matrix: Array) -> None:
             matrix[i, j] = math.sqrt(max(total, 1e-300)) if i == j else total / matrix[j, j]
 
 
-@lean
+@njit(cache=True)
 def substitute(factor: Array, right: Array, out: Array) -> None:
     """Solve factor factor^T out = right; `factor` as `factorise` leaves it, `out` (n,) may be `right`."""
     count = right.shape[0]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.geometry.transforms import fit_rigid
@@ -14,23 +17,35 @@ from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.tracking import schedule
+from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.marker_model import MarkerModel
-from rhot_app.tracking.model_start import (
-    FLATTEST_M2,
-    LEAST_MARKERS,
-    UNFIT_M,
-    Located,
-    count_apart,
-    locate_clear,
-)
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
 
+LEAST_MARKERS = 4
+"""Markers that show where a hand is."""
+
+FLATTEST_M2 = 1e-5
+"""Least area spanned by three palm markers that show how the palm is turned."""
+
+UNFIT_M = 0.06
+"""Markers so far from where the hand has them are something else. A first fit of a moving hand may be 3 cm off."""
+
 _TARGET_SD_M = 1e-3
 _WAITING = schedule.FRAMES  # frames of each camera; those before would tell nothing more of an instant
+
+
+class Located(NamedTuple):
+    """Where M markers were at `t_ns`, master ns: `positions` (M, 3) m, world, with `covariances` (M, 3, 3) m^2, NaN
+    where not located; `clear` (M,) bool: by two cameras that saw it beyond doubt."""
+
+    t_ns: int
+    positions: Array
+    covariances: Array
+    clear: NDArray[np.bool_]
 
 
 class Starter:
@@ -64,7 +79,7 @@ class Starter:
     def _locate(self, paired: Paired) -> Located:
         rig, count = self._rig, len(self._rig.marker_ids)
         positions, covariances, clear = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count, np.bool_)
-        locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
+        _locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
                       rig.focal, rig.shapes, positions, covariances, clear)
         return Located(paired.t_ns, positions, covariances, clear)
 
@@ -81,7 +96,8 @@ class Starter:
                 pose.world_from_palm[:3, 3] = centre + (pose.world_from_palm[:3, 3] - centre) * scale
             return pose
         pose = self._fitted(markers)
-        return pose if pose is not None and count_apart(markers, self._worn_at(pose), UNFIT_M) == 0 else None
+        return pose if pose is not None and not np.any(
+            np.linalg.norm(markers - self._worn_at(pose), axis=1) > UNFIT_M) else None
 
     def _tips_and_wrist(self, markers: Array) -> tuple[Array, Array]:
         """(5, 3) m of the fingertips and (3,) m of the wrist, NaN where not located."""
@@ -112,3 +128,16 @@ class Starter:
             return None
         fit = fit_palm(self._markers.model, wrist, tips, None, 0.0)
         return None if fit is None else fit.pose
+
+
+@njit(cache=True)
+def _locate_clear(flags: NDArray[np.int64], live: NDArray[np.bool_], pixels: Array, covariances: Array,
+                  intrinsics: Array, cameras: Array, focal: Array, shapes: Array, positions: Array,
+                  position_covariances: Array, clear: NDArray[np.bool_]) -> None:
+    """Fill what `Located` holds of one instant; arrays as in `Paired` and `RigArrays`."""
+    used, count = np.empty(flags.shape, np.bool_), positions.shape[0]
+    choose_views(flags, live, used, clear)
+    locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, positions, position_covariances,
+               np.empty(count))
+    for m in range(count):
+        clear[m] = not (clear[m] or math.isnan(positions[m, 0]))

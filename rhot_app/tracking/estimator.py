@@ -31,16 +31,6 @@ from rhot_node.wire.messages import MarkerFlag
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-PALM_SPREAD = np.array([0.055, 0.25])
-"""m and rad: how far a palm moves and turns within one correlation time (`python benchmarks/process_prior.py`)."""
-
-SLOWEST, FASTEST = np.full(3, 3.4), 15.0
-"""1/s: rates of a hand at rest (palm translation, palm rotation, angles; `python benchmarks/process_prior.py`), and of
-the fastest one."""
-
-BIAS_S = 1.0
-"""s: correlation time of the paint biases: hands turn so that other paint shows."""
-
 START_SD = 0.03, 0.5
 """m and rad: standard deviation of the palm's pose as it is first found."""
 
@@ -56,15 +46,12 @@ LOST_AFTER_NS, LOST_AFTER_PERIODS = 500_000_000, 5.0
 WRONG_AFTER_NS, WRONG_AFTER_PERIODS = 100_000_000, 3.0
 """Most observations rejected for this long, or for so many frame periods: the estimate is wrong."""
 
-FARTHEST_AHEAD_S = 0.1
-"""s: predictions go no farther ahead."""
-
 _JUMP_NS = 1_000_000_000  # frames farther apart are of different sessions
 _PENDING = 16
 
 
 class Estimator:
-    """Implements `PredictingTracker`: a state after every frame."""
+    """Implements `Tracker`: a state after every frame."""
 
     def __init__(self, rig: Rig) -> None:
         """Raises RigError when a marker has no place on the hand."""
@@ -73,9 +60,7 @@ class Estimator:
         self._size: HandSize | None = None
         if rig.tracker.float_scale:
             self._size = HandSize(self._markers.dh, self._markers.limits, natural, self._markers.paint_variance)
-        covariance = np.asarray(np.linalg.inv(natural.information), dtype=np.float64)
-        self._process = HandProcess(self._markers.dh, self._markers.limits, natural.mean, covariance, PALM_SPREAD,
-                                    SLOWEST, FASTEST, np.zeros((len(self._rig.marker_ids), 3, 3)), BIAS_S)
+        self._process = HandProcess.of(self._markers)
         self._filter = IteratedFilter(self._process)
         self._starter = Starter(self._rig, self._markers)
         self._association = MarkerAssociation(self._rig)  # without a prediction, by rays
@@ -122,19 +107,6 @@ class Estimator:
         knot = self._filter.newest
         return self._states.describe(self._time_ns(knot.t_s), knot.state, knot.covariance, self._sequence - 1,
                                      taken[-1], begun)
-
-    def state_at(self, t_ns: int) -> HandState | None:
-        """The hand predicted to master time `t_ns`, at most FARTHEST_AHEAD_S ahead; None while there is no hand."""
-        newest = max((frame for frame in self._sightings.newest if frame is not None),
-                     key=lambda frame: frame.t_receive_ns, default=None)
-        if not self._tracking or newest is None:
-            return None
-        begun, since_s = time.perf_counter(), self._filter.newest.t_s
-        t_s = min(max(self._seconds(t_ns), since_s), since_s + FARTHEST_AHEAD_S)
-        if self._seconds(t_ns) - since_s > 1e-9 * LOST_AFTER_NS:
-            return None
-        state, covariance = self._filter.predict(t_s)
-        return self._states.describe(self._time_ns(t_s), state, covariance, self._sequence - 1, newest, begun)
 
     def _seconds(self, t_ns: int) -> float:
         return 1e-9 * (t_ns - self._epoch_ns)

@@ -13,7 +13,7 @@ from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
 from rhot_app.tracking import stages
 from rhot_app.tracking.association import GATE
-from rhot_app.tracking.hand_process import ANGLES, BIAS, POSE, VELOCITY
+from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
 from rhot_app.tracking.locate import locate_all
 from rhot_app.tracking.marker_model import MarkerModel, project_marker, scaled_table
 from rhot_app.tracking.marker_residual import SIZE_S, SIZE_SD, MarkerFrame
@@ -165,9 +165,9 @@ class EstimatorStates:
         raw, raw_covariances, errors = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count)
         markers, joints, angles = np.empty(count, np.uint8), np.empty(21, np.uint8), np.empty(21, np.uint8)
         angle_sd = np.empty(21)
-        aligned = np.empty((*fresh.shape, 2))
+        aligned, motion_sd = np.empty((*fresh.shape, 2)), np.empty((2, 21))
         _place(state, covariance, self._dh, m.half_axes, m.poses, m.intrinsics, sightings.residuals, points,
-               covariances, aligned)
+               covariances, motion_sd, aligned)
         if rig.band_half_axes is not None:
             world = np.eye(4)
             world[:3] = state[:ANGLES].reshape(3, 4)
@@ -176,7 +176,7 @@ class EstimatorStates:
                    rig.cameras, rig.focal, self._shapes, raw, raw_covariances, errors)
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
         in_sight = (np.count_nonzero(age <= 2 * sightings.fresh_ns[:, None], axis=0) > 1).all()
-        world = np.eye(4)
+        world, deviation = np.eye(4), np.sqrt(np.maximum(np.diag(covariance), 0.0))
         world[:3] = state[:ANGLES].reshape(3, 4)
         return HandState(
             sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
@@ -189,7 +189,10 @@ class EstimatorStates:
             angle_knowledge=angles, world_from_palm=world, palm_knowledge=Knowledge(palm), epipolar_error_px=errors,
             joint_covariances=covariances[:_FIRST_TIP], angle_sd=angle_sd,
             fingertip_covariances=covariances[_FIRST_TIP:_FIRST_MARKER],
-            palm_covariance=covariance[:6, :6].copy(), hand_scale=self._scale,
+            palm_covariance=covariance[:6, :6].copy(), velocity=state[VELOCITY:ACCELERATION].copy(),
+            acceleration=state[ACCELERATION:BIAS].copy(), velocity_sd=deviation[POSE:2 * POSE],
+            acceleration_sd=deviation[2 * POSE:3 * POSE], joint_velocity_sd=motion_sd[0],
+            joint_acceleration_sd=motion_sd[1], hand_scale=self._scale,
             hand_scale_sd=self._scale_sd,
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
@@ -257,9 +260,10 @@ def _accept(t_ns, expected, pixels, pixel_covariances, flags, seen, weights, tim
 
 
 @njit(cache=True)
-def _place(state, covariance, dh, half_axes, poses, intrinsics, residuals, points, covariances, aligned):
-    """Fill points (26 + M, 3) m with covariances, and `aligned` (C, M, 2) px: each camera's last observation of a
-    marker, carried on to the state's instant."""
+def _place(state, covariance, dh, half_axes, poses, intrinsics, residuals, points, covariances, motion_sd, aligned):
+    """Fill points (26 + M, 3) m with covariances, `motion_sd` (2, 21) m/s and m/s^2 of the joints' velocities and
+    accelerations, and `aligned` (C, M, 2) px: each camera's last observation of a marker, carried on to the state's
+    instant."""
     count = points.shape[0]
     frames, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3, POSE))
     world = np.eye(4)
@@ -283,6 +287,14 @@ def _place(state, covariance, dh, half_axes, poses, intrinsics, residuals, point
                 covariances[p, i, j] = 0.0
                 for a in range(used):
                     covariances[p, i, j] += jacobian[p, i, columns[a]] * product[a, j]
+        for order in range(2 if p < _FIRST_TIP else 0):
+            variance, first = 0.0, POSE * (order + 1)
+            for a in range(used):
+                for b in range(used):
+                    together = covariance[first + columns[a], first + columns[b]]
+                    for i in range(3):
+                        variance += jacobian[p, i, columns[a]] * together * jacobian[p, i, columns[b]]
+            motion_sd[order, p] = math.sqrt(max(variance, 0.0))
     place, slope = np.empty(3), np.empty((2, 3))
     for camera in range(poses.shape[0]):
         for m in range(half_axes.shape[0]):

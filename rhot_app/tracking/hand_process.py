@@ -5,7 +5,7 @@ without a preferred place. Paint biases are a first-order process. The rates of 
 faster it is estimated to move, the shorter is the correlation time.
 
 The past is remembered by the places of the markers only. What these leave open of the pose, of its velocity and of its
-acceleration is drawn anew from the pose prior at every prediction. A filter that linearises anew with every frame
+acceleration is drawn anew from the pose prior before every prediction. A filter that linearises anew with every frame
 would otherwise believe to know it (Huang, Mourikis and Roumeliotis 2010).
 """
 
@@ -21,6 +21,7 @@ from rhot_app.estimation.gauss_markov import integrated, integrated_noise, mater
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, move, rotation_vector
 from rhot_app.hand.skeleton import ANGLE_SLICES
+from rhot_app.tracking.marker_model import MarkerModel
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,16 @@ paint biases (M, 3) m along the world's axes."""
 
 REMEMBERED_M = 0.3e-3
 """m: how well a marker's place is remembered; paint is not known better (`marker_model.PAINT_SD_M`)."""
+
+PALM_SPREAD = np.array([0.055, 0.25])
+"""m and rad: how far a palm moves and turns within one correlation time (`python benchmarks/process_prior.py`)."""
+
+SLOWEST, FASTEST = np.full(3, 3.4), 15.0
+"""1/s: rates of a hand at rest (palm translation, palm rotation, angles; `python benchmarks/process_prior.py`), and of
+the fastest one."""
+
+BIAS_S = 1.0
+"""s: correlation time of the paint biases: hands turn so that other paint shows."""
 
 LIMIT_SD_RAD = math.radians(0.5)
 """rad: how far joints go beyond their passive limits."""
@@ -68,6 +79,13 @@ class HandProcess:
             self.stationary[range(first, first + 6), range(first, first + 6)] = scale * np.repeat(spread, 3) ** 2
             self.stationary[first + 6:first + POSE, first + 6:first + POSE] = scale * covariance
         self.set_bias(bias)
+
+    @classmethod
+    def of(cls, markers: MarkerModel) -> HandProcess:
+        """The process of recorded hands, of a hand that wears these markers; paint biases are 0 until `set_bias`."""
+        covariance = np.asarray(np.linalg.inv(markers.natural.information), dtype=np.float64)
+        return cls(markers.dh, markers.limits, markers.natural.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
+                   np.zeros((len(markers.finger), 3, 3)), BIAS_S)
 
     def set_bias(self, bias: Array) -> None:
         """Change the covariances (M, 3, 3) m^2 of the paint biases."""
@@ -106,19 +124,42 @@ class HandProcess:
         """See `Process`. Long times are taken in steps in which the rates change little."""
         state, covariance = state.copy(), covariance.copy()
         if dt_s > 0.0:
-            rate = _predict(state, covariance, dt_s, self.mean, self._angles, self._information, self._spread,
-                            self._slowest, self._fastest, self._bias, self._bias_s)
             kept, drawn = _redraw(state, self.dh, self._limits, self.mean, self._information)
-            _draw(covariance, kept, drawn, rate)
+            _draw(covariance, kept, drawn, self.rates(state)[2])
+            _predict(state, covariance, dt_s, self.mean, self._angles, self._information, self._spread,
+                     self._slowest, self._fastest, self._bias, self._bias_s)
         return state, covariance
 
     def transition(self, state: Array, dt_s: float) -> Array:
         """See `Process`."""
         out, after = np.eye(self.size), state.copy()
         if dt_s > 0.0:
+            _map_rows(_redraw(after, self.dh, self._limits, self.mean, self._information)[0], out)
             _transition(after, out, dt_s, self.mean, self._information, self._spread, self._slowest, self._fastest,
                         self._bias_s)
-            _map_rows(_redraw(after, self.dh, self._limits, self.mean, self._information)[0], out)
+        return out
+
+    def remembered(self, state: Array) -> Array:
+        """See `Process`: what moves markers."""
+        out = np.eye(self.size)
+        _map_rows(_redraw(state.copy(), self.dh, self._limits, self.mean, self._information)[0], out)
+        return out
+
+    def advance(self, state: Array, dt_s: float) -> Array:
+        """Where a state goes in `dt_s` by itself; its paint biases may be left out."""
+        after = state.copy()
+        if dt_s > 0.0:
+            _advance(after, dt_s, self.mean, self._information, self._spread, self._slowest, self._fastest)
+        return after
+
+    def strayed(self, state: Array, dt_s: float) -> Array:
+        """(27,) m and rad: standard deviation of where the process noise takes a pose in `dt_s`."""
+        noise, rate, out = np.empty((3, 3)), self.rates(state), np.empty(POSE)
+        for group, own in enumerate((slice(0, 3), slice(3, 6))):
+            integrated_noise(rate[group], dt_s, noise)
+            out[own] = self._spread[group] * math.sqrt(noise[0, 0])
+        matern52_noise(rate[2], dt_s, noise)
+        out[6:] = np.sqrt(noise[0, 0] * np.diag(self._angles))
         return out
 
     def rates(self, state: Array) -> Array:
@@ -212,6 +253,17 @@ def _transition(state, out, dt, mean, information, spread, slowest, fastest, bia
         _carry(state, mean, rate, step, blocks, turn)
         _apply(blocks, turn, out)
     out[MOTION:] *= math.exp(-dt / bias_s)
+
+
+@njit(cache=True)
+def _advance(state, dt, mean, information, spread, slowest, fastest):
+    blocks, turn, rate = np.empty((3, 3, 3)), np.empty((3, 3)), np.empty(3)
+    left = dt
+    while left > 0.0:
+        _rates(state, information, spread, slowest, fastest, rate)
+        step = min(left, 0.5 / rate.max())
+        left -= step if left - step > 1e-9 else left
+        _carry(state, mean, rate, step, blocks, turn)
 
 
 @njit(cache=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import NaturalPose
 from rhot_app.hand.size_evidence import Posture, implausibility
-from rhot_app.tracking.model_start import Located
+from rhot_app.tracking.acquisition import Located
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.tracking import schedule, tracks
-from rhot_app.tracking.kalman.share import Share
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
@@ -75,7 +74,6 @@ class Pairing:
             np.zeros((cameras, markers, length, 2, 2)), np.zeros((cameras, markers, length), np.uint16),
             np.zeros((cameras, markers), np.int64), np.empty((cameras, markers), np.int64),
             np.empty((cameras, markers, 2)), np.empty((cameras, markers), np.uint16))
-        self._shared = Share(self._tracks)
         self.reset()
 
     def reset(self) -> None:
@@ -97,7 +95,7 @@ class Pairing:
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame into the tracks. Duplicates are ignored, late frames are put in their place."""
         camera = observations.camera
-        if _ingest(self._shared, camera, observations.t_row0_master_ns, observations.t_receive_ns,
+        if _ingest(self._tracks, camera, observations.t_row0_master_ns, observations.t_receive_ns,
                    observations.row_time_ns, observations.pixels, observations.covariances, observations.flags):
             self._latest = self.newest_frames[camera] = observations
 
@@ -113,7 +111,7 @@ class Pairing:
             return None
         live, pixels = np.empty(self._shape[0], np.bool_), np.empty((*self._shape, 2))
         covariances, flags = np.empty((*self._shape, 2, 2)), np.empty(self._shape, np.int64)
-        instant = _pair(self._shared, live, pixels, covariances, flags)
+        instant = _pair(self._tracks, live, pixels, covariances, flags)
         return None if instant < 0 else Paired(instant, pixels, covariances, flags, live, self._latest)
 
     def last_seen(self) -> tuple[Array, Flags]:
@@ -122,10 +120,9 @@ class Pairing:
 
 
 @njit(cache=True)
-def _ingest(shared: Share, camera: int, t_row0_ns: int, receive_ns: int, row_time_ns: int, pixels: Array,
+def _ingest(all_tracks: _Tracks, camera: int, t_row0_ns: int, receive_ns: int, row_time_ns: int, pixels: Array,
             covariances: Array, flags: Flags) -> bool:
-    """Take one frame into shared `_Tracks`; returns whether it is its camera's newest."""
-    all_tracks: _Tracks = shared.of
+    """Take one frame into the tracks; returns whether it is its camera's newest."""
     frames, book, marks, newest = all_tracks.frames, all_tracks.book, all_tracks.marks, all_tracks.newest
     if marks[_FIRST_RECEIVE] < 0:
         marks[_FIRST_RECEIVE] = receive_ns
@@ -152,9 +149,8 @@ def _ingest(shared: Share, camera: int, t_row0_ns: int, receive_ns: int, row_tim
 
 
 @njit(cache=True)
-def _pair(shared: Share, live: Mask, pixels: Array, covariances: Array, flags: Times) -> int:
+def _pair(all_tracks: _Tracks, live: Mask, pixels: Array, covariances: Array, flags: Times) -> int:
     """The instant at which a state is due, with the last four arrays filled as `Paired` says; -1 when none is."""
-    all_tracks: _Tracks = shared.of
     frames, book, marks = all_tracks.frames, all_tracks.book, all_tracks.marks
     schedule.find_live(frames, book, marks[_FIRST_RECEIVE], marks[_LAST_RECEIVE], live)
     instant, period, all_new = schedule.newest_instant(frames, book, all_tracks.newest, live)

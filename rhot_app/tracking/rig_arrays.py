@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +14,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model
 from rhot_app.hand.places import ROLES, farthest_apart, place_of
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
-from rhot_app.project import OneEuroSettings, Rig
+from rhot_app.project import OTHER_HAND, FilterSettings, OneEuroSettings, Rig
 from rhot_app.tracking.estimate import disparity_law
 from rhot_node.markers import FLAT_PATCHES, Marker
 
@@ -45,6 +46,22 @@ class RigArrays:
     band_half_axes: Array | None
     law: Array
     reach: Array
+
+
+def rigs_of_hands(rig: Rig) -> list[tuple[Rig, NDArray[np.intp]]]:
+    """The rig as if each of its one or two hands were alone, with the numbers of that hand's markers. The filters are
+    not an estimator's."""
+    if rig.other_hand is None:
+        return [(rig, np.arange(len(rig.markers.markers)))]
+    found = []
+    for hand, wanted in ((rig.hand, False), (rig.other_hand, True)):
+        columns = np.flatnonzero([(one.role or "").startswith(OTHER_HAND) == wanted for one in rig.markers.markers])
+        alone = tuple(msgspec.structs.replace(one, role=(one.role or "").removeprefix(OTHER_HAND) or None)
+                      for one in (rig.markers.markers[m] for m in columns))
+        markers = msgspec.structs.replace(rig.markers, markers=alone)
+        found.append((msgspec.structs.replace(rig, markers=markers, hand=hand, other_hand=None,
+                                              filters=FilterSettings()), columns))
+    return found
 
 
 def compile_rig(rig: Rig) -> RigArrays:

@@ -36,7 +36,9 @@ class Condition(enum.Enum):
 
 UNESTIMATED: dict[str, Any] = {
     "joint_covariances": np.full((21, 3, 3), np.nan), "fingertip_covariances": np.full((5, 3, 3), np.nan),
-    "angle_sd": np.full(21, np.nan), "palm_covariance": np.full((6, 6), np.nan),
+    "angle_sd": np.full(21, np.nan), "palm_covariance": np.full((6, 6), np.nan), "velocity": np.full(27, np.nan),
+    "acceleration": np.full(27, np.nan), "velocity_sd": np.full(27, np.nan), "acceleration_sd": np.full(27, np.nan),
+    "joint_velocity_sd": np.full(21, np.nan), "joint_acceleration_sd": np.full(21, np.nan),
     "hand_scale": 1.0, "hand_scale_sd": math.nan}
 """What a tracker without covariances says in their place. Read-only."""
 
@@ -73,11 +75,22 @@ class HandState:
     world_from_palm: Array  # (4, 4)
     palm_knowledge: Knowledge
     epipolar_error_px: Array  # (M,) rms distance of the rays' points from the reprojected marker, px
-    joint_covariances: Array  # (21, 3, 3) m^2; NaN from a tracker that does not estimate it, as are the next five
+    joint_covariances: Array  # (21, 3, 3) m^2; NaN from a tracker that does not estimate it, as are the next ten
     fingertip_covariances: Array  # (5, 3, 3) m^2
     angle_sd: Array  # (21,) rad
     palm_covariance: Array  # (6, 6) m^2 and rad^2: palm translation, then rotation about its origin, world axes
+    velocity: Array  # (27,) m/s and rad/s: of the palm's translation and rotation, along world axes, and of the angles
+    acceleration: Array  # (27,) m/s^2 and rad/s^2
+    velocity_sd: Array  # (27,) m/s and rad/s
+    acceleration_sd: Array  # (27,) m/s^2 and rad/s^2
+    joint_velocity_sd: Array  # (21,) m/s, root of the trace
+    joint_acceleration_sd: Array  # (21,) m/s^2
     hand_scale: float  # factor on every length of the rig's hand
     hand_scale_sd: float
     latency_s: dict[str, float]  # by LATENCY_STAGES
     other: HandState | None = None  # of the rig's other hand at the same instant, with its own markers only
+
+    @property
+    def tracked(self) -> bool:
+        """Whether there is a hand."""
+        return self.condition in (Condition.TRACKING, Condition.PARTIAL)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,14 +77,4 @@ class Tracker(Protocol):
 
     def reset(self) -> None:
         """Forget everything: a new session, or a node's clock was set."""
-        ...
-
-
-@runtime_checkable
-class PredictingTracker(Tracker, Protocol):
-    """A tracker that tells of other instants than those of its states: for a display that shows what it draws later."""
-
-    def state_at(self, t_ns: int) -> HandState | None:
-        """The hand as it should be at master time `t_ns`, by all that was ingested; None while there is no hand. It has
-        the number of the newest state."""
         ...

@@ -1,4 +1,4 @@
-"""Two hands at once: a model tracker for each, fed with its own markers, and one state of both at the same instant.
+"""Two hands at once: an estimator for each, fed with its own markers, and one state of both at the same instant.
 
 Nothing but the cameras is common to the hands, so nothing is gained by estimating them together: names of markers are
 confirmed within each hand, and a hand that is lost does not disturb the other.
@@ -6,20 +6,19 @@ confirmed within each hand, and a hand that is lost does not disturb the other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.project import OTHER_HAND, FilterSettings, Rig
-from rhot_app.tracking.model_tracker import ModelTracker
-from rhot_app.tracking.state import Condition, HandState
-from rhot_app.tracking.tracker import CameraObservations, PredictingTracker
-from rhot_node.markers import Marker
+from rhot_app.project import Rig
+from rhot_app.tracking.estimator import Estimator
+from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_app.tracking.rig_arrays import rigs_of_hands
+from rhot_app.tracking.state import HandState
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 
 Indices = NDArray[np.intp]
 Column = NDArray[Any]
@@ -40,24 +39,19 @@ class TwoHands:
     The arrays of a state's markers are those of the whole rig; its `other` has its own markers only.
     """
 
-    def __init__(self, rig: Rig, one_hand: Callable[[Rig], PredictingTracker] = ModelTracker) -> None:
+    def __init__(self, rig: Rig, one_hand: Callable[[Rig], Tracker] = Estimator) -> None:
         """`one_hand` makes the tracker of each hand. Raises RigError as it does."""
-        assert rig.other_hand is not None
-        markers = rig.markers.markers
-        others = [(marker.role or "").startswith(OTHER_HAND) for marker in markers]
-        self._ids = rig.markers.ids
-        self._own: tuple[Indices, Indices] = np.flatnonzero(np.logical_not(others)), np.flatnonzero(others)
+        (first, own), (second, others) = rigs_of_hands(rig)
+        self._ids, self._own = rig.markers.ids, (own, others)
         self._order = np.argsort(np.concatenate(self._own))
-        self._hand = one_hand(rig_of_hand(rig, rig.hand, [markers[m] for m in self._own[0]]))
-        self._other = one_hand(rig_of_hand(rig, rig.other_hand, [markers[m] for m in self._own[1]]))
+        self._hand, self._other = one_hand(first), one_hand(second)
+        self._extrapolators = Extrapolator(first), Extrapolator(second)
         self._sequence = 0
         self._newest: list[CameraObservations | None] = [None] * len(rig.nodes)
-        self._last: tuple[HandState, HandState] | None = None
 
     def reset(self) -> None:
         """Forget everything but the count of states."""
         self._newest = [None] * len(self._newest)
-        self._last = None
         self._hand.reset()
         self._other.reset()
 
@@ -80,18 +74,10 @@ class TwoHands:
         hand, other = self._hand.solve(), self._other.solve()
         if hand is None or other is None:  # both or neither: they see the same frames
             return None
-        self._last = hand, other
         self._sequence += 1
-        t_ns = max([state.t_master_ns for state in self._last if _is_there(state)] or [hand.t_master_ns])
-        return self._merge(_at(t_ns, hand, self._hand), _at(t_ns, other, self._other))
-
-    def state_at(self, t_ns: int) -> HandState | None:
-        """Both hands as `ModelTracker.state_at` has them; None while neither is there."""
-        hand, other = self._hand.state_at(t_ns), self._other.state_at(t_ns)
-        if self._last is None or (hand is None and other is None):
-            return None
-        return self._merge(hand or replace(self._last[0], t_master_ns=t_ns),
-                           other or replace(self._last[1], t_master_ns=t_ns))
+        t_ns = max([state.t_master_ns for state in (hand, other) if state.tracked] or [hand.t_master_ns])
+        return self._merge(*(replace(extrapolator.at(state, t_ns) or state, t_master_ns=t_ns)
+                             for state, extrapolator in zip((hand, other), self._extrapolators, strict=True)))
 
     def _merge(self, hand: HandState, other: HandState) -> HandState:
         """The state of `hand` with the markers of both."""
@@ -104,22 +90,3 @@ class TwoHands:
     def _gather(self, hand: Column, other: Column, axis: int) -> Column:
         """An array of both hands' markers in the rig's order; `axis` is that of the markers."""
         return np.concatenate([hand, other], axis=axis).take(self._order, axis=axis)
-
-
-def rig_of_hand(rig: Rig, hand: HandAnatomy, markers: Sequence[Marker]) -> Rig:
-    """The rig as if this hand with these of its markers were alone; the filters are not a model tracker's."""
-    alone = tuple(msgspec.structs.replace(marker, role=(marker.role or "").removeprefix(OTHER_HAND) or None)
-                  for marker in markers)
-    return msgspec.structs.replace(rig, markers=msgspec.structs.replace(rig.markers, markers=alone), hand=hand,
-                                   other_hand=None, filters=FilterSettings())
-
-
-def _at(t_ns: int, state: HandState, tracker: PredictingTracker) -> HandState:
-    """The newest `state` of a hand, brought to `t_ns` where another hand was seen a little later."""
-    if _is_there(state) and state.t_master_ns < t_ns:
-        return tracker.state_at(t_ns) or state
-    return replace(state, t_master_ns=t_ns)
-
-
-def _is_there(state: HandState) -> bool:
-    return state.condition in (Condition.TRACKING, Condition.PARTIAL)

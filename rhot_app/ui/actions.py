@@ -13,8 +13,8 @@ from rhot_app.ui.scene.page import SceneBar
 from rhot_app.ui.shapes import shape_icon
 from rhot_app.ui.wizards.catalogue import WIZARDS
 
-CLOUD_KINDS = (("joints", "Of the hand's inner joints; the model tracker estimates them."),
-               ("fingertips", "Of the fingertips; the model tracker estimates them."),
+CLOUD_KINDS = (("joints", "Of the hand's inner joints; the estimator estimates them."),
+               ("fingertips", "Of the fingertips; the estimator estimates them."),
                ("markers", "Of the markers, as far as they are not the fingertips drawn already."))
 """Whose uncertainty can be drawn; the words are the settings' names too."""
 
@@ -62,7 +62,7 @@ class Actions(QObject):
         self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
         self.names = self._make("Marker names", "", "Names beside the markers in the scene.", checkable=True)
         self.now = self._make("Hand as of now", "N", "Draw the hand where it is when you see it, not where it was in "
-                              "the newest pictures, 10 to 40 ms before. The model tracker predicts it (N).",
+                              "the newest pictures, 10 to 40 ms before. The estimator predicts it (N).",
                               checkable=True)
         self.clouds = self._make("Uncertainty", "U", "How well places are known, as ellipsoids: the true place lies "
                                  "inside in 97 of 100 cases (three sigma) (U).", checkable=True)

@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f"what the hand does: {names}, or a motion file (default {TwinChoice().motion})")
     parser.add_argument("--seed", type=int, default=TwinChoice().seed, metavar="N",
                         help=f"seed of noise, clocks and cloth (default {TwinChoice().seed})")
-    parser.add_argument("--tracker", choices=("classic", "model", "estimator"), default=TwinChoice().tracker,
+    parser.add_argument("--tracker", choices=("classic", "estimator"), default=TwinChoice().tracker,
                         help=f"what makes a hand of the markers (default {TwinChoice().tracker})")
     add_window_arguments(parser)
 

@@ -40,8 +40,7 @@ _SIZE = (860, 600)
 _FORMATS = {"csv": "CSV: a table", "parquet": "Parquet: a table for analysis", "npz": "NPZ: NumPy's arrays",
             "trc": "TRC: points, for OpenSim", "c3d": "C3D: points, motion capture", "bvh": "BVH: a moving skeleton",
             "gltf": "glTF: an animated hand", "mcap": "MCAP: for Foxglove"}
-_TRACKERS = (("as recorded", None), ("classic", "classic"), ("model", "model"),
-             ("estimator", "estimator"))
+_TRACKERS = (("as recorded", None), ("classic", "classic"), ("estimator", "estimator"))
 _FRAMES = (("rig", "rig"), ("wrist, along the palm's axes", "wrist"))
 _UNITS: tuple[tuple[str, Units], ...] = (("mm", "mm"), ("m", "m"))
 
@@ -66,7 +65,7 @@ class ExportDialog(QDialog):
         self.frame_box = _box(_FRAMES, "Where positions are told: in the rig frame, or relative to the wrist joint.")
         self.units_box = _box(_UNITS, "Unit of length, where the format leaves a choice.")
         self.smooth_box = QCheckBox("Smooth")
-        self.smooth_box.setToolTip("Every state uses what came after it as well. Only the model tracker can.")
+        self.smooth_box.setToolTip("Every state uses what came after it as well. Only the estimator can.")
         self.rate_box = QDoubleSpinBox()
         self.rate_box.setRange(0.0, MOST_HZ)
         self.rate_box.setDecimals(1)

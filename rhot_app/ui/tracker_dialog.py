@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.hand.anthropometry import scaled_hand
-from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, model_tracker_obstacle
+from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.job import Job
@@ -214,7 +214,7 @@ class TrackerDialog(QDialog):
         self.size_check.setChecked(settings.float_scale)
         self.variant_words.setText(VARIANTS[settings.variant][1])
         self.limits_words.setText(LIMITS[settings.limits][1])
-        obstacle = model_tracker_obstacle(self._rig)
+        obstacle = estimator_obstacle(self._rig)
         self.obstacle_label.setText("" if obstacle is None else f"{obstacle.why} {obstacle.remedy}")
         self.obstacle_label.setVisible(bool(self.obstacle_label.text()))
         self.details.setVisible(settings.kind != "classic")
@@ -235,8 +235,7 @@ class TrackerDialog(QDialog):
         resting = self._job is None
         possible = not self.obstacle_label.text()
         self.kinds["classic"].setEnabled(resting)
-        for kind in ("model", "estimator"):
-            self.kinds[kind].setEnabled(resting and possible)
+        self.kinds["estimator"].setEnabled(resting and possible)
         self.details.setEnabled(resting and possible)
         self.undo_button.setEnabled(resting and bool(self._made))
         self.close_button.setEnabled(resting)

@@ -71,8 +71,8 @@ def test_a_rig_that_nobody_calibrated_is_not_called_good() -> None:
     report = check_rig(load_rig(resource_path("rigs", "two_pis.json")))
     assert report.verdict.codes == {"nominal"}
     assert report.verdict.grade is Grade.FAIR
-    trusting = check_rig(with_tracker(load_rig(resource_path("rigs", "two_pis.json")), "model"))
-    assert trusting.verdict.codes == {"nominal"} and "model tracker" in trusting.verdict.findings[0].sentence
+    trusting = check_rig(with_tracker(load_rig(resource_path("rigs", "two_pis.json")), "estimator"))
+    assert trusting.verdict.codes == {"nominal"} and "estimator" in trusting.verdict.findings[0].sentence
 
 
 def test_cameras_that_nobody_put_together_are_not_called_good(rig: Rig) -> None:
@@ -168,20 +168,20 @@ def test_a_rig_that_measures_disparity_needs_no_lenses(rig: Rig) -> None:
     assert check_rig(blind).verdict.codes == {"disparity"}
 
 
-@pytest.mark.parametrize("kind", ["classic", "model"])
-def test_nodes_that_the_chosen_tracker_cannot_use_are_named(rig: Rig, kind: Literal["classic", "model"]) -> None:
+@pytest.mark.parametrize("kind", ["classic", "estimator"])
+def test_nodes_that_the_chosen_tracker_cannot_use_are_named(rig: Rig, kind: Literal["classic", "estimator"]) -> None:
     left = msgspec.structs.replace(rig.nodes[0], text_datagrams=True, data_port=5005)
     verdict = check_rig(msgspec.structs.replace(rig, nodes=(left, rig.nodes[1]),
                                                 tracker=TrackerSettings(kind=kind))).verdict
     found = [finding.sentence for finding in verdict.findings if finding.code == "tracker"]
-    assert verdict.acceptable == (kind == "classic") and len(found) == (kind == "model")
+    assert verdict.acceptable == (kind == "classic") and len(found) == (kind == "estimator")
     assert all(f"node {left.name} sends text" in sentence and "tracker.kind" in sentence for sentence in found)
 
 
-def test_a_marker_that_the_model_tracker_cannot_place_is_named(rig: Rig) -> None:
+def test_a_marker_that_the_estimator_cannot_place_is_named(rig: Rig) -> None:
     first, *others = rig.markers.markers
     markers = change(rig.markers, markers=(change(first, role=None), *others))
-    for kind, named in (("classic", False), ("model", True)):
+    for kind, named in (("classic", False), ("estimator", True)):
         verdict = check_rig(change(rig, markers=markers, tracker=TrackerSettings(kind=kind))).verdict  # type: ignore[arg-type]
         found = [finding.sentence for finding in verdict.findings if finding.code == "tracker"]
         assert verdict.acceptable != named and [first.id in sentence for sentence in found] == [True] * named

@@ -100,8 +100,8 @@ def test_lenses_that_nobody_calibrated_are_said_once_and_as_rhot_check_says_it()
     assert advice.text.startswith("Not calibrated: millimetres are not reliable. The lenses of left and right")
     assert (advice.level, advice.mender, advice.lasting) == ("warning", "lens", True)
     assert [finding.sentence for finding in check_rig(rig).verdict.findings] == [advice.text]
-    (advice,) = calibration_advice(with_tracker(rig, "model"))
-    assert "model tracker" in advice.text
+    (advice,) = calibration_advice(with_tracker(rig, "estimator"))
+    assert "estimator" in advice.text
 
 
 def test_a_rig_known_exactly_and_one_that_was_calibrated_need_no_words() -> None:

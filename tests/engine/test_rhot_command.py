@@ -89,7 +89,7 @@ def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
         node.close()
     assert running_engine(place) is None
     assert len(list(LogReader(log_path))) > 100
-    by_model = json.loads(rhot("replay", str(log_path), "--json", "--tracker", "model").stdout)
+    by_model = json.loads(rhot("replay", str(log_path), "--json", "--tracker", "estimator").stdout)
     summary = json.loads(rhot("replay", str(log_path), "--json").stdout)
     assert by_model["states"] > 1.5 * summary["states"], "one per frame, not one per pair"
     smoothed = json.loads(rhot("replay", str(log_path), "--json", "--tracker", "estimator", "--smooth").stdout)

@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -241,7 +240,8 @@ DEEP = b'{"command": "set_rig", "document": {"format": ' + b"[" * 50_000 + b"]" 
 
 @pytest.mark.parametrize("data", [
     b"", b"\xff", b"[]", b"{}", b'{"command": 3}', DEEP, DEEP.replace(b"[", b'{"a":').replace(b"]", b"}"),
-    b'{"command": "predict", "t_master_ns": ' + b"9" * 5000 + b"}", b'{"command": "' + b"x" * 100_000 + b'"}',
+    b'{"command": "bookmark", "text": "", "t_master_ns": ' + b"9" * 5000 + b"}",
+    b'{"command": "' + b"x" * 100_000 + b'"}',
     b'{"command": "node", "node_id": ' + b"[" * 60 + b"]" * 60 + b', "request": "command"}',
     b'{"command": "record", "path": "/tmp/\\u0000 command"}',
 ], ids=lambda data: data[:50])
@@ -255,43 +255,6 @@ def test_broken_bytes_are_refused_and_the_engine_lives(client: EngineClient, dat
     assert answer["ok"] is False
     socket.close()
     assert client.command("hello")["pid"]
-
-
-class Predictor(FakeTracker):
-    """Says of every instant what it said of the last one."""
-
-    def state_at(self, t_ns: int) -> HandState | None:
-        if t_ns == 666:
-            raise FloatingPointError("numbers went wrong")
-        state = self.solve()
-        return None if state is None else replace(state, t_master_ns=t_ns)
-
-
-def test_a_hand_is_predicted_to_the_instant_that_a_client_asks_for(rig: Rig, tmp_path: Path) -> None:
-    nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
-    bench = Bench(rig, tmp_path / "g", Predictor)
-    with EngineClient(tmp_path / "g") as client:
-        assert client.predict(1) is None, "nothing was seen yet"
-        for node in nodes:
-            node.start()
-        client.command("start")
-        collect(client, HandState)
-        eventually(lambda: client.predict(123_456_789_000) is not None, told=lambda: "no hand was predicted")
-        state = client.predict(123_456_789_000)
-        assert state is None or state.t_master_ns == 123_456_789_000
-        with pytest.raises(EngineError, match=r"failed to predict \(FloatingPointError: numbers went wrong\)"):
-            client.predict(666)
-        for nonsense in (-1, 1 << 63, True, "now", 1.5, None):
-            with pytest.raises(EngineError, match="monotonic clock"):
-                client.command("predict", t_master_ns=nonsense)
-    for node in nodes:
-        node.close()
-    bench.close()
-
-
-def test_a_tracker_that_predicts_nothing_says_so(client: EngineClient) -> None:
-    with pytest.raises(EngineError, match="choose the model tracker"):
-        client.predict(1)
 
 
 def test_requests_go_to_the_node_and_back(client: EngineClient, peer: ControlPeer) -> None:

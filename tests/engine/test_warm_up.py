@@ -47,7 +47,7 @@ def two_hands():
 
 
 @pytest.mark.parametrize("rig", [make_rig(), model_rig(), table_rig(), two_hands()],
-                         ids=["classic", "model", "table", "two hands"])
+                         ids=["classic", "estimator", "table", "two hands"])
 def test_rehearsal_tracks_the_rigs_hands_and_forgets_them(rig):
     spy = Spy(make_tracker(rig))
     warm_up(spy, rig)

@@ -143,6 +143,13 @@ def test_smoothed_fingertips_are_nearer_to_the_truth_while_their_markers_are_hid
                if state.condition in HERE)
 
 
+def test_a_fast_hand_is_smoothed_as_well(tmp_path):
+    """Between two frames it moves so far that what markers leave open changes."""
+    one = take(Order(make_scene(twin_defaults(), 3), "fast", SECONDS, sketched=True), tmp_path)
+    (error, _, _), (better, _, _) = (tips(one, states) for states in both(one, one.records()))
+    assert rms(better[80:]) < 0.95 * rms(error[80:])
+
+
 def test_what_cameras_triangulate_themselves_is_not_smoothed(grasp):
     states, smoothed = both(grasp, grasp.records())
     raw = {state.t_master_ns: state.marker_raw_positions for state in states if state.condition is Condition.TRACKING}

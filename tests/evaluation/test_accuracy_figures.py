@@ -92,7 +92,7 @@ def test_runs_are_pooled_each_figure_in_its_way() -> None:
 def test_tables_put_trackers_side_by_side() -> None:
     truth = make_truth()
     judged = {"classic": judge(make_track(truth, TIMES, off=2e-3), truth),
-              "model": judge(make_track(truth, TIMES, off=1e-3, covariance=1e-6 * np.eye(3)), truth)}
+              "estimator": judge(make_track(truth, TIMES, off=1e-3, covariance=1e-6 * np.eye(3)), truth)}
     comparison = Comparison((Run("grasp", 1, judged), Run("grasp", 2, judged)))
     lines = table(comparison).splitlines()
     assert len(lines) == 5 and len({len(line) for line in lines}) == 1

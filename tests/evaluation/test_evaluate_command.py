@@ -79,7 +79,8 @@ def test_a_scene_that_cannot_be_is_said_of_the_option(option: str, value: str, s
     assert capsys.readouterr().err.startswith(f"rhot: {option} {float(value)}: {said}")
 
 
-@pytest.mark.parametrize("stray", [("--sketched",), ("--seeds", "3"), ("--motions", "rest"), ("--trackers", "model")])
+@pytest.mark.parametrize("stray", [("--sketched",), ("--seeds", "3"), ("--motions", "rest"),
+                                   ("--trackers", "estimator")])
 def test_what_belongs_to_a_comparison_is_not_passed_over_without_one(stray: tuple[str, ...],
                                                                     capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", *stray]) == 2

@@ -18,7 +18,7 @@ from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene import make_scene, twin_defaults
 
-CLASSIC, MODEL = TrackerSettings(kind="classic"), TrackerSettings(kind="model")
+CLASSIC, MODEL = TrackerSettings(kind="classic"), TrackerSettings(kind="estimator")
 
 
 def sketch(folder: Path, motion: str, seconds: float) -> Take:
@@ -45,7 +45,7 @@ def test_a_camera_that_is_blind_makes_fingertips_worse(grasp: Take, rig: Rig) ->
         assert bad["within_3_sd_share"] is None  # the classic tracker states nothing
 
 
-def test_the_model_tracker_knows_how_badly_it_knows_a_hand_before_one_camera(grasp: Take) -> None:
+def test_the_estimator_knows_how_badly_it_knows_a_hand_before_one_camera(grasp: Take) -> None:
     figures = scenarios.one_camera_blind(grasp, rig_with(grasp.rig, MODEL), says_so=True)
     assert figures["tips_mm"] is not None and figures["tips_mm"] > 2.0
     assert figures["within_3_sd_share"] is not None and figures["within_3_sd_share"] > 0.95
@@ -102,7 +102,7 @@ def test_a_tracker_that_does_not_estimate_the_size_never_finds_it(grasp: Take, r
 
 @pytest.mark.parametrize("wrong", [1.1, 0.9])
 def test_a_tracker_that_estimates_the_size_finds_it_and_states_no_more_than_it_knows(grasp: Take, wrong: float) -> None:
-    estimating = rig_with(grasp.rig, TrackerSettings(kind="model", float_scale=True))
+    estimating = rig_with(grasp.rig, TrackerSettings(kind="estimator", float_scale=True))
     rig = msgspec.structs.replace(estimating, hand=scaled_hand(grasp.rig.hand, wrong))
     figures = scenarios.growing(grasp, rig, 1.0 / wrong)
     assert all(figures[key] is not None for key in ("within_2_percent_after_s", "stated_percent", "max_off_in_sd"))

@@ -10,20 +10,20 @@ from rhot_app.evaluation.trial_table import legend, trial_table
 
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "trackers.py"
 BLIND = {"classic": {"tips_mm": 33.25, "within_3_sd_share": None},
-         "model": {"tips_mm": 1234.5, "within_3_sd_share": 0.99}}
+         "estimator": {"tips_mm": 1234.5, "within_3_sd_share": 0.99}}
 
 
 def test_a_table_lines_up_and_says_what_was_tried() -> None:
     head, columns, classic, model = trial_table("blind", "grasp, 8 s", BLIND).rstrip("\n").splitlines()
     assert head == "blind: grasp, 8 s"
     assert columns.split() == ["tips_mm", "within_3_sd_share"] and len({len(columns), len(classic), len(model)}) == 1
-    assert classic.split() == ["classic", "33.250", "-"] and model.split() == ["model", "1234", "0.990"]
+    assert classic.split() == ["classic", "33.250", "-"] and model.split() == ["estimator", "1234", "0.990"]
 
 
 def test_the_legend_tells_of_the_columns_that_were_shown_once() -> None:
-    told = legend([BLIND, {"model": {"tips_mm": 1.0, "lag_ms": 0.1}}]).splitlines()
+    told = legend([BLIND, {"estimator": {"tips_mm": 1.0, "lag_ms": 0.1}}]).splitlines()
     assert [line.split()[0] for line in told] == ["tips_mm", "within_3_sd_share", "lag_ms"]
-    assert legend([{"model": {"starts": 3.0}}]) == ""
+    assert legend([{"estimator": {"starts": 3.0}}]) == ""
 
 
 def test_the_command_says_seeds_motion_and_markers(tmp_path: Path) -> None:

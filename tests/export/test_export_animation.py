@@ -116,10 +116,10 @@ class Gltf:
         return local[index] if index not in self.parent else self._chain(self.parent[index], local) @ local[index]
 
 
-@pytest.mark.parametrize("tracker", ["classic", "model"])
+@pytest.mark.parametrize("tracker", ["classic", "estimator"])
 def test_the_nodes_of_gltf_move_as_the_hand(tracker: str, log: Path, states_by: Callable[[str], HandStates],
                                             tmp_path: Path) -> None:
-    options = ExportOptions(tracker="model" if tracker == "model" else "classic")
+    options = ExportOptions(tracker="estimator" if tracker == "estimator" else "classic")
     file, states = Gltf(export_log(log, tmp_path / "a.glb", options=options).path), states_by(tracker)
     known = np.flatnonzero(states.tracked & np.isfinite(states.world_from_palm[:, 0, 0]))
     assert file.times() == pytest.approx(states.times_s[known], abs=1e-5), "a keyframe for every tracked state"

@@ -48,11 +48,11 @@ def as_protobuf(value: Any) -> Any:
 @pytest.fixture(scope="module")
 def exported(log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("mcap") / "a.mcap"
-    return export_log(log, out, options=ExportOptions(tracker="model")).path
+    return export_log(log, out, options=ExportOptions(tracker="estimator")).path
 
 
 def test_every_state_is_a_message(exported: Path, states_by: Callable[[str], HandStates]) -> None:
-    states = states_by("model")
+    states = states_by("estimator")
     found, schemas = messages(exported)
     assert schemas["/hand/state"] == "rhot.HandState"
     sent = found["/hand/state"]
@@ -64,7 +64,7 @@ def test_every_state_is_a_message(exported: Path, states_by: Callable[[str], Han
 
 
 def test_foxglove_knows_scene_and_frames(exported: Path, states_by: Callable[[str], HandStates]) -> None:
-    states = states_by("model")
+    states = states_by("estimator")
     found, schemas = messages(exported)
     assert (schemas["/hand/scene"], schemas["/tf"]) == ("foxglove.SceneUpdate", "foxglove.FrameTransforms")
     shown = {time: ParseDict(as_protobuf(message), SceneUpdate()) for time, message in found["/hand/scene"]}

@@ -108,7 +108,7 @@ def test_a_table_frame_is_turned_less(log: Path, states: HandStates, tmp_path: P
 
 
 def test_a_points_residual_is_its_standard_deviation(log: Path, tmp_path: Path) -> None:
-    path = export_log(log, tmp_path / "a.c3d", options=ExportOptions(tracker="model")).path
+    path = export_log(log, tmp_path / "a.c3d", options=ExportOptions(tracker="estimator")).path
     residuals = ezc3d.c3d(str(path))["data"]["meta_points"]["residuals"][0]
     known = residuals[JOINTS.index("index_tip")]
     assert 0.05 < np.median(known[known > 0.0]) < 10.0

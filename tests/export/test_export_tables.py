@@ -24,10 +24,10 @@ def points(table: pandas.DataFrame, kind: str, names: tuple[str, ...], unit: str
     return table[columns].to_numpy(float).reshape(len(table), len(names), 3)
 
 
-def test_csv_holds_the_states_of_the_model_tracker(log: Path, states_by: Callable[[str], HandStates],
+def test_csv_holds_the_states_of_the_estimator(log: Path, states_by: Callable[[str], HandStates],
                                                    tmp_path: Path) -> None:
-    done = export_log(log, tmp_path / "a.csv", options=ExportOptions(tracker="model"))
-    table, states = pandas.read_csv(done.path), states_by("model")
+    done = export_log(log, tmp_path / "a.csv", options=ExportOptions(tracker="estimator"))
+    table, states = pandas.read_csv(done.path), states_by("estimator")
     assert len(table) == done.states == len(states) > 100
     assert list(table["t_master_ns"]) == list(states.t_master_ns)
     assert list(table["condition"]) == list(states.conditions)

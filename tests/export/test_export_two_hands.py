@@ -31,7 +31,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Path:
                    for marker in left.markers.markers)
     rig = msgspec.structs.replace(
         right, markers=msgspec.structs.replace(right.markers, markers=right.markers.markers + others),
-        other_hand=left.hand, tracker=TrackerSettings(kind="model"))
+        other_hand=left.hand, tracker=TrackerSettings(kind="estimator"))
     own, other = moving("grasp", 1.0, "rhot8"), moving("pinch", 1.0, "rhot8", "left")
     frames = sights(rig, lambda times: np.concatenate([own(times), other(times) + ASIDE], axis=1), 1.0)
     return write_log(tmp_path_factory.mktemp("both") / "both.rhotlog", rig, frames)
@@ -49,7 +49,7 @@ def test_both_are_smoothed(both: Path) -> None:
 
 
 def test_tables_and_points_have_both(both: Path, tmp_path: Path) -> None:
-    states = states_of_log(both, "model")
+    states = states_of_log(both, "estimator")
     assert states.other is not None and states.other.tracked.mean() > 0.5
     table = pandas.read_csv(export_log(both, tmp_path / "a.csv").path)
     place = states.other.joint_positions[:, JOINTS.index("index_tip")]

@@ -1,4 +1,4 @@
-"""Rigs for the model tracker, the hands that it is shown, and how far from the truth it puts them."""
+"""Rigs for the estimator, the hands that it is shown, and how far from the truth it puts them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def model_rig(markers: str = "rhot6", side: str = "right", cameras: int = 2, **s
     flat = tuple(msgspec.structs.replace(marker, radius_mm=None, shape="disc") for marker in chosen.markers)
     return msgspec.structs.replace(
         make_rig(cameras=cameras), markers=msgspec.structs.replace(chosen, markers=flat),
-        hand=load_hand(resource_path("hands", f"{side}.json")), tracker=TrackerSettings(kind="model", **settings))
+        hand=load_hand(resource_path("hands", f"{side}.json")), tracker=TrackerSettings(kind="estimator", **settings))
 
 
 @cache

@@ -36,7 +36,9 @@ def with_further(frame: CameraObservations, markers: list[int], points_m: np.nda
                          np.ones(count), np.zeros(count, np.uint16))
     return replace(frame, pixels=own, further=further)
 
-KNOWN = {"classic": MEASURED, "model": INFERRED}  # the model tracker calls nothing of flat markers measured
+
+
+KNOWN = {"classic": MEASURED, "estimator": INFERRED}  # a blob is paint that nobody measured
 
 
 @given(st.integers(0, 2**31), st.integers(1, 6), st.integers(0, 9))
@@ -76,7 +78,7 @@ def test_markers_that_swap_names_are_told_apart_by_all_of_them_together() -> Non
 THING = REST[1] + np.array([0.2, -0.15, 0.5])  # of the index marker's colour, half a metre behind the hand
 
 
-@pytest.mark.parametrize("kind", ["classic", "model"])
+@pytest.mark.parametrize("kind", ["classic", "estimator"])
 @pytest.mark.parametrize("first", [False, True])
 def test_a_thing_behind_the_hand_is_not_the_marker(kind: str, first: bool) -> None:
     frames = [with_further(frame, [1], THING[None], first=first)
@@ -86,7 +88,7 @@ def test_a_thing_behind_the_hand_is_not_the_marker(kind: str, first: bool) -> No
     assert max(np.linalg.norm(state.marker_positions[1] - REST[1]) for state in states) < 2e-3
 
 
-@pytest.mark.parametrize("kind", ["classic", "model"])
+@pytest.mark.parametrize("kind", ["classic", "estimator"])
 def test_a_thing_does_not_take_the_place_of_a_hidden_marker(kind: str) -> None:
     things = np.stack([THING, THING + np.array([-0.4, 0.0, 0.1])])
     frames = []

@@ -6,27 +6,27 @@ from modelled_hand import model_rig
 
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.simulator.motion import FACING
+from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.hand_size import FOLLOW_S, GRID, LEAST_SD, USUAL_SD, HandSize
-from rhot_app.tracking.kalman.wearing import compile_wearing
-from rhot_app.tracking.model_start import Located
+from rhot_app.tracking.marker_model import compile_markers
 
-WEARING = compile_wearing(model_rig())
-MARKERS = len(WEARING.roles)
+WORN = compile_markers(model_rig())
+MARKERS = len(WORN.roles)
 NOISE_M = 5e-4
 INDEX, LITTLE = 1, 4
 
 
 def size_of_nobody():
-    return HandSize(WEARING.worn.dh, WEARING.limits, WEARING.natural, WEARING.bias_variance)
+    return HandSize(WORN.dh, WORN.limits, WORN.natural, WORN.paint_variance)
 
 
 def natural_poses(count, seed):
     """(count, 21) rad, drawn from the natural pose within the limits, about."""
     rng, poses = np.random.default_rng(seed), []
-    root = np.linalg.cholesky(np.linalg.inv(WEARING.natural.information))
+    root = np.linalg.cholesky(np.linalg.inv(WORN.natural.information))
     while len(poses) < count:
-        angles = WEARING.natural.mean + root @ rng.normal(size=21)
-        bounded = np.clip(angles, *WEARING.limits.T)
+        angles = WORN.natural.mean + root @ rng.normal(size=21)
+        bounded = np.clip(angles, *WORN.limits.T)
         if np.abs(angles - bounded).max() < np.radians(8.0):
             poses.append(bounded)
     return np.array(poses)
@@ -39,7 +39,7 @@ def world():
 
 
 def located(angles, scale, rng):
-    points, dh = np.empty((MARKERS, 3)), WEARING.worn.dh
+    points, dh = np.empty((MARKERS, 3)), WORN.dh
     forward_arrays(dh, world(), angles, empty_frames(dh), points)
     points = world()[:3, 3] + scale * (points - world()[:3, 3]) + NOISE_M * rng.normal(size=points.shape)
     return Located(0, points, np.tile(NOISE_M**2 * np.eye(3), (MARKERS, 1, 1)), np.ones(MARKERS, bool))

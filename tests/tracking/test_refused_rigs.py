@@ -1,4 +1,4 @@
-"""Rigs that the model tracker cannot work with are refused with a sentence."""
+"""Rigs that the estimator cannot work with are refused with a sentence."""
 
 import msgspec
 import pytest
@@ -28,7 +28,7 @@ def test_two_markers_in_one_place_are_refused():
 
 def test_a_rig_without_calibration_is_refused():
     rig = msgspec.structs.replace(RIG, depth=DepthSettings(mode="disparity"))
-    with pytest.raises(RigError, match=r"The model tracker needs calibrated cameras.*tracker\.kind"):
+    with pytest.raises(RigError, match=r"The estimator needs calibrated cameras.*tracker\.kind"):
         make_tracker(rig)
 
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from modelled_hand import after_s, deviations, model_rig, moving, seconds, sights, states_of
-from synthetic_rig import EPOCH_NS, LOST, altered, make_rig
+from synthetic_rig import LOST, altered, make_rig
 
 from rhot_app.engine import codec
 from rhot_app.engine.advice import hands_advice
@@ -14,6 +14,7 @@ from rhot_app.errors import RigError
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import OTHER_HAND, Rig, TrackerSettings, parse_rig
 from rhot_app.tracking.classic import ClassicTracker
+from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.two_hands import TwoHands
@@ -30,7 +31,7 @@ def two_handed(**settings) -> Rig:
                    for marker in LEFT.markers.markers)
     mixed = tuple(marker for pair in zip(RIGHT.markers.markers, others, strict=True) for marker in pair)
     return msgspec.structs.replace(RIGHT, markers=msgspec.structs.replace(RIGHT.markers, markers=mixed),
-                                   other_hand=LEFT.hand, tracker=TrackerSettings(**{"kind": "model"} | settings))
+                                   other_hand=LEFT.hand, tracker=TrackerSettings(**{"kind": "estimator"} | settings))
 
 
 RIG = two_handed()
@@ -103,16 +104,19 @@ def test_one_hand_that_leaves_is_lost_alone():
 
 def test_both_are_predicted_to_one_instant():
     tracker = make_tracker(RIG)
-    assert isinstance(tracker, TwoHands) and tracker.state_at(EPOCH_NS) is None
+    assert isinstance(tracker, TwoHands)
     for frame in FRAMES:
         tracker.ingest(frame)
         state = tracker.solve()
-    ahead = tracker.state_at(state.t_master_ns + 10_000_000)
+    ahead = Extrapolator(RIG).at(state, state.t_master_ns + 10_000_000)
+    for one, before in ((ahead, state), (ahead.other, state.other)):
+        assert (one.joint_positions != before.joint_positions).any(axis=1).all()
+        assert (one.marker_positions != before.marker_positions).any(axis=1).all()
     assert ahead.t_master_ns == ahead.other.t_master_ns == state.t_master_ns + 10_000_000
     assert tracker.newest_frames() == tuple(max((f for f in FRAMES if f.camera == c), key=lambda f: f.t_row0_master_ns)
                                             for c in range(2))
     tracker.reset()
-    assert tracker.newest_frames() == (None, None) and tracker.state_at(state.t_master_ns) is None
+    assert tracker.newest_frames() == (None, None)
 
 
 def test_a_state_of_two_hands_is_published_whole(states):

@@ -93,7 +93,6 @@ class FakeEngine:
         self.refuse_rig = ""  # why the engine takes no other rig
         self.scale = (1.03, 0.017)  # what a floating hand's size is estimated to be
         self.commands: list[tuple[str, dict[str, Any]]] = []
-        self.predicted: list[int] = []
         self.sequence = 0
         self.session = 1
         self._model = build_model(self.rig.hand)
@@ -134,7 +133,7 @@ class FakeEngine:
             epipolar_error_px=np.full(count, 0.12), **self._estimated(), latency_s=latency)
 
     def _estimated(self) -> dict[str, Any]:
-        """What the model tracker adds: fingers that grow less certain from the thumb on, and the hand's size."""
+        """What the estimator adds: fingers that grow less certain from the thumb on, and the hand's size."""
         if self.rig.tracker.kind == "classic":
             return UNESTIMATED
         spread = np.repeat([1.0, 1.0, 1.5, 3.0, 8.0, 20.0], [1, 4, 4, 4, 4, 4])
@@ -143,7 +142,10 @@ class FakeEngine:
         return {"joint_covariances": np.diag(NOISE_M**2) * (spread**2)[:, None, None],
                 "fingertip_covariances": np.diag(NOISE_M**2) * (spread[4::4]**2)[:, None, None],
                 "angle_sd": np.radians(np.repeat([1.0, 1.0, 3.0, 8.0, 20.0], [5, 4, 4, 4, 4])),
-                "palm_covariance": np.diag([4e-4, 4e-4, 5e-4, 0.01, 0.01, 0.02]) ** 2, **scale}
+                "palm_covariance": np.diag([4e-4, 4e-4, 5e-4, 0.01, 0.01, 0.02]) ** 2,
+                "velocity": np.repeat([0.1, 0.0], [3, 24]), "acceleration": np.zeros(27),
+                "velocity_sd": np.full(27, 0.01), "joint_velocity_sd": np.full(21, 0.01),
+                "acceleration_sd": np.full(27, 0.1), "joint_acceleration_sd": np.full(21, 0.1), **scale}
 
     def _kinds(self, knowledge: np.ndarray) -> tuple[np.ndarray, np.ndarray, Knowledge]:
         """How joints, angles and palm are known, from how the markers are."""
@@ -245,13 +247,6 @@ class FakeClient:
             messages += [engine.preview(camera, self._next_preview) for camera in range(len(engine.rig.nodes))]
             self._next_preview += 0.25
         return messages
-
-    def predict(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
-        """The hand at that time, by the same motion; the classic tracker predicts nothing."""
-        self.engine.predicted.append(t_master_ns)
-        if self.engine.dead or self.engine.rig.tracker.kind == "classic":
-            raise EngineError("this rig's tracker predicts nothing")
-        return self.engine.state(1e-9 * t_master_ns)
 
     def command(self, name: str, **args: Any) -> dict[str, Any]:
         """Start, stop, and tell or save the rig as the engine would; raises EngineError when it is dead."""

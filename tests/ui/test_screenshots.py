@@ -97,7 +97,7 @@ def test_scene_alone(shown):
 
 
 def test_what_is_real(make_bench):
-    rig = msgspec.structs.replace(synthetic_rig(), tracker=TrackerSettings(kind="model", float_scale=True))
+    rig = msgspec.structs.replace(synthetic_rig(), tracker=TrackerSettings(kind="estimator", float_scale=True))
     bench = make_bench(FakeBackend(FakeEngine(rig, running=False)))
     bench.window.resize(SIZE)
     bench.track()

@@ -96,8 +96,8 @@ def stand_in(tmp_path, rig_path, monkeypatch):
 
 
 def test_simulated_nodes_are_started_watched_and_ended(session, stand_in):
-    opened = session.open_twin(TwinChoice(motion="rest", tracker="model"), quiet)
-    assert opened.rig.tracker.kind == "model"
+    opened = session.open_twin(TwinChoice(motion="rest", tracker="estimator"), quiet)
+    assert opened.rig.tracker.kind == "estimator"
     assert opened.simulated and opened.ours and session.twin_alive()
     eventually(lambda: session.twin_pace() == TwinPace(11.25, 40.0))
     assert {process.role for process in started_processes(session._place)} == {"engine", session_module.TWIN_ROLE}

@@ -20,8 +20,8 @@ from rhot_app.ui.models.tracker_words import scale_text, size_text
 from rhot_app.ui.tracker_dialog import TrackerDialog
 from rhot_app.ui.wizards.models.rig_rows import rig_rows
 
-MODEL = TrackerSettings(kind="model")
-FLOATING = TrackerSettings(kind="model", float_scale=True)
+MODEL = TrackerSettings(kind="estimator")
+FLOATING = TrackerSettings(kind="estimator", float_scale=True)
 
 
 def with_tracker(tracker):
@@ -68,12 +68,12 @@ def click_on_word(button):
                      QPoint(12, button.height() // 2))
 
 
-def test_the_model_tracker_is_one_click_away_and_taken_back_with_one_key(opened):
+def test_the_estimator_is_one_click_away_and_taken_back_with_one_key(opened):
     desk = opened(synthetic_rig())
     dialog, path = desk.dialog, desk.path
     assert dialog.kinds["classic"].isChecked() and not dialog.details.isVisible()
     assert not dialog.undo_button.isEnabled()
-    click_on_word(dialog.kinds["model"])
+    click_on_word(dialog.kinds["estimator"])
     desk.settled("In force.")
     assert desk.engine.rig.tracker == MODEL and load_rig(path).tracker == MODEL
     assert [version.replaced_by for version in versions(path)] == ["choosing the tracker model full anatomical limits"]
@@ -88,7 +88,7 @@ def test_it_stays_open_until_the_engine_has_changed_over(opened, qtbot):
     desk, go_on = opened(synthetic_rig()), threading.Event()
     connect = desk.dialog._connect
     desk.dialog._connect = lambda: connect() if go_on.wait(PATIENCE_MS / 1e3) else None
-    click_on_word(desk.dialog.kinds["model"])
+    click_on_word(desk.dialog.kinds["estimator"])
     assert not desk.dialog.close_button.isEnabled()
     desk.dialog.close()
     QTest.keyClick(desk.dialog, Qt.Key.Key_Escape)
@@ -108,11 +108,11 @@ def test_fingers_and_limits_are_chosen_from_lists(opened):
         QTest.keyClick(box, Qt.Key.Key_Down)
         desk.until(lambda before=before: load_rig(desk.path) != before and dialog.close_button.isEnabled()
               and dialog.details.isEnabled())
-    assert load_rig(desk.path).tracker == TrackerSettings(kind="model", variant="coupled", limits="thesis")
+    assert load_rig(desk.path).tracker == TrackerSettings(kind="estimator", variant="coupled", limits="thesis")
     assert "DIP = 2/3 PIP" in dialog.variant_words.text()
     QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
     desk.settled("Taken back.")
-    assert load_rig(desk.path).tracker == TrackerSettings(kind="model", variant="coupled")
+    assert load_rig(desk.path).tracker == TrackerSettings(kind="estimator", variant="coupled")
     assert dialog.limits_box.currentData() == "anatomical"
 
 
@@ -154,14 +154,14 @@ def test_a_size_that_is_not_certain_cannot_be_used(opened):
 
 def test_what_stands_in_the_way_is_said(opened):
     dialog = opened(msgspec.structs.replace(synthetic_rig(), depth=DepthSettings(mode="disparity"))).dialog
-    assert not dialog.kinds["model"].isEnabled() and dialog.obstacle_label.isVisible()
+    assert not dialog.kinds["estimator"].isEnabled() and dialog.obstacle_label.isVisible()
     assert "distance from disparity" in dialog.obstacle_label.text()
 
 
 def test_a_refusal_changes_nothing(opened):
     desk = opened(synthetic_rig())
     desk.engine.refuse_rig = "marker 'nose' sits nowhere on the hand."
-    click_on_word(desk.dialog.kinds["model"])
+    click_on_word(desk.dialog.kinds["estimator"])
     desk.settled("marker 'nose' sits nowhere on the hand.")
     assert desk.dialog.kinds["classic"].isChecked() and load_rig(desk.path).tracker.kind == "classic"
     assert not desk.dialog.undo_button.isEnabled() and versions(desk.path) == []
@@ -174,9 +174,9 @@ def test_the_window_follows_and_somebody_elses_change_is_not_taken_back(bench, t
     bench.until(lambda: bench.controller.rig is not None)
     bench.window.actions_.tracker.trigger()
     dialog = bench.window.dialogs.tracker
-    click_on_word(dialog.kinds["model"])
+    click_on_word(dialog.kinds["estimator"])
     bench.until(lambda: bench.controller.rig.tracker == MODEL and dialog.undo_button.isEnabled())
-    bench.backend.engine.rig = with_tracker(TrackerSettings(kind="model", variant="coupled"))
+    bench.backend.engine.rig = with_tracker(TrackerSettings(kind="estimator", variant="coupled"))
     bench.window.rig_watch.look_soon()
     bench.until(lambda: dialog.variant_box.currentData() == "coupled")
     assert not dialog.undo_button.isEnabled()

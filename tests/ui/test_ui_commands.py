@@ -32,8 +32,8 @@ def test_the_demo_takes_a_motion_and_a_seed(opened):
 
 
 def test_the_demo_takes_a_tracker(opened):
-    assert main(["demo", "--tracker", "model"]) == 0
-    assert opened == [(None, TwinChoice(tracker="model"))]
+    assert main(["demo", "--tracker", "estimator"]) == 0
+    assert opened == [(None, TwinChoice(tracker="estimator"))]
 
 
 def test_the_demo_takes_a_motion_file(opened, tmp_path):

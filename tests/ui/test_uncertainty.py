@@ -26,7 +26,7 @@ def rig():
 
 @pytest.fixture
 def estimating(make_bench, rig):
-    """The window on a rig with the model tracker, tracking."""
+    """The window on a rig with the estimator, tracking."""
     bench = make_bench(FakeBackend(FakeEngine(rig, running=False)))
     bench.track()
     return bench

@@ -30,8 +30,8 @@ _PER_MARKER = ("marker_positions", "marker_raw_positions", "marker_covariances",
 
 
 def one_hand_rig() -> Rig:
-    """The test bench's rig with the model tracker."""
-    return msgspec.structs.replace(synthetic_rig(), tracker=TrackerSettings(kind="model"))
+    """The test bench's rig with the estimator."""
+    return msgspec.structs.replace(synthetic_rig(), tracker=TrackerSettings(kind="estimator"))
 
 
 def two_hand_rig() -> Rig:

@@ -35,7 +35,7 @@ class TwinChoice:
     motion: str = "grasp"
     seed: int = 1
     preset: str = "wide"
-    tracker: Literal["classic", "model", "estimator"] = "classic"
+    tracker: Literal["classic", "estimator"] = "classic"
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,10 +40,6 @@ class Client(Protocol):
         """Ask the engine; raises EngineError."""
         ...
 
-    def predict(self, t_master_ns: int, *, timeout_s: float = 3.0) -> HandState | None:
-        """The hand as it should be at that time; raises EngineError."""
-        ...
-
 
 class Live:
     """The newest of everything, and the sliding windows behind the plots.

@@ -12,11 +12,9 @@ from rhot_app.tracking.state import HandState
 KINDS: Final = {
     "classic": ("Classic", "The thesis's way: triangulate each marker, smooth it, then bend the fingers one by one. "
                 "Works with every rig. A marker needs two cameras, and joints do not say how well they are known."),
-    "model": ("Model", "One hand estimated from everything that every camera sees, at the time it was seen. A marker "
-              "that one camera sees counts, hidden fingers are carried on, and every joint says how well it is known. "
-              "Needs calibrated cameras with clocks."),
-    "estimator": ("Estimator", "On trial: the same by a simpler filter. It alone smooths recordings; the model "
-                  "tracker is nearer in a grasp. Needs calibrated cameras with clocks."),
+    "estimator": ("Estimator", "One hand estimated from everything that every camera sees, at the time it was seen. A "
+                  "marker that one camera sees counts, hidden fingers are carried on, and every joint says how well "
+                  "it is known. It predicts, and smooths recordings. Needs calibrated cameras with clocks."),
 }
 VARIANTS: Final = {
     "full": ("full: every joint by itself", "27 degrees of freedom. The default."),
@@ -36,11 +34,11 @@ SETTLED_SD = 0.02
 
 
 def settings_text(settings: TrackerSettings) -> str:
-    """One line, e.g. "model, full, anatomical limits, size estimated"."""
+    """One line, e.g. "estimator, full, anatomical limits, size estimated"."""
     if settings.kind == "classic":
         return "classic"
     size = ", size estimated" if settings.float_scale else ""
-    return f"model, {settings.variant}, {settings.limits} limits{size}"
+    return f"estimator, {settings.variant}, {settings.limits} limits{size}"
 
 
 def size_known(state: HandState | None) -> bool:

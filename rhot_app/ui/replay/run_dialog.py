@@ -20,8 +20,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.ui.replay.session import Choice
 
-_TRACKERS = (("as the rig says", ""), ("classic", "classic"), ("model", "model"),
-             ("estimator", "estimator"))
+_TRACKERS = (("as the rig says", ""), ("classic", "classic"), ("estimator", "estimator"))
 _WIDTH_PX = 480
 
 
@@ -78,7 +77,7 @@ class RunDialog(QDialog):
         self.rig_choice = FileChoice("Track with a rig file", "as recorded")
         self.hand_choice = FileChoice("Track with a hand file", "the rig's hand")
         self.smooth_box = QCheckBox("Smooth")
-        self.smooth_box.setToolTip("Every state uses what came after it as well. Only the model tracker can.")
+        self.smooth_box.setToolTip("Every state uses what came after it as well. Only the estimator can.")
         self.start_button, close = QPushButton("Track"), QPushButton("Cancel")
         self.start_button.setDefault(True)
         self.start_button.clicked.connect(self._choose)

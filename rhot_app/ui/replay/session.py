@@ -26,7 +26,7 @@ _PLOT_SPACING_NS = 50_000_000  # thirty seconds of a plot are 600 rows then
 class Choice:
     """How a recording is to be tracked: as it was recorded, or with another tracker, rig file or hand file."""
 
-    tracker: Literal["", "classic", "model", "estimator"] = ""
+    tracker: Literal["", "classic", "estimator"] = ""
     rig: Path | None = None
     hand: Path | None = None
     beside: bool = False  # compared with the run that is shown, instead of in its place
@@ -46,7 +46,7 @@ class Choice:
 
     @property
     def text(self) -> str:
-        """In words, e.g. "model tracker, desk.json"."""
+        """In words, e.g. "estimator, desk.json"."""
         parts = [f"{self.tracker} tracker"] if self.tracker else []
         parts += [path.name for path in (self.rig, self.hand) if path is not None]
         parts += ["smoothed"] if self.smooth else []

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rhot_app.evaluation.takes import LOG_NAME, Order, take
+from rhot_app.evaluation.takes import LOG_NAME, Order, Take, take
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_app.ui.replay.run import Run, track_log
 
@@ -15,10 +15,16 @@ SECONDS = 4.0
 
 
 @pytest.fixture(scope="session")
-def grasp_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four seconds of two cameras at a hand that grasps, as a raw log."""
+def grasp_take(tmp_path_factory: pytest.TempPathFactory) -> Take:
+    """Four seconds of two cameras at a hand that grasps, with the truth."""
     order = Order(make_scene(twin_defaults(), 3), "grasp", SECONDS, sketched=True)
-    return take(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME
+    return take(order, tmp_path_factory.mktemp("takes"))
+
+
+@pytest.fixture(scope="session")
+def grasp_log(grasp_take: Take) -> Path:
+    """The raw log of `grasp_take`."""
+    return grasp_take.folder / LOG_NAME
 
 
 @pytest.fixture

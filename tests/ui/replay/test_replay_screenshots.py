@@ -56,7 +56,7 @@ def test_the_replay(themed, recordings, tmp_path):
     log = recordings / "two cups.rhotlog"
     window.open(log)
     until(lambda: window.replay is not None)
-    window.work.start(log, Choice("model", beside=True))
+    window.work.start(log, Choice("estimator", beside=True))
     until(lambda: window.replay.second is not None)
     window.seek(9.5)
     window._loop("end")

@@ -240,10 +240,10 @@ def test_two_runs_are_compared_side_by_side(desk):
     window = desk.window
     window.toolbar.compare.trigger()
     dialog = window.dialog
-    dialog.tracker_box.setCurrentIndex(dialog.tracker_box.findData("model"))
+    dialog.tracker_box.setCurrentIndex(dialog.tracker_box.findData("estimator"))
     desk.click(dialog.start_button)
     desk.until(lambda: window.replay.second is not None)
-    assert window.replay.run.rig.tracker.kind == "classic" and window.replay.second.rig.tracker.kind == "model"
+    assert window.replay.run.rig.tracker.kind == "classic" and window.replay.second.rig.tracker.kind == "estimator"
     desk.scrub(2.5)
     desk.until(lambda: desk.drawn_ns == window.replay.run.tracked.times_ns[window.replay.player.number])
     first, second = (actors._hands[0].items[3] for actors in (window.parts.scene._actors, window.parts.scene._second))
@@ -252,7 +252,7 @@ def test_two_runs_are_compared_side_by_side(desk):
     assert abs(np.mean(first._arrays[0] - second._arrays[0])) < 0.02
     desk.until(window.parts.difference.isVisible)
     desk.until(lambda: [values[0] != "–" for values in window.parts.difference.legend.values] == [True] * 5)
-    desk.until(lambda: "Solid: as recorded. Blue and translucent: model tracker." in window.advice.texts)
+    desk.until(lambda: "Solid: as recorded. Blue and translucent: estimator." in window.advice.texts)
     window.toolbar.alone.trigger()
     assert window.parts.scene._second is None and window.replay.second is None
     assert not window.parts.difference.isVisible()

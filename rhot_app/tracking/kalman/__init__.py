@@ -1,1 +1,0 @@
-"""One hand as the state of an iterated extended Kalman filter, and the residuals that tell about it."""
