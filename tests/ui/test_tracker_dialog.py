@@ -76,7 +76,7 @@ def test_the_estimator_is_one_click_away_and_taken_back_with_one_key(opened):
     click_on_word(dialog.kinds["estimator"])
     desk.settled("In force.")
     assert desk.engine.rig.tracker == MODEL and load_rig(path).tracker == MODEL
-    assert [version.replaced_by for version in versions(path)] == ["choosing the tracker model full anatomical limits"]
+    assert [version.replaced_by for version in versions(path)] == ["choosing the tracker estimator full anatomical limits"]
     assert dialog.details.isVisible()
     QTest.keyClick(dialog, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     desk.settled("Taken back.")
@@ -196,4 +196,4 @@ def test_a_size_is_written_with_the_digits_that_mean_something():
 def test_earlier_versions_tell_of_the_tracker():
     rows = rig_rows(synthetic_rig(), with_tracker(FLOATING))
     assert [(row.what, row.before, row.after) for row in rows] == [
-        ("tracker", "classic", "model, full, anatomical limits, size estimated")]
+        ("tracker", "classic", "estimator, full, anatomical limits, size estimated")]

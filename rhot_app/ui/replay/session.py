@@ -47,7 +47,7 @@ class Choice:
     @property
     def text(self) -> str:
         """In words, e.g. "estimator, desk.json"."""
-        parts = [f"{self.tracker} tracker"] if self.tracker else []
+        parts = [{"classic": "classic tracker"}.get(self.tracker, self.tracker)] if self.tracker else []
         parts += [path.name for path in (self.rig, self.hand) if path is not None]
         parts += ["smoothed"] if self.smooth else []
         return ", ".join(parts) or "as recorded"
