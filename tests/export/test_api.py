@@ -38,7 +38,8 @@ def test_smoothed_states(log: Path, states_by: Callable[[str], HandStates], tmp_
     found = recording.states("estimator", smooth=True)
     assert len(found) == pytest.approx(len(filtered), abs=2) and (np.diff(found.t_master_ns) >= 0).all()
     assert (np.diff(found.sequence) == 1).all()
-    assert np.nanmedian(found.angle_sd) < 0.95 * np.nanmedian(filtered.angle_sd)
+    spread = [np.nanmedian(np.trace(one.fingertip_covariances, axis1=2, axis2=3)) for one in (filtered, found)]
+    assert spread[1] < 0.8 * spread[0]
     frame = recording.to_dataframe("estimator", rate_hz=25.0, units="m", smooth=True)
     done = recording.export(tmp_path / "a.csv", tracker="estimator", rate_hz=25.0, units="m", smooth=True)
     assert len(frame) == pytest.approx(45, abs=2) and done.states == len(found)

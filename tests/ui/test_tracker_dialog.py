@@ -76,7 +76,8 @@ def test_the_estimator_is_one_click_away_and_taken_back_with_one_key(opened):
     click_on_word(dialog.kinds["estimator"])
     desk.settled("In force.")
     assert desk.engine.rig.tracker == MODEL and load_rig(path).tracker == MODEL
-    assert [version.replaced_by for version in versions(path)] == ["choosing the tracker estimator full anatomical limits"]
+    assert [version.replaced_by for version in versions(path)] == [
+        "choosing the tracker estimator full anatomical limits"]
     assert dialog.details.isVisible()
     QTest.keyClick(dialog, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     desk.settled("Taken back.")
