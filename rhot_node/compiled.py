@@ -14,11 +14,13 @@ import os
 import re
 import shutil
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
 _KEPT = 3  # states of the sources: today's, and those of a checkout or two beside it
+_IN_USE_S = 3600.0
 _PACKAGES = ("rhot_node", "rhot_app")
 _COMPILER = b"numba"
 _IMPORTS = re.compile(r"^from ([\w.]+) import ([^()\n]+|\([^)]*)", re.MULTILINE)
@@ -109,4 +111,5 @@ def _present_hash() -> str:
 def _forget_old(base: Path) -> None:
     folders = sorted((path for path in base.iterdir() if path.is_dir()), key=lambda path: path.stat().st_mtime)
     for folder in folders[:-_KEPT]:
-        shutil.rmtree(folder, ignore_errors=True)
+        if time.time() - folder.stat().st_mtime > _IN_USE_S:  # programs of other checkouts may run on it
+            shutil.rmtree(folder, ignore_errors=True)

@@ -54,7 +54,7 @@ def entries(path: Path) -> dict[str, bytes]:
 class FakeClient(EngineClient):
     """An engine whose nodes say more than they should."""
 
-    rig = synthetic_rig()
+    own_rig = synthetic_rig()
     key = ""
 
     def command(self, name: str, *, timeout_s: float = 3.0, **arguments: Any) -> dict[str, Any]:
@@ -62,7 +62,7 @@ class FakeClient(EngineClient):
         if name == "status":
             return {"status": {"log_path": ""}}
         if name == "rig":
-            return {"document": msgspec.to_builtins(self.rig), "path": ""}
+            return {"document": msgspec.to_builtins(self.own_rig), "path": ""}
         if arguments["node_id"] == 2:
             raise EngineError("node right does not answer on its control channel.")
         return {"answer": {"health": [{"code": "heat", "sentence": "76 degrees"}], "key": self.key}}
@@ -71,9 +71,9 @@ class FakeClient(EngineClient):
 def test_no_key_and_no_code_is_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RHOT_KEYS", str(tmp_path / "keys.json"))
     own, node, code, link = load_master_keys().own, new_key_pair(), new_code(), secrets.token_bytes(32)
-    left = msgspec.structs.replace(FakeClient.rig.nodes[0], public_key=node.public_key)
-    rig = msgspec.structs.replace(FakeClient.rig, nodes=(left, FakeClient.rig.nodes[1]))
-    monkeypatch.setattr(FakeClient, "rig", rig)
+    left = msgspec.structs.replace(FakeClient.own_rig.nodes[0], public_key=node.public_key)
+    rig = msgspec.structs.replace(FakeClient.own_rig, nodes=(left, FakeClient.own_rig.nodes[1]))
+    monkeypatch.setattr(FakeClient, "own_rig", rig)
     monkeypatch.setattr(FakeClient, "key", link.hex())
     monkeypatch.setattr("rhot_app.engine.report.EngineClient", FakeClient)
     place = tmp_path / "engine"
