@@ -17,7 +17,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROO
 MOST_WORDS = 35
 MOST_CHARACTERS = 100
 
-LIST_ITEM = re.compile(r"\s*(?:[*+-]|\d+\.)\s+")
+LIST_ITEM = re.compile(r"^\s*(?:[*+-]|\d+\.)\s+")
 SENTENCE_END = re.compile(r"(?<=[.?!])[\"')*]*\s+(?=[\"'(*\[]*[A-Z0-9x])")
 ABBREVIATIONS = re.compile(r"\b(?:[Ee]q|[Ff]ig|al|vs|e\.g|i\.e)\.")
 
@@ -93,6 +93,7 @@ def test_no_line_is_long(page: Path) -> None:
 @pytest.mark.parametrize(("text", "counts"), [
     ("One two. Three `rhot demo --seed 1` five.", [2, 3]),
     ("* a b\n  c\n* d", [3, 1]),
+    ("**A b.** C + d e.", [2, 3]),
     ("| a b | c. D e |", [2, 1, 2]),
     ("a b\n\n    code that is long\n\nc", [2, 1]),
     ("```\ncode\n```\na [b c](d.md) (eq. 2.3) e", [6]),
