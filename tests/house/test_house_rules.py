@@ -101,7 +101,8 @@ def test_links_to_sections_name_headings() -> None:
             continue
         for target, section in re.findall(r"\]\(([^)#\s:]*)#([^)\s]+)\)", text):
             page = path.parent / target if target else path
-            headings = re.findall(r"^#+ (.+)$", re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL), re.MULTILINE)
+            prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+            headings = re.findall(r"^#+ (.+)$", prose, re.MULTILINE)
             if section not in {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}:
                 broken.append(f"{path.relative_to(ROOT)} -> {target}#{section}")
     assert not broken, "\n".join(broken)

@@ -77,7 +77,8 @@ def words(sentence: str) -> int:
 @pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
 def test_no_sentence_is_long(page: Path) -> None:
     long = [f"{page.relative_to(ROOT)}:{number}: {words(sentence)} words: {sentence}"
-            for number, block in blocks(page.read_text()) for sentence in sentences(block) if words(sentence) > MOST_WORDS]
+            for number, block in blocks(page.read_text())
+            for sentence in sentences(block) if words(sentence) > MOST_WORDS]
     assert not long, "\n".join(long)
 
 
