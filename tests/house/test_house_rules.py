@@ -94,6 +94,20 @@ def test_links_between_documents_lead_somewhere() -> None:
     assert not broken, "\n".join(broken)
 
 
+def test_links_to_sections_name_headings() -> None:
+    broken = []
+    for path, text in tracked_text():
+        if path.suffix != ".md":
+            continue
+        for target, section in re.findall(r"\]\(([^)#\s:]*)#([^)\s]+)\)", text):
+            page = path.parent / target if target else path
+            prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+            headings = re.findall(r"^#+ (.+)$", prose, re.MULTILINE)
+            if section not in {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}:
+                broken.append(f"{path.relative_to(ROOT)} -> {target}#{section}")
+    assert not broken, "\n".join(broken)
+
+
 @pytest.mark.parametrize("folder", ["tests"])
 def test_test_files_have_unique_names(folder: str) -> None:
     names = [path.name for path in (ROOT / folder).rglob("test_*.py")]
