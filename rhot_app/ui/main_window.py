@@ -33,6 +33,7 @@ from rhot_app.ui.rig_watch import RigWatch
 from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
+from rhot_app.ui.shapes import show_overflow
 from rhot_app.ui.theme import scheme_named
 from rhot_app.ui.voice import label_of, look_of, notices_of
 from rhot_app.ui.welcome import WelcomePage
@@ -74,7 +75,8 @@ class MainWindow(QMainWindow):
         self.welcome = WelcomePage(settings.motion)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.welcome)
-        self.pages.addWidget(ScenePage(self.screen_parts.scene, self.actions_.scene_bar()))
+        self.scene_page = ScenePage(self.screen_parts.scene, self.actions_.scene_bar())
+        self.pages.addWidget(self.scene_page)
         self.setCentralWidget(self.pages)
         self.lens_caps = LensCaps(controller, self.actions_.caps, self.tell)
         self.docks = Docks(self)
@@ -150,7 +152,7 @@ class MainWindow(QMainWindow):
         for action, wizard in zip(self.actions_.wizards, WIZARDS, strict=True):
             action.triggered.connect(lambda checked=False, wizard=wizard: self.wizards.open(wizard))
         self.actions_.earlier.triggered.connect(self.wizards.open_versions)
-        self.toolbar.calibrate_button.menu().aboutToShow.connect(self._show_ages)
+        self.toolbar.calibrate_menu.aboutToShow.connect(self._show_ages)
         self.wizards.rig_used.connect(self.rig_watch.look_soon)
         self.wizards.failed.connect(self._show_failure)
 
@@ -266,6 +268,7 @@ class MainWindow(QMainWindow):
         if shown != self._buttons_shown:
             self._buttons_shown = shown
             self.toolbar.set_scheme(a, self.appearance.scheme, running=c.running, recording=c.recording)
+            show_overflow(self.scene_page.bar, self.appearance.scheme.text)
         usable = c.opened is not None and not c.engine_gone
         self.screen_parts.scene.offer_start(usable and not c.running)
         for action in (a.start, a.record):

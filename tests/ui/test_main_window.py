@@ -170,7 +170,7 @@ def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
 
     def escape():
         lit.append(button.grab().toImage() != idle)
-        tracking.press(Qt.Key.Key_Escape, button.menu())
+        tracking.press(Qt.Key.Key_Escape, tracking.window.toolbar.rig_menu)
 
     QCursor.setPos(button.mapToGlobal(button.rect().center()))
     QTimer.singleShot(200, escape)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QPainter
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QBrush, QColor, QFont, QFontMetrics, QPainter
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from rhot_app.calibration.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
@@ -24,6 +24,8 @@ from rhot_app.ui.shapes import ShapeMark
 FINGER_HEADS = (("spread", "abduction"), ("MCP", "MCP"), ("PIP", "PIP"), ("DIP", "DIP"))
 THUMB_HEADS = (("spread", "abduction"), ("CMC", "CMC"), ("turn", "abduction"), ("MCP", "MCP"), ("IP", "IP"))
 
+_WIDEST, _WIDE = "-88 ±88°", "-88 ±8°"
+
 
 class AngleCell(QLabel):
     """One angle: plain when measured, muted when inferred, hatched ground when guessed."""
@@ -34,7 +36,22 @@ class AngleCell(QLabel):
         self._knowledge = Knowledge.UNKNOWN
         self._title = name.replace("_", " ")
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.setContentsMargins(4, 1, 4, 1)
+        self.setContentsMargins(2, 1, 2, 1)
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """Room for every angle: a column that grew with what it says would move the whole dock."""
+        return self._room_for(_WIDEST)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        """Room for an angle that is known to less than ten degrees."""
+        return self._room_for(_WIDE)
+
+    def _room_for(self, text: str) -> QSize:
+        bold = QFont(self.font())
+        bold.setWeight(QFont.Weight.DemiBold)
+        margins = self.contentsMargins()
+        return QSize(QFontMetrics(bold).horizontalAdvance(text) + margins.left() + margins.right(),
+                     super().sizeHint().height())
 
     def show_angle(self, angle_rad: float, sd_rad: float, knowledge: Knowledge) -> None:
         """Another value with its standard deviation, NaN when that is not known."""
@@ -124,6 +141,7 @@ class HandPanel(QWidget):
     def _fill_whole(self) -> None:
         self._palm_mark, self.palm = ShapeMark(12), QLabel(DASH)
         self.palm.setToolTip(f"{tip('palm')}\n{tip('hand size')}")
+        self.palm.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # it must not widen the dock
         self._whole.addWidget(QLabel("palm"))
         self._whole.addSpacing(8)
         self._whole.addWidget(self._palm_mark)
@@ -134,7 +152,7 @@ class HandPanel(QWidget):
             label = QLabel(head)
             label.setProperty("muted", True)
             label.setAlignment(Qt.AlignmentFlag.AlignRight)
-            label.setContentsMargins(4, 0, 4, 0)
+            label.setContentsMargins(2, 0, 2, 0)
             label.setToolTip(tip(term) + ("" if term == "abduction" else "\n" + tip("flexion")))
             self._grid.addWidget(label, row, column)
 

@@ -40,7 +40,7 @@ class ReplayScreen(QWidget):
         self.jitter, self.difference = JitterPlot(scheme), DifferencePlot(scheme)
         self.plots: tuple[PlotPanel, ...] = (self.jitter, self.difference)
         for plot in self.plots:
-            plot.reset_button.hide()  # a recording's past is not forgotten
+            plot.head.leave_out(plot.reset_button)  # a recording's past is not forgotten
         self.timeline, self.transport = Timeline(scheme), Transport(scheme)
         self.pacer = FramePacer()
         self._shown: tuple[int | None, float] | None = None
