@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
 from rhot_app.engine.health_watch import HealthWatch
@@ -22,6 +23,9 @@ _SUMMARY_NS = 500_000_000  # sorting the latencies is the dearest part of a stat
 
 NodeMessage = Callable[[int], str]
 """``message(node_id)``: what the node itself says about its fault."""
+
+NodeBlack = Callable[[int], bool]
+"""``black(node_id)``: whether the node says that its camera's picture is black."""
 
 
 class Observer:
@@ -44,7 +48,8 @@ class Observer:
         self._health.restart()
 
     def status(self, rig_path: str, session: int, running: bool, recorder: Recorder | None,
-               message: NodeMessage, extra: list[Advice]) -> EngineStatus:
+               message: NodeMessage, extra: list[Advice],
+               black: NodeBlack = lambda node_id: False) -> EngineStatus:
         """The engine's status now, with the `extra` advice."""
         now_ns = time.monotonic_ns()
         for meter in self._meters:
@@ -56,7 +61,7 @@ class Observer:
             t_master_ns=now_ns, pid=os.getpid(), session=session, running=running,
             condition=self._condition(running, nodes, now_ns).value, rig_name=self.rig.name, rig_path=rig_path,
             state_rate_hz=self._pipeline.states.rate_hz(now_ns), nodes=nodes,
-            advice=most_urgent_first((*extra, *self._advice(nodes, running, now_ns))), latency=self._latency,
+            advice=most_urgent_first((*extra, *self._advice(nodes, running, now_ns, black))), latency=self._latency,
             log_path="" if recorder is None else str(recorder.path),
             log_bytes=0 if recorder is None else recorder.bytes_written,
             log_seconds=0.0 if recorder is None else recorder.seconds, replaying=self._source.log_path)
@@ -73,8 +78,9 @@ class Observer:
         self._ever_tracked |= condition is Condition.TRACKING
         return condition
 
-    def _advice(self, nodes: tuple[NodeStatus, ...], running: bool, now_ns: int) -> list[Advice]:
-        facts = [self._facts(camera, status, now_ns) for camera, status in enumerate(nodes)]
+    def _advice(self, nodes: tuple[NodeStatus, ...], running: bool, now_ns: int, black: NodeBlack) -> list[Advice]:
+        facts = [replace(self._facts(camera, status, now_ns), black=black(status.node_id))
+                 for camera, status in enumerate(nodes)]
         nowhere = no_marker_advice(facts, running)
         marker_ids = self.rig.markers.ids
         found = [advice for one in facts for advice in node_advice(one, marker_ids, running, sight=not nowhere)]

@@ -59,7 +59,8 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory:
         nodes = NodeControl(context, own)
         streams = OutputProcess(place.states, outputs, follow_rig=rig_outputs)
         stack.callback(streams.close)
-        engine = Engine(rig, rig_path, make_source, trackers, publish, nodes.message, GarbageMan(), streams)
+        engine = Engine(rig, rig_path, make_source, trackers, publish, nodes.message, GarbageMan(), streams,
+                        nodes.black)
         stack.callback(engine.close)
         server = Server(context, place, engine, nodes)
         stack.callback(server.close)

@@ -27,6 +27,12 @@ def test_a_well_node_needs_no_words() -> None:
     assert no_marker_advice([WELL], running=True) == []
 
 
+def test_a_black_picture_asks_for_no_colours() -> None:
+    covered = replace(WELL, unseen_s=(5.0, 5.0, 5.0), black=True)
+    assert no_marker_advice([covered, covered], running=True) == []
+    assert texts(covered) == ["left is black: is the lens covered?"]
+
+
 @pytest.mark.parametrize(("facts", "words"), [
     (replace(WELL, status=replace(STATUS, state="silent")), ["left", "10.0.0.5:47800", "rhot-node"]),
     (replace(WELL, status=replace(STATUS, state="silent", paired=False)), ["no key for it", "`rhot pair`"]),
@@ -50,6 +56,7 @@ def test_a_well_node_needs_no_words() -> None:
     (replace(WELL, recent=Recent(100, 0, {"kernel_overflow": 9}, 0)), ["kernel drops"]),
     (replace(WELL, unseen_s=(0.0, 12.0, 0.0)), ["Camera left", "index", "12 s"]),
     (replace(WELL, unseen_s=(5.0, 12.0, 7.0)), ["seen no marker for 5 s"]),
+    (replace(WELL, unseen_s=(5.0, 12.0, 7.0), black=True), ["left is black: is the lens covered?"]),
 ])
 def test_trouble_is_named(facts: NodeFacts, words: list[str]) -> None:
     (text,) = texts(facts)
