@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,19 +88,23 @@ def _factor(picture: Exposed, markers: Mapping[str, Exposed]) -> float:
 def _findings(picture: Exposed, markers: Mapping[str, Exposed], factor: float,
               settings: CameraSettings | None) -> list[Finding]:
     darker, brighter = _darker(min(factor, 0.67), settings), _brighter(max(factor, 1.5), settings)
+    shares = {name: max(one.over, *one.channels) for name, one in markers.items()}
+    over = {name: share for name, share in shares.items() if share >= MARKER_OVER[0]}
+    dim = {name: one.median for name, one in markers.items() if name not in over and one.median <= MARKER_DIM[0]}
     findings = []
-    for name, one in markers.items():
-        share = max(one.over, *one.channels)
-        if share >= MARKER_OVER[0]:
-            channel = ("red", "green", "blue")[int(np.argmax(one.channels))]
-            findings.append(Finding(
-                "marker_over", _grade(share, MARKER_OVER),
-                f"{100.0 * share:.0f} % of {name} is cut off in {channel}.",
-                "The paint is too bright for the camera, so that its hue is wrong there.", darker))
-        elif one.median <= MARKER_DIM[0]:
-            grade = Grade.POOR if one.median <= MARKER_DIM[1] else Grade.FAIR
-            findings.append(Finding("marker_under", grade, f"{name} reaches a level of {one.median:.0f} of 255 only.",
-                                    "The paint is so dark that noise blurs its hue.", brighter))
+    if over:
+        worst = max(over, key=lambda name: over[name])
+        channel = ("red", "green", "blue")[int(np.argmax(markers[worst].channels))]
+        findings.append(Finding(
+            "marker_over", _grade(over[worst], MARKER_OVER),
+            f"{_and(over)} too bright for the camera: {100.0 * over[worst]:.0f} % of {worst} is cut off in {channel}.",
+            "The hue is wrong there.", darker))
+    if dim:
+        worst = min(dim, key=lambda name: dim[name])
+        findings.append(Finding(
+            "marker_under", Grade.POOR if dim[worst] <= MARKER_DIM[1] else Grade.FAIR,
+            f"{_and(dim)} too dark: {worst} reaches a level of {dim[worst]:.0f} of 255 only.",
+            "Noise blurs the hue.", brighter))
     if picture.over >= PICTURE_OVER[0]:
         findings.append(Finding(
             "over", _grade(picture.over, PICTURE_OVER),
@@ -114,6 +118,12 @@ def _findings(picture: Exposed, markers: Mapping[str, Exposed], factor: float,
     return findings
 
 
+def _and(names: Iterable[str]) -> str:
+    """E.g. "thumb, index and wrist are"."""
+    *others, last = names
+    return f"{', '.join(others)} and {last} are" if others else f"{last} is"
+
+
 def _grade(share: float, limits: tuple[float, float]) -> Grade:
     return Grade.POOR if share >= limits[1] else Grade.FAIR
 
@@ -122,7 +132,7 @@ def _darker(factor: float, settings: CameraSettings | None) -> str:
     if settings is None:
         return "Shorten the exposure time; if it is short already, lower the gain."
     wanted = _rounded(factor * settings.exposure_us)
-    return f"Shorten exposure_us from {settings.exposure_us:.0f} to about {wanted:.0f}."
+    return f"Shorten exposure to {_ms(wanted)}."
 
 
 def _brighter(factor: float, settings: CameraSettings | None) -> str:
@@ -131,11 +141,16 @@ def _brighter(factor: float, settings: CameraSettings | None) -> str:
     now, longest_us = settings.exposure_us, min(1e6 / settings.fps, 1e3 * BLUR_MS)
     wanted = _rounded(min(factor * now, longest_us))
     if wanted <= 1.2 * now:
-        return (f"Give more light, or raise the gain {factor:.1f} times: beyond an exposure_us of {longest_us:.0f} a "
-                "moving hand is blurred.")
+        return (f"Give more light, or raise the gain {factor:.1f} times: an exposure beyond {_ms(longest_us)} blurs "
+                "a moving hand.")
     rest = factor * now / wanted
     more = "" if rest < 1.2 else f", and give more light or raise the gain {rest:.1f} times"
-    return f"Lengthen exposure_us from {now:.0f} to about {wanted:.0f}{more}."
+    return f"Lengthen exposure to {_ms(wanted)}{more}."
+
+
+def _ms(exposure_us: float) -> str:
+    """An exposure time as the camera wizard shows it, e.g. "11.7 ms"."""
+    return f"{exposure_us / 1000.0:.{1 if exposure_us >= 1000.0 else 2}f} ms"
 
 
 def _rounded(value_us: float) -> float:

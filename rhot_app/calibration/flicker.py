@@ -158,11 +158,11 @@ def _findings(mains: float | None, depth: float, depths: dict[float, float], ban
         return [Finding("flicker_unseen", Grade.GOOD, f"Flicker of {' and '.join(blind)} mains would not be seen.",
                         "The frames come in step with it: its bands stand still, and harm little.")] if blind else []
     now = 1e6 * exposure_s
-    fitting = ", ".join(f"{one:.0f}" for one in exposures)
+    fitting = " or ".join(f"{1e-3 * one:.2f}" for one in exposures) + " ms"
     if exposures and now > 0.5 * exposures[0]:
-        remedy = f"Set exposure_us to {fitting}: over that time this lamp averages out."
+        remedy = f"Set the exposure to {fitting}: over that time this lamp averages out."
     elif exposures:
-        remedy = (f"Use a lamp that does not flicker (direct current), or set exposure_us to {fitting}, over which "
+        remedy = (f"Use a lamp that does not flicker (direct current), or set the exposure to {fitting}, over which "
                   "this lamp averages out; a moving hand is then blurred more.")
     else:
         remedy = "Use a lamp that does not flicker (direct current): no exposure between two frames is long enough."

@@ -17,7 +17,8 @@ def make_plan(kit: Kit) -> Plan:
     choices = CameraChoices(kit.rig.nodes, kit.node_settings)
     step = SettingsStep(choices, kit.rig.markers)
     tryout = Tryout(kit.connect)
-    accept = AcceptStep(lambda: step.propose(kit.rig_path), missing="Nothing was changed: there is nothing to save.")
+    accept = AcceptStep(lambda: step.propose(kit.rig_path),
+                        missing="Nothing was changed, and the pictures are not good yet.")
     page = CameraPage(step, tryout)
     tryout.setParent(page)
 
