@@ -58,6 +58,10 @@ class Actions(QObject):
         self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
         self.markers = self._make("Markers …", "", "The marker set that the rig file says.")
         self.hand = self._make("Hand …", "", "The hand's bones that the rig file says.")
+        self.properties = QMenu("Properties", parent)
+        self.properties.setToolTipsVisible(True)
+        self.properties.menuAction().setToolTip("What the rig file says, to read.")
+        self.properties.addActions([self.cameras, self.markers, self.hand])
         self.files = self._make("How to calibrate", "", "Opens the guide.")
         self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene (F).")
         self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
@@ -145,9 +149,9 @@ class MainToolBar(QToolBar):
         a = actions
         self.rig_button, self.rig_menu = self._add_menu("Rig", [
             a.twin, a.open, a.nodes, None, a.open_recording, a.recordings, a.video, a.bookmark, a.export, None,
-            a.outputs, a.caps.menuAction(), a.save_rig, a.close_rig, None, a.quit])
+            a.outputs, a.caps.menuAction(), a.properties.menuAction(), a.save_rig, a.close_rig, None, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
-            *a.wizards, None, a.earlier, None, a.tracker, a.cameras, a.markers, a.hand, None, a.files])
+            *a.wizards, None, a.earlier, None, a.tracker, None, a.files])
         self.view_button, self.view_menu = self._add_menu("View", [
             *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, None, a.dark, a.light, None, a.reset])
         self.controls.addAction(actions.guide)

@@ -297,7 +297,7 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home,
+        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.close_rig, a.properties.menuAction(), a.frame, a.home,
                 a.names, a.clouds, a.now]
 
     def _show_busy(self) -> None:

@@ -181,8 +181,12 @@ def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
     QCursor.setPos(tracking.window.mapToGlobal(tracking.window.rect().center()))
 
 
-def test_the_calibrate_menu_shows_what_the_rig_says(tracking):
+def test_the_rig_menu_shows_what_the_rig_says(tracking):
     window = tracking.window
+    a = window.actions_
+    assert [entry.text() for entry in a.properties.actions()] == ["Cameras …", "Markers …", "Hand …"]
+    assert a.properties.menuAction() in window.toolbar.rig_menu.actions()
+    assert not {a.cameras, a.markers, a.hand} & set(window.toolbar.calibrate_menu.actions())
     for action, tab in ((window.actions_.cameras, 0), (window.actions_.markers, 1), (window.actions_.hand, 2)):
         action.trigger()
         dialog = next(w for w in tracking.window.children() if type(w).__name__ == "RigDialog" and w.isVisible())

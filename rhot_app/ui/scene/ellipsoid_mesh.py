@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.skeleton import JOINTS, TIP_ROLES
-from rhot_app.tracking.state import HandState
+from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.ui.models.palette import Scheme, rgb_of
 from rhot_app.ui.scene.frames import to_display
 from rhot_app.ui.scene.hand_mesh import TIPS, PosedMesh
@@ -27,7 +27,9 @@ LARGEST_M = 0.06
 LARGER = 10
 """The other choice beside true size: a good place is known to a millimetre, which is too small to see from afar."""
 
-_ALPHA = 90
+_ALPHA, _GUESSED_ALPHA = 90, 26
+"""How solid: the ellipsoid of a guess is large, so that only its rim may stand out from the hand inside."""
+
 _INNER = np.array([k for k in range(len(JOINTS)) if k not in TIPS])
 _TIPS = np.array(TIPS)
 
@@ -63,7 +65,7 @@ class EllipsoidMesh:
         rows += [marker.display_rgb for marker in markers.markers]
         count = len(self._sphere.vertices)
         self.faces: Faces = repeat_faces(self._sphere.faces, count, len(rows))
-        self.colours: Colours = np.repeat(np.array([(*rgb, _ALPHA) for rgb in rows], np.uint8), count, axis=0)
+        self._colours: Colours = np.repeat(np.array([(*rgb, _ALPHA) for rgb in rows], np.uint8), count, axis=0)
         self.cut = False
 
     def pose(self, state: HandState, choice: EllipsoidChoice) -> PosedMesh:
@@ -84,6 +86,12 @@ class EllipsoidMesh:
                                     state.marker_knowledge]).astype(np.uint8)
         return PosedMesh(to_display(vertices.reshape(-1, 3)), to_display(normals.reshape(-1, 3)),
                          np.repeat(knowledge, len(self._sphere.vertices)))
+
+    def colours(self, posed: PosedMesh) -> Colours:
+        """(N, 4) bytes of posed ellipsoids: fainter where they are guessed."""
+        shown = self._colours.copy()
+        shown[posed.knowledge == Knowledge.GUESSED, 3] = _GUESSED_ALPHA
+        return shown
 
     def _chosen(self, state: HandState, choice: EllipsoidChoice) -> NDArray[np.bool_]:
         """Which are wanted. A painted fingertip is one place: its marker's ellipsoid would flicker in the tip's own."""

@@ -67,7 +67,8 @@ class HandActors:
         markers = self._markers.pose(state)
         self._draw(self._marker_item, markers, with_knowledge(self._markers.colours, markers.knowledge))
         if choice is not None and choice.any:
-            self._draw(self._ellipsoid_item, self._ellipsoids.pose(state, choice), self._ellipsoids.colours)
+            clouds = self._ellipsoids.pose(state, choice)
+            self._draw(self._ellipsoid_item, clouds, self._ellipsoids.colours(clouds))
 
     def _draw(self, item: MeshItem, mesh: PosedMesh, colours: Colours) -> None:
         """What is guessed is hatched, whatever it is."""

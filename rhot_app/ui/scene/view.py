@@ -16,6 +16,7 @@ from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.hands import each_hand, hand_names
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
+from rhot_app.ui.models.tracker_words import KINDS
 from rhot_app.ui.scene import stage
 from rhot_app.ui.scene.actors import Actors, second_actors
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
@@ -216,6 +217,11 @@ class SceneView(GLViewWidget):
         self.update()
 
     @property
+    def tracker_word(self) -> str:
+        """What makes a hand of the markers; "" without a rig."""
+        return "" if self._rig is None else KINDS[self._rig.tracker.kind][0].lower()
+
+    @property
     def _up(self) -> Up:
         return "-y" if self._rig is None else self._rig.up
 
@@ -263,7 +269,7 @@ class SceneView(GLViewWidget):
         if self._actors is not None:
             text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self._actors.cut,
                                   pictures_alone=self._by_calibration.sd_m != 0.0)
-            self._legend.paint(painter, self.height(), self._scheme, text)
+            self._legend.paint(painter, size, self._scheme, text, self.tracker_word)
 
 
 def _of_rig(state: HandState | None, rig: Rig | None) -> HandState | None:
