@@ -18,6 +18,7 @@ KINDS = (Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED)
 _BONE_PX = (34.0, 13.0)
 _PAD_PX = 8.0
 _GAP_PX = 8.0
+_WIDEST_PX = 220.0  # of its words, so that the hand has the rest
 
 
 def ellipsoid_text(choice: EllipsoidChoice | None, *, cut: bool, pictures_alone: bool = False) -> str:
@@ -43,7 +44,7 @@ class Legend:
         ratio = painter.device().devicePixelRatioF()
         key = (scheme.name, text, tracker, ratio, size[0], painter.font().key())
         if key != self._key:
-            widest = size[0] - 4 * _PAD_PX - _BONE_PX[0] - _GAP_PX
+            widest = min(size[0] - 4 * _PAD_PX - _BONE_PX[0] - _GAP_PX, _WIDEST_PX)
             self.rows = (*(KNOWLEDGE[kind].word for kind in KINDS),
                          *_wrapped(text, QFontMetricsF(painter.font()), widest))
             self._key = key
@@ -79,7 +80,10 @@ def _draw(scheme: Scheme, rows: tuple[str, ...], tracker: str, font: QFont, rati
     painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.TextAntialiasing)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(scheme.scene))  # solid: what is large in the scene must not cut the words
-    painter.drawRoundedRect(box, 6, 6)
+    widths = [metrics.horizontalAdvance(head) if head else 0.0] * above
+    widths += [metrics.horizontalAdvance(row) + _BONE_PX[0] + _GAP_PX for row in rows]
+    for number, wide in enumerate(widths):  # no wider than its words: what is behind the rest stays in sight
+        painter.drawRect(QRectF(0, 0.5 * _PAD_PX + number * step, wide + 2 * _PAD_PX, step))
     painter.setFont(font)
     for number, row in enumerate(rows):
         line = QRectF(_PAD_PX, 0.5 * _PAD_PX + (above + number) * step, box.width() - 2 * _PAD_PX, step)
