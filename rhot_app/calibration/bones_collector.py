@@ -100,8 +100,7 @@ class BonesCollector:
             which = "thumb" if least.finger == "thumb" else f"{least.finger} finger"
             return f"Bend and stretch the {which} fully: {least.sweeps} of {SWEEPS} times done."
         if self._together_s < LEAST_S:
-            return (f"Move all fingers freely and turn the hand, with every marker in sight: {self._together_s:.0f} of "
-                    f"{LEAST_S:.0f} s done.")
+            return "Move all fingers freely and turn the hand, with every marker in sight."
         return "Every finger has moved enough."
 
 

@@ -78,7 +78,7 @@ def bending_findings(reach_m: Array, bending_m: Array) -> list[Finding]:
 def _still(finger: str, how: str) -> Finding:
     return Finding("finger_still", Grade.FAIR, f"The {finger} finger {how}." if finger != "thumb" else
                    f"The thumb {how}.", "Its joints do not show where they are.",
-                   "Bend and stretch it fully, several times.")
+                   "Record again, and bend it further than this time.")
 
 
 def slip_findings(tracks: MarkerTracks) -> list[Finding]:

@@ -129,7 +129,7 @@ def test_a_hand_that_holds_still_is_told_to_move(few_instants: pytest.MonkeyPatc
     report = solve_bones(still, base_hand())
     few_instants.setattr(hand_fit, "INSTANTS", 100)
     told = [finding.sentence for finding in report.verdict.findings if finding.code == "finger_still"]
-    assert len(told) == 5 and all("Bend and stretch" in sentence for sentence in told)
+    assert len(told) == 5 and all("bend it further" in sentence for sentence in told)
     assert sum(bone.known is Known.PRIOR for bone in report.bones) >= 10
 
 

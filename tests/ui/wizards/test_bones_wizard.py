@@ -153,7 +153,11 @@ def test_the_coach_counts_what_each_finger_has_done():
     early = sum(bar.fraction for bar in coach.bars())
     for end in range(120, len(states), 60):
         coach.watch(states[end - 120:end])
-    assert len(coach.bars()) == 5 and sum(bar.fraction for bar in coach.bars()) > early + 1.0
+        assert all(bar.full for bar in coach.bars()) == (coach.shortfall() == ""), "bars and words agree"
+        for bar in coach.bars():
+            assert not (bar.full and f"the {bar.name}" in coach.sentence()), "what is ticked is not asked for again"
+        assert " s done" not in coach.sentence(), "the time that is left is said already"
+    assert len(coach.bars()) == 6 and sum(bar.fraction for bar in coach.bars()) > early + 1.0
     assert coach.sentence()
 
 

@@ -99,6 +99,7 @@ class BoardStep(Step):
         self._views: dict[str, BoardView | None] = {}
         self._beyond: deque[Beyond] = deque(maxlen=_JUDGED)
         self._missing = ""
+        self._recognised = False
         self._next_why_s = 0.0  # the looker's own
         self.board: Board | None = None
         self.problem = ""
@@ -127,6 +128,7 @@ class BoardStep(Step):
     def forget_views(self) -> None:
         """What was seen is of another board or camera."""
         self._views, self._missing = {}, ""
+        self._recognised = False
         self._beyond.clear()
 
     def _build(self) -> None:
@@ -157,6 +159,7 @@ class BoardStep(Step):
         """Where the board was seen."""
         if seen.board == self.board:
             self._views = seen.views
+            self._recognised = self._recognised or any(view is not None for view in seen.views.values())
             self._beyond.extend(seen.beyond)
             if seen.missing is not None:
                 self._missing = seen.missing
@@ -179,11 +182,12 @@ class BoardStep(Step):
         if self._fields.square_mm is None:
             hint = " ".join(filter(None, (UNMEASURED, self._hint(len(overlays)))))
             return StepView("Measure the squares and type their size.", hint=hint, overlays=overlays)
-        return StepView(self._sentence(len(overlays)), done=True, hint=self._hint(len(overlays)), overlays=overlays)
+        return StepView(self._sentence(len(overlays)), done=self._recognised, passable=True,
+                        hint=self._hint(len(overlays)), overlays=overlays)
 
     def _sentence(self, found: int) -> str:
         if found == 0:
-            return "Say which board you hold, and show it to check."
+            return "Show the board to check it." if not self._recognised else "Seen: this is the board. Press Next."
         names = " and ".join(name for name, view in self._views.items() if view is not None)
         return f"Seen by {names}: this is the board."
 

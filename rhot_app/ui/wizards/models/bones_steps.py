@@ -151,12 +151,21 @@ class SweepCoach:
         """One for each finger with a marker at its end."""
         if self._collector is None:
             return ()
-        return tuple(Bar(finger.finger, finger.fraction, f"bent and stretched {finger.sweeps} times")
-                     for finger in self._collector.progress.fingers if finger.seen)
+        from rhot_app.calibration.bones_collector import LEAST_S
+
+        progress = self._collector.progress
+        fingers = (Bar(finger.finger, finger.fraction, f"bent and stretched {finger.sweeps} times; how far shows when "
+                       "the hand is fitted") for finger in progress.fingers if finger.seen)
+        return (Bar("in sight", min(progress.seconds / LEAST_S, 1.0), f"of {LEAST_S:.0f} s in which the cameras see "
+                    "the markers together"), *fingers)
 
     def sentence(self) -> str:
         """What to do next."""
         return self._collector.progress.sentence if self._collector is not None else "Show the hand to both cameras."
+
+    def shortfall(self) -> str:
+        """What has not moved enough."""
+        return "" if self._collector is not None and self._collector.progress.done else self.sentence()
 
 
 def make_coach(rig: Rig) -> Coach:

@@ -102,7 +102,9 @@ class DistanceStep(Step):
         """What to do next, and how many distances there are."""
         bars = (Bar("distances", min(len(self.rows) / ENOUGH, 1.0), f"{len(self.rows)} of {ENOUGH} or more"),
                 Bar("spread", self._spread(), "from near to far: the farthest three times the nearest"))
-        return StepView(self._sentence(), done=self.report is not None, hint=self.problem, bars=bars,
+        enough = all(bar.full for bar in bars)
+        return StepView(self._sentence(), done=self.report is not None and enough, hint=self.problem, bars=bars,
+                        passable=self.report is not None,
                         overlays=self._overlays(), kept=len(self.rows))
 
     def _overlays(self) -> dict[str, Overlay]:
@@ -117,6 +119,8 @@ class DistanceStep(Step):
     def _sentence(self) -> str:
         if not self.rows:
             return "Hold the marker straight before the cameras, enter its distance, press Space."
+        if self._spread() < 1.0:
+            return "Now much nearer, or much farther away."
         return "Now at another distance." if len(self.rows) < ENOUGH else "Enough. Go on, or measure more."
 
     def _spread(self) -> float:
