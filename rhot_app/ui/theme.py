@@ -104,6 +104,10 @@ def style_sheet(s: Scheme) -> str:
     QLineEdit, QComboBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
         padding: 4px 8px; min-height: 20px; }}
     QLineEdit:focus, QComboBox:focus {{ border-color: {s.accent}; }}
+    QComboBox {{ combobox-popup: 0; }}
+    QComboBox QAbstractItemView {{ background: {s.raised}; color: {s.text}; border: 1px solid {s.border};
+        selection-background-color: {s.accent}; selection-color: {s.on_accent}; outline: none; }}
+    QComboBox QAbstractItemView::item {{ min-height: 26px; padding: 0 6px; }}
     SceneBar {{ padding: 2px 4px; }}
     SceneBar QToolButton {{ padding: 3px 10px; }}
     SceneBar QToolButton[popupMode="1"] {{ padding-right: 26px; }}

@@ -33,7 +33,7 @@ class PickPage(Page):
     def __init__(self, step: PickStep, scheme: Scheme) -> None:
         super().__init__(step)
         self._picks = step
-        self.pickable = True
+        self.pickable = self.one_large = True
         self.list = PaintList(scheme, ("marker", "pictures"))
         self.list.setToolTip("Choose what to click next. The patches are the rig's colour and the one picked. A tick: "
                              "enough places and angles were seen; a cross: the colour is another marker's or the "
@@ -95,6 +95,7 @@ class BoundsPage(Page):
     def __init__(self, step: BoundsStep, scheme: Scheme) -> None:
         super().__init__(step)
         self._bounds = step
+        self.one_large = True
         self.list = PaintList(scheme, ("marker", "hue"))
         self.mask_choice = MaskChoice()
         self.rows = {control.field: ControlRow(control) for control in BOUNDS}

@@ -103,6 +103,7 @@ class WizardFrame:
         self.pages.setCurrentWidget(page)
         self.middle.setCurrentWidget(page.centre if page.centre is not None else self.wall)
         self.wall.set_pickable(page.pickable)
+        self.wall.show_one_large(page.one_large)
         self.back_button.setEnabled(number > 0)
         (page.first_field or self.middle).setFocus()  # so that Space captures and no button has it
 

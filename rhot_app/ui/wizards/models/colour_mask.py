@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.colour_cause import Cause, Explainer
 from rhot_app.calibration.colour_drift import DriftReport, LightDrift, drift_findings
 from rhot_app.calibration.verdict import Finding
-from rhot_app.ui.wizards.models.drawing import Dots, Layer, Overlay, Tag
+from rhot_app.ui.wizards.models.drawing import Callout, Dots, Layer, Overlay
 from rhot_app.ui.wizards.models.step import Pictures
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_bgr
@@ -97,10 +97,10 @@ def mask_overlay(sight: Sight, markers: MarkerSet, chosen: int | None) -> Overla
     palette[0, 3] = _DIMMED
     for index, marker in enumerate(markers.markers):
         palette[index + 1] = (*marker.display_rgb, 255 if chosen in (None, index) else _FAINT)
-    marks: list[Layer | Dots | Tag] = [Layer(palette[sight.labels])]
+    marks: list[Layer | Dots | Callout] = [Layer(palette[sight.labels])]
     for number, mark in enumerate(sight.seen):
         if mark.found and chosen in (None, mark.index):
             marks.append(Dots(np.array([[mark.x, mark.y]]), "text", radius=3.0))
             further = "" if number < len(markers.markers) else "?"  # something else of the marker's colour
-            marks.append(Tag(mark.x + 8.0, mark.y - 4.0, markers.ids[mark.index] + further))
+            marks.append(Callout(mark.x, mark.y, markers.ids[mark.index] + further))
     return tuple(marks)

@@ -15,7 +15,7 @@ from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.wizards.models.chart import Chart, ChartedStep, Curve
-from rhot_app.ui.wizards.models.drawing import Dots, Overlay, Tag
+from rhot_app.ui.wizards.models.drawing import Callout, Dots, Overlay
 from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Bar, Step, StepView
 
@@ -113,7 +113,7 @@ class DistanceStep(Step):
         if not states:
             return {}
         name, places = self.rig.markers.ids[self.marker], states[-1].camera_pixels[:, self.marker]
-        return {camera: (Dots(place[None, :]), Tag(float(place[0]), float(place[1]), name))
+        return {camera: (Dots(place[None, :]), Callout(float(place[0]), float(place[1]), name))
                 for camera, place in zip(states[-1].camera_names, places, strict=True) if np.isfinite(place).all()}
 
     def _sentence(self) -> str:
