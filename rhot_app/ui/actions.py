@@ -34,6 +34,7 @@ class Actions(QObject):
         self.video = self._make("Record video, too", "", "Each camera writes its own frames as long as the next "
                                 "recording lasts. Rig, Recordings fetches them afterwards.", checkable=True)
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
+        self.shows = QMenu("Simulated hand does", parent)
         self.caps = QMenu("Cover a simulated camera", parent)
         self.caps.setToolTipsVisible(True)
         self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")
@@ -149,7 +150,8 @@ class MainToolBar(QToolBar):
         a = actions
         self.rig_button, self.rig_menu = self._add_menu("Rig", [
             a.twin, a.open, a.nodes, None, a.open_recording, a.recordings, a.video, a.bookmark, a.export, None,
-            a.outputs, a.caps.menuAction(), a.properties.menuAction(), a.save_rig, a.close_rig, None, a.quit])
+            a.outputs, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig, a.close_rig,
+            None, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
             *a.wizards, None, a.earlier, None, a.tracker, None, a.files])
         self.view_button, self.view_menu = self._add_menu("View", [

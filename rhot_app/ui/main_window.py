@@ -35,6 +35,7 @@ from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
 from rhot_app.ui.shapes import show_overflow
 from rhot_app.ui.theme import scheme_named
+from rhot_app.ui.twin_shows import TwinShows
 from rhot_app.ui.voice import label_of, look_of, notices_of
 from rhot_app.ui.welcome import WelcomePage
 from rhot_app.ui.wizards.catalogue import OPEN_WIZARD, WIZARDS, wizard_named
@@ -79,6 +80,8 @@ class MainWindow(QMainWindow):
         self.pages.addWidget(self.scene_page)
         self.setCentralWidget(self.pages)
         self.lens_caps = LensCaps(controller, self.actions_.caps, self.tell)
+        self.twin_shows = TwinShows(controller, self.actions_.shows, self.tell)
+        self.wizards.twin_menu = self.twin_shows.menu
         self.docks = Docks(self)
         self._add_docks()
         self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)

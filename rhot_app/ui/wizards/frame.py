@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QMenu, QPushButton, QStackedWidget, QVBoxLayout, QWidget
 
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.theme import app_font
@@ -58,7 +58,10 @@ class WizardFrame:
         self.back_button.setToolTip("Alt+Left. Nothing is lost.")
         self.next_button = QPushButton("Next")
         self.next_button.setDefault(True)
-        for button in (self.close_button, self.back_button):
+        self.twin_button = QPushButton("Simulated hand does …")
+        self.twin_button.setToolTip("The simulated rig only: what stands before its cameras.")
+        self.twin_button.hide()
+        for button in (self.close_button, self.back_button, self.twin_button):
             button.setAutoDefault(False)
         self._lay_out(parent)
 
@@ -88,6 +91,7 @@ class WizardFrame:
         lower.addWidget(self.below, 1)
         buttons = QHBoxLayout()
         buttons.addWidget(self.close_button)
+        buttons.addWidget(self.twin_button)
         buttons.addStretch(1)
         buttons.addWidget(self.back_button)
         buttons.addWidget(self.next_button)
@@ -97,6 +101,12 @@ class WizardFrame:
         layout.addLayout(upper, 1)
         layout.addWidget(self._lower)
         layout.addLayout(buttons)
+
+    def offer_twin(self, menu: QMenu | None) -> None:
+        """A button for what the simulated hand does; None on a real rig, where a person does it."""
+        if menu is not None:
+            self.twin_button.setMenu(menu)
+        self.twin_button.setVisible(menu is not None)
 
     def show_page(self, page: Page, number: int) -> None:
         """Another step: its controls, and its own middle or the pictures."""

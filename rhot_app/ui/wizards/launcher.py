@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, parse_rig
@@ -55,6 +55,8 @@ class Launcher(QObject):
         self._scheme = scheme
         self._window = window
         self._job: Job | None = None
+        self.twin_menu: Callable[[QWidget], QMenu | None] = lambda parent: None
+        """Makes the menu of what the simulated hand does; None on a real rig."""
         self.wizard: WizardWindow | None = None
         self.versions: VersionsDialog | None = None
 
@@ -106,6 +108,7 @@ class Launcher(QObject):
         self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
         self.wizard.used.connect(lambda proposal, on: self._note(proposal, str(now.path or ""), on=on))
         self.wizard.finished.connect(self._forget)
+        self.wizard.frame.offer_twin(self.twin_menu(self.wizard))
         self.wizard.open()
 
     def _note(self, proposal: Proposal, path: str, *, on: bool) -> None:

@@ -146,7 +146,9 @@ def test_the_coaches_tell_a_still_hand_from_a_fast_one():
     fast.watch(heard(0.8))
     assert StillCoach(still).sentence() == "Good, hold still." and "rest the hand" in StillCoach(fast).sentence()
     assert "Faster" in FastCoach(still).sentence() and FastCoach(fast).sentence() == "Good, go on."
-    assert FastCoach(fast).bars()[0].full and FastCoach(fast).bars()[-1].full
+    coach = FastCoach(fast)
+    coach.watch(())
+    assert all(bar.full for bar in coach.bars()) and coach.shortfall() == ""
     assert [row[3] for row in still.rows()] == ["–"] * 6, "a hand at rest shows no lag"
     assert float(fast.rows()[0][3]) == pytest.approx(10.0, abs=1.0)
     assert float(still.rows()[0][1]) == pytest.approx(0.2 * 3**0.5, abs=0.05)

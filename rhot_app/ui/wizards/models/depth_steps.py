@@ -119,9 +119,9 @@ class DistanceStep(Step):
     def _sentence(self) -> str:
         if not self.rows:
             return "Hold the marker straight before the cameras, enter its distance, press Space."
-        if self._spread() < 1.0:
-            return "Now much nearer, or much farther away."
-        return "Now at another distance." if len(self.rows) < ENOUGH else "Enough. Go on, or measure more."
+        if len(self.rows) < ENOUGH:
+            return "Now at another distance."
+        return "Enough. Go on, or measure more." if self._spread() >= 1.0 else "Now much nearer, or much farther away."
 
     def _spread(self) -> float:
         distances = [row.distance_m for row in self.rows]
