@@ -90,7 +90,7 @@ def test_live_twin_obeys_heals_a_killed_node_and_ends_with_its_nodes(
         eventually(lambda: remote.state().cameras["left"].exposure_us == 6000.0,
                    told=lambda: "what the node is told, the twin's sensor does")
         assert remote.cover("left").covered == ("left",)
-        eventually(lambda: "black" in [trouble["code"] for trouble in ask_node(rig_path, {"request": "state"})["health"]],
+        eventually(lambda: "black" in [one["code"] for one in ask_node(rig_path, {"request": "state"})["health"]],
                    told=lambda: "the node does not say that its picture is black")
         assert remote.cover().covered == ()
     nodes = children(process.pid)

@@ -12,6 +12,7 @@ from rhot_app.ui.theme import app_font
 from rhot_app.ui.wizards.models.step import Bar
 
 _ROW_PX = 26
+_MOST_PX = 152  # of all rows together: the part of the window that is kept for them
 _BAR_PX = 12
 _TICK_PX = 16
 
@@ -27,7 +28,12 @@ class BarsView(QWidget):
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Room for all bars."""
-        return QSize(260, max(_ROW_PX * len(self.bars), _ROW_PX))
+        return QSize(260, self.row_px * max(len(self.bars), 1))
+
+    @property
+    def row_px(self) -> int:
+        """Height of one bar's row: less where there are many."""
+        return min(_ROW_PX, _MOST_PX // max(len(self.bars), 1))
 
     def show_bars(self, bars: tuple[Bar, ...]) -> None:
         """Other bars, or fuller ones."""
@@ -48,7 +54,7 @@ class BarsView(QWidget):
         metrics = QFontMetricsF(painter.font())
         room = max((metrics.horizontalAdvance(bar.name) for bar in self.bars), default=0.0) + 12
         for row, bar in enumerate(self.bars):
-            box = QRectF(0, row * _ROW_PX, self.width(), _ROW_PX)
+            box = QRectF(0, row * self.row_px, self.width(), self.row_px)
             painter.setPen(QColor(self._scheme.text))
             painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, bar.name)
             track = QRectF(room, box.center().y() - _BAR_PX / 2, self.width() - room - _TICK_PX - 8, _BAR_PX)
