@@ -21,9 +21,9 @@ import msgspec
 from rhot_app.errors import RhotError
 from rhot_app.evaluation.report import table
 from rhot_app.evaluation.runner import evaluate_frames
-from rhot_app.simulator.film import film
-from rhot_app.simulator.scene import Scene, TwinSettings, make_scene, twin_defaults
-from rhot_app.simulator.shot import make_shot
+from rhot_app.simulator.nodes.film import film
+from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.scene.scene import Scene, TwinSettings, make_scene, twin_defaults
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "calibration"))
 
 from bones_twin import RICH, SIX, Sloppiness, base_hand, bones_mm, person, record
 
-from rhot_app.calibration.bones import solve_bones
-from rhot_app.calibration.bones_report import BonesReport, Known
-from rhot_app.calibration.hand_bundle_model import Poses, expected
-from rhot_app.calibration.hand_shape import HandUnknowns
-from rhot_app.calibration.marker_places import MarkerTracks, tracks_of
+from rhot_app.calibration.hand.bones import solve_bones
+from rhot_app.calibration.hand.bones_report import BonesReport, Known
+from rhot_app.calibration.hand.bundle_model import Poses, expected
+from rhot_app.calibration.hand.marker_places import MarkerTracks, tracks_of
+from rhot_app.calibration.hand.shape import HandUnknowns
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import neutral_pose
 from rhot_app.recording.qualisys import read_qualisys

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from rhot_app.project import Rig
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import NodeLink
 from rhot_node.clock import NodeClock
 from rhot_node.wire.codec import encode

@@ -27,7 +27,7 @@ sys.path.insert(0, str(ROOT / "tests" / "calibration"))
 
 from colour_twin import SKIN, WOOD_RGB, HandScene, calibrate, repainted, tally  # noqa: E402
 
-from rhot_app.calibration.colours import ColourReport  # noqa: E402
+from rhot_app.calibration.colour.colours import ColourReport  # noqa: E402
 from rhot_app.calibration.verdict import Grade  # noqa: E402
 from rhot_node.files import resource_path  # noqa: E402
 from rhot_node.markers import load_markers  # noqa: E402

@@ -23,9 +23,9 @@ from typing import Any
 
 from distributed import LocalCluster
 
-from rhot_app.evaluation.takes import LOG_NAME, Order, take, takes_folder
+from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set, data_sets_folder
 from rhot_app.export.export import FORMATS
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 GOALS = {"classic": 20.0, "estimator": 5.0}
 GOAL_MB = 500.0
@@ -114,8 +114,9 @@ def main() -> int:
     parser.add_argument("--logs", type=Path, default=None, help="where logs are kept (default ~/.cache/rhot/takes)")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
-    folder = options.logs or takes_folder()
-    log = take(Order(make_scene(twin_defaults(), 1), "grasp", options.seconds, sketched=True), folder).folder / LOG_NAME
+    folder = options.logs or data_sets_folder()
+    order = Order(make_scene(twin_defaults(), 1), "grasp", options.seconds, sketched=True)
+    log = data_set(order, folder).folder / LOG_NAME
     found: dict[str, Any] = {"seconds": options.seconds}
     if options.formats != "none":
         found["exports"] = exports(log, options.seconds, options.trackers.split(","), options.formats.split(","))

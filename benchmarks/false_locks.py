@@ -24,11 +24,11 @@ from twin_frames import twin_scene
 
 from rhot_app.engine.replay_summary import replay_states
 from rhot_app.engine.warm_up import warm_up
-from rhot_app.evaluation.takes import Order, Take, take
+from rhot_app.evaluation.data_sets import DataSet, Order, data_set
 from rhot_app.evaluation.track import rig_with
 from rhot_app.project import TrackerSettings
-from rhot_app.simulator.node_log import T0_MASTER_NS
-from rhot_app.sources.replay import LogDoor
+from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import Knowledge
 
@@ -37,14 +37,14 @@ SECONDS = 3.125  # of each scene: 125 frames a camera
 FAR_M = 0.02
 
 
-def tally(filmed: Take, missing: frozenset[str], kind: str) -> Counter[str]:
+def tally(filmed: DataSet, missing: frozenset[str], kind: str) -> Counter[str]:
     """Counts of one tracker on one recording: `false` locks, `measured` and painted (`worn`) markers, `states`."""
     rig = rig_with(filmed.rig, TrackerSettings(kind=kind))
     tracker = make_tracker(rig)
     warm_up(tracker, rig)
     gone = np.array([name in missing for name in rig.markers.ids])
     counts: Counter[str] = Counter()
-    for state in replay_states(filmed.records(), LogDoor(rig), tracker):
+    for state in replay_states(filmed.records(), LogValidator(rig), tracker):
         measured = state.marker_knowledge == Knowledge.MEASURED
         truth = filmed.truth.markers_at(np.array([1e-9 * (state.t_master_ns - T0_MASTER_NS)]))[0]
         far = np.linalg.norm(state.marker_positions - truth, axis=1) > FAR_M
@@ -64,7 +64,7 @@ def case(background: str, bare: bool, frames: int, kinds: list[str], folder: Pat
         ids = scene.markers.ids
         missing = frozenset(ids if bare else (ids[seed % len(ids)],))
         order = Order(scene, MOTIONS[seed % len(MOTIONS)], SECONDS, missing=missing)
-        filmed = take(order, folder)
+        filmed = data_set(order, folder)
         for kind in kinds:
             counts[kind] += tally(filmed, missing, kind)
         filmed_frames += 2 * round(SECONDS * scene.preset.fps)

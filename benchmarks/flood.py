@@ -21,10 +21,10 @@ from pathlib import Path
 from rhot_app.engine.serve import prepare_process
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.project import Rig
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
-from rhot_app.sources.door import NodeDoor
 from rhot_app.sources.receiver import NodeReceiver, open_data_socket
+from rhot_app.sources.validation import DatagramValidator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.codec import encode
@@ -62,7 +62,7 @@ def run(rate: int, seconds: float) -> dict[str, object]:
         t = now_ns - k * 1000
         clock.add(t, t + 20_000, t + 20_000, t + 40_000, 1)
     rig = synthetic_rig()
-    door = NodeDoor(rig, 0, clock)
+    door = DatagramValidator(rig, 0, clock)
     door.expect_session(SESSION)
     receiver = NodeReceiver(open_data_socket(0, "left"), door, "left")
     consumer = Consumer(rig)

@@ -8,9 +8,9 @@ from typing import Protocol
 import msgspec
 import numpy as np
 
-from rhot_app.simulator.synthetic_node import synthetic_rig
-from rhot_app.sources.door import OLDEST_FRAME_NS
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import PENDING_MAX, NodeLink
+from rhot_app.sources.validation import OLDEST_FRAME_NS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings

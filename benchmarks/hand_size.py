@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.project import Rig
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.hand_size import GRID, USUAL_SD, HandSize
 from rhot_app.tracking.marker_model import MarkerModel, compile_markers

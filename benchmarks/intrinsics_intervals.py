@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "calibrat
 
 from intrinsics_twin import BOARD, twin_views
 
-from rhot_app.calibration.intrinsics import solve
-from rhot_app.calibration.lens_fit import PARAMETERS
+from rhot_app.calibration.lens.fit import PARAMETERS
+from rhot_app.calibration.lens.intrinsics import solve
 
 Array = NDArray[np.float64]
 

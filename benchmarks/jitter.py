@@ -15,9 +15,9 @@ from typing import Any
 import msgspec
 
 from rhot_app.evaluation.runner import evaluate_frames
-from rhot_app.simulator.film import film
-from rhot_app.simulator.scene import TwinSettings, make_scene, twin_defaults
-from rhot_app.simulator.shot import make_shot
+from rhot_app.simulator.nodes.film import film
+from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.scene.scene import TwinSettings, make_scene, twin_defaults
 
 DETECTORS = ("fast", "reference")
 

@@ -28,12 +28,19 @@ from dh_oracle import frames_of, jacobian_of, lever_jacobian, points_of
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.articulated import load_articulated
 from rhot_app.hand.articulated_hand import articulated_hand
-from rhot_app.hand.articulated_model import ArticulatedModel, build_articulated, forward_state, state_jacobian
+from rhot_app.hand.articulated_model import (
+    STATE_ROOT,
+    ArticulatedModel,
+    build_articulated,
+    forward_state,
+    forward_state_arrays,
+    state_jacobian,
+    state_jacobian_arrays,
+)
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
 from rhot_app.hand.model import build_model
 from rhot_app.hand.openxr import OPENXR_JOINTS, openxr_arrays, openxr_map
-from rhot_app.hand.state_kinematics import STATE_ROOT, forward_state_arrays, state_jacobian_arrays
 from rhot_node.files import resource_path
 
 Array = NDArray[np.float64]
@@ -131,7 +138,7 @@ def openxr_cost(seconds: float) -> Cost:
                 float("nan"), float("nan"))
 
 
-def disagreement(model: ArticulatedModel) -> tuple[float, float, float]:
+def error_inflation(model: ArticulatedModel) -> tuple[float, float, float]:
     """Largest difference of frames and points (m) from numpy's, and of the Jacobian from numpy's and from central
     differences (m per state number), over 20 random states."""
     rng = np.random.default_rng(0)
@@ -162,7 +169,7 @@ def main() -> int:
     for cost in costs:
         print(f"{cost.name:58s} {cost.python_us:10.2f} {cost.compiled_us:12.2f} {cost.numpy_us:10.0f} "
               f"{cost.numpy_us / cost.python_us:7.0f}")
-    worst = disagreement(digiteyes)
+    worst = error_inflation(digiteyes)
     print(f"digiteyes, largest difference: from numpy {worst[0]:.1e} m, its Jacobian {worst[1]:.1e}; "
           f"from central differences {worst[2]:.1e}")
     print(f"target: hand, forward and Jacobian, {TARGET_US:g} us: "

@@ -21,7 +21,7 @@ import numpy as np
 
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 
 RECORDS = 10_000
 

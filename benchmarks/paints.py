@@ -29,11 +29,11 @@ import numpy as np
 
 from rhot_app.errors import RhotError
 from rhot_app.evaluation.compare import TRACKERS, judge
+from rhot_app.evaluation.data_sets import Order, data_set
 from rhot_app.evaluation.report import SETTLE_S
-from rhot_app.evaluation.takes import Order, take
 from rhot_app.hand.skeleton import WRIST_ROLE
 from rhot_app.progress import ProgressLine
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers, save_markers
 
@@ -85,7 +85,7 @@ def rows(name: str, args: argparse.Namespace, folder: Path) -> list[dict[str, An
     for side in paint.sides:
         settings = msgspec.structs.replace(twin_defaults(), markers=str(markers), facing=side, **paint.scene)
         line = ProgressLine(f"filming {name}, {side}")
-        film = take(Order(make_scene(settings, args.seed), args.motion, args.seconds), args.logs or folder,
+        film = data_set(Order(make_scene(settings, args.seed), args.motion, args.seconds), args.logs or folder,
                     lambda _, line=line: line)
         line.finish()
         after = film.truth.cameras[0].times_s >= SETTLE_S

@@ -20,8 +20,8 @@ from scipy.spatial.transform import Rotation
 
 from rhot_app.errors import RhotError
 from rhot_app.hand.model import HandModel, build_model
-from rhot_app.simulator.recorded import recorded_motion
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.recorded import recorded_motion
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 EDGE_S, EVERY_S, STEP_S = 0.3, 0.01, 1e-3  # of the differences; the filter's ends say nothing
 

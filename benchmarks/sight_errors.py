@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import RhotError
 from rhot_app.evaluation.compare import MOTIONS, orders
+from rhot_app.evaluation.data_sets import DataSet, data_set, data_sets_folder
 from rhot_app.evaluation.report import SETTLE_S
-from rhot_app.evaluation.takes import Take, take, takes_folder
 from rhot_app.progress import ProgressLine
-from rhot_app.simulator.node_log import T0_MASTER_NS
-from rhot_app.simulator.scene import make_scene, twin_defaults
-from rhot_app.sources.replay import LogDoor
+from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.marker_model import MarkerModel, compile_markers, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -44,9 +44,9 @@ class Errors:
     stated: Array
 
 
-def errors_of(one: Take, markers: MarkerModel) -> list[Errors]:
+def errors_of(one: DataSet, markers: MarkerModel) -> list[Errors]:
     """Every camera's errors after the first second."""
-    door, frames = LogDoor(one.rig), [[] for _ in one.rig.nodes]
+    door, frames = LogValidator(one.rig), [[] for _ in one.rig.nodes]
     for record in one.records():
         seen = door.feed(record)
         if seen is not None:
@@ -58,7 +58,7 @@ def errors_of(one: Take, markers: MarkerModel) -> list[Errors]:
     return [Errors(*(np.array(column) for column in zip(*of_camera, strict=True))) for of_camera in frames]
 
 
-def _off(one: Take, markers: MarkerModel, seen: CameraObservations, times_s: Array) -> Array:
+def _off(one: DataSet, markers: MarkerModel, seen: CameraObservations, times_s: Array) -> Array:
     """(M, 2) px: one frame's sights less where the true hand's silhouettes were at their rows' times."""
     places, palms = one.truth.markers_at(times_s), one.truth.palm_at(times_s)
     out, pixel, slope = np.full(seen.pixels.shape, np.nan), np.empty(2), np.empty((2, 3))
@@ -94,7 +94,7 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=8.0, help="length of a take (default 8)")
     parser.add_argument("--motions", default=",".join(MOTIONS))
-    parser.add_argument("--sketched", action="store_true", help="logs without pictures (rhot_app/simulator/sights.py)")
+    parser.add_argument("--sketched", action="store_true", help="logs without pictures")
     args = parser.parse_args()
     if args.seeds < 1:
         parser.error("--seeds must be 1 or more")
@@ -103,7 +103,8 @@ def main() -> int:
     print(f"{'px':16s}{'stated':>9s}{'common':>9s}{'own':>9s}{'share':>9s}{'lasts':>9s}")
     try:
         for motion in args.motions.split(","):
-            takes = [take(order, takes_folder(), lambda title: ProgressLine(f"filming {title}")) for order in orders(
+            takes = [data_set(order, data_sets_folder(), lambda title: ProgressLine(f"filming {title}"))
+                     for order in orders(
                 make_scene(twin_defaults(), 1), [motion], range(1, args.seeds + 1), args.seconds,
                 sketched=args.sketched)]
             markers = compile_markers(takes[0].rig)

@@ -41,8 +41,16 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint
 from rhot_app.hand.solvers.knuckles import shape_knuckles
 from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
-from rhot_app.hand.solvers.methods import COARSE, EFFORT, Method, solve, solve_arrays
-from rhot_app.hand.solvers.neighbours import differences_of, share_out, solve_neighbours
+from rhot_app.hand.solvers.methods import (
+    COARSE,
+    EFFORT,
+    Method,
+    differences_of,
+    share_out,
+    solve,
+    solve_arrays,
+    solve_neighbours,
+)
 from rhot_app.hand.solvers.problem import Problem, make_problem
 from rhot_app.hand.variants import inter_finger
 from rhot_node.files import resource_path

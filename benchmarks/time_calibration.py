@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from rhot_app.calibration.observations import ObservationCollector
-from rhot_app.calibration.time_offset import calibrate_times
+from rhot_app.calibration.time.offset import calibrate_times
 from rhot_app.progress import ProgressLine
 from rhot_app.project import Rig
-from rhot_app.simulator.moments import Shutter
-from rhot_app.simulator.nodes import NodePorts
-from rhot_app.simulator.scene import Scene, build_rig, make_scene, twin_defaults
-from rhot_app.simulator.shot import make_renderer, make_shot
+from rhot_app.simulator.nodes.nodes import NodePorts
+from rhot_app.simulator.nodes.shot import make_renderer, make_shot
+from rhot_app.simulator.render.exposure_samples import Shutter
+from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_i420
@@ -59,7 +59,7 @@ def film(scene: Scene, motion: Path, camera: int, row_time_us: float, seconds: f
     line = ProgressLine(f"camera {scene.names[camera]}")
     found = []
     for number, t_ns in enumerate(times):
-        pixels, _ = renderer.render(shot.act.source, 1e-9 * t_ns, number)
+        pixels, _ = renderer.render(shot.scene_object.source, 1e-9 * t_ns, number)
         markers = detector.detect(from_i420(pixels, width, height))
         found.append(CameraObservations(
             camera=camera, t_row0_master_ns=t_ns, row_time_ns=round(1e3 * row_time_us), clock_bound_s=1e-4,

@@ -28,16 +28,16 @@ import numpy as np
 from rhot_app.errors import RhotError
 from rhot_app.evaluation import scenarios
 from rhot_app.evaluation.accuracy import Figures
-from rhot_app.evaluation.alterations import EPISODE_S
 from rhot_app.evaluation.compare import TRACKERS
-from rhot_app.evaluation.takes import Order, Take, take, takes_folder
+from rhot_app.evaluation.data_sets import DataSet, Order, data_set, data_sets_folder
+from rhot_app.evaluation.fault_injection import EPISODE_S
+from rhot_app.evaluation.run_table import Results, legend, run_table
 from rhot_app.evaluation.track import rig_with
-from rhot_app.evaluation.trial_table import Results, legend, trial_table
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.skeleton import TIP_ROLES
 from rhot_app.progress import ProgressLine
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 RAMP = str(Path(__file__).parent / "motions" / "ramp.json")
 CROSS_S, STILL_S, START_EVERY_S, SCALE_S = 60.0, 12.0, 1.0, 40.0
@@ -79,14 +79,14 @@ class Bench:
         """Takes of crossing fingers, a minute each."""
         return max(1, round(self.minutes))
 
-    def takes(self, motion: str, seconds: float | None = None, seeds: Iterable[int] | None = None) -> Iterable[Take]:
+    def takes(self, motion: str, seconds: float | None = None, seeds: Iterable[int] | None = None) -> Iterable[DataSet]:
         """One take per seed, filmed where it is not there yet."""
         settings = msgspec.structs.replace(twin_defaults(), markers=self.markers)
         for seed in self.seeds if seeds is None else seeds:
             order = Order(make_scene(settings, seed), motion, seconds or self.seconds, sketched=self.sketched)
-            yield take(order, self.folder, lambda title: ProgressLine(f"filming {title}"))
+            yield data_set(order, self.folder, lambda title: ProgressLine(f"filming {title}"))
 
-    def each(self, takes: Iterable[Take], trial: Callable[[Take, Rig], Figures],
+    def each(self, takes: Iterable[DataSet], trial: Callable[[DataSet, Rig], Figures],
              trackers: dict[str, TrackerSettings] = TRACKERS) -> Results:
         """A trial on every take with every tracker, the takes' figures together."""
         runs: dict[str, list[Figures]] = {name: [] for name in trackers}
@@ -109,7 +109,7 @@ def hidden(bench: Bench, *, together: bool) -> Results:
 
 def mixed(bench: Bench) -> Results:
     """Index and middle finger wear one colour."""
-    def trial(one: Take, rig: Rig) -> Figures:
+    def trial(one: DataSet, rig: Rig) -> Figures:
         roles = [marker.role for marker in rig.markers.markers]
         pair = roles.index(TIP_ROLES[1]), roles.index(TIP_ROLES[2])
         return scenarios.names_mixed_up(one, rig, pair=pair, share=0.3)
@@ -142,7 +142,7 @@ def scale(bench: Bench) -> Results:
                 if settings.kind == "estimator"}
     results: Results = {}
     for wrong in WRONG_SCALES:
-        def trial(one: Take, rig: Rig, wrong: float = wrong) -> Figures:
+        def trial(one: DataSet, rig: Rig, wrong: float = wrong) -> Figures:
             other = msgspec.structs.replace(rig, hand=scaled_hand(rig.hand, wrong))
             return scenarios.growing(one, other, 1.0 / wrong)
         for name, figures in bench.each(bench.takes(bench.motion, SCALE_S), trial, floating).items():
@@ -196,8 +196,8 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10.0, help="of crossing, and of computing (default 10)")
     parser.add_argument("--hidden-for", type=float, nargs=2, metavar=("MIN", "MAX"), default=EPISODE_S,
                         help=f"s, how long markers stay hidden at a time (default {EPISODE_S[0]} to {EPISODE_S[1]})")
-    parser.add_argument("--sketched", action="store_true", help="logs without pictures (rhot_app/simulator/sights.py)")
-    parser.add_argument("--logs", type=Path, metavar="DIR", default=takes_folder(),
+    parser.add_argument("--sketched", action="store_true", help="logs without pictures")
+    parser.add_argument("--logs", type=Path, metavar="DIR", default=data_sets_folder(),
                         help="where the logs are kept, and found again")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
@@ -227,7 +227,7 @@ def main() -> int:
         except RhotError as exc:
             print(f"{name}: {exc}", file=sys.stderr)
             continue
-        print(trial_table(name, bench.about(name), done[name]), flush=True)
+        print(run_table(name, bench.about(name), done[name]), flush=True)
         if args.json is not None:
             args.json.write_text(json.dumps(done, indent=1) + "\n")
     print(legend(done.values()))

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel, undistort_point
 from rhot_app.geometry.silhouette import ellipsoid
-from rhot_app.simulator.body import CYLINDER, HandBody
-from rhot_app.simulator.painter import PoseSource
-from rhot_app.simulator.raycast import NO_HIT, PREPARED, hit, prepare
-from rhot_app.simulator.scene import Scene, TwinSettings, make_scene, twin_defaults
-from rhot_app.simulator.shot import make_renderer, make_shot
-from rhot_app.simulator.spans import outline
+from rhot_app.simulator.nodes.shot import make_renderer, make_shot
+from rhot_app.simulator.render.body import CYLINDER, HandBody
+from rhot_app.simulator.render.painter import PoseSource
+from rhot_app.simulator.render.raycast import NO_HIT, PREPARED, hit, prepare
+from rhot_app.simulator.render.scanline_bounds import outline
+from rhot_app.simulator.scene.scene import Scene, TwinSettings, make_scene, twin_defaults
 from rhot_node.detect.image import YuvImage, from_i420
 
 Array = NDArray[np.float64]
@@ -57,11 +57,11 @@ def twin_scene(background: str = "cloth", preset: str = "wide", distance_m: floa
 def held_poses(scene: Scene, motion: str, poses: int, frames: int, every_s: float = 0.31) -> Iterator[Pose]:
     """The motion stopped every `every_s`, `frames` pictures each."""
     shot = make_shot(scene, motion, 1.0)
-    body, preset = shot.act.thing, scene.preset
+    body, preset = shot.scene_object.thing, scene.preset
     assert isinstance(body, HandBody)
     renderers = [make_renderer(shot, index) for index in (0, 1)]
     for number in range(poses):
-        source = _Held(shot.act.source, every_s * (number + 0.5))
+        source = _Held(shot.scene_object.source, every_s * (number + 0.5))
         pictures: tuple[list[YuvImage], list[YuvImage]] = ([], [])
         outline, centre = np.full((2, 2, body.marker_count, 2), np.nan)
         for index, renderer in enumerate(renderers):
@@ -88,12 +88,12 @@ class Moment:
 def moving_frames(scene: Scene, motion: str, index: int, frames: int) -> Iterator[Moment]:
     """The first `frames` pictures of one camera."""
     shot = make_shot(scene, motion, frames / scene.preset.fps)
-    body, renderer, preset = shot.act.thing, make_renderer(shot, index), scene.preset
+    body, renderer, preset = shot.scene_object.thing, make_renderer(shot, index), scene.preset
     assert isinstance(body, HandBody)
     for number, t_ns in enumerate(scene.frame_times_ns(index, 2.0 + frames / preset.fps)[:frames]):
-        packed, visible = renderer.render(shot.act.source, 1e-9 * t_ns, number)
+        packed, visible = renderer.render(shot.scene_object.source, 1e-9 * t_ns, number)
         yield Moment(from_i420(packed.copy(), preset.width, preset.height),
-                     places(body, scene.camera(index), shot.act.source, 1e-9 * t_ns, 1e-9 * scene.row_time_ns),
+                     places(body, scene.camera(index), shot.scene_object.source, 1e-9 * t_ns, 1e-9 * scene.row_time_ns),
                      visible.copy())
 
 

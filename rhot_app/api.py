@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.board import Board, CharucoBoard, Chessboard
-from rhot_app.calibration.stereo_report import StereoReport
+from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.stereo.report import StereoReport
 from rhot_app.engine.client import EngineClient
 from rhot_app.errors import CalibrationError, EngineError, ExportError, RecordingError, RhotError, RigError
 from rhot_app.export.export import Exported, export_log
@@ -159,11 +159,11 @@ def calibrate_stereo(pictures: Mapping[str, Sequence[str | Path]], board: Board,
 
     Raises CalibrationError when the pictures cannot be put together. The command is ``rhot calibrate stereo``.
     """
-    from rhot_app.calibration.intrinsics_file import load_intrinsics
-    from rhot_app.calibration.lens_search import find_lens
-    from rhot_app.calibration.stereo import KnownLengths, calibrate
-    from rhot_app.calibration.stereo_reading import read_shared
-    from rhot_app.calibration.stereo_rig import calibrated_rig, lens_of, require_nodes, rig_verdict
+    from rhot_app.calibration.lens.intrinsics_file import load_intrinsics
+    from rhot_app.calibration.lens.search import find_lens
+    from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate
+    from rhot_app.calibration.stereo.reading import read_shared
+    from rhot_app.calibration.stereo.rig import calibrated_rig, lens_of, require_nodes, rig_verdict
 
     names = list(pictures)
     require_nodes(rig, names)

@@ -15,21 +15,21 @@ from multiprocessing import get_context
 import msgspec
 import numpy as np
 
-from rhot_app.calibration.board import STANDARD_BOARD
-from rhot_app.calibration.corners import detect
-from rhot_app.calibration.filter_simulation import OFF, Footage, simulate
-from rhot_app.calibration.hand_bundle_model import POSE, Poses, linearise
-from rhot_app.calibration.hand_shape import HandUnknowns
-from rhot_app.calibration.marker_places import PALM, MarkerPlace
+from rhot_app.calibration.board.boards import STANDARD_BOARD
+from rhot_app.calibration.board.corners import detect
+from rhot_app.calibration.filters.simulation import OFF, Footage, simulate
+from rhot_app.calibration.hand.bundle_model import POSE, Poses, linearise
+from rhot_app.calibration.hand.marker_places import PALM, MarkerPlace
+from rhot_app.calibration.hand.shape import HandUnknowns
 from rhot_app.engine.warm_up import warm_up as rehearse_tracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.outputs.joints import JointConverter
 from rhot_app.project import Rig, TrackerSettings, load_rig
-from rhot_app.simulator.scene import make_scene, twin_defaults
-from rhot_app.simulator.shot import make_renderer, make_shot
-from rhot_app.simulator.shows import BoardShow, HandShow
+from rhot_app.simulator.nodes.shot import make_renderer, make_shot
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.scene_description import BoardShow, HandShow
 from rhot_app.tracking.make import make_tracker
 from rhot_node.compiled import mark_complete
 from rhot_node.detect.fast import FastDetector
@@ -63,7 +63,7 @@ def warm_twin(_rig: Rig) -> None:
     scene = make_scene(twin_defaults(), seed=1)
     for show in (HandShow("rest"), BoardShow(on_table=True)):
         shot = make_shot(scene, show, seconds=1.0)
-        make_renderer(shot, 0).render(shot.act.source, t_row0_s=0.0, number=0)
+        make_renderer(shot, 0).render(shot.scene_object.source, t_row0_s=0.0, number=0)
 
 
 def warm_boards(_rig: Rig) -> None:

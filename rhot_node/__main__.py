@@ -114,7 +114,7 @@ def _serve(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     """Put the parts together and loop until the end."""
     from rhot_node.announce import Announcer
-    from rhot_node.capture.open import open_camera, takes_settings
+    from rhot_node.capture.open import data_set_settings, open_camera
     from rhot_node.control import ControlServer
     from rhot_node.daemon import NodeDaemon
     from rhot_node.detector_plugin import DetectorChoice
@@ -138,7 +138,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     choice, health = DetectorChoice(make_detector), HealthMonitor(Machine())
     videos = VideoRecorder(video_folder(options.settings))
     daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), choice.make,
-                        camera_takes_settings=takes_settings(options.camera), loop=options.loop,
+                        camera_takes_settings=data_set_settings(options.camera), loop=options.loop,
                         troubles=lambda: [*choice.troubles(), *health.troubles()], video=videos.offer)
     manager = ServiceManager()
     boot_id = secrets.randbits(32)

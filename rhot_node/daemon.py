@@ -15,6 +15,7 @@ from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.detector import Detector
 from rhot_node.errors import CameraError
 from rhot_node.health.check import Check
+from rhot_node.health.checks import BLACK_PICTURE, is_black
 from rhot_node.pictures import PictureBox
 from rhot_node.requests import SettingsStore
 from rhot_node.session import Sessions, Stream
@@ -25,6 +26,7 @@ log = logging.getLogger(__name__)
 READ_S = 0.05  # how long to wait for a frame before looking at everything else
 REOPEN_S = 1.0  # between tries to open a lost camera
 U32_MAX = 2**32 - 1
+_LIGHT_PERIOD_S = 1.0
 
 OpenCamera = Callable[[CameraSettings], Camera]
 MakeDetector = Callable[[NodeSettings], Detector]
@@ -80,6 +82,8 @@ class NodeDaemon:
         self._shown_state = NodeState.STARTING
         self._retry_s = 0.0
         self._last_frame: tuple[int, int] | None = None  # number and time of the frame before
+        self._black = False
+        self._light_due_s = 0.0
         self._session = 0  # whose sequence is being counted
         self._sequence = 0
 
@@ -104,7 +108,8 @@ class NodeDaemon:
                 "message": self._message, "session": stream.session if stream else 0,
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
                 "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns(),
-                "camera": camera.report() if isinstance(camera, Reporting) else {}, "health": self._troubles()}
+                "camera": camera.report() if isinstance(camera, Reporting) else {},
+                "health": [*self._troubles(), *([BLACK_PICTURE] if self._black else [])]}
 
     def introduce(self) -> dict[str, Any]:
         """What anybody may know, paired or not."""
@@ -145,6 +150,7 @@ class NodeDaemon:
             return True
         if frame is None:
             return True
+        self._look_at_light(frame)
         markers = self._detector.detect(frame.image)
         late = self._count_frame(frame)
         stream = self.sessions.current
@@ -175,6 +181,13 @@ class NodeDaemon:
         else:
             self.counters.not_sent += 1
 
+    def _look_at_light(self, frame: Frame) -> None:
+        """Once a second, because the image is gone by the time that somebody asks."""
+        now_s = time.monotonic()
+        if now_s >= self._light_due_s:
+            self._light_due_s = now_s + _LIGHT_PERIOD_S
+            self._black = is_black(frame.image.y)
+
     def _count_frame(self, frame: Frame) -> bool:
         """Count the frame; says whether its processing took longer than the budget."""
         self.counters.frames += 1
@@ -192,6 +205,7 @@ class NodeDaemon:
 
     def _open(self) -> None:
         self._last_frame = None
+        self._black = False
         self._camera = self._open_camera(self._settings.camera)
         self._size = self._camera.size
         self._message = ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import sys
 from types import ModuleType
 
 KINDS: dict[str, str] = {
@@ -20,14 +21,18 @@ KINDS: dict[str, str] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """One subcommand per calibration."""
-    kinds = parser.add_subparsers(dest="kind", metavar="KIND", title="kinds", required=True)
+    kinds = parser.add_subparsers(dest="kind", metavar="KIND", title="kinds")
     for kind, summary in KINDS.items():
         room = kinds.add_parser(kind, help=summary, description=f"Calibrate {summary}.")
         _module(kind).add_arguments(room)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the chosen calibration; exit code 2 when its result may not be used."""
+    """Run the chosen calibration; exit code 2 when its result may not be used. Without one, list all."""
+    if args.kind is None:
+        rows = "\n".join(f"  {kind:12s}{summary}" for kind, summary in KINDS.items())
+        print(f"rhot calibrate KIND, one of:\n{rows}\n`rhot calibrate KIND --help` has its options.", file=sys.stderr)
+        return 2
     return int(_module(args.kind).run(args))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhot_app.calibration.camera_calibration import NOT_CALIBRATED, calibration_finding
+from rhot_app.calibration.lens.camera_calibration import NOT_CALIBRATED, calibration_finding
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus
 from rhot_app.project import Rig
@@ -64,6 +64,7 @@ class NodeFacts:
     unseen_s: Sequence[float]  # per marker, since this camera last saw it
     streams_elsewhere: bool  # for another master
     not_started_s: float  # how long the node has been ready although it was told to start
+    black: bool = False  # the camera's picture
 
 
 def disk_advice(folder: str, seconds_left: float) -> list[Advice]:
@@ -87,7 +88,10 @@ def node_advice(facts: NodeFacts, marker_ids: Sequence[str], running: bool, *, s
 
 
 def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool) -> list[Advice]:
-    """The one sentence that replaces all others about sight when no camera sees anything."""
+    """The one sentence that replaces all others about sight when no camera sees anything; none while a picture is
+    black, which is said of each camera."""
+    if any(facts.black for facts in all_facts):
+        return []
     seconds = min((min(facts.unseen_s) for facts in all_facts), default=0.0)
     if running and seconds > UNSEEN_S and any(facts.recent.accepted for facts in all_facts):
         return [Advice("warning", f"No camera has seen a marker for {seconds:.0f} s. Hold the hand into both pictures; "
@@ -207,6 +211,8 @@ def calibration_advice(rig: Rig) -> list[Advice]:
 
 
 def _sight_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:
+    if facts.black:
+        return [Advice("warning", f"{facts.status.name} is black: is the lens covered?")]
     unseen = [(seconds, marker) for seconds, marker in zip(facts.unseen_s, marker_ids, strict=True)
               if seconds > UNSEEN_S]
     if not unseen:

@@ -25,6 +25,9 @@ from rhot_node.files import decode_message
 VANISHED_S = 1.0
 """An engine publishes its status ten times a second; after this long without one it is gone."""
 
+ABSENT_S = 2.0
+"""An engine that starts makes its sockets sooner."""
+
 _RECEIVE_QUEUE = 2000  # messages a slow client may fall behind before the oldest are dropped
 
 
@@ -92,7 +95,11 @@ class EngineClient:
         try:
             socket.connect(self.directory.commands)
             socket.send(msgspec.json.encode({"command": name, **arguments}))
-            if not socket.poll(round(1e3 * timeout_s)):
+            absent = not Path(self.directory.commands.removeprefix("ipc://")).exists()
+            if not socket.poll(round(1e3 * (min(timeout_s, ABSENT_S) if absent else timeout_s))):
+                if absent:
+                    raise EngineError(f"There is no engine in {self.directory.path}. Start it with "
+                                      "`rhot engine --rig FILE`.")
                 raise EngineError(f"the engine in {self.directory.path} gave no answer to {name!r} in {timeout_s:g} s. "
                                   "Is it running? Start it with `rhot engine --rig FILE`.")
             frames = socket.recv_multipart()

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot engine``."""
     parser.add_argument("--rig", type=Path, required=True, metavar="FILE", help="the rig file (rhot-rig, JSON)")
-    parser.add_argument("--log", type=Path, metavar="FILE", help="write the raw log of all datagrams to this new file")
+    parser.add_argument("--record", "--log", type=Path, dest="log", metavar="FILE",
+                        help="write the raw log of all datagrams to this new file")
     parser.add_argument("--video", action="store_true",
-                        help="have every node record its frames, too, as long as --log is written; `rhot video "
+                        help="have every node record its frames, too, as long as --record writes; `rhot video "
                              "collect` fetches them")
     parser.add_argument("--unchecked", action="store_true",
                         help="serve also a rig that `rhot check` refuses, to calibrate it")
@@ -39,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _require_acceptable(rig: Rig, path: Path) -> None:
     """Raises RigError when `rhot check` refuses the rig."""
-    from rhot_app.calibration.rig_checks import check_rig
+    from rhot_app.calibration.check.checks import check_rig
     from rhot_app.calibration.verdict import Grade
     from rhot_app.errors import RigError
 

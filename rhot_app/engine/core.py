@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from rhot_app.engine.advice import disk_advice, hands_advice, moved_advice
-from rhot_app.engine.observer import NodeMessage, Observer
+from rhot_app.engine.observer import NodeBlack, NodeMessage, Observer
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
 from rhot_app.engine.status import Advice, EngineStatus
@@ -41,7 +41,8 @@ class Engine:
 
     def __init__(self, rig: Rig, rig_path: Path | None, make_source: MakeSource, make_tracker: MakeTracker,
                  publish: PublishState, node_message: NodeMessage = lambda node_id: "",
-                 after_state: AfterState = lambda: None, outputs: OutputProcess | None = None) -> None:
+                 after_state: AfterState = lambda: None, outputs: OutputProcess | None = None,
+                 node_black: NodeBlack = lambda node_id: False) -> None:
         """Open the source and warm the tracker up; raises SourceError when a port is taken, OutputError for an output
         that cannot be.
 
@@ -56,6 +57,7 @@ class Engine:
         self._make_source = make_source
         self._make_tracker = make_tracker
         self._node_message = node_message
+        self._node_black = node_black
         self._notice = ""  # why the last recording ended
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
         self._lock = threading.RLock()
@@ -197,7 +199,7 @@ class Engine:
             outputs = self._outputs
             extra += [] if outputs is None else [Advice("warning", text) for text in outputs.complaints()]
             status = self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
-                                           self._node_message, extra)
+                                           self._node_message, extra, self._node_black)
             return status if outputs is None else replace(status, outputs=outputs.status())
 
     def close(self) -> None:

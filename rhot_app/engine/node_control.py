@@ -1,6 +1,6 @@
 """The engine as client of the nodes' control channels: requests handed on without waiting, previews, fault messages.
 
-Used by the server's thread only, except `message`, which any thread may read.
+Used by the server's thread only, except `message` and `black`, which any thread may read.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import msgspec
 import zmq
 
 from rhot_app.engine.commands import Answer, Arguments, refusal
-from rhot_app.engine.node_health import health_advice
+from rhot_app.engine.node_health import health_advice, sees_black
 from rhot_app.engine.status import Advice, EngineStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
@@ -26,8 +26,7 @@ from rhot_node.keys import KeyPair, connect_with
 TIMEOUT_S = 2.7
 """A still may take two seconds on a node whose camera has just stopped; a client waits for three."""
 
-_FAULT_PERIOD_S = 1.0
-_HEALTH_PERIOD_S = 3.0
+_STATE_PERIOD_S = 1.0  # a black picture is known before its markers are missed (`advice.UNSEEN_S`)
 _VIDEO_PERIOD_S = 3.0  # a node ends a video that it was not reminded of for LEASE_S (rhot_node.video.recorder)
 _LAST_WORDS_MS = 200
 
@@ -59,6 +58,7 @@ class _Peer:
     asked: dict[int, _Asked] = field(default_factory=dict)
     message: str = ""
     health: tuple[Advice, ...] = ()
+    black: bool = False
     asked_s: float = -1e9
     video: str = ""  # what it was told to record
     video_told_s: float = -1e9
@@ -126,7 +126,7 @@ class NodeControl:
                 elif asked.client is None:
                     state = answer.get("answer", {})
                     peer.message = printable(str(state.get("message", "")))
-                    peer.health = health_advice(peer.node.name, state)
+                    peer.health, peer.black = health_advice(peer.node.name, state), sees_black(state)
                 else:
                     done.append((asked.client, (answer, attachment)))
             for asked in [asked for asked in peer.asked.values() if now_s > asked.deadline_s]:
@@ -167,8 +167,8 @@ class NodeControl:
         return found
 
     def ask_for_states(self, status: EngineStatus) -> None:
-        """Ask nodes for their own words: of a fault once a second, of their machines' health every few seconds. What
-        is over is forgotten."""
+        """Ask nodes for their own words: of a fault and of their machines' health once a second. What is over is
+        forgotten."""
         now_s = time.monotonic()
         for node in status.nodes:
             peer = self._peers.get(node.node_id)
@@ -177,8 +177,8 @@ class NodeControl:
             if node.state != "fault":
                 peer.message = ""
             if node.state == "silent":
-                peer.health = ()
-            elif now_s - peer.asked_s > (_FAULT_PERIOD_S if node.state == "fault" else _HEALTH_PERIOD_S):
+                peer.health, peer.black = (), False
+            elif now_s - peer.asked_s > _STATE_PERIOD_S:
                 peer.asked_s = now_s
                 self._put(peer, None, "node", {"request": "state"})
 
@@ -202,6 +202,11 @@ class NodeControl:
         """What the node says about its fault; empty when it has none or did not say yet."""
         peer = self._peers.get(node_id)
         return "" if peer is None else peer.message
+
+    def black(self, node_id: int) -> bool:
+        """Whether the node says that its camera's picture is black."""
+        peer = self._peers.get(node_id)
+        return peer is not None and peer.black
 
     def close(self) -> None:
         """End the nodes' videos and close all sockets. May be called twice."""

@@ -5,9 +5,13 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
+
+from rhot_app.calibration.check.health import HealthMonitor, HealthSample
+from rhot_app.calibration.verdict import Grade
 from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
-from rhot_app.engine.health_watch import HealthWatch
 from rhot_app.engine.node_health import most_urgent_first
 from rhot_app.engine.node_meter import NodeMeter
 from rhot_app.engine.pipeline import Pipeline
@@ -16,12 +20,16 @@ from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
 from rhot_app.sources.receiver import RECEIVE_BUFFER
 from rhot_app.sources.source import ObservationSource
-from rhot_app.tracking.state import Condition, HandState
+from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.tracking.tracker import Tracker
 
 _SUMMARY_NS = 500_000_000  # sorting the latencies is the dearest part of a status
 
 NodeMessage = Callable[[int], str]
 """``message(node_id)``: what the node itself says about its fault."""
+
+NodeBlack = Callable[[int], bool]
+"""``black(node_id)``: whether the node says that its camera's picture is black."""
 
 
 class Observer:
@@ -44,7 +52,8 @@ class Observer:
         self._health.restart()
 
     def status(self, rig_path: str, session: int, running: bool, recorder: Recorder | None,
-               message: NodeMessage, extra: list[Advice]) -> EngineStatus:
+               message: NodeMessage, extra: list[Advice],
+               black: NodeBlack = lambda node_id: False) -> EngineStatus:
         """The engine's status now, with the `extra` advice."""
         now_ns = time.monotonic_ns()
         for meter in self._meters:
@@ -56,7 +65,7 @@ class Observer:
             t_master_ns=now_ns, pid=os.getpid(), session=session, running=running,
             condition=self._condition(running, nodes, now_ns).value, rig_name=self.rig.name, rig_path=rig_path,
             state_rate_hz=self._pipeline.states.rate_hz(now_ns), nodes=nodes,
-            advice=most_urgent_first((*extra, *self._advice(nodes, running, now_ns))), latency=self._latency,
+            advice=most_urgent_first((*extra, *self._advice(nodes, running, now_ns, black))), latency=self._latency,
             log_path="" if recorder is None else str(recorder.path),
             log_bytes=0 if recorder is None else recorder.bytes_written,
             log_seconds=0.0 if recorder is None else recorder.seconds, replaying=self._source.log_path)
@@ -73,8 +82,9 @@ class Observer:
         self._ever_tracked |= condition is Condition.TRACKING
         return condition
 
-    def _advice(self, nodes: tuple[NodeStatus, ...], running: bool, now_ns: int) -> list[Advice]:
-        facts = [self._facts(camera, status, now_ns) for camera, status in enumerate(nodes)]
+    def _advice(self, nodes: tuple[NodeStatus, ...], running: bool, now_ns: int, black: NodeBlack) -> list[Advice]:
+        facts = [replace(self._facts(camera, status, now_ns), black=black(status.node_id))
+                 for camera, status in enumerate(nodes)]
         nowhere = no_marker_advice(facts, running)
         marker_ids = self.rig.markers.ids
         found = [advice for one in facts for advice in node_advice(one, marker_ids, running, sight=not nowhere)]
@@ -103,3 +113,47 @@ def condition_of(state: HandState) -> Condition:
         return state.condition
     both = {state.condition, state.other.condition}
     return Condition.PARTIAL if both & {Condition.TRACKING, Condition.PARTIAL} else Condition.LOST
+
+
+# -- feeds the health monitor from a running pipeline, outside the frames' own thread, and words what it finds ---------
+
+LOOK_NS = 95_000_000  # the status comes every 100 ms
+JUDGE_NS = 2_000_000_000
+
+
+class HealthWatch:
+    """One rig's health. `advice` is called with every status and mostly returns what it said before."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._monitor = HealthMonitor(rig)
+        self._advice: list[Advice] = []
+        self._looked_ns = self._judged_ns = 0
+        self._sequence = -1
+
+    def restart(self) -> None:
+        """A new run begins."""
+        self._monitor.reset()
+        self._advice = []
+        self._sequence = -1
+
+    def advice(self, state: HandState | None, tracker: Tracker, now_ns: int) -> list[Advice]:
+        """Look at the newest state if a tenth of a second is over, judge every other second."""
+        if state is not None and state.sequence != self._sequence and now_ns - self._looked_ns >= LOOK_NS:
+            self._looked_ns, self._sequence = now_ns, state.sequence
+            self._look(state, tracker)
+        if now_ns - self._judged_ns >= JUDGE_NS:
+            self._judged_ns = now_ns
+            self._advice = [Advice("error" if found.finding.grade is Grade.POOR else "warning", found.finding.sentence,
+                                   found.mender)
+                            for found in self._monitor.findings()]
+        return self._advice
+
+    def _look(self, state: HandState, tracker: Tracker) -> None:
+        frames = [frame for frame in tracker.newest_frames() if frame is not None]
+        if len(frames) < len(state.camera_names):
+            return
+        self._monitor.feed(HealthSample(
+            t_ns=state.t_master_ns, positions=state.marker_raw_positions,
+            measured=state.marker_knowledge == Knowledge.MEASURED, errors_px=state.epipolar_error_px,
+            qualities=np.array([frame.qualities for frame in frames]),
+            flags=np.array([frame.flags for frame in frames])))

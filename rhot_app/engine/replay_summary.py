@@ -9,7 +9,7 @@ import numpy as np
 
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
-from rhot_app.sources.replay import LogDoor
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations, Tracker
@@ -35,7 +35,7 @@ class FrameSmoother(Protocol):
         ...
 
 
-def replay_states(records: Iterable[Record], door: LogDoor, tracker: Tracker) -> Iterator[HandState]:
+def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracker) -> Iterator[HandState]:
     """The states that the engine would have published from these records, one for every frame that completes one."""
     changes = door.changes
     for record in records:
@@ -51,7 +51,7 @@ def replay_states(records: Iterable[Record], door: LogDoor, tracker: Tracker) ->
             yield state
 
 
-def smoothed_states(records: Iterable[Record], door: LogDoor, tracker: FrameSmoother) -> Iterator[HandState]:
+def smoothed_states(records: Iterable[Record], door: LogValidator, tracker: FrameSmoother) -> Iterator[HandState]:
     """The states of these records by all of them, in the order of time; they come some seconds late."""
     changes = door.changes
     for record in records:
@@ -71,7 +71,7 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker | SmoothedTracker) -
 
     Raises RecordingError when not one record of the log can be read.
     """
-    door = LogDoor(rig)
+    door = LogValidator(rig)
     times = _Span()
     records = times.watch(reader)
     states = list(smoothed_states(records, door, tracker) if isinstance(tracker, SmoothedTracker)

@@ -7,17 +7,21 @@ import gc
 import os
 import signal
 import time
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import zmq
 
+from rhot_app.engine.codec import TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, encode
+from rhot_app.engine.commands import Answer, Commands, parse, refusal
 from rhot_app.engine.core import Engine, MakeSource, MakeTracker
 from rhot_app.engine.directory import EngineDirectory, EngineLock, open_directory
 from rhot_app.engine.node_control import NodeControl
+from rhot_app.engine.node_health import most_urgent_first
 from rhot_app.engine.output_process import OutputProcess
-from rhot_app.engine.server import Server, StatePublisher
+from rhot_app.errors import EngineError
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.sources.realtime import share_interpreter
 from rhot_app.tracking.make import make_tracker
@@ -59,7 +63,8 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory:
         nodes = NodeControl(context, own)
         streams = OutputProcess(place.states, outputs, follow_rig=rig_outputs)
         stack.callback(streams.close)
-        engine = Engine(rig, rig_path, make_source, trackers, publish, nodes.message, GarbageMan(), streams)
+        engine = Engine(rig, rig_path, make_source, trackers, publish, nodes.message, GarbageMan(), streams,
+                        nodes.black)
         stack.callback(engine.close)
         server = Server(context, place, engine, nodes)
         stack.callback(server.close)
@@ -91,3 +96,119 @@ class GarbageMan:
         if time.monotonic() - self._collected_s > _COLLECT_S:
             gc.collect()
             self._collected_s = time.monotonic()
+
+
+# -- the engine's sockets towards its clients --------------------------------------------------------------------------
+
+STATUS_NS = 100_000_000
+"""Status is published ten times a second, so that a client misses an engine within one."""
+
+_SEND_QUEUE = 1000  # messages kept for a slow client before it misses some
+_POLL_MS = 20
+
+
+class StatePublisher:
+    """The socket of the hand states; used by the pipeline's thread only. Never blocks: a slow client misses states."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], directory: EngineDirectory) -> None:
+        self.count = 0
+        self._socket = _bind(context, zmq.PUB, directory.states)
+
+    def __call__(self, payload: bytes) -> None:
+        """Publish one state's bytes."""
+        self._socket.send_multipart((TOPIC_STATE, payload), zmq.DONTWAIT, copy=True)
+        self.count += 1
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class Server:
+    """Answers commands, publishes status and previews. `step` belongs to one thread."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], directory: EngineDirectory, engine: Engine,
+                 nodes: NodeControl) -> None:
+        self.ending = False
+        self._engine = engine
+        self._nodes = nodes
+        self._events = _bind(context, zmq.PUB, directory.events)
+        self._commands_socket = _bind(context, zmq.ROUTER, directory.commands)
+        self._commands = Commands(engine, quit_=self.end, preview=nodes.set_preview)
+        self._poller = zmq.Poller()
+        self._poller.register(self._commands_socket, zmq.POLLIN)
+        self._status_due_ns = 0
+
+    def end(self) -> None:
+        """Have `run` return after the step at hand."""
+        self.ending = True
+
+    def step(self, timeout_ms: int = _POLL_MS) -> None:
+        """Wait for a command or a node's answer, deal with all that wait, publish what is due."""
+        self._nodes.follow(self._engine.rig)
+        self._nodes.record_video(self._engine.video)
+        if self._poller.poll(timeout_ms):
+            self._answer_commands()
+        for client, node_answer in self._nodes.answers():
+            self._send(client, *node_answer)
+        for preview in self._nodes.previews():
+            self._publish(TOPIC_PREVIEW, encode(preview))
+        now_ns = time.monotonic_ns()
+        if now_ns >= self._status_due_ns:
+            self._status_due_ns = now_ns + STATUS_NS
+            status = self._engine.status()
+            self._nodes.ask_for_states(status)
+            status = replace(status, advice=most_urgent_first((*status.advice, *self._nodes.advice())))
+            self._publish(TOPIC_STATUS, encode(status))
+
+    def run(self, until: Callable[[], bool] = lambda: False) -> None:
+        """Serve until `end`, or until `until` is true."""
+        while not self.ending and not until():
+            self.step()
+
+    def close(self) -> None:
+        """Close all sockets; what was answered last still reaches the client."""
+        self._nodes.close()
+        self._events.close()
+        self._commands_socket.close(linger=200)
+
+    def _publish(self, topic: bytes, payload: bytes) -> None:
+        self._events.send_multipart((topic, payload), zmq.DONTWAIT)
+
+    def _answer_commands(self) -> None:
+        while True:
+            try:
+                client, *frames = self._commands_socket.recv_multipart(zmq.DONTWAIT)
+            except zmq.Again:
+                return
+            if len(frames) == 2 and frames[0] == b"":  # as REQ sends them; anything else cannot be answered
+                self._answer(client, frames[1])
+
+    def _answer(self, client: bytes, data: bytes) -> None:
+        try:
+            name, arguments = parse(data)
+            if name in self._nodes.commands:
+                self._nodes.ask(client, name, arguments)
+                return
+        except EngineError as exc:
+            self._send(client, refusal(exc))
+            return
+        self._send(client, *self._commands.answer(name, arguments))
+
+    def _send(self, client: bytes, answer: Answer, attachment: bytes | None = None) -> None:
+        frames = [client, b"", msgspec.json.encode(answer)]
+        self._commands_socket.send_multipart(frames if attachment is None else [*frames, attachment])
+
+
+def _bind(context: zmq.Context[zmq.Socket[bytes]], kind: int, endpoint: str) -> zmq.Socket[bytes]:
+    """A socket bound to `endpoint`; a socket file left behind by a dead engine is replaced (the lock is ours)."""
+    socket = context.socket(kind)
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.SNDHWM, _SEND_QUEUE)
+    try:
+        socket.bind(endpoint)
+        Path(endpoint.removeprefix("ipc://")).chmod(0o600)
+    except (zmq.ZMQError, OSError) as exc:
+        socket.close()
+        raise EngineError(f"{endpoint}: cannot be opened ({exc}); choose another --directory.") from exc
+    return socket

@@ -17,7 +17,7 @@ from rhot_app.errors import EngineError, RecordingError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.sources.replay import LogDoor
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import CameraObservations
@@ -38,7 +38,7 @@ class SmoothedReplay:
         with contextlib.closing(LogReader(path)) as reader:
             try:
                 records = _watched(reader, progress)
-                for state in smoothed_states(records, LogDoor(rig), SmoothedTracker(rig)):
+                for state in smoothed_states(records, LogValidator(rig), SmoothedTracker(rig)):
                     self._offsets.append(self._offsets[-1] + self._file.write(encode(state)))
                     received_ns.append(state.t_receive_ns)
             except OSError as exc:

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.evaluation.deviations import Deviations, Worn, distances
-from rhot_app.evaluation.honesty import axes_within
+from rhot_app.evaluation.consistency import axes_within
+from rhot_app.evaluation.deviations import Deviations, WornMarkers, distances
 from rhot_app.evaluation.score import count_swaps, rms
 from rhot_app.evaluation.track import DISPLAY_HZ, Track
-from rhot_app.simulator.truth import Truth
+from rhot_app.simulator.truth.truth import Truth
 
 Array = NDArray[np.float64]
 Figures = dict[str, float | None]
@@ -20,7 +20,7 @@ _ADDED = ("swaps",)  # over runs these add up; everything else is averaged, root
 _PLAIN = ("states_per_s", "measured_share", "predicted_3_sd_share")
 
 
-def accuracy(track: Track, off: Deviations, truth: Truth, worn: Worn) -> Figures:
+def accuracy(track: Track, off: Deviations, truth: Truth, worn: WornMarkers) -> Figures:
     """The figures of one run.
 
     `tip_visible`: fingertips whose marker both cameras truly see, whatever the tracker says of them; `tip_measured`:
@@ -48,7 +48,7 @@ def accuracy(track: Track, off: Deviations, truth: Truth, worn: Worn) -> Figures
     }
 
 
-def display_error(track: Track, truth: Truth, worn: Worn) -> Array:
+def display_error(track: Track, truth: Truth, worn: WornMarkers) -> Array:
     """(D, T) m: at each tick of a display, how far the fingertips of the newest state received are from where they are
     now. No prediction: what the state says of its own instant is shown."""
     ticks = np.arange(track.receive_s[0], track.receive_s[-1], 1.0 / DISPLAY_HZ)
@@ -57,7 +57,7 @@ def display_error(track: Track, truth: Truth, worn: Worn) -> Array:
     return distances(shown - truth.markers_at(ticks)[:, worn.tips])
 
 
-def predicted(track: Track, truth: Truth, worn: Worn) -> tuple[Array, Array]:
+def predicted(track: Track, truth: Truth, worn: WornMarkers) -> tuple[Array, Array]:
     """What the tracker, asked at each tick of a display, says of the tick: how far off fingertips are, (K, T, 3) m, and
     their covariances (K, T, 3, 3) m^2. K is 0 when it predicts nothing."""
     if track.predicted is None:

@@ -7,15 +7,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rhot_app.evaluation.accuracy import Figures, accuracy, pooled
+from rhot_app.evaluation.consistency import DEGREES, Consistency, Squares, consistency, squares
+from rhot_app.evaluation.data_sets import DataSet, Order, Told, data_set
 from rhot_app.evaluation.deviations import deviations, worn_by
-from rhot_app.evaluation.honesty import DEGREES, Consistency, Squares, consistency, squares
 from rhot_app.evaluation.report import SETTLE_S
-from rhot_app.evaluation.takes import Order, Take, Told, take
 from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.progress import Progress, silent
 from rhot_app.project import TrackerSettings
-from rhot_app.simulator.node_log import CABLE, Network
-from rhot_app.simulator.scene import Scene, make_scene
+from rhot_app.simulator.nodes.node_log import CABLE, Network
+from rhot_app.simulator.scene.scene import Scene, make_scene
 
 MOTIONS = ("rest", "wave", "grasp", "pinch", "fast")
 TRACKERS = {"classic": TrackerSettings(kind="classic"), "estimator": TrackerSettings(kind="estimator")}
@@ -62,7 +62,7 @@ class Comparison:
         """The figures of all seeds of a motion."""
         return pooled([run.judged[tracker].figures for run in self.of(motion)])
 
-    def honesty(self, motion: str, tracker: str) -> dict[str, Consistency]:
+    def covariance_consistency(self, motion: str, tracker: str) -> dict[str, Consistency]:
         """How true the covariances are, by quantity, over all seeds of a motion."""
         runs = [run.judged[tracker].squares for run in self.of(motion)]
         return {quantity: consistency(runs, quantity) for quantity in DEGREES}
@@ -82,7 +82,7 @@ def compare(wanted: Sequence[Order], folder: Path, trackers: dict[str, TrackerSe
     runs: list[Run] = []
     outdated = 0
     for number, order in enumerate(wanted):
-        recorded = take(order, folder, told)
+        recorded = data_set(order, folder, told)
         outdated += recorded.outdated
         judged = {}
         for place, (name, settings) in enumerate(trackers.items()):
@@ -92,7 +92,7 @@ def compare(wanted: Sequence[Order], folder: Path, trackers: dict[str, TrackerSe
     return Comparison(tuple(runs), outdated)
 
 
-def judge(recorded: Take, settings: TrackerSettings) -> Judged:
+def judge(recorded: DataSet, settings: TrackerSettings) -> Judged:
     """One tracker on one take, after the first second."""
     worn = worn_by(recorded.rig)
     track = tracked(recorded.records(), rig_with(recorded.rig, settings))
@@ -110,5 +110,5 @@ def as_fields(comparison: Comparison) -> dict[str, object]:
             "motions": {motion: {name: comparison.together(motion, name) for name in names}
                         for motion in comparison.motions()},
             "honesty": {motion: {name: {quantity: asdict(one)
-                                        for quantity, one in comparison.honesty(motion, name).items()}
+                                        for quantity, one in comparison.covariance_consistency(motion, name).items()}
                                  for name in names} for motion in comparison.motions()}}

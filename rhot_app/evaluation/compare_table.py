@@ -9,7 +9,7 @@ from pathlib import Path
 from rhot_app.errors import SimulatorError
 from rhot_app.evaluation.accuracy import Figures, ratio
 from rhot_app.evaluation.compare import Comparison, Run
-from rhot_app.evaluation.honesty import DEGREES, band
+from rhot_app.evaluation.consistency import DEGREES, band
 from rhot_node.files import read_json
 
 
@@ -64,7 +64,7 @@ def table(comparison: Comparison, columns: Sequence[Column] = COLUMNS) -> str:
     return "\n".join(lines)
 
 
-def honesty_table(comparison: Comparison) -> str:
+def consistency_table(comparison: Comparison) -> str:
     """Per motion and tracker: average NEES by quantity, its share inside the band, and what is within 3 sigma."""
     seeds = len(comparison.of(comparison.motions()[0]))
     heads = "".join(f"{quantity + ' ' + _span(seeds, degrees):>22}" for quantity, degrees in DEGREES.items())
@@ -75,7 +75,7 @@ def honesty_table(comparison: Comparison) -> str:
              " " * (margin + 8) + heads, " " * (margin + 8) + words * len(DEGREES)]
     for motion in comparison.motions():
         for tracker in comparison.trackers():
-            found = comparison.honesty(motion, tracker)
+            found = comparison.covariance_consistency(motion, tracker)
             cells = "".join(f"{cell(one.average, '.2f'):>8}{cell(one.inside, '.2f'):>7}{cell(one.within, '.3f'):>7}"
                             for one in found.values())
             lines.append(f"{motion:<{margin}}{tracker[:7]:<8}{cells}")

@@ -12,7 +12,7 @@ from rhot_app.evaluation.score import VISIBLE_FRACTION
 from rhot_app.evaluation.track import Track
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, TIP_ROLES
 from rhot_app.project import Rig
-from rhot_app.simulator.truth import Truth
+from rhot_app.simulator.truth.truth import Truth
 from rhot_app.tracking.state import Knowledge
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
-class Worn:
+class WornMarkers:
     """Which fingers wear what. `tips` (T,): markers on fingertips, `tip_fingers` (T,): whose; `angles` (A,): indices of
     the joint angles of fingers that wear any marker."""
 
@@ -29,14 +29,14 @@ class Worn:
     angles: NDArray[np.int64]
 
 
-def worn_by(rig: Rig) -> Worn:
+def worn_by(rig: Rig) -> WornMarkers:
     """What the rig's marker set says."""
     roles = [marker.role or "" for marker in rig.markers.markers]
     pairs = [(roles.index(role), finger) for finger, role in enumerate(TIP_ROLES) if role in roles]
     dressed = [any(role.startswith(f"{finger}_") for role in roles) for finger in FINGERS]
     angles = [np.arange(part.start, part.stop) for part, has in zip(ANGLE_SLICES, dressed, strict=True) if has]
     tips = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    return Worn(tips[:, 0], tips[:, 1], np.concatenate([np.empty(0, np.int64), *angles]))
+    return WornMarkers(tips[:, 0], tips[:, 1], np.concatenate([np.empty(0, np.int64), *angles]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class Deviations:
     measured: Mask
 
 
-def deviations(track: Track, truth: Truth, worn: Worn) -> Deviations:
+def deviations(track: Track, truth: Truth, worn: WornMarkers) -> Deviations:
     """Compare a track with what was true at its times."""
     times = track.times_s
     markers = truth.markers_at(times)

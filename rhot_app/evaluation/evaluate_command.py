@@ -102,11 +102,11 @@ def _motions_of(args: argparse.Namespace, usual: Sequence[str]) -> list[str]:
 def _compare(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
     from rhot_app.evaluation.compare import MOTIONS, TRACKERS, as_fields, compare, orders
-    from rhot_app.evaluation.compare_table import LEGEND, baseline_table, honesty_table, read_baseline, table
+    from rhot_app.evaluation.compare_table import LEGEND, baseline_table, consistency_table, read_baseline, table
+    from rhot_app.evaluation.data_sets import data_sets_folder
     from rhot_app.evaluation.report import SETTLE_S
-    from rhot_app.evaluation.takes import takes_folder
     from rhot_app.progress import ProgressLine
-    from rhot_app.simulator.node_log import Network
+    from rhot_app.simulator.nodes.node_log import Network
 
     unseen = [name for name in _OF_PICTURES if getattr(args, name) is not None]
     if args.sketched and unseen:
@@ -130,7 +130,7 @@ def _compare(args: argparse.Namespace) -> int:
     wanted = orders(scene_of(args), motions, range(args.seed, args.seed + seeds), seconds,
                     network=Network(loss=args.loss), sketched=bool(args.sketched))
     baseline = None if args.baseline is None else read_baseline(args.baseline)
-    folder = args.logs or takes_folder()
+    folder = args.logs or data_sets_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as exc:
@@ -145,7 +145,7 @@ def _compare(args: argparse.Namespace) -> int:
     if result.outdated:
         print(f"{result.outdated} logs in {folder} were filmed with another detector or twin than today's; "
               "remove them, or choose another --logs, to film anew.", file=sys.stderr)
-    tables = [table(result), LEGEND, honesty_table(result)]
+    tables = [table(result), LEGEND, consistency_table(result)]
     if baseline is not None:
         tables.append(baseline_table(result, baseline))
     print(json.dumps(as_fields(result)) if args.json else "\n\n".join(tables))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from rhot_app.errors import SimulatorError
+from rhot_app.evaluation.run import EvaluationRun
 from rhot_app.evaluation.score import TrueSamples, score
-from rhot_app.evaluation.trial import Trial
-from rhot_app.simulator.film import TRUTH_NAME
-from rhot_app.simulator.truth import load_truth
+from rhot_app.simulator.nodes.film import TRUTH_NAME
+from rhot_app.simulator.truth.truth import load_truth
 
 SETTLE_S = 1.0
 """What happens before this scene time is not judged."""
@@ -24,7 +24,7 @@ COLUMNS = (
 )
 
 
-def figures_of(trial: Trial, frames: Path) -> dict[str, Any]:
+def figures_of(trial: EvaluationRun, frames: Path) -> dict[str, Any]:
     """All figures of a trial on the shot in `frames`. Raises SimulatorError when there is nothing to judge."""
     truth = load_truth(frames / TRUTH_NAME)
     states = [state for state in trial.states if (state.t_master_ns - trial.t0_ns) * 1e-9 >= SETTLE_S]

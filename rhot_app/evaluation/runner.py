@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from rhot_app.evaluation.report import figures_of
-from rhot_app.evaluation.trial import run_trial
+from rhot_app.evaluation.run import evaluation_run
 from rhot_app.progress import ProgressLine
-from rhot_app.simulator.film import film
-from rhot_app.simulator.scene import Scene
-from rhot_app.simulator.shot import make_shot, read_shot
+from rhot_app.simulator.nodes.film import film
+from rhot_app.simulator.nodes.shot import make_shot, read_shot
+from rhot_app.simulator.scene.scene import Scene
 
 Detector = Literal["fast", "reference"]
 
@@ -19,7 +19,7 @@ def evaluate(scene: Scene, motion: str, seconds: float, work: Path, *, loss: flo
              detector: Detector = "fast") -> dict[str, Any]:
     """Figures of a motion filmed in `scene`; `work` is an empty folder. Raises RhotError."""
     shot = make_shot(scene, motion, seconds)
-    line = ProgressLine(f"rendering {seconds:g} s of {shot.act.name}")
+    line = ProgressLine(f"rendering {seconds:g} s of {shot.scene_object.name}")
     film(shot, work / "frames", line)
     line.finish()
     return evaluate_frames(work / "frames", work, loss=loss, detector=detector)
@@ -31,7 +31,7 @@ def evaluate_frames(frames: Path, work: Path, *, loss: float = 0.0, detector: De
     line = ProgressLine(f"playing {shot.seconds:g} s of {shot.motion}")
     place = work / "run"
     place.mkdir()
-    trial = run_trial(frames, scene, shot.seconds, place, loss=loss, detector=detector, progress=line)
+    trial = evaluation_run(frames, scene, shot.seconds, place, loss=loss, detector=detector, progress=line)
     line.finish()
     return {"motion": shot.motion, "seconds": shot.seconds, "seed": shot.seed, "preset": scene.settings.preset,
             "distance_m": scene.settings.distance_m, "loss": loss, "detector": detector,

@@ -13,23 +13,24 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from rhot_app.engine.replay_summary import replay_states
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import SimulatorError
-from rhot_app.evaluation import alterations as alter
+from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.accuracy import Figures
-from rhot_app.evaluation.deviations import Deviations, deviations, distances, worn_by
-from rhot_app.evaluation.honesty import axes_within
+from rhot_app.evaluation.consistency import axes_within
+from rhot_app.evaluation.data_sets import DataSet
+from rhot_app.evaluation.deviations import Deviations, WornMarkers, deviations, distances, worn_by
 from rhot_app.evaluation.report import SETTLE_S
-from rhot_app.evaluation.score import count_swaps, rms
-from rhot_app.evaluation.steadiness import found_after, lag, rising, settled_after, spread
-from rhot_app.evaluation.takes import Take
+from rhot_app.evaluation.score import VISIBLE_FRACTION, count_swaps, rms
 from rhot_app.evaluation.track import Timed, Track, tracked
 from rhot_app.hand.skeleton import WRIST_ROLE
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.sources.replay import LogDoor
+from rhot_app.simulator.truth.truth import Truth
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.tracker import Tracker
 
@@ -45,7 +46,7 @@ SCALE_TOLERANCE = 0.02
 SCALE_TIMES_S = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)
 
 
-def one_camera_blind(take: Take, rig: Rig, tracker: Tracker | None = None, *, says_so: bool) -> Figures:
+def one_camera_blind(take: DataSet, rig: Rig, tracker: Tracker | None = None, *, says_so: bool) -> Figures:
     """Fingertips while the first camera is covered for a second, and which part of their axes is within three of the
     stated standard deviations (0.9973 when honest), and how long after it every fingertip that both see is within 5 mm;
     `says_so` False: while its node is silent."""
@@ -65,13 +66,13 @@ def one_camera_blind(take: Take, rig: Rig, tracker: Tracker | None = None, *, sa
             "states_per_s": len(during.times_s) / BLIND_S}
 
 
-def blind_from(take: Take) -> float:
+def blind_from(take: DataSet) -> float:
     """When `one_camera_blind` covers the camera, s of the take."""
     last = max(take.seconds - BLIND_S - 0.5, BLIND_FROM_S)
     return float(np.random.default_rng(_seed(take)).uniform(BLIND_FROM_S, last))
 
 
-def markers_hidden(take: Take, rig: Rig, tracker: Tracker | None = None, *, share: float,
+def markers_hidden(take: DataSet, rig: Rig, tracker: Tracker | None = None, *, share: float,
                    together: bool, lasting_s: tuple[float, float] = alter.EPISODE_S) -> Figures:
     """Fingertips of every state when each marker is hidden for a share of the time, for `lasting_s` at a time."""
     change = alter.hidden(share, take.seconds, [node.node_id for node in rig.nodes], len(rig.markers.markers),
@@ -79,19 +80,19 @@ def markers_hidden(take: Take, rig: Rig, tracker: Tracker | None = None, *, shar
     return _all_states(take, rig, alter.changed(take.records(), change), tracker)
 
 
-def names_mixed_up(take: Take, rig: Rig, *, pair: tuple[int, int], share: float) -> Figures:
+def names_mixed_up(take: DataSet, rig: Rig, *, pair: tuple[int, int], share: float) -> Figures:
     """Fingertips and swaps when nodes take one marker for another for a share of the time."""
     change = alter.mixed_up(pair, share, take.seconds, [node.node_id for node in rig.nodes], _seed(take))
     return _all_states(take, rig, alter.changed(take.records(), change))
 
 
-def plain(take: Take, rig: Rig) -> Figures:
+def plain(take: DataSet, rig: Rig) -> Figures:
     """Fingertips of every state, and swaps, on the log as it is: of whatever the tracker shows - that a hidden marker
     is carried on to where another one is counts - and of what it calls measured."""
     return _all_states(take, rig, take.records())
 
 
-def wrist_alone(take: Take, rig: Rig) -> Figures:
+def wrist_alone(take: DataSet, rig: Rig) -> Figures:
     """What is said of the palm's turn when only the wrist's marker is left, three seconds into the take, and what is
     true: rms over the states."""
     wrist = [marker.role for marker in rig.markers.markers].index(WRIST_ROLE)
@@ -104,13 +105,13 @@ def wrist_alone(take: Take, rig: Rig) -> Figures:
     return {"palm_turn_deg": _deg(rms(turn)), "stated_deg": _deg(rms(stated))}
 
 
-def standing_still(take: Take, rig: Rig) -> Figures:
+def standing_still(take: DataSet, rig: Rig) -> Figures:
     """Spread of a still hand's fingertips, per axis of the rig and in space."""
     axes, whole = spread(tracked(take.records(), rig), worn_by(rig))
     return {"sd_x_mm": 1e3 * axes[0], "sd_y_mm": 1e3 * axes[1], "sd_z_mm": 1e3 * axes[2], "sd_mm": 1e3 * whole}
 
 
-def lagging(take: Take, rig: Rig, *, speeding_up: bool) -> Figures:
+def lagging(take: DataSet, rig: Rig, *, speeding_up: bool) -> Figures:
     """Lag of the fingertips by best time shift; `speeding_up`: only while the palm gets faster."""
     worn = worn_by(rig)
     track = tracked(take.records(), rig)
@@ -122,7 +123,7 @@ def lagging(take: Take, rig: Rig, *, speeding_up: bool) -> Figures:
     return {"lag_ms": 1e3 * lag(times, tips, take.truth, worn), "tips_mm": _mm(rms(off))}
 
 
-def growing(take: Take, rig: Rig, true_scale: float) -> Figures:
+def growing(take: DataSet, rig: Rig, true_scale: float) -> Figures:
     """How the estimated size of the hand nears the truth: its error at SCALE_TIMES_S, when it stays within
     SCALE_TOLERANCE, whether it is at the last of these times, what standard deviation is stated in the end, and how
     many of them it was ever off, None where none is stated. `true_scale`: true length over that of the rig's hand."""
@@ -139,7 +140,7 @@ def growing(take: Take, rig: Rig, true_scale: float) -> Figures:
                       if known.any() else None}
 
 
-def starting(take: Take, rig: Rig, starts_s: Sequence[float]) -> list[float | None]:
+def starting(take: DataSet, rig: Rig, starts_s: Sequence[float]) -> list[float | None]:
     """For each scene time at which datagrams begin to come: time until every visible fingertip is within 5 mm, s."""
     found = []
     for start_s in starts_s:
@@ -152,7 +153,7 @@ def starting(take: Take, rig: Rig, starts_s: Sequence[float]) -> list[float | No
     return found
 
 
-def computing(take: Take, rig: Rig, minutes: float) -> Figures:
+def computing(take: DataSet, rig: Rig, minutes: float) -> Figures:
     """Time from a datagram's bytes to its state, and how memory grows after the first lap of a log that is repeated."""
     records = take.records()
     laps = max(2, round(60.0 * minutes / take.seconds))
@@ -160,7 +161,7 @@ def computing(take: Take, rig: Rig, minutes: float) -> Figures:
     warm_up(tracker, rig)
     first = _Lap(records)
     timed = Timed(first.watch(alter.prolonged(records, laps)))
-    for _ in replay_states(timed, LogDoor(rig), tracker):
+    for _ in replay_states(timed, LogValidator(rig), tracker):
         pass
     by_clock, of_processor = 1e6 * np.array(timed.compute_s), 1e6 * np.array(timed.cpu_s)
     return {"median_us": float(np.median(by_clock)), "p99_us": float(np.percentile(by_clock, 99.0)),
@@ -209,7 +210,7 @@ def _resident_bytes() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
-def _all_states(take: Take, rig: Rig, records: Sequence[Record], tracker: Tracker | None = None) -> Figures:
+def _all_states(take: DataSet, rig: Rig, records: Sequence[Record], tracker: Tracker | None = None) -> Figures:
     track = tracked(records, rig, tracker)
     track = track.where((track.times_s >= SETTLE_S) & (track.times_s <= take.seconds))
     off, true = _off(track, take), take.truth.markers_at(track.times_s)
@@ -221,11 +222,11 @@ def _all_states(take: Take, rig: Rig, records: Sequence[Record], tracker: Tracke
             "seconds": float(track.times_s[-1] - track.times_s[0])}
 
 
-def _off(track: Track, take: Take) -> Deviations:
+def _off(track: Track, take: DataSet) -> Deviations:
     return deviations(track, take.truth, worn_by(take.rig))
 
 
-def _seed(take: Take) -> int:
+def _seed(take: DataSet) -> int:
     """A number that differs from take to take."""
     return zlib.crc32(take.folder.name.encode())
 
@@ -241,3 +242,66 @@ def _deg(value: float | None) -> float | None:
 def _most_mm(distances_m: Array) -> float | None:
     finite = distances_m[np.isfinite(distances_m)]
     return float(1e3 * finite.max()) if finite.size else None
+
+
+# -- how calm and how prompt a track is --------------------------------------------------------------------------------
+
+Mask = NDArray[np.bool_]
+
+SETTLED_S = 2.0
+"""A still hand's spread is measured after this scene time."""
+
+NEAR_M = 5e-3
+"""A hand counts as found when every fingertip in sight is as near as this to the truth."""
+
+_LAG_LIMITS_S = (-0.05, 0.1)
+_RISING_MPS = 0.1
+
+
+def spread(track: Track, worn: WornMarkers) -> tuple[Array, float]:
+    """Standard deviation of a still hand's fingertips about their means after SETTLED_S: per axis (3,) and in space, m;
+    root mean square over the fingers."""
+    tips = track.fingertip_positions[track.times_s >= SETTLED_S][:, worn.tip_fingers]
+    variances = np.nanmean(np.nanvar(tips, axis=0), axis=0)
+    return np.sqrt(variances), float(np.sqrt(variances.sum()))
+
+
+def lag(times_s: Array, tips: Array, truth: Truth, worn: WornMarkers) -> float:
+    """By how much later the truth would have to be to fit the fingertips (N, T, 3) best, s; > 0 is late.
+
+    What a fingertip is off by all the time is no lag, so the mean is left out; the best fit is in the least squares.
+    """
+    known = np.isfinite(tips).all(axis=(1, 2))
+
+    def misfit(shift_s: float) -> float:
+        off = tips[known] - truth.markers_at(times_s[known] - shift_s)[:, worn.tips]
+        return float(np.square(off - off.mean(axis=0)).sum())
+
+    grid = np.linspace(*_LAG_LIMITS_S, 31)
+    best = int(np.argmin([misfit(shift) for shift in grid]))
+    bounds = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
+    return float(minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-6}).x)
+
+
+def rising(times_s: Array, truth: Truth) -> Mask:
+    """(N,) whether the palm is getting faster at these times, and is no longer at rest."""
+    before, now, after = (truth.palm_at(times_s + step)[:, :3, 3] for step in (-5e-3, 0.0, 5e-3))
+    speed_before, speed_after = distances(now - before) / 5e-3, distances(after - now) / 5e-3
+    return np.asarray((speed_after > speed_before) & (speed_after > _RISING_MPS))
+
+
+def found_after(track: Track, truth: Truth, worn: WornMarkers, first_s: float) -> float | None:
+    """Time from the first datagram, received at scene time `first_s`, until a state has every fingertip whose marker is
+    truly visible nearer than NEAR_M to the truth, s. None when there never is one."""
+    off = distances(track.fingertip_positions[:, worn.tip_fingers] - truth.markers_at(track.times_s)[:, worn.tips])
+    visible = truth.visible_at(track.times_s)[:, worn.tips] >= VISIBLE_FRACTION
+    good = visible.any(axis=1) & np.where(visible, off < NEAR_M, True).all(axis=1)
+    return float(track.receive_s[np.argmax(good)] - first_s) if good.any() else None
+
+
+def settled_after(times_s: Array, ratios: Array, tolerance: float) -> float | None:
+    """The time from which on a ratio (N,) stays within `tolerance` of 1; None when it does not at the end."""
+    outside = np.flatnonzero(~(np.abs(ratios - 1.0) <= tolerance))
+    if not outside.size:
+        return float(times_s[0])
+    return None if outside[-1] == len(times_s) - 1 else float(times_s[outside[-1] + 1])

@@ -16,8 +16,8 @@ from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import SimulatorError
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.node_log import T0_MASTER_NS
-from rhot_app.sources.replay import LogDoor
+from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import HandState
@@ -103,7 +103,7 @@ def tracked(records: Iterable[Record], rig: Rig, tracker: Tracker | None = None)
     states: list[HandState] = []
     display = Display(records, rig, states) if rig.tracker.kind == "estimator" else None
     timed = Timed(records if display is None else display)
-    states.extend(replay_states(timed, LogDoor(rig), chosen))  # one by one, as they come
+    states.extend(replay_states(timed, LogValidator(rig), chosen))  # one by one, as they come
     return track_of(states, np.array(timed.compute_s), None if display is None else display.predicted())
 
 

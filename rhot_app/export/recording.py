@@ -16,7 +16,7 @@ from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.observation_table import why_none
 from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.sources.replay import LogDoor
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations, Tracker
@@ -58,7 +58,7 @@ class TrackedLog:
         except BaseException:
             self._reader.close()
             raise
-        self._door = LogDoor(self.rig)
+        self._door = LogValidator(self.rig)
         self._size = max(path.stat().st_size, 1)
 
     @property

@@ -19,7 +19,7 @@ from rhot_app.calibration.observations import InstantTable, ObservationCollector
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.sources.replay import LogDoor
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.state import HandState, Knowledge
@@ -60,7 +60,7 @@ def read_instants(path: Path, rig: Rig | None = None) -> tuple[Rig, InstantTable
 
 def _frames(reader: LogReader, rig: Rig) -> Iterator[CameraObservations]:
     """Every admitted frame. Raises RecordingError at the end when there was none."""
-    door = LogDoor(rig)
+    door = LogValidator(rig)
     count = 0
     for record in reader:
         frame = door.feed(record)
@@ -72,7 +72,7 @@ def _frames(reader: LogReader, rig: Rig) -> Iterator[CameraObservations]:
                              f"({why_none(door)}). Give the rig that the log was recorded with, or record again.")
 
 
-def why_none(door: LogDoor) -> str:
+def why_none(door: LogValidator) -> str:
     """What became of a log's datagrams, in words."""
     reasons = [f"{count} of {link.node.name} refused: {reason}" for link in door.links
                for reason, count in link.door.dropped.items()]

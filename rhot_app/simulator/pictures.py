@@ -15,14 +15,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.simulator.camera_workers import Progress
-from rhot_app.simulator.film import TRUTH_NAME, new_folder
-from rhot_app.simulator.painter import Solids
-from rhot_app.simulator.sheet import Sheet, ruler_ends
-from rhot_app.simulator.shot import Shot, make_renderer, save_shot
-from rhot_app.simulator.shows import RulerShow
-from rhot_app.simulator.stations import Stations
-from rhot_app.simulator.truth import FrameTruth, save_truth, true_act
+from rhot_app.simulator.nodes.camera_workers import Progress
+from rhot_app.simulator.nodes.film import TRUTH_NAME, new_folder
+from rhot_app.simulator.nodes.shot import Shot, make_renderer, save_shot
+from rhot_app.simulator.render.painter import Solids
+from rhot_app.simulator.render.sheet import Sheet, ruler_ends
+from rhot_app.simulator.scene.board_motion import BoardPoses
+from rhot_app.simulator.scene.scene_description import RulerShow
+from rhot_app.simulator.truth.truth import FrameTruth, save_truth, true_object
 from rhot_node.detect.image import from_i420, to_bgr
 from rhot_node.files import write_document
 
@@ -74,14 +74,15 @@ def take_pictures(shot: Shot, folder: Path, count: int, progress: Progress | Non
         rolls = [_expose(shot, index, work, times, progress) for index in range(len(names))]
         write_document(work / PICTURES_NAME,
                        PicturesFile({name: roll.pictures for name, roll in zip(names, rolls, strict=True)}))
-        save_truth(work / TRUTH_NAME, true_act(shot.act, float(times[-1]), tuple(roll.truth for roll in rolls)))
+        truths = tuple(roll.truth for roll in rolls)
+        save_truth(work / TRUTH_NAME, true_object(shot.scene_object, float(times[-1]), truths))
         save_shot(shot, work)
 
 
 def picture_times(shot: Shot, count: int) -> Array:
     """(count,) s: when to take them."""
-    source = shot.act.source
-    if isinstance(source, Stations):
+    source = shot.scene_object.source
+    if isinstance(source, BoardPoses):
         rests = source.rest_times_s()
         rounds, place = np.divmod(np.arange(count), len(rests))
         return np.asarray(rests[place] + rounds * source.period_s)
@@ -94,7 +95,7 @@ def _expose(shot: Shot, index: int, folder: Path, times: Array, progress: Progre
     renderer = make_renderer(shot, index)
     pictures, visible = [], []
     for number, t_s in enumerate(times):
-        frame, fractions = renderer.render(shot.act.source, float(t_s), number)
+        frame, fractions = renderer.render(shot.scene_object.source, float(t_s), number)
         file = f"{name}/{number:03d}.png"
         cv2.imwrite(str(folder / file), to_bgr(from_i420(frame, preset.width, preset.height)))
         pictures.append(Picture(file, float(t_s), _samples(shot, index, float(t_s), fractions),
@@ -109,7 +110,7 @@ def _ruler(shot: Shot, index: int, t_s: float) -> tuple[float, float, float, flo
     """Where a ruler's crosses are, to a tenth of a pixel."""
     if not isinstance(shot.show, RulerShow):
         return None
-    pose = shot.act.source.sample(np.array([t_s]))[0][0]
+    pose = shot.scene_object.source.sample(np.array([t_s]))[0][0]
     ends = ruler_ends(1e-3 * shot.show.length_mm) @ pose[:3, :3].T + pose[:3, 3]
     (x0, y0), (x1, y1) = np.round(shot.scene.camera(index).project(ends), 1)
     return float(x0), float(y0), float(x1), float(y1)
@@ -117,11 +118,11 @@ def _ruler(shot: Shot, index: int, t_s: float) -> tuple[float, float, float, flo
 
 def _samples(shot: Shot, index: int, t_s: float, visible: Array) -> dict[str, tuple[int, int, int, int]]:
     """A box on the paint of every marker that is seen whole."""
-    if isinstance(shot.act.thing, Sheet):
+    if isinstance(shot.scene_object.thing, Sheet):
         return {}
-    solids: Solids = shot.act.thing
+    solids: Solids = shot.scene_object.thing
     camera = shot.scene.camera(index)
-    centres = solids.marker_positions(*shot.act.source.sample(np.array([t_s])))[0]
+    centres = solids.marker_positions(*shot.scene_object.source.sample(np.array([t_s])))[0]
     boxes = {}
     for marker, centre, part in zip(shot.scene.markers.markers, centres, visible, strict=True):
         (x, y), half = camera.project(centre)[0], _SAMPLE * camera.intrinsics[0] * _PAINT_M / centre[2]

@@ -8,12 +8,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.simulator.show_arguments import add_show_arguments, show_of
+from rhot_app.simulator.scene.scene_arguments import add_show_arguments, show_of
 
 if TYPE_CHECKING:
-    from rhot_app.simulator.camera_workers import Progress
-    from rhot_app.simulator.scene import Scene
-    from rhot_app.simulator.shot import Shot
+    from rhot_app.simulator.nodes.camera_workers import Progress
+    from rhot_app.simulator.nodes.shot import Shot
+    from rhot_app.simulator.scene.scene import Scene
 
 MOST_PICTURES = 999
 POINT_SIGMA_PX = 0.12
@@ -61,7 +61,7 @@ def scene_of(args: argparse.Namespace) -> Scene:
     import msgspec
 
     from rhot_app.errors import SimulatorError
-    from rhot_app.simulator.scene import TwinSettings, make_scene, twin_defaults
+    from rhot_app.simulator.scene.scene import TwinSettings, make_scene, twin_defaults
 
     if args.seed < 0:
         raise SimulatorError(f"--seed is 0 or more, not {args.seed}.")
@@ -122,21 +122,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Render; Ctrl-C leaves nothing half-written."""
     from rhot_app.progress import ProgressLine
-    from rhot_app.simulator.shot import make_shot
+    from rhot_app.simulator.nodes.shot import make_shot
 
     _check(args)
     if args.depth_table is not None:
         return _write_depth_table(args)
     began = time.monotonic()
     shot = make_shot(scene_of(args), show_of(args), args.seconds, frozenset(args.hide))
-    line = ProgressLine(f"simulating {shot.act.name}" if args.pictures else
-                        f"simulating {args.seconds:g} s of {shot.act.name}")
+    line = ProgressLine(f"simulating {shot.scene_object.name}" if args.pictures else
+                        f"simulating {args.seconds:g} s of {shot.scene_object.name}")
     _write(shot, args, line)
     line.finish()
     frames = {name: args.pictures or len(shot.scene.frame_times_ns(k, args.seconds))
               for k, name in enumerate(shot.scene.names)}
     if args.json:
-        print(json.dumps({"out": str(args.out.absolute()), "motion": shot.act.name, "seconds": args.seconds,
+        print(json.dumps({"out": str(args.out.absolute()), "motion": shot.scene_object.name, "seconds": args.seconds,
                           "seed": args.seed, "preset": shot.scene.settings.preset,
                           "distance_m": shot.scene.settings.distance_m, "frames": frames,
                           "elapsed_s": round(time.monotonic() - began, 3)}))
@@ -161,8 +161,8 @@ def _check(args: argparse.Namespace) -> None:
 
 def _write_depth_table(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
-    from rhot_app.simulator.distances import TABLE_NAME, write_distances
-    from rhot_app.simulator.points import PointNoise
+    from rhot_app.simulator.truth.distances import TABLE_NAME, write_distances
+    from rhot_app.simulator.truth.points import PointNoise
 
     try:
         distances = [0.01 * float(text) for text in args.depth_table.split(",")]
@@ -184,10 +184,10 @@ def _write(shot: Shot, args: argparse.Namespace, progress: Progress) -> None:
 
         take_pictures(shot, folder, args.pictures, progress)
     elif args.points is not None:
-        from rhot_app.simulator.points import PointNoise, write_points
+        from rhot_app.simulator.truth.points import PointNoise, write_points
 
         write_points(shot, folder, PointNoise(args.points), progress)
     else:
-        from rhot_app.simulator.film import film
+        from rhot_app.simulator.nodes.film import film
 
         film(shot, folder, progress)

@@ -18,7 +18,7 @@ from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.key_exchange import KeyExchange
 from rhot_app.sources.lost_nodes import LostNodes
 from rhot_app.sources.node_link import NodeLink
-from rhot_app.sources.tap import Tap
+from rhot_app.sources.record_sink import RecordSink
 from rhot_node.errors import WireError
 from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.keys import KeyPair
@@ -52,7 +52,7 @@ class NodeLinks:
         """`links` and `data_ports` in the order of the rig's nodes; `own`: the master's keys, None when no node is
         paired. Text nodes are not spoken to. Raises SourceError."""
         self._keys = KeyExchange(links, own)
-        self._tap: Tap | None = None
+        self._tap: RecordSink | None = None
         self._recent: deque[tuple[RecordKind, int, int, bytes]] = deque(maxlen=RECENT * len(links))
         self.broadcast_failure = ""
         self._links = {link.node.node_id: link for link in links if not link.node.text_datagrams}
@@ -89,7 +89,7 @@ class NodeLinks:
             for link in self._links.values():
                 link.want(0, now_ns)
 
-    def record_to(self, tap: Tap | None) -> None:
+    def record_to(self, tap: RecordSink | None) -> None:
         """Hand every command datagram to `tap` from now on: first the running session and the last exchanges,
         without which a recording that begins now could not tell the nodes' times."""
         with self._lock:

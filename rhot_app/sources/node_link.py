@@ -6,9 +6,9 @@ No sockets. Live links and replayed logs feed the same object.
 from __future__ import annotations
 
 from rhot_app.project import Rig
-from rhot_app.sources.admission import NOBODY_YET, holder_of
+from rhot_app.sources.authentication import NOBODY_YET, holder_of
 from rhot_app.sources.clock import NodeClockModel
-from rhot_app.sources.door import NodeDoor
+from rhot_app.sources.validation import DatagramValidator
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import ClockReply, ClockRequest, Message, NodeState
 from rhot_node.wire.seal import Seal
@@ -32,7 +32,7 @@ class NodeLink:
         """`camera` is the node's index in the rig."""
         self.node = rig.nodes[camera]
         self.clock = NodeClockModel()
-        self.door = NodeDoor(rig, camera, self.clock)
+        self.door = DatagramValidator(rig, camera, self.clock)
         self.state: NodeState | None = None
         self.session = 0  # the node's own word
         self.wanted = 0  # the session we told it to stream; 0: none

@@ -9,8 +9,8 @@ import threading
 from collections.abc import Callable
 
 from rhot_app.errors import SourceError
-from rhot_app.sources.door import NodeDoor, Verified
 from rhot_app.sources.realtime import claim_interpreter, hurry_this_thread, share_interpreter
+from rhot_app.sources.validation import DatagramValidator, Verified
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 
@@ -73,7 +73,7 @@ class NodeReceiver:
     tracker's own work.
     """
 
-    def __init__(self, sock: socket.socket, door: NodeDoor, name: str) -> None:
+    def __init__(self, sock: socket.socket, door: DatagramValidator, name: str) -> None:
         self.door = door
         self.tap: DatagramTap | None = None
         self.deliver: Deliver = to_nobody

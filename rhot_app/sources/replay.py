@@ -11,16 +11,16 @@ from pathlib import Path
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
-from rhot_app.sources.admission import RECORDED
+from rhot_app.sources.authentication import RECORDED
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
-from rhot_app.sources.tap import Tap
+from rhot_app.sources.record_sink import RecordSink
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.errors import WireError
 from rhot_node.wire.messages import ClockReply, ClockRequest, Start
 
 
-class LogDoor:
+class LogValidator:
     """Takes records in the order written and gives the frames that live nodes would have given."""
 
     def __init__(self, rig: Rig) -> None:
@@ -92,7 +92,7 @@ class LogReplay:
         LogReader(path).close()
         self._path = path
         self._speed = speed
-        self._door = LogDoor(rig)
+        self._door = LogValidator(rig)
         self.links = self._door.links
         self._notice = ""
         self._ending = threading.Event()
@@ -133,7 +133,7 @@ class LogReplay:
         if self._thread is not None:
             self._thread.join()
 
-    def record_to(self, tap: Tap | None) -> None:
+    def record_to(self, tap: RecordSink | None) -> None:
         """Raises RecordingError: a copy of the log's file is the recording."""
         if tap is not None:
             raise RecordingError(f"a replay is not recorded; copy {self._path} instead.")

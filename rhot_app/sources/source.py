@@ -8,7 +8,7 @@ from typing import Protocol
 from rhot_app.project import Rig
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver
-from rhot_app.sources.tap import Tap
+from rhot_app.sources.record_sink import RecordSink
 
 
 class ObservationSource(Protocol):
@@ -59,7 +59,7 @@ class ObservationSource(Protocol):
         """Have the nodes stop."""
         ...
 
-    def record_to(self, tap: Tap | None) -> None:
+    def record_to(self, tap: RecordSink | None) -> None:
         """Hand every datagram and clock exchange to `tap` from now on, beginning with what a replay needs to know."""
         ...
 

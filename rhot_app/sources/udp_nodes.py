@@ -10,7 +10,7 @@ from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.links import NodeLinks
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import DatagramTap, Deliver, NodeReceiver, open_data_socket
-from rhot_app.sources.tap import Tap
+from rhot_app.sources.record_sink import RecordSink
 from rhot_node.keys import KeyPair
 
 
@@ -72,7 +72,7 @@ class UdpNodes:
         for link in self.links:
             link.want(0, time.monotonic_ns())
 
-    def record_to(self, tap: Tap | None) -> None:
+    def record_to(self, tap: RecordSink | None) -> None:
         """Tap all sockets; None ends it."""
         self._commands.record_to(tap)  # first what is known of sessions and clocks: datagrams mean nothing before
         for link, receiver in zip(self.links, self.receivers, strict=True):
@@ -85,7 +85,7 @@ class UdpNodes:
             receiver.close()
 
 
-def _datagram_tap(tap: Tap, node_id: int) -> DatagramTap:
+def _datagram_tap(tap: RecordSink, node_id: int) -> DatagramTap:
     def put(t_receive_ns: int, data: bytes) -> None:
         tap.put(RecordKind.DATAGRAM, node_id, t_receive_ns, data)
     return put

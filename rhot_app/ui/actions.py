@@ -10,7 +10,7 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
 from rhot_app.ui.scene.ellipsoid_mesh import LARGER
 from rhot_app.ui.scene.page import SceneBar
-from rhot_app.ui.shapes import shape_icon
+from rhot_app.ui.shapes import shape_icon, show_overflow
 from rhot_app.ui.wizards.catalogue import WIZARDS
 
 CLOUD_KINDS = (("joints", "Of the hand's inner joints; the estimator estimates them."),
@@ -19,6 +19,7 @@ CLOUD_KINDS = (("joints", "Of the hand's inner joints; the estimator estimates t
 """Whose uncertainty can be drawn; the words are the settings' names too."""
 
 _SOURCE_PX = 220  # of a long file's name no more is shown, so that the window's word stays in sight
+_START_WORDS, _RECORD_WORDS = ("Start", "Stop"), ("Record", "Stop recording")  # idle, at work
 _CALM_MS = 100  # the system may report the mouse over the button once more when the menu above it has gone
 
 
@@ -33,6 +34,7 @@ class Actions(QObject):
         self.video = self._make("Record video, too", "", "Each camera writes its own frames as long as the next "
                                 "recording lasts. Rig, Recordings fetches them afterwards.", checkable=True)
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
+        self.shows = QMenu("Simulated hand does", parent)
         self.caps = QMenu("Cover a simulated camera", parent)
         self.caps.setToolTipsVisible(True)
         self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")
@@ -57,6 +59,10 @@ class Actions(QObject):
         self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
         self.markers = self._make("Markers …", "", "The marker set that the rig file says.")
         self.hand = self._make("Hand …", "", "The hand's bones that the rig file says.")
+        self.properties = QMenu("Properties", parent)
+        self.properties.setToolTipsVisible(True)
+        self.properties.menuAction().setToolTip("What the rig file says, to read.")
+        self.properties.addActions([self.cameras, self.markers, self.hand])
         self.files = self._make("How to calibrate", "", "Opens the guide.")
         self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene (F).")
         self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
@@ -117,31 +123,40 @@ class _ElidingLabel(QLabel):
 
 
 class MainToolBar(QToolBar):
-    """Start, Record, Rig, Calibrate, View, Guide; at the right the rig's name and the state."""
+    """Start, Record, Rig, Calibrate, View, Guide; at the right the rig's name and the state.
+
+    In a narrow window the controls that do not fit stand behind an arrow; the state stays in sight.
+    """
 
     def __init__(self, actions: Actions, panels: list[QAction], scheme: Scheme, parent: QWidget) -> None:
         super().__init__("Main", parent)
         self.setObjectName("main toolbar")
         self.setMovable(False)
-        self.setIconSize(QSize(24, 18))
         self.setFloatable(False)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        self.addAction(actions.start)
-        self.addAction(actions.record)
-        self.addSeparator()
+        self.controls = QToolBar("Controls", self)
+        self.controls.setObjectName("controls")
+        self.controls.setIconSize(QSize(24, 18))
+        self.controls.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.controls.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self.addWidget(self.controls)
+        margins = self.controls.layout()
+        assert margins is not None
+        margins.setContentsMargins(0, 0, 0, 0)  # it took those of a toolbar that stands alone
+        self._changing = (actions.start, actions.record)
+        for action in self._changing:
+            self.controls.addAction(action)
+        self.controls.addSeparator()
         a = actions
-        self.rig_button = self._add_menu("Rig", [a.twin, a.open, a.nodes, None, a.open_recording, a.recordings,
-                                                 a.video, a.bookmark, a.export, None, a.outputs, a.caps.menuAction(),
-                                                 a.save_rig, a.close_rig, None, a.quit])
-        self.calibrate_button = self._add_menu("Calibrate", [*a.wizards, None, a.earlier, None, a.tracker, a.cameras,
-                                                             a.markers, a.hand, None, a.files])
-        self.view_button = self._add_menu("View", [*panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now,
-                                                   None, a.dark, a.light, None, a.reset])
-        self.addAction(actions.guide)
-        spacer = QWidget()
-        spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self.addWidget(spacer)
+        self.rig_button, self.rig_menu = self._add_menu("Rig", [
+            a.twin, a.open, a.nodes, None, a.open_recording, a.recordings, a.video, a.bookmark, a.export, None,
+            a.outputs, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig, a.close_rig,
+            None, a.quit])
+        self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
+            *a.wizards, None, a.earlier, None, a.tracker, None, a.files])
+        self.view_button, self.view_menu = self._add_menu("View", [
+            *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, None, a.dark, a.light, None, a.reset])
+        self.controls.addAction(actions.guide)
         self.source_label = QToolButton()
         self.source_label.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.source_label.clicked.connect(actions.bookmark.trigger)
@@ -155,21 +170,22 @@ class MainToolBar(QToolBar):
         self.addWidget(self.badge)
         self.set_scheme(actions, scheme, running=False, recording=False)
 
-    def _add_menu(self, title: str, entries: list[QAction | None]) -> QToolButton:
-        button, menu = QToolButton(), QMenu(self)
+    def _add_menu(self, title: str, entries: list[QAction | None]) -> tuple[QToolButton, QMenu]:
+        menu = QMenu(title, self)
         menu.setToolTipsVisible(True)
         for entry in entries:
             if entry is None:
                 menu.addSeparator()
             else:
                 menu.addAction(entry)
-        button.setText(title)
-        button.setMenu(menu)
+        self.controls.addAction(menu.menuAction())  # an action, not a widget: behind the arrow it becomes a submenu
+        button = self.controls.widgetForAction(menu.menuAction())
+        assert isinstance(button, QToolButton)
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         menu.aboutToHide.connect(lambda: QTimer.singleShot(_CALM_MS, lambda: _calm_down(button)))
-        self.addWidget(button)
-        return button
+        return button, menu
 
     def show_rig(self, name: str, path: str, *, edited: bool) -> None:
         """Name of the rig, "" for none; `edited` says that its file does not say the same."""
@@ -191,12 +207,25 @@ class MainToolBar(QToolBar):
     def set_scheme(self, actions: Actions, scheme: Scheme, *, running: bool, recording: bool) -> None:
         """Words and icons of the two buttons that change."""
         ratio = self.devicePixelRatioF()
-        actions.start.setText("Stop" if running else "Start")
+        self._fix_widths(scheme)
+        actions.start.setText(_START_WORDS[running])
         actions.start.setIcon(shape_icon("stop" if running else "play", scheme.accent, ratio))
-        actions.record.setText("Stop recording" if recording else "Record")
+        actions.record.setText(_RECORD_WORDS[recording])
         actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
+        show_overflow(self.controls, scheme.text)
         self.badge.set_scheme(scheme)
         self.source_label.setStyleSheet(f"color: {scheme.accent}; font-weight: 700;")
+
+    def _fix_widths(self, scheme: Scheme) -> None:
+        """A button whose word changes is as wide as its longest, or the menus would move under the mouse."""
+        for action, words in zip(self._changing, (_START_WORDS, _RECORD_WORDS), strict=True):
+            button = self.controls.widgetForAction(action)
+            action.setIcon(shape_icon("stop", scheme.accent, self.devicePixelRatioF()))
+            widths = []
+            for word in words:
+                action.setText(word)
+                widths.append(button.sizeHint().width())
+            button.setFixedWidth(max(widths))
 
 
 def _calm_down(button: QToolButton) -> None:

@@ -279,7 +279,7 @@ class Controller(QObject):
         self._start_job("The engine stopped. Starting it again …",
                         lambda progress: self.backend.restart_engine(path, start, progress.report), self._on_opened)
 
-    def act(self, key: str) -> None:
+    def press(self, key: str) -> None:
         """The button of a notice."""
         if key == RESTART_TWIN:
             self.open_twin(self.twin_choice)

@@ -25,16 +25,18 @@ from rhot_app.ui.docks import Docks
 from rhot_app.ui.guide import page_of
 from rhot_app.ui.lens_caps import LensCaps
 from rhot_app.ui.models.notice import Notice
-from rhot_app.ui.models.passing import PassingNotices
+from rhot_app.ui.models.transient_notices import TransientNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.recordings import SHOW_FOLDER, Recordings
-from rhot_app.ui.replay.desk import ReplayDesk
+from rhot_app.ui.replay.windows import ReplayWindows
 from rhot_app.ui.rig_watch import RigWatch
 from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Screen
 from rhot_app.ui.settings import Settings
+from rhot_app.ui.shapes import show_overflow
+from rhot_app.ui.status_words import label_of, look_of, notices_of
 from rhot_app.ui.theme import scheme_named
-from rhot_app.ui.voice import label_of, look_of, notices_of
+from rhot_app.ui.twin_shows import TwinShows
 from rhot_app.ui.welcome import WelcomePage
 from rhot_app.ui.wizards.catalogue import OPEN_WIZARD, WIZARDS, wizard_named
 from rhot_app.ui.wizards.launcher import Launcher
@@ -55,13 +57,13 @@ class MainWindow(QMainWindow):
         self.settings = settings
         self._buttons_shown: tuple[bool, bool] | None = None
         self._next_behind = 0.0
-        self.passing = PassingNotices()
+        self.passing = TransientNotices()
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, self.tell)
         self.rig_watch = RigWatch(controller)
         self.wizards = Launcher(controller.backend.asker, controller.backend.client,
                                 lambda: self.appearance.scheme, settings, self)
-        self.replays = ReplayDesk(settings, lambda: self.appearance.scheme, self, lambda: controller.rig)
+        self.replays = ReplayWindows(settings, lambda: self.appearance.scheme, self, lambda: controller.rig)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
         scheme = scheme_named(settings.scheme)
@@ -74,9 +76,12 @@ class MainWindow(QMainWindow):
         self.welcome = WelcomePage(settings.motion)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.welcome)
-        self.pages.addWidget(ScenePage(self.screen_parts.scene, self.actions_.scene_bar()))
+        self.scene_page = ScenePage(self.screen_parts.scene, self.actions_.scene_bar())
+        self.pages.addWidget(self.scene_page)
         self.setCentralWidget(self.pages)
         self.lens_caps = LensCaps(controller, self.actions_.caps, self.tell)
+        self.twin_shows = TwinShows(controller, self.actions_.shows, self.tell)
+        self.wizards.twin_menu = self.twin_shows.menu
         self.docks = Docks(self)
         self._add_docks()
         self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)
@@ -150,7 +155,7 @@ class MainWindow(QMainWindow):
         for action, wizard in zip(self.actions_.wizards, WIZARDS, strict=True):
             action.triggered.connect(lambda checked=False, wizard=wizard: self.wizards.open(wizard))
         self.actions_.earlier.triggered.connect(self.wizards.open_versions)
-        self.toolbar.calibrate_button.menu().aboutToShow.connect(self._show_ages)
+        self.toolbar.calibrate_menu.aboutToShow.connect(self._show_ages)
         self.wizards.rig_used.connect(self.rig_watch.look_soon)
         self.wizards.failed.connect(self._show_failure)
 
@@ -227,7 +232,7 @@ class MainWindow(QMainWindow):
         elif key == SHOW_FOLDER:
             self.recordings.show_folder()
         else:
-            self.controller.act(key)
+            self.controller.press(key)
 
     def reset_settings(self) -> None:
         """As on the first start: layout, switches, last rig."""
@@ -266,6 +271,7 @@ class MainWindow(QMainWindow):
         if shown != self._buttons_shown:
             self._buttons_shown = shown
             self.toolbar.set_scheme(a, self.appearance.scheme, running=c.running, recording=c.recording)
+            show_overflow(self.scene_page.bar, self.appearance.scheme.text)
         usable = c.opened is not None and not c.engine_gone
         self.screen_parts.scene.offer_start(usable and not c.running)
         for action in (a.start, a.record):
@@ -294,7 +300,7 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.close_rig, a.cameras, a.markers, a.hand, a.frame, a.home,
+        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.close_rig, a.properties.menuAction(), a.frame, a.home,
                 a.names, a.clouds, a.now]
 
     def _show_busy(self) -> None:

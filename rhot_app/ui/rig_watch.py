@@ -18,7 +18,7 @@ LOOK_S = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class RigSight:
+class RigObservation:
     """The engine's rig at one moment; `edited` when its file says something else or cannot be read."""
 
     rig: Rig
@@ -26,12 +26,12 @@ class RigSight:
     edited: bool
 
 
-def look_at_rig(client: Client) -> RigSight:
+def look_at_rig(client: Client) -> RigObservation:
     """Ask the engine and read the file. Waits; raises EngineError, RigError."""
     answer = client.command("rig")
     path = str(answer.get("path", ""))
     rig = parse_rig(msgspec.json.encode(answer["document"]), path or "the engine's rig")
-    return RigSight(rig, path, bool(path) and not _file_says(Path(path), rig))
+    return RigObservation(rig, path, bool(path) and not _file_says(Path(path), rig))
 
 
 def _file_says(path: Path, rig: Rig) -> bool:
@@ -78,7 +78,7 @@ class RigWatch:
         """An engine that does not answer is told of elsewhere."""
         self._looking = False
 
-    def _take(self, sight: RigSight, asked_for: object) -> None:
+    def _take(self, sight: RigObservation, asked_for: object) -> None:
         self._looking = False
         opened = self._controller.opened
         if opened is None or opened is not asked_for:

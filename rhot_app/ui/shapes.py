@@ -6,7 +6,7 @@ import math
 
 from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QBrush, QColor, QIcon, QPainter, QPen, QPixmap, QPolygonF
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QToolBar, QToolButton, QWidget
 
 
 def paint_shape(painter: QPainter, shape: str, box: QRectF, colour: QColor) -> None:
@@ -129,6 +129,25 @@ def shape_icon(shape: str, colour: str, ratio: float = 1.0) -> QIcon:
     paint_shape(painter, shape, QRectF(1, 1, 16, 16), QColor(colour))
     painter.end()
     return QIcon(picture)
+
+
+def show_overflow(bar: QToolBar, colour: str) -> None:
+    """Give a toolbar's own arrow, behind which stand the controls that do not fit, a colour that can be seen."""
+    arrow = bar.findChild(QToolButton, "qt_toolbar_ext_button")
+    if isinstance(arrow, QToolButton):
+        ratio = bar.devicePixelRatioF()
+        picture = QPixmap(round(10 * ratio), round(16 * ratio))
+        picture.setDevicePixelRatio(ratio)
+        picture.fill(Qt.GlobalColor.transparent)
+        painter = QPainter(picture)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QPen(QColor(colour), 1.6))
+        for x in (1.0, 5.0):
+            painter.drawPolyline(QPolygonF([QPointF(x, 3.0), QPointF(x + 4.0, 8.0), QPointF(x, 13.0)]))
+        painter.end()
+        arrow.setIcon(QIcon(picture))
+        arrow.setIconSize(QSize(10, 16))
+        arrow.setToolTip("More controls")
 
 
 class ShapeMark(QWidget):

@@ -66,6 +66,8 @@ def style_sheet(s: Scheme) -> str:
     #advicebar {{ border-top: 1px solid {s.border}; border-bottom: none; padding: 1px 0 0 0; }}
     QToolBar {{ background: {s.panel}; border: none; border-bottom: 1px solid {s.border}; padding: 4px 8px;
         spacing: 4px; }}
+    QToolBar #qt_toolbar_ext_button {{ padding: 0; border: none; }}
+    #controls {{ border: none; padding: 0; }}
     QToolBar QToolButton {{ padding: 6px 12px; border: 1px solid transparent; border-radius: 6px; }}
     QToolBar QToolButton:hover {{ background: {s.raised}; }}
     QToolBar QToolButton:pressed, QToolBar QToolButton:checked {{ background: {s.raised}; border-color: {s.border}; }}
@@ -89,6 +91,8 @@ def style_sheet(s: Scheme) -> str:
     QPushButton[flat="true"] {{ background: transparent; border: 1px solid transparent; padding: 2px 6px; }}
     QPushButton[flat="true"]:hover, QPushButton[flat="true"]:focus {{ border-color: {s.accent}; }}
     QPushButton[flat="true"]:checked {{ background: {s.raised}; border-color: {s.border}; color: {s.accent}; }}
+    #advice QPushButton {{ padding: 1px 12px; }}
+    #advice QToolButton {{ padding: 1px 20px 1px 8px; border: 1px solid {s.border}; border-radius: 6px; }}
     QLabel[muted="true"] {{ color: {s.muted}; }}
     QLabel[title="true"] {{ font-weight: 600; }}
     QFrame[card="true"] {{ background: {s.raised}; border: 1px solid {s.border}; border-radius: 8px; }}
@@ -100,6 +104,10 @@ def style_sheet(s: Scheme) -> str:
     QLineEdit, QComboBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
         padding: 4px 8px; min-height: 20px; }}
     QLineEdit:focus, QComboBox:focus {{ border-color: {s.accent}; }}
+    QComboBox {{ combobox-popup: 0; }}
+    QComboBox QAbstractItemView {{ background: {s.raised}; color: {s.text}; border: 1px solid {s.border};
+        selection-background-color: {s.accent}; selection-color: {s.on_accent}; outline: none; }}
+    QComboBox QAbstractItemView::item {{ min-height: 26px; padding: 0 6px; }}
     SceneBar {{ padding: 2px 4px; }}
     SceneBar QToolButton {{ padding: 3px 10px; }}
     SceneBar QToolButton[popupMode="1"] {{ padding-right: 26px; }}

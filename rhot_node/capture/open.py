@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import stat
 from pathlib import Path
+from typing import Any, Final
 
-from rhot_node.capture.camera import Camera
+from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting
 from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, PacedCamera, VideoFile
-from rhot_node.capture.plugin import open_plugin_camera
 from rhot_node.capture.stream import StreamCamera
 from rhot_node.capture.webcam import Webcam
 from rhot_node.capture.yuv import YuvRecording
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
-from rhot_node.errors import CameraError
-from rhot_node.plugins import PREFIX
+from rhot_node.errors import CameraError, NodeError, PluginError
+from rhot_node.plugins import PREFIX, about_plugin, load_plugin
 
 VIDEO4LINUX_MAJOR = 81  # Linux, Documentation/admin-guide/devices.txt
 
@@ -65,7 +66,7 @@ def _require_video(path: Path) -> None:
         raise CameraError(f"{path}: is no camera. A camera is a video4linux device, such as /dev/video0.")
 
 
-def takes_settings(spec: str) -> bool:
+def data_set_settings(spec: str) -> bool:
     """Whether camera settings mean anything to this source; a recording brings its own."""
     return not spec.startswith("yuv:")
 
@@ -99,3 +100,68 @@ def _split_options(text: str, spec: str, *known: str) -> tuple[str, dict[str, st
     if not name:
         raise CameraError(f"camera {spec!r}: it names no file.")
     return name, options
+
+
+# -- cameras from other packages ---------------------------------------------------------------------------------------
+
+GROUP: Final = "rhot.cameras"
+
+
+class PluginCamera:
+    """A camera of a plug-in. Whatever goes wrong in it becomes a CameraError: the node says so and opens it again."""
+
+    def __init__(self, name: str, spec: str, settings: CameraSettings, clock: NodeClock) -> None:
+        """Open the camera; raises CameraError."""
+        self._name = name
+        try:
+            self._camera: Camera = load_plugin(GROUP, name)(spec, settings, clock)
+            width, height = self._camera.size
+            self._size = int(width), int(height)
+        except CameraError:
+            raise
+        except PluginError as exc:
+            raise CameraError(f"camera {PREFIX}{name}: {exc}") from exc
+        except Exception as exc:
+            raise self._failed("could not open its camera", exc) from exc
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px."""
+        return self._size
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The next frame, as `Camera.read`."""
+        try:
+            frame = self._camera.read(timeout_s)
+        except (CameraError, EndOfRecording):
+            raise
+        except Exception as exc:
+            raise self._failed("failed over a frame", exc) from exc
+        if frame is not None and (not isinstance(frame, Frame) or frame.image.size != self._size):
+            raise CameraError(f"camera {PREFIX}{self._name}: {about_plugin(GROUP, self._name)} gave something else "
+                              f"than a frame of {self._size[0]} x {self._size[1]} px.")
+        return frame
+
+    def report(self) -> dict[str, Any]:
+        """What the camera says of itself, when it does."""
+        if isinstance(self._camera, Reporting):
+            with contextlib.suppress(Exception):
+                return dict(self._camera.report())
+        return {}
+
+    def close(self) -> None:
+        """Release the camera."""
+        with contextlib.suppress(Exception):
+            self._camera.close()
+
+    def _failed(self, what: str, exc: Exception) -> CameraError:
+        if isinstance(exc, NodeError):
+            return CameraError(f"camera {PREFIX}{self._name}: {exc}")
+        return CameraError(f"camera {PREFIX}{self._name}: {about_plugin(GROUP, self._name)} {what} "
+                           f"({type(exc).__name__}: {exc}).")
+
+
+def open_plugin_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> PluginCamera:
+    """Open ``plug:NAME:SPEC`` or ``plug:NAME``. Raises CameraError."""
+    name, _, rest = spec.removeprefix(PREFIX).partition(":")
+    return PluginCamera(name, rest, settings, clock)

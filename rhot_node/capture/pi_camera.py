@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +15,6 @@ from typing import Any
 
 from rhot_node.capture.camera import Frame
 from rhot_node.capture.pi_controls import make_controls
-from rhot_node.capture.pi_requests import NewestRequest, read_metadata
 from rhot_node.capture.sensors import Box, choose_preset, mid_exposure_ns, read_out
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -228,3 +228,63 @@ def _box(rectangle: Any) -> Box:
     if isinstance(rectangle, tuple):
         return Box(*rectangle)
     return Box(rectangle.x, rectangle.y, rectangle.width, rectangle.height)
+
+
+# -- the completed requests of a Pi camera -----------------------------------------------------------------------------
+
+WANTED = frozenset({"SensorTimestamp", "ExposureTime", "ScalerCrop", "SyncReady"})
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """A completed request, how many came before it, and when it was complete. Whoever takes it releases it."""
+
+    request: Any
+    index: int
+    t_node_ns: int
+
+
+class NewestRequest:
+    """Holds one request. `put` is picamera2's callback, in its thread; the rest is the reader's."""
+
+    def __init__(self, clock: NodeClock) -> None:
+        self._clock = clock
+        self._changed = threading.Condition()
+        self._newest: Arrival | None = None
+        self._count = 0
+        self._closed = False
+
+    def put(self, request: Any) -> None:
+        """Keep `request` and give the one before it back."""
+        t_node_ns = self._clock.now_ns()
+        request.acquire()
+        with self._changed:
+            old = self._newest
+            self._newest = Arrival(request, self._count, t_node_ns)
+            self._count += 1
+            if self._closed:
+                old, self._newest = self._newest, None
+            self._changed.notify()
+        if old is not None:
+            old.request.release()
+
+    def take(self, timeout_s: float) -> Arrival | None:
+        """The newest request not taken yet; None when none comes in time."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._newest is not None, timeout_s)
+            newest, self._newest = self._newest, None
+            return newest
+
+    def close(self) -> None:
+        """Give back what waits, and everything that still comes."""
+        with self._changed:
+            self._closed = True
+        waiting = self.take(0.0)
+        if waiting is not None:
+            waiting.request.release()
+
+
+def read_metadata(request: Any) -> dict[str, Any]:
+    """The few values that are needed, as libcamera gives them: `get_metadata` turns every one into Python's, which
+    takes longer than a frame of 200 Hz has to spare."""
+    return {key.name: value for key, value in request.request.metadata.items() if key.name in WANTED}

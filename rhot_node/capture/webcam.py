@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import re
+import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,7 +15,6 @@ import cv2
 import numpy as np
 
 from rhot_node.capture.camera import Frame
-from rhot_node.capture.latest import LatestGrabber
 from rhot_node.capture.pace import available_delay_ns
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -135,3 +136,62 @@ def configure(capture: Capture, settings: CameraSettings) -> list[str]:
 def _read(capture: Capture) -> Plane | None:
     ok, image = capture.read()
     return np.asarray(image, dtype=np.uint8) if ok and image is not None else None
+
+
+# -- a thread that empties a device whose read blocks, so that a slow reader always gets the newest frame --------------
+
+@dataclass(frozen=True, slots=True)
+class Grabbed:
+    """One image as the device gave it: (H, W, 3) BGR, how many came before it, and when its read returned."""
+
+    image: Plane
+    number: int
+    t_return_node_ns: int
+
+
+class LatestGrabber:
+    """Calls `grab` for ever in its own thread and keeps the newest image. `grab` returns None when the device failed;
+    `release` is called at the end, in the same thread."""
+
+    def __init__(self, grab: Callable[[], Plane | None], release: Callable[[], object], clock: NodeClock) -> None:
+        self._grab = grab
+        self._release = release
+        self._clock = clock
+        self._changed = threading.Condition()
+        self._newest: Grabbed | None = None
+        self._failed = False
+        self._ending = False
+        self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
+        self._thread.start()
+
+    @property
+    def failed(self) -> bool:
+        """True when the device gave no more images."""
+        return self._failed
+
+    def take(self, timeout_s: float) -> Grabbed | None:
+        """The newest image not taken yet; None when none comes in time or the device failed."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._newest is not None or self._failed, timeout_s)
+            newest, self._newest = self._newest, None
+            return newest
+
+    def close(self) -> None:
+        """End the thread; when the device does not return from its read, leave it to end by itself."""
+        self._ending = True
+        self._thread.join(timeout=2.0)
+
+    def _run(self) -> None:
+        number = 0
+        while not self._ending:
+            image = self._grab()
+            t_return_node_ns = self._clock.now_ns()
+            with self._changed:
+                if image is None:
+                    self._failed = True
+                    self._changed.notify_all()
+                    break
+                self._newest = Grabbed(image, number, t_return_node_ns)
+                self._changed.notify_all()
+            number += 1
+        self._release()

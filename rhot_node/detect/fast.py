@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rhot_node.detect.find import DOUBTFUL, SEARCH_STEP, Finder
 from rhot_node.detect.gate import Labels
+from rhot_node.detect.illuminant import DEAD_ZONE, MARKERS_LEAST, SWITCHED, Illuminant
+from rhot_node.detect.illuminant_guess import guess_illuminant
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.light import DEAD_ZONE, MARKERS_LEAST, SWITCHED, Light
-from rhot_node.detect.light_guess import guess_light
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
@@ -35,7 +35,7 @@ class FastDetector:
         """`precise` False: markers in plain view are placed by their soft centroid, without a fit of the outline."""
         self._set = markers
         self._markers = markers.markers
-        self._light = Light(markers)
+        self._light = Illuminant(markers)
         self._fresh = True  # no picture has been seen yet
         self._until_guess = GUESS_EVERY
         self._found = 0  # markers found in the last frame
@@ -47,7 +47,7 @@ class FastDetector:
     def reset(self) -> None:
         """Forget all tracks and the light: the next frame is searched as a whole."""
         self.lose_all()
-        self._light.warmth = 0.0
+        self._light.temperature_shift = 0.0
         self._fresh, self._until_guess, self._found = True, GUESS_EVERY, 0
 
     def lose_all(self) -> None:
@@ -67,9 +67,9 @@ class FastDetector:
         return self._finder.paint_mask(image, seen)
 
     @property
-    def warmth(self) -> float:
-        """How much warmer the light is than the one the colours were learnt in; see `rhot_node.detect.light`."""
-        return self._light.warmth
+    def temperature_shift(self) -> float:
+        """How much warmer the light is than the one the colours were learnt in; see `rhot_node.detect.illuminant`."""
+        return self._light.temperature_shift
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """The best candidate of every marker, in the order of the marker set, lost markers reported as lost; then the
@@ -129,15 +129,15 @@ class FastDetector:
 
         The guess is kept if more markers are then in plain view, with a chroma as strong as paint has in that light.
         """
-        known, before = self._light.warmth, len(self._finder.plainly(seen, lone=False))
-        if not guess_light(image, self._light, self._finder.gate, self._set):
+        known, before = self._light.temperature_shift, len(self._finder.plainly(seen, lone=False))
+        if not guess_illuminant(image, self._light, self._finder.gate, self._set):
             return seen if not self._fresh else self._find_in_new_light(image)
         guessed = self._find_in_new_light(image)
         plain = self._finder.plainly(guessed, lone=False)
         strong = np.count_nonzero(self._light.strong(plain, self._finder.paint[plain]))
         if strong >= MARKERS_LEAST and strong > before:
             return guessed
-        self._light.warmth = known
+        self._light.temperature_shift = known
         return self._find_in_new_light(image)
 
     def _find_in_new_light(self, image: YuvImage) -> tuple[MarkerObservation, ...]:

@@ -16,12 +16,12 @@ from rhot_node.detect import measure as m
 from rhot_node.detect.follow import learn_noise, noise_level
 from rhot_node.detect.followed import Followed
 from rhot_node.detect.gate import AREA_MIN, ColourGate, merits
+from rhot_node.detect.illuminant import Illuminant
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.labels import directions, sector_table
-from rhot_node.detect.light import Light
 from rhot_node.detect.outline import INTERIOR, OUTSIDE
+from rhot_node.detect.reported_covariance import FLOOR_VARIANCE, mask_variance
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
-from rhot_node.detect.stated import FLOOR_VARIANCE, mask_variance
 from rhot_node.detect.track import ALIVE, EXTENT, MARGIN, TRACK_COLUMNS, Track, lost_observation
 from rhot_node.detect.track import X as TRACK_X
 from rhot_node.detect.track import Y as TRACK_Y
@@ -45,7 +45,7 @@ Blob = list[float]  # a row of a search's blobs
 class Finder:
     """The tracks of all markers, and the search for new ones. Track s is of marker s modulo the number of markers."""
 
-    def __init__(self, markers: MarkerSet, light: Light) -> None:
+    def __init__(self, markers: MarkerSet, light: Illuminant) -> None:
         """`light`: that of the pictures, read and set by the caller."""
         self._markers, self._light = markers.markers, light
         self._count = len(self._markers)
@@ -78,7 +78,7 @@ class Finder:
             if slot not in seen:
                 track = self._tracks[slot]
                 if self._measure(camera_image, slot, track.request(self._request)) \
-                        and not track.is_litter(self._row.tolist()):
+                        and not track.is_outside(self._row.tolist()):
                     seen[slot] = self._observe(slot, NO_FLAGS)
                     self._follow(camera_image, slot, seen[slot])
                 else:

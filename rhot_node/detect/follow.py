@@ -4,7 +4,7 @@ A marker's window is predicted at constant velocity. The projection of its chrom
 as the camera shows it (so that no light has to be mended), gives a soft centroid; about that the outline of the last
 frame is fitted anew (`contour`). Whatever is not as plain as it was - area, level, outline, misfit, the frame's border,
 a rival in the window - sends the marker back to the careful measurement (`measure`), which also brings it here
-(`rhot_node.detect.begin`).
+(`rhot_node.detect.followed`).
 
 All coordinates are chroma pixels.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from rhot_node.detect import contour_columns as c
-from rhot_node.detect import stated as st
+from rhot_node.detect import reported_covariance as st
 from rhot_node.detect import track as t
 from rhot_node.detect.contour import fit
 from rhot_node.detect.contour_pixels import project

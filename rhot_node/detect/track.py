@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
 from rhot_node.detect import position as p
-from rhot_node.detect import stated as st
+from rhot_node.detect import reported_covariance as st
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import FLAGS, MarkerFlag, MarkerObservation
 
@@ -93,7 +93,7 @@ class Track:
         size = math.log(area / self.area) / (0.35 + 0.02 * gap)
         return away * away + size * size
 
-    def is_litter(self, row: Row) -> bool:
+    def is_outside(self, row: Row) -> bool:
         """Whether a measured row may be of specks that lie where the marker was, so that a search should decide.
 
         What hides a marker leaves some of it in its colour, and shade leaves it its size.

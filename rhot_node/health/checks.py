@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rhot_node.health.check import Check
 from rhot_node.health.machine import Machine, Throttled
 
@@ -14,6 +17,17 @@ POWER_REMEDY = ("Use the board's own power supply (5.1 V; 3 A, for a Pi 5 5 A) w
                 "devices off.")
 COOL_REMEDY = "Give it a heat sink or a fan and free air; a closed case needs a fan."
 NOW = Throttled.UNDER_VOLTAGE | Throttled.CAPPED | Throttled.THROTTLED | Throttled.HOT
+
+
+BLACK_LUMA = 32  # grey levels: twice the black of video range (ITU-R BT.601: 16)
+BLACK_SHARE = 99.0  # per cent of the pixels; a lamp's reflection on a lens cap is smaller than the rest
+BLACK_PICTURE = Check("black", "warning", "Its camera's picture is black.", "Is the lens covered?")
+_BLACK_STEP_PX = 16
+
+
+def is_black(luma: NDArray[np.uint8]) -> bool:
+    """Whether a picture (H, W) shows nothing at all: its lens is covered, or there is no light."""
+    return bool(np.percentile(luma[::_BLACK_STEP_PX, ::_BLACK_STEP_PX], BLACK_SHARE) < BLACK_LUMA)
 
 
 def check_power(flags: Throttled | None) -> Check:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
 
 Array = NDArray[np.float64]
 

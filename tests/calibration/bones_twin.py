@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 from scipy.special import erf
 
-from rhot_app.calibration import hand_prior
-from rhot_app.calibration.hand_bundle_model import Poses, expected
-from rhot_app.calibration.hand_shape import MARKERS, HandUnknowns
-from rhot_app.calibration.marker_places import PALM, MarkerPlace, MarkerTracks
+from rhot_app.calibration.hand import prior as hand_prior
+from rhot_app.calibration.hand.bundle_model import Poses, expected
+from rhot_app.calibration.hand.marker_places import PALM, MarkerPlace, MarkerTracks
+from rhot_app.calibration.hand.shape import MARKERS, HandUnknowns
 from rhot_app.geometry.transforms import exp_so3
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.model import build_model

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from rhot_app.calibration.colour_samples import ColourSamples
-from rhot_app.calibration.colours import ColourReport, solve_colours
-from rhot_app.simulator.acts import Act
-from rhot_app.simulator.body import SKIN_RGB, HandBody
-from rhot_app.simulator.lamp import Lamp
-from rhot_app.simulator.render import FrameRenderer
-from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
-from rhot_app.simulator.shot import make_renderer, make_shot
+from rhot_app.calibration.colour.colours import ColourReport, solve_colours
+from rhot_app.calibration.colour.samples import ColourSamples
+from rhot_app.simulator.nodes.shot import make_renderer, make_shot
+from rhot_app.simulator.render.body import SKIN_RGB, HandBody
+from rhot_app.simulator.render.render import FrameRenderer
+from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
+from rhot_app.simulator.scene.scene_objects import SceneObject
 from rhot_node.detect.colour import box_mask, colours_of
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_i420
@@ -51,8 +51,8 @@ class HandScene:
         scene: Scene = make_scene(settings, seed)
         self.scene = scene if markers is None else dataclasses.replace(scene, markers=markers)
         shot = make_shot(self.scene, motion, 60.0)
-        self._act: Act = shot.act
-        self.source = shot.act.source
+        self._act: SceneObject = shot.scene_object
+        self.source = shot.scene_object.source
         self.renderer: FrameRenderer = make_renderer(shot, 0)
         self._camera = self.scene.camera(0)
         self._readout_s = 1e-9 * self.scene.row_time_ns * self.scene.preset.height

@@ -6,9 +6,8 @@ import numpy as np
 from board_rendering import LENS, corners_px, pose
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board import Board, Chessboard
-from rhot_app.calibration.corners import BoardView
-from rhot_app.calibration.subpixel import side_px
+from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.corners import BoardView, side_px
 
 Array = NDArray[np.float64]
 

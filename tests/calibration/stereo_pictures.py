@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board import Chessboard
-from rhot_app.calibration.corners import BoardView, detect
-from rhot_app.calibration.lens_start import LensStart
-from rhot_app.calibration.stereo_views import SharedViews, Shot
+from rhot_app.calibration.board.boards import Chessboard
+from rhot_app.calibration.board.corners import BoardView, detect
+from rhot_app.calibration.lens.start import LensStart
+from rhot_app.calibration.stereo.views import SharedViews, Shot
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "stereo_chessboard"
 NUMBERS = range(1, 15)

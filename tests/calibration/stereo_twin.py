@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board import Board, Chessboard
-from rhot_app.calibration.corners import BoardView
-from rhot_app.calibration.lens_start import LensStart
-from rhot_app.calibration.stereo_views import SharedViews, Shot
+from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.lens.start import LensStart
+from rhot_app.calibration.stereo.views import SharedViews, Shot
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid
 

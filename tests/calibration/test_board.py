@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot_app.calibration.board import CharucoBoard, Chessboard, parse_size
+from rhot_app.calibration.board.boards import CharucoBoard, Chessboard, parse_size
 from rhot_app.errors import CalibrationError
 
 

@@ -11,11 +11,11 @@ import pytest
 from bones_twin import RICH, SIX, TRIAD, Sloppiness, base_hand, bones_mm, person, record
 
 from rhot_app.__main__ import main
-from rhot_app.calibration import hand_fit
-from rhot_app.calibration.bones import solve_bones
-from rhot_app.calibration.bones_entry import enter_bones
-from rhot_app.calibration.bones_report import BonesReport, Known
-from rhot_app.calibration.marker_places import MarkerTracks, tracks_of
+from rhot_app.calibration.hand import fit as hand_fit
+from rhot_app.calibration.hand.bones import solve_bones
+from rhot_app.calibration.hand.bones_entry import enter_bones
+from rhot_app.calibration.hand.bones_report import BonesReport, Known
+from rhot_app.calibration.hand.marker_places import MarkerTracks, tracks_of
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.skeleton import FINGERS
@@ -129,7 +129,7 @@ def test_a_hand_that_holds_still_is_told_to_move(few_instants: pytest.MonkeyPatc
     report = solve_bones(still, base_hand())
     few_instants.setattr(hand_fit, "INSTANTS", 100)
     told = [finding.sentence for finding in report.verdict.findings if finding.code == "finger_still"]
-    assert len(told) == 5 and all("Bend and stretch" in sentence for sentence in told)
+    assert len(told) == 5 and all("bend it further" in sentence for sentence in told)
     assert sum(bone.known is Known.PRIOR for bone in report.bones) >= 10
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from stereo_twin import SIZE, Twin, stereo_twin
 
-from rhot_app.calibration.bundle import adjust
-from rhot_app.calibration.bundle_layout import Layout, LensFreedom
-from rhot_app.calibration.bundle_model import BundleState, Observations, linearise, residuals
+from rhot_app.calibration.stereo.bundle import adjust
+from rhot_app.calibration.stereo.bundle_layout import Layout, LensFreedom
+from rhot_app.calibration.stereo.bundle_model import BundleState, Observations, linearise, residuals
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import inverse

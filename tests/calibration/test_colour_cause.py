@@ -7,8 +7,8 @@ import pytest
 from colour_scenes import PAINTS, RADIUS, SKIN, picture, place
 from marker_rendering import Canvas, Rgb, disc
 
-from rhot_app.calibration.colour_cause import Cause, Explainer
-from rhot_app.calibration.paint_region import PaintRegion
+from rhot_app.calibration.colour.cause import Cause, Explainer
+from rhot_app.calibration.colour.paint_region import PaintRegion
 from rhot_node.detect.colour import learn_chroma_from_pixels
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from colour_scenes import PAINTS, box, picture
 
-from rhot_app.calibration.colour_drift import DriftReport, LightDrift
-from rhot_app.calibration.colour_samples import ColourSamples
-from rhot_app.calibration.colours import solve_colours
+from rhot_app.calibration.colour.colours import solve_colours
+from rhot_app.calibration.colour.drift import DriftReport, IlluminantDrift
+from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.calibration.verdict import Grade
 from rhot_node.detect.fast import FastDetector
-from rhot_node.detect.light import gains_of
+from rhot_node.detect.illuminant import gains_of
 from rhot_node.markers import MarkerSet
 
 
@@ -24,7 +24,7 @@ def learnt() -> MarkerSet:
 
 
 def watch(markers: MarkerSet, frames: int = 6, **light) -> DriftReport:
-    drift = LightDrift(markers)
+    drift = IlluminantDrift(markers)
     for seed in range(frames):
         drift.update(picture(seed=seed, **light))
     return drift.report()
@@ -33,20 +33,21 @@ def watch(markers: MarkerSet, frames: int = 6, **light) -> DriftReport:
 def test_the_light_of_the_calibration_is_no_drift(learnt: MarkerSet) -> None:
     report = watch(learnt)
     assert report.verdict.grade is Grade.GOOD and report.verdict.findings == ()
-    assert abs(report.warmth) < 0.06
+    assert abs(report.temperature_shift) < 0.06
     assert report.light == pytest.approx(1.0, abs=0.06)
     assert [drift.marker for drift in report.markers] == list(PAINTS)
     assert min(drift.margin for drift in report.markers) > 0.6
 
 
-@pytest.mark.parametrize(("warmth", "word"), [(0.35, "warmer"), (-0.35, "colder")])
-def test_another_lamp_is_named_while_every_marker_is_still_found(learnt: MarkerSet, warmth: float, word: str) -> None:
-    gains = tuple(gains_of(warmth))
+@pytest.mark.parametrize(("temperature_shift", "word"), [(0.35, "warmer"), (-0.35, "colder")])
+def test_another_lamp_is_named_while_every_marker_is_still_found(learnt: MarkerSet, temperature_shift: float,
+                                                                 word: str) -> None:
+    gains = tuple(gains_of(temperature_shift))
     report = watch(learnt, gains=gains)
-    assert report.warmth == pytest.approx(warmth, abs=0.06)
+    assert report.temperature_shift == pytest.approx(temperature_shift, abs=0.06)
     (finding,) = [one for one in report.verdict.findings if one.code == "temperature"]
     assert word in finding.figure and "learn the colours again" in finding.remedy
-    assert (report.kelvin < 4000) == (warmth > 0)
+    assert (report.kelvin < 4000) == (temperature_shift > 0)
     assert all(seen.found for seen in FastDetector(learnt).detect(picture(gains=gains)))
 
 
@@ -73,7 +74,7 @@ def test_a_worn_paint_is_named(learnt: MarkerSet) -> None:
 
 def test_a_detector_that_runs_already_is_asked_instead_of_a_second_one(learnt: MarkerSet) -> None:
     detector = FastDetector(learnt)
-    drift = LightDrift(learnt, detector)
+    drift = IlluminantDrift(learnt, detector)
     for seed in range(4):
         image = picture(seed=seed)
         drift.update(image, detector.detect(image))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from colour_scenes import PAINTS, box, picture, place
 
-from rhot_app.calibration.colour_gathering import ColourGathering
-from rhot_app.calibration.colour_samples import VIEWS_MOST
-from rhot_app.calibration.colours import solve_colours
-from rhot_app.calibration.separability import SKIN
+from rhot_app.calibration.colour.colours import solve_colours
+from rhot_app.calibration.colour.gathering import ColourGathering
+from rhot_app.calibration.colour.samples import VIEWS_MOST
+from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.gate import ColourGate
 from rhot_node.markers import ChromaModel

@@ -7,12 +7,12 @@ import pytest
 from colour_scenes import PAINTS, box, picture, place
 from marker_rendering import Rgb
 
-from rhot_app.calibration.colour_gathering import ColourGathering
-from rhot_app.calibration.colour_identity import Identity, colours_taken, has_hue_of_skin, identify, skin_shown
-from rhot_app.calibration.colours import ColourReport, solve_colours
+from rhot_app.calibration.colour.colours import ColourReport, solve_colours
+from rhot_app.calibration.colour.gathering import ColourGathering
+from rhot_app.calibration.colour.identity import Identity, colours_taken, has_hue_of_skin, identify, skin_shown
 from rhot_app.calibration.verdict import Grade
 from rhot_node.detect.colour import learn_chroma_from_colours
-from rhot_node.detect.light import YCC_FROM_RGB, gains_of
+from rhot_node.detect.illuminant import YCC_FROM_RGB, gains_of
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 
@@ -58,11 +58,11 @@ def solved(gathering: ColourGathering, **options) -> ColourReport:
 
 
 @pytest.mark.parametrize("orange", [(230, 120, 30), (220, 20, 60)], ids=str)
-@pytest.mark.parametrize("warmth", [0.0, 0.35])
+@pytest.mark.parametrize("temperature_shift", [0.0, 0.35])
 def test_a_saturated_paint_of_skins_hue_is_usable_beside_skin_that_a_warm_lamp_colours(orange: Rgb,
-                                                                                      warmth: float) -> None:
+                                                                                      temperature_shift: float) -> None:
     paints = {**PAINTS, "wrist": orange}
-    report = solved(gathered(paints, light=0.8, gains=tuple(gains_of(warmth))))
+    report = solved(gathered(paints, light=0.8, gains=tuple(gains_of(temperature_shift))))
     assert report.verdict.acceptable and "skin" not in report.verdict.codes, report.verdict
 
 

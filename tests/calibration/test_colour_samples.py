@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from colour_scenes import PAINTS, SKIN, box, picture, place
 
-from rhot_app.calibration.colour_samples import ColourSamples
-from rhot_app.calibration.paint_region import region_at, region_in
+from rhot_app.calibration.colour.paint_region import region_at, region_in
+from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.errors import CalibrationError
 
 

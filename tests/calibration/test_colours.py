@@ -11,17 +11,17 @@ from colour_scenes import PAINTS, RADIUS, SKIN, WOOD, box, picture, place
 from marker_rendering import Rgb
 from patience import quickest
 
-from rhot_app.calibration.colour_light import LAMPS
-from rhot_app.calibration.colour_room import hue_histogram
-from rhot_app.calibration.colour_samples import ColourSamples
-from rhot_app.calibration.colours import NO_COLOURS, ColourReport, solve_colours
+from rhot_app.calibration.colour.colours import NO_COLOURS, ColourReport, solve_colours
+from rhot_app.calibration.colour.illuminant import LAMPS
+from rhot_app.calibration.colour.samples import ColourSamples
+from rhot_app.calibration.colour.surroundings import hue_histogram
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import box_mask, colours_of
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.light import gains_of
 from rhot_node.detect.reference import ReferenceDetector
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
@@ -65,10 +65,11 @@ def test_six_paints_are_learnt_named_and_told_apart(six: ColourReport) -> None:
         assert abs(math.degrees(away)) < 3.0
 
 
-@pytest.mark.parametrize("lamp", [lamp for lamp in LAMPS if lamp.warmth in (-0.54, 0.54, 0.0)], ids=str)
+@pytest.mark.parametrize("lamp", [lamp for lamp in LAMPS if lamp.temperature_shift in (-0.54, 0.54, 0.0)], ids=str)
 def test_no_marker_is_lost_by_another_lamp(six: ColourReport, lamp) -> None:
     shift = (11.0, 23.0)
-    shown = picture(shift=shift, light=lamp.brightness ** (1 / 2.2), gains=tuple(gains_of(lamp.warmth)), seed=7)
+    shown = picture(shift=shift, light=lamp.brightness ** (1 / 2.2), gains=tuple(gains_of(lamp.temperature_shift)),
+                    seed=7)
     assert misplaced(six, shown, shift) == []
 
 

@@ -11,9 +11,9 @@ from board_rendering import LENS, Photo, corners_px, pose, take
 from patience import quickest
 from stereo_pictures import NUMBERS, needs_pictures, picture
 
-from rhot_app.calibration.board import Board, CharucoBoard, Chessboard
-from rhot_app.calibration.corners import detect
-from rhot_app.calibration.missing import why_missing
+from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.corners import detect
+from rhot_app.calibration.board.missing import why_missing
 
 BOARD = Chessboard(9, 6, 0.03)
 TURN = (0.3, -0.35, 0.15)

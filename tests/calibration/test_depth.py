@@ -10,8 +10,8 @@ import pytest
 from synthetic_rig import make_rig
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.depth import DepthGeometry, fit_depth, geometry_of
-from rhot_app.calibration.depth_table import DepthTable, read_depth_table
+from rhot_app.calibration.depth.fit import DepthGeometry, fit_depth, geometry_of
+from rhot_app.calibration.depth.table import DepthTable, read_depth_table
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.disparity import depth_from_disparity

@@ -8,10 +8,10 @@ from board_rendering import LENS
 from intrinsics_twin import BOARD, twin_views
 from stereo_twin import stereo_twin
 
-from rhot_app.calibration.corners import BoardView
-from rhot_app.calibration.disagreement import in_words, what_is_stated
-from rhot_app.calibration.intrinsics import IntrinsicsReport, solve
-from rhot_app.calibration.stereo import calibrate
+from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
+from rhot_app.calibration.robust_error import in_words, what_is_reported
+from rhot_app.calibration.stereo.calibrate import calibrate
 
 SHEET = BOARD.object_points()[:, :2] / BOARD.object_points().max()
 
@@ -34,20 +34,20 @@ def bent() -> list[IntrinsicsReport]:
 
 
 def test_independent_errors_are_no_disagreement() -> None:
-    found = [solve(twin_views(np.random.default_rng(seed), noise_px=0.1), BOARD).disagreement for seed in range(2)]
+    found = [solve(twin_views(np.random.default_rng(seed), noise_px=0.1), BOARD).error_inflation for seed in range(2)]
     assert min(found) >= 1.0 and max(found) < 1.3
     figures = calibrate(stereo_twin().views(np.random.default_rng(0), 0.1), stereo_twin().starts()).figures
-    assert figures is not None and figures.disagreement < 1.5
+    assert figures is not None and figures.error_inflation < 1.5
 
 
 def test_a_board_that_bends_in_every_picture_is_noticed(bent: list[IntrinsicsReport]) -> None:
-    assert min(report.disagreement for report in bent) > 1.5
-    assert "bends from picture to picture" in in_words(bent[0].disagreement)
-    assert "apart" in what_is_stated(bent[0].disagreement) and "apart" not in what_is_stated(1.1)
+    assert min(report.error_inflation for report in bent) > 1.5
+    assert "bends from picture to picture" in in_words(bent[0].error_inflation)
+    assert "apart" in what_is_reported(bent[0].error_inflation) and "apart" not in what_is_reported(1.1)
 
 
 def test_what_is_stated_then_holds(bent: list[IntrinsicsReport]) -> None:
     off = np.concatenate([(report.lens - LENS) / report.std for report in bent])
-    by_corners = np.concatenate([(report.lens - LENS) / report.std * report.disagreement for report in bent])
+    by_corners = np.concatenate([(report.lens - LENS) / report.std * report.error_inflation for report in bent])
     assert np.sqrt(np.mean(off**2)) < 1.8
     assert np.sqrt(np.mean(by_corners**2)) > 2.5

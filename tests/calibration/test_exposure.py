@@ -7,9 +7,9 @@ import pytest
 from colour_scenes import PAINTS, picture, place
 from marker_rendering import Canvas
 
-from rhot_app.calibration.exposure import measure_exposure
+from rhot_app.calibration.check.exposure import measure_exposure
+from rhot_app.calibration.colour.white_balance import balance_on_grey
 from rhot_app.calibration.verdict import Grade
-from rhot_app.calibration.white_balance import balance_on_grey
 from rhot_app.errors import CalibrationError
 from rhot_node.config import CameraSettings
 
@@ -34,10 +34,18 @@ def test_cut_off_paint_is_named_with_its_channel_and_a_shorter_time() -> None:
     report = measure_exposure(image, masks(image.u.shape), CameraSettings(exposure_us=4000.0))
     finding = next(one for one in report.findings if one.code == "marker_over" and "index" in one.figure)
     assert "cut off in red" in finding.figure
-    assert "Shorten exposure_us from 4000 to about" in finding.remedy
-    wanted = float(finding.remedy.rsplit(" ", 1)[1].rstrip("."))
+    assert finding.remedy.startswith("Shorten exposure to ") and finding.remedy.endswith(" ms.")
+    wanted = 1000.0 * float(finding.remedy.split()[-2])
     again = picture(light=1.35 * (wanted / 4000.0) ** (1 / GAMMA))
     assert not [one for one in measure_exposure(again, masks(again.u.shape)).findings if one.code == "marker_over"]
+
+
+def test_all_markers_share_one_sentence() -> None:
+    for light, exposure_us, code in ((1.6, 4000.0, "marker_over"), (0.2, 1000.0, "marker_under")):
+        image = picture(light=light)
+        report = measure_exposure(image, masks(image.u.shape), CameraSettings(exposure_us=exposure_us))
+        (finding,) = [one for one in report.findings if one.code == code]
+        assert " and " in finding.figure and " are too " in finding.figure
 
 
 def test_the_paint_is_judged_even_where_luma_is_fine() -> None:
@@ -53,7 +61,7 @@ def test_dark_markers_get_light_and_after_that_gain() -> None:
     image = picture(light=0.2, background=(60, 62, 66))
     report = measure_exposure(image, masks(image.u.shape), CameraSettings(exposure_us=1000.0))
     assert {one.code for one in report.findings} >= {"marker_under"}
-    assert "Lengthen exposure_us from 1000" in report.findings[0].remedy
+    assert "Lengthen exposure to " in report.findings[0].remedy
     long = measure_exposure(image, masks(image.u.shape), CameraSettings(exposure_us=8000.0))
     assert "more light, or raise the gain" in long.findings[0].remedy
     unknown = measure_exposure(image, masks(image.u.shape))

@@ -14,10 +14,10 @@ from synthetic_rig import WIDE, Sight, compare, make_rig, observe, run, still_tr
 from waving import waving
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.filter_judgement import FilterTargets
-from rhot_app.calibration.filter_meters import FilterMeter, jitter, lag, motion_of
-from rhot_app.calibration.filter_simulation import OFF, make_footage, simulate
-from rhot_app.calibration.filter_tuning import tune_filters
+from rhot_app.calibration.filters.judgement import FilterTargets
+from rhot_app.calibration.filters.meters import FilterMeter, jitter, lag, motion_of
+from rhot_app.calibration.filters.simulation import OFF, make_footage, simulate
+from rhot_app.calibration.filters.tuning import tune_filters
 from rhot_app.calibration.observations import InstantTable
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from colour_scenes import picture
 
-from rhot_app.calibration.camera_advice import CameraAdvisor
-from rhot_app.calibration.flicker import FlickerWatch, measure_flicker, row_means
+from rhot_app.calibration.check.camera_advice import CameraAdvisor, FlickerWatch, measure_flicker, row_means
 from rhot_app.errors import CalibrationError
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import YuvImage
@@ -61,9 +60,9 @@ def test_the_remedy_is_an_exposure_over_which_the_lamp_averages_out(mains: float
     (finding,) = report.findings
     assert "direct current" in finding.remedy
     if expected:
-        assert f"{expected[0]:.0f}" in finding.remedy
+        assert f"{expected[0] / 1000:.2f}" in finding.remedy and "ms" in finding.remedy
         near = measure_flicker(rows, times, 48e-6, 9e-3, fps).findings[0]
-        assert near.remedy.startswith("Set exposure_us to")
+        assert near.remedy.startswith("Set the exposure to")
 
 
 def test_frames_of_a_global_shutter_differ_in_brightness() -> None:

@@ -8,7 +8,7 @@ import pytest
 from patience import quickest
 from synthetic_rig import make_rig
 
-from rhot_app.calibration.health import HealthMonitor, HealthSample
+from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.project import Rig
 
 MARKERS = 6

@@ -9,10 +9,9 @@ import pytest
 from board_rendering import LENS, corners_px, pose
 from intrinsics_twin import BOARD, seen, twin_views
 
-from rhot_app.calibration.board import CharucoBoard
-from rhot_app.calibration.intrinsics import IntrinsicsReport, solve
-from rhot_app.calibration.lens_certainty import expected_errors
-from rhot_app.calibration.residual_field import residual_field
+from rhot_app.calibration.board.boards import CharucoBoard
+from rhot_app.calibration.lens.certainty import expected_errors
+from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, residual_field, solve
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from stereo_pictures import BOARD, NUMBERS, needs_pictures, views_of
 
-from rhot_app.calibration.intrinsics import IntrinsicsReport, solve
+from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
 
 pytestmark = needs_pictures
 
@@ -40,7 +40,7 @@ def test_halves_of_the_views_agree_within_what_is_stated() -> None:
     first, second = solve(views[:7], BOARD), solve(views[7:], BOARD)
     apart = (first.lens - second.lens) / np.hypot(first.std, second.std)
     assert np.sqrt(np.mean(apart**2)) < 2.0
-    assert min(first.disagreement, second.disagreement) > 1.5
+    assert min(first.error_inflation, second.error_inflation) > 1.5
 
 
 def test_two_cameras_find_the_same_board() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from board_rendering import LENS, Photo, corners_px, pose, take
 
-from rhot_app.calibration.board import Board, CharucoBoard, Chessboard
-from rhot_app.calibration.corners import BoardView, detect
-from rhot_app.calibration.intrinsics import solve
+from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.corners import BoardView, detect
+from rhot_app.calibration.lens.intrinsics import solve
 from rhot_app.calibration.verdict import Grade
 
 PHOTO = Photo(blur_px=0.8, noise=3.0, oversampling=3)

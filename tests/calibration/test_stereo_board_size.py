@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from stereo_pictures import BOARD, NUMBERS, needs_pictures, picture
 
-from rhot_app.calibration.board_size_check import look_beyond, size_finding
-from rhot_app.calibration.corners import detect
+from rhot_app.calibration.board.corners import detect
+from rhot_app.calibration.board.size_check import look_beyond, size_finding
 from rhot_app.calibration.verdict import Finding
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rhot_app.calibration.stereo_files import match_files
-from rhot_app.calibration.views import in_natural_order
+from rhot_app.calibration.lens.views import in_natural_order
+from rhot_app.calibration.stereo.reading import match_files
 from rhot_app.errors import CalibrationError
 
 

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from rhot_app.calibration.board import CharucoBoard
-from rhot_app.calibration.stereo_reading import read_shared, read_view
+from rhot_app.calibration.board.boards import CharucoBoard
+from rhot_app.calibration.stereo.reading import read_shared, read_view
 from rhot_app.errors import CalibrationError
 
 BOARD = CharucoBoard(8, 6, 0.03, 0.022)

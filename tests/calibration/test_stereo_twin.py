@@ -9,15 +9,14 @@ import pytest
 from patience import quickest
 from stereo_twin import BOARD, LENSES, RIGHT_FROM_LEFT, SIZE, Twin, stereo_twin, with_boards
 
-from rhot_app.calibration.board import CharucoBoard, Chessboard
-from rhot_app.calibration.lens_start import LensStart
-from rhot_app.calibration.ruler import RulerReading, read_ruler
-from rhot_app.calibration.stereo import calibrate
-from rhot_app.calibration.stereo_adjust import StereoSolution, view_rms
-from rhot_app.calibration.stereo_points import locate
-from rhot_app.calibration.stereo_report import StereoFigures, StereoReport
-from rhot_app.calibration.stereo_solve import solve
-from rhot_app.calibration.stereo_views import SharedViews, Shot
+from rhot_app.calibration.board.boards import CharucoBoard, Chessboard
+from rhot_app.calibration.depth.ruler import RulerReading, read_ruler
+from rhot_app.calibration.lens.start import LensStart
+from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
+from rhot_app.calibration.stereo.calibrate import calibrate, solve
+from rhot_app.calibration.stereo.points import locate
+from rhot_app.calibration.stereo.report import StereoFigures, StereoReport
+from rhot_app.calibration.stereo.views import SharedViews, Shot
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid

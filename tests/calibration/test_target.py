@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.board import STANDARD_BOARD, CharucoBoard, Chessboard
-from rhot_app.calibration.corners import detect
-from rhot_app.calibration.target import PAPERS_MM, RULER_MM, draw_target
-from rhot_app.calibration.target_drawing import Drawing
+from rhot_app.calibration.board.boards import STANDARD_BOARD, CharucoBoard, Chessboard
+from rhot_app.calibration.board.corners import detect
+from rhot_app.calibration.board.target import PAPERS_MM, RULER_MM, Drawing, draw_target
 from rhot_app.errors import CalibrationError
 
 PX_PER_MM = 4.0

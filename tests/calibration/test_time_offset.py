@@ -14,8 +14,8 @@ from synthetic_rig import hand_trajectory, make_rig, still_trajectory
 from waving import SIDEWAYS, collect, see, waving
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.time_offset import calibrate_times
-from rhot_app.calibration.time_tracks import interpolate
+from rhot_app.calibration.time.offset import calibrate_times
+from rhot_app.calibration.time.tracks import interpolate
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_app.project import CameraPose, load_rig, save_rig

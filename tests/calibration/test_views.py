@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from stereo_pictures import BOARD, FOLDER, needs_pictures
 
-from rhot_app.calibration.board import Chessboard
-from rhot_app.calibration.views import in_natural_order, matching_files, read_views
+from rhot_app.calibration.board.boards import Chessboard
+from rhot_app.calibration.lens.views import in_natural_order, matching_files, read_views
 from rhot_app.errors import CalibrationError
 
 pytestmark = needs_pictures

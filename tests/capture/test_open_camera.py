@@ -12,7 +12,7 @@ import pytest
 from patience import quickest
 
 from rhot_node.capture.camera import Camera, EndOfRecording, Frame
-from rhot_node.capture.open import open_camera, takes_settings
+from rhot_node.capture.open import data_set_settings, open_camera
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -138,8 +138,8 @@ def test_yuv_and_its_start_file(tmp_path: Path) -> None:
 
 
 def test_recordings_and_twins_bring_their_own_settings() -> None:
-    assert takes_settings("0") and takes_settings("folder") and takes_settings("stream:socket")
-    assert not takes_settings("yuv:folder")
+    assert data_set_settings("0") and data_set_settings("folder") and data_set_settings("stream:socket")
+    assert not data_set_settings("yuv:folder")
 
 
 def test_an_image_of_another_size_ends_in_an_error(tmp_path: Path) -> None:

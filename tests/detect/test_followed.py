@@ -13,8 +13,8 @@ from marker_rendering import SKIN, Canvas, Rgb, disc
 from rhot_node.detect import contour_pixels
 from rhot_node.detect.contour_columns import COSINES, HALF_COSINES, HALF_SINES, NODES, SINES
 from rhot_node.detect.fast import GLANCE, FastDetector
+from rhot_node.detect.illuminant import Illuminant, gains_of
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.light import Light, gains_of
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerFlag
@@ -102,15 +102,15 @@ def test_another_light_costs_a_followed_frame_nothing(monkeypatch: pytest.Monkey
     detector = FastDetector(TIPS)
     for _ in range(6):
         detector.detect(canvas.expose(rng))
-    assert detector.warmth == pytest.approx(0.4, abs=0.06)
+    assert detector.temperature_shift == pytest.approx(0.4, abs=0.06)
     rows: list[float] = []
-    balanced = Light.balanced
+    balanced = Illuminant.balanced
 
-    def watched(light: Light, image: YuvImage, step: int = 1, first: int = 0) -> YuvImage:
+    def watched(light: Illuminant, image: YuvImage, step: int = 1, first: int = 0) -> YuvImage:
         rows.append(len(image.u[first::step]) / len(image.u))
         return balanced(light, image, step, first)
 
-    monkeypatch.setattr(Light, "balanced", watched)
+    monkeypatch.setattr(Illuminant, "balanced", watched)
     for _ in range(4 * GLANCE):
         assert all(mark.found for mark in detector.detect(canvas.expose(rng)))
     assert sum(rows) < 0.02 * 4 * GLANCE  # of every picture, by the rows that are searched at a glance

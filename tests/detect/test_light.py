@@ -7,8 +7,15 @@ import pytest
 from marker_rendering import SKIN, Canvas, capsule, disc, to_yuv
 
 from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.illuminant import (
+    HUE_SIGMA_DEG,
+    Illuminant,
+    balance_matrix,
+    fit_temperature_shift,
+    gains_of,
+    paint_rgb,
+)
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.light import HUE_SIGMA_DEG, Light, balance_matrix, fit_warmth, gains_of, paint_rgb
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 
@@ -45,16 +52,16 @@ def test_no_marker_is_lost_in_a_single_picture_by_another_lamp(lamp: tuple[float
     seen = detector.detect(lit((brightness * red, brightness * green, brightness * blue)))
     assert found_at_their_places(seen)
     expected = np.log(red / blue) / 1.55
-    assert detector.warmth == pytest.approx(expected, abs=0.06)
+    assert detector.temperature_shift == pytest.approx(expected, abs=0.06)
 
 
 def test_a_lamp_that_changes_slowly_is_followed_even_by_one_marker_in_view() -> None:
     detector = FastDetector(RHOT6)
     for step in range(60):
-        warmth = 0.004 * step
-        seen = detector.detect(lit(tuple(gains_of(warmth)), ("thumb",), seed=step))
+        temperature_shift = 0.004 * step
+        seen = detector.detect(lit(tuple(gains_of(temperature_shift)), ("thumb",), seed=step))
         assert found_at_their_places(seen, ("thumb",)), step
-    assert detector.warmth == pytest.approx(0.24, abs=0.1)
+    assert detector.temperature_shift == pytest.approx(0.24, abs=0.1)
 
 
 def test_a_lamp_that_is_switched_costs_no_frame() -> None:
@@ -64,34 +71,34 @@ def test_a_lamp_that_is_switched_costs_no_frame() -> None:
 
 
 def test_the_light_of_the_calibration_leaves_the_picture_as_it_is() -> None:
-    light, image = Light(RHOT6), lit((1.0, 1.0, 1.0))
+    light, image = Illuminant(RHOT6), lit((1.0, 1.0, 1.0))
     assert light.balanced(image) is image
     detector = FastDetector(RHOT6)
     for seed in range(5):
         detector.detect(lit((1.0, 1.0, 1.0), seed=seed))
-    assert abs(detector.warmth) < 0.05
+    assert abs(detector.temperature_shift) < 0.05
 
 
 def test_two_markers_in_a_picture_make_nobody_believe_in_another_light() -> None:
     pair = MarkerSet(markers=RHOT6.markers[:2])
     detector = FastDetector(pair)
     detector.detect(lit(BULB, ("ring", "wrist")))  # neither is in the set
-    assert detector.warmth == 0.0
+    assert detector.temperature_shift == 0.0
 
 
 def test_reset_forgets_the_light() -> None:
     detector = FastDetector(RHOT6)
     detector.detect(lit(BULB))
     detector.reset()
-    assert detector.warmth == 0.0
+    assert detector.temperature_shift == 0.0
 
 
 def test_a_balanced_picture_shows_the_colours_of_the_calibration() -> None:
     rng = np.random.default_rng(3)
     colours = rng.uniform(30, 170, (12, 16, 3))
     plain = to_yuv(np.kron(colours, np.ones((2, 2, 1))))
-    light = Light(RHOT6)
-    light.warmth = 0.4
+    light = Illuminant(RHOT6)
+    light.temperature_shift = 0.4
     other = to_yuv(np.asarray(np.kron(colours * gains_of(0.4), np.ones((2, 2, 1)))))
     balanced = light.balanced(other)
     assert np.abs(balanced.u.astype(int) - plain.u).max() <= 2
@@ -106,17 +113,17 @@ def test_the_warmth_is_where_the_hues_agree_and_one_wrong_marker_does_no_harm() 
     grid = np.linspace(-1.0, 1.0, 41)
     predicted = np.array([10.0 + 80.0 * grid, 170.0 + 50.0 * grid, -60.0 - 50.0 * grid])
     hues = np.array([10.0 + 80.0 * 0.33, 170.0 + 50.0 * 0.33 - 360.0, 100.0])
-    warmth, information = fit_warmth(hues, predicted, grid)
-    assert warmth == pytest.approx(0.33, abs=0.02)
+    temperature_shift, information = fit_temperature_shift(hues, predicted, grid)
+    assert temperature_shift == pytest.approx(0.33, abs=0.02)
     assert information == pytest.approx((80**2 + 50**2) / HUE_SIGMA_DEG**2, rel=0.01)
 
 
 def test_a_colour_that_no_lamp_changes_tells_nothing_of_the_lamp() -> None:
     grid = np.linspace(-1.0, 1.0, 41)
-    warmth, information = fit_warmth(np.array([3.0]), np.zeros((1, 41)), grid)
-    assert (warmth, information) == (pytest.approx(0.0, abs=1e-9), 0.0)
-    light = Light(RHOT6)
-    light.warmth = 0.3
+    temperature_shift, information = fit_temperature_shift(np.array([3.0]), np.zeros((1, 41)), grid)
+    assert (temperature_shift, information) == (pytest.approx(0.0, abs=1e-9), 0.0)
+    light = Illuminant(RHOT6)
+    light.temperature_shift = 0.3
     little = RHOT6.markers[RHOT6.ids.index("little")].chroma
     assert light.read([RHOT6.ids.index("little")], np.array([[80.0, little.cb, little.cr]])) < 0.1
 

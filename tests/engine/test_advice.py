@@ -5,7 +5,7 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from rhot_app.calibration.rig_checks import check_rig
+from rhot_app.calibration.check.checks import check_rig
 from rhot_app.engine.advice import NodeFacts, calibration_advice, disk_advice, no_marker_advice, node_advice
 from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import NodeStatus
@@ -25,6 +25,12 @@ def texts(facts: NodeFacts, running: bool = True) -> list[str]:
 def test_a_well_node_needs_no_words() -> None:
     assert texts(WELL) == []
     assert no_marker_advice([WELL], running=True) == []
+
+
+def test_a_black_picture_asks_for_no_colours() -> None:
+    covered = replace(WELL, unseen_s=(5.0, 5.0, 5.0), black=True)
+    assert no_marker_advice([covered, covered], running=True) == []
+    assert texts(covered) == ["left is black: is the lens covered?"]
 
 
 @pytest.mark.parametrize(("facts", "words"), [
@@ -50,6 +56,7 @@ def test_a_well_node_needs_no_words() -> None:
     (replace(WELL, recent=Recent(100, 0, {"kernel_overflow": 9}, 0)), ["kernel drops"]),
     (replace(WELL, unseen_s=(0.0, 12.0, 0.0)), ["Camera left", "index", "12 s"]),
     (replace(WELL, unseen_s=(5.0, 12.0, 7.0)), ["seen no marker for 5 s"]),
+    (replace(WELL, unseen_s=(5.0, 12.0, 7.0), black=True), ["left is black: is the lens covered?"]),
 ])
 def test_trouble_is_named(facts: NodeFacts, words: list[str]) -> None:
     (text,) = texts(facts)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from rhot_app.project import save_rig
-from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 
 DOCS = Path(__file__).parents[2] / "docs"
 

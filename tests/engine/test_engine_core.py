@@ -19,8 +19,8 @@ from rhot_app.errors import EngineError, RecordingError, RhotError, RigError
 from rhot_app.project import OneEuroSettings, OutputSettings, Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.rig_history import versions
-from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
-from rhot_app.sources.replay import LogDoor, LogReplay
+from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.sources.replay import LogReplay, LogValidator
 from rhot_app.sources.udp_nodes import UdpNodes
 from rhot_app.tracking.state import HandState
 from rhot_node.clock import NodeClock
@@ -141,7 +141,7 @@ def test_log_replays_to_the_same_states(tmp_path: Path, rig: Rig, bench: Bench, 
     assert set(right["dropped"]) <= {"time", "clock_in_doubt"}, "what a busy machine sends too late"
     assert right["accepted"] + sum(right["dropped"].values()) == right["received"]
     assert summary["state_rate_hz"] == pytest.approx(1e9 / np.diff(live).mean(), rel=0.1)
-    door = LogDoor(rig)
+    door = LogValidator(rig)
     again = np.array([s.t_master_ns for s in replay_states(LogReader(tmp_path / "a.log"), door, FakeTracker(rig))])
     nearest = np.abs(live[:, None] - again[None, :]).min(axis=1)
     assert np.mean(nearest < 20_000) > 0.9  # the clock's estimate may step between two records of different threads

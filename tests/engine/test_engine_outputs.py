@@ -22,7 +22,7 @@ from rhot_app.engine.core import Engine
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.errors import OutputError
 from rhot_app.project import OutputSettings, save_rig
-from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.udp_nodes import UdpNodes
 
 

@@ -11,7 +11,7 @@ import pytest
 from synthetic_rig import WIDE, Sight, Trajectory, hand_trajectory, make_rig, observe
 
 from rhot_app.engine.advice import calibration_advice
-from rhot_app.engine.health_watch import HealthWatch
+from rhot_app.engine.observer import HealthWatch
 from rhot_app.engine.status import Advice
 from rhot_app.project import CameraPose, DepthSettings, Rig
 from rhot_app.tracking.make import make_tracker

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rhot_app.engine.meters import RateMeter
+from rhot_app.engine.pipeline import RateMeter
 
 MS = 1_000_000
 

@@ -7,9 +7,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from rhot_app.engine.node_health import SENTENCE_MAX, health_advice, most_urgent_first
+from rhot_app.engine.node_health import SENTENCE_MAX, health_advice, most_urgent_first, sees_black
 from rhot_app.engine.status import Advice
-from rhot_node.health.checks import check_heat, check_power
+from rhot_node.health.checks import BLACK_PICTURE, check_heat, check_power
 from rhot_node.health.machine import Throttled
 
 
@@ -20,6 +20,12 @@ def test_a_nodes_own_checks_become_advice() -> None:
     assert power.level == "error" and power.text.startswith("Node left: its supply voltage is too low now")
     assert "power supply" in power.text
     assert heat.level == "warning" and "76 °C" in heat.text and "fan" in heat.text
+
+
+def test_a_black_picture_is_known_and_not_said_twice() -> None:
+    answer = msgspec.json.decode(msgspec.json.encode({"health": [BLACK_PICTURE]}))
+    assert sees_black(answer) and health_advice("left", answer) == ()
+    assert not sees_black({}) and not sees_black({"health": ["black"]})
 
 
 @pytest.mark.parametrize("health", [

@@ -15,13 +15,13 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
 from rhot_app.engine.directory import open_directory
 from rhot_app.engine.node_control import NodeControl
-from rhot_app.engine.server import Server, StatePublisher
+from rhot_app.engine.serve import Server, StatePublisher
 from rhot_app.engine.status import EngineStatus, Preview
 from rhot_app.errors import EngineError, RecordingError
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.bookmarks import Bookmark, read_bookmarks
 from rhot_app.recording.video import video_name
-from rhot_app.simulator.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.udp_nodes import UdpNodes
 from rhot_app.tracking.state import HandState
 from rhot_node.wire.messages import NodeState
@@ -323,3 +323,8 @@ def test_a_vanished_engine_is_noticed(rig: Rig, tmp_path: Path) -> None:
         assert client.command("hello")["pid"]
         client.command("quit")
         again.close()
+
+
+def test_where_no_engine_is_a_client_says_so(tmp_path: Path) -> None:
+    with EngineClient(tmp_path / "none") as client, pytest.raises(EngineError, match="There is no engine in"):
+        client.command("status", timeout_s=30.0)

@@ -10,11 +10,11 @@ from rhot_app.engine.replay_summary import replay_states, smoothed_states
 from rhot_app.engine.smoothed_replay import SmoothedReplay
 from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import EngineError, RecordingError
-from rhot_app.evaluation.takes import LOG_NAME, Order, take
+from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
 from rhot_app.project import with_tracker
 from rhot_app.recording.raw_log import LogReader, encode_header
-from rhot_app.simulator.scene import make_scene, twin_defaults
-from rhot_app.sources.replay import LogDoor
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import SmoothedTracker
 
 
@@ -22,16 +22,16 @@ from rhot_app.tracking.smoothing import SmoothedTracker
 def log(tmp_path_factory):
     """1.8 s of grasping."""
     order = Order(make_scene(twin_defaults(), 1), "grasp", 1.8, sketched=True)
-    return take(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME
+    return data_set(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME
 
 
 def test_every_pass_gives_the_smoothed_states(log):
     rig = with_tracker(LogReader(log).rig, "estimator")
-    expected = list(smoothed_states(LogReader(log), LogDoor(rig), SmoothedTracker(rig)))
+    expected = list(smoothed_states(LogReader(log), LogValidator(rig), SmoothedTracker(rig)))
     tracker = SmoothedReplay(log, rig).for_rig(rig)
     warm_up(tracker, rig)
     for first in (0, len(expected)):
-        states = list(replay_states(LogReader(log), LogDoor(rig), tracker))
+        states = list(replay_states(LogReader(log), LogValidator(rig), tracker))
         assert [state.t_master_ns for state in states] == [state.t_master_ns for state in expected]
         assert [state.sequence for state in states] == list(range(first, first + len(states)))
         np.testing.assert_array_equal([state.fingertip_positions for state in states],

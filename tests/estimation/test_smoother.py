@@ -9,12 +9,12 @@ from linear_motion import ConstantVelocity, kalman_update, place
 from rhot_app.engine.replay_summary import replay_states, smoothed_states
 from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.estimation.smoother import ChunkedSmoother, Estimate, smooth
-from rhot_app.evaluation import alterations as alter
-from rhot_app.evaluation.takes import Order, take
+from rhot_app.evaluation import fault_injection as alter
+from rhot_app.evaluation.data_sets import Order, data_set
 from rhot_app.project import with_tracker
-from rhot_app.simulator.node_log import T0_MASTER_NS
-from rhot_app.simulator.scene import make_scene, twin_defaults
-from rhot_app.sources.replay import LogDoor
+from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.state import Condition
@@ -104,15 +104,15 @@ def test_a_covariance_with_a_negative_eigenvalue_ends_nothing(variance):
 
 @pytest.fixture(scope="module")
 def grasp(tmp_path_factory):
-    return take(Order(make_scene(twin_defaults(), 1), "grasp", SECONDS, sketched=True),
+    return data_set(Order(make_scene(twin_defaults(), 1), "grasp", SECONDS, sketched=True),
                 tmp_path_factory.mktemp("takes"))
 
 
 def both(one, records):
     """Filtered and smoothed states of the records."""
     rig = with_tracker(one.rig, "estimator")
-    return (list(replay_states(records, LogDoor(rig), make_tracker(rig))),
-            list(smoothed_states(records, LogDoor(rig), SmoothedTracker(rig))))
+    return (list(replay_states(records, LogValidator(rig), make_tracker(rig))),
+            list(smoothed_states(records, LogValidator(rig), SmoothedTracker(rig))))
 
 
 def tips(one, states):
@@ -145,7 +145,7 @@ def test_smoothed_fingertips_are_nearer_to_the_truth_while_their_markers_are_hid
 
 def test_a_fast_hand_is_smoothed_as_well(tmp_path):
     """Between two frames it moves so far that what markers leave open changes."""
-    one = take(Order(make_scene(twin_defaults(), 3), "fast", SECONDS, sketched=True), tmp_path)
+    one = data_set(Order(make_scene(twin_defaults(), 3), "fast", SECONDS, sketched=True), tmp_path)
     (error, _, _), (better, _, _) = (tips(one, states) for states in both(one, one.records()))
     assert rms(better[80:]) < 0.95 * rms(error[80:])
 

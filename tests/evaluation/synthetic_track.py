@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rhot_app.evaluation.deviations import Worn
+from rhot_app.evaluation.deviations import WornMarkers
 from rhot_app.evaluation.track import Track
-from rhot_app.simulator.truth import FrameTruth, Truth
+from rhot_app.simulator.truth.truth import FrameTruth, Truth
 from rhot_app.tracking.state import Knowledge
 
-WORN = Worn(np.arange(5), np.arange(5), np.arange(21))
+WORN = WornMarkers(np.arange(5), np.arange(5), np.arange(21))
 PLACES = np.array([[0.02 * k, 0.0, 0.6] for k in range(6)])
 LATE_S = 0.03  # from the instant of a state to its datagram
 

@@ -10,12 +10,12 @@ from synthetic_track import LATE_S, WORN, make_track, make_truth
 
 from rhot_app.evaluation.accuracy import accuracy, display_error, pooled, predicted, ratio
 from rhot_app.evaluation.compare import Comparison, Judged, Run
-from rhot_app.evaluation.compare_table import COLUMNS, honesty_table, table
+from rhot_app.evaluation.compare_table import COLUMNS, consistency_table, table
+from rhot_app.evaluation.consistency import squares
 from rhot_app.evaluation.deviations import deviations, worn_by
-from rhot_app.evaluation.honesty import squares
 from rhot_app.evaluation.track import Predicted, Track
 from rhot_app.project import load_rig
-from rhot_app.simulator.truth import Truth
+from rhot_app.simulator.truth.truth import Truth
 from rhot_app.tracking.state import Knowledge
 from rhot_node.files import resource_path
 
@@ -98,7 +98,7 @@ def test_tables_put_trackers_side_by_side() -> None:
     assert len(lines) == 5 and len({len(line) for line in lines}) == 1
     assert lines[-1].split()[:4] == ["grasp", "2.00", "1.00", "0.50"]
     assert all(column.heading in lines[0] for column in COLUMNS)
-    honest = honesty_table(comparison).splitlines()
+    honest = consistency_table(comparison).splitlines()
     assert honest[-2].split()[:5] == ["grasp", "classic", "-", "-", "-"], "no covariances, no figures"
     assert honest[-1].split()[2:5] == ["0.33", "1.00", "1.000"], "an error of one sigma in one of three axes"
 

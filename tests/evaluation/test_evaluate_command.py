@@ -10,9 +10,9 @@ import pytest
 
 from rhot_app.__main__ import main
 from rhot_app.evaluation.compare import TRACKERS, compare
-from rhot_app.evaluation.compare_table import honesty_table, table
-from rhot_app.evaluation.takes import Order
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.evaluation.compare_table import consistency_table, table
+from rhot_app.evaluation.data_sets import Order
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 RAMP = Path(__file__).resolve().parents[2] / "benchmarks" / "motions" / "ramp.json"
 QUICK = ("evaluate", "--compare", "--sketched", "--trackers", "classic", "--motions", "rest, pinch", "--seeds", "2",
@@ -54,7 +54,7 @@ def test_a_recording_of_a_motions_name_is_another_motion(tmp_path: Path) -> None
     found = compare(wanted, tmp_path / "logs", {"classic": TRACKERS["classic"]})
     assert found.motions() == ["pinch", "pinch.json"]
     assert [len(found.of(motion)) for motion in found.motions()] == [1, 1]
-    for printed in (table(found), honesty_table(found)):
+    for printed in (table(found), consistency_table(found)):
         assert [line.split()[0] for line in printed.splitlines()[-2:]] == ["pinch", "pinch.json"]
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from synthetic_track import WORN, make_track, make_truth
 
-from rhot_app.evaluation.deviations import deviations
-from rhot_app.evaluation.honesty import (
+from rhot_app.evaluation.consistency import (
     INSTANT_S,
     Squares,
     at_instants,
@@ -17,6 +16,7 @@ from rhot_app.evaluation.honesty import (
     normalised,
     squares,
 )
+from rhot_app.evaluation.deviations import deviations
 
 COVARIANCE = 1e-6 * np.array([[1.0, 0.3, 0.0], [0.3, 2.0, -0.5], [0.0, -0.5, 9.0]])
 TIMES = np.arange(0.0, 3.9, INSTANT_S) + 0.5 * INSTANT_S

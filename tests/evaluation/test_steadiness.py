@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from synthetic_track import LATE_S, WORN, make_track, make_truth
 
-from rhot_app.evaluation.steadiness import found_after, lag, rising, settled_after, spread
+from rhot_app.evaluation.scenarios import found_after, lag, rising, settled_after, spread
 
 TIMES = np.arange(0.5, 3.5, 0.025)
 

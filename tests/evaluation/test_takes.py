@@ -9,18 +9,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot_app.evaluation import alterations as alter
-from rhot_app.evaluation import takes
+from rhot_app.evaluation import data_sets as takes
+from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.compare import judge, orders
-from rhot_app.evaluation.takes import LOG_NAME, Order, Stream, Take, take
+from rhot_app.evaluation.data_sets import LOG_NAME, DataSet, Order, Stream, data_set
 from rhot_app.evaluation.track import tracked
 from rhot_app.project import TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.camera_workers import Report
-from rhot_app.simulator.node_log import CABLE, Network
-from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
-from rhot_app.simulator.shot import Shot
-from rhot_app.sources.replay import LogDoor
+from rhot_app.simulator.nodes.camera_workers import Report
+from rhot_app.simulator.nodes.node_log import CABLE, Network
+from rhot_app.simulator.nodes.shot import Shot
+from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.files import resource_path
 
@@ -33,13 +33,13 @@ def scene(seed: int = 1) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def grasp(tmp_path_factory: pytest.TempPathFactory) -> Take:
+def grasp(tmp_path_factory: pytest.TempPathFactory) -> DataSet:
     """A take without pictures."""
-    return take(Order(scene(), "grasp", SECONDS, sketched=True), tmp_path_factory.mktemp("takes"))
+    return data_set(Order(scene(), "grasp", SECONDS, sketched=True), tmp_path_factory.mktemp("takes"))
 
 
-def through_the_door(one: Take, records: list[Record]) -> tuple[LogDoor, list[CameraObservations]]:
-    door = LogDoor(one.rig)
+def through_the_door(one: DataSet, records: list[Record]) -> tuple[LogValidator, list[CameraObservations]]:
+    door = LogValidator(one.rig)
     return door, [frame for record in records if (frame := door.feed(record)) is not None]
 
 
@@ -48,7 +48,7 @@ def found_share(frames: list[CameraObservations]) -> np.ndarray:
     return np.isfinite(np.array([frame.pixels[:, 0] for frame in frames])).mean(axis=0)
 
 
-def test_every_datagram_is_admitted_and_tracked_to_a_millimetre(grasp: Take) -> None:
+def test_every_datagram_is_admitted_and_tracked_to_a_millimetre(grasp: DataSet) -> None:
     door, frames = through_the_door(grasp, grasp.records())
     assert len(frames) == sum(record.kind is RecordKind.DATAGRAM for record in grasp.records()) > 150
     assert all(not link.door.dropped for link in door.links)
@@ -57,7 +57,7 @@ def test_every_datagram_is_admitted_and_tracked_to_a_millimetre(grasp: Take) -> 
     assert figures["swaps"] == 0.0
 
 
-def test_the_clocks_of_a_take_disagree_and_are_found_out(grasp: Take) -> None:
+def test_the_clocks_of_a_take_disagree_and_are_found_out(grasp: DataSet) -> None:
     door, frames = through_the_door(grasp, grasp.records())
     offsets = [link.clock.offset_s for link in door.links]
     assert all(offset is not None and offset > 1.0 for offset in offsets) and offsets[0] != offsets[1]
@@ -70,7 +70,7 @@ def test_one_order_is_filmed_once_and_the_same_anywhere(tmp_path: Path) -> None:
     told: list[str] = []
     logs = []
     for folder in (tmp_path / "a", tmp_path / "a", tmp_path / "b"):
-        one = take(order, folder, told.append)
+        one = data_set(order, folder, told.append)
         logs.append((one.folder / LOG_NAME).read_bytes())
         assert not one.outdated
     assert told == ["pinch, 0.3 s, seed 3"] * 2
@@ -81,11 +81,11 @@ def test_one_order_is_filmed_once_and_the_same_anywhere(tmp_path: Path) -> None:
 def test_a_sketch_that_other_sources_made_is_outdated(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str, outdated: bool) -> None:
     order = Order(scene(3), "pinch", 0.3, sketched=True)
-    assert not take(order, tmp_path).outdated
+    assert not data_set(order, tmp_path).outdated
     monkeypatch.setattr(takes, changed, (*getattr(takes, changed), "rays"))  # as good as another text of one of them
     takes._source_digest.cache_clear()
     try:
-        assert take(order, tmp_path).outdated is outdated
+        assert data_set(order, tmp_path).outdated is outdated
     finally:
         takes._source_digest.cache_clear()
 
@@ -112,7 +112,7 @@ def test_every_motion_is_ordered_with_every_seed() -> None:
 
 
 def test_a_lossy_network_loses_its_share(tmp_path: Path) -> None:
-    one = take(Order(scene(), "rest", SECONDS, Network(loss=0.3), sketched=True), tmp_path)
+    one = data_set(Order(scene(), "rest", SECONDS, Network(loss=0.3), sketched=True), tmp_path)
     door, frames = through_the_door(one, one.records())
     assert 0.55 < len(frames) / 160 < 0.85
     assert sum(link.door.sequence.lost for link in door.links) > 20
@@ -123,13 +123,13 @@ def test_pictures_are_rendered_and_the_nodes_detector_finds_the_markers(
     def here(shot: Shot, work: Callable[[Shot, int, Report], Stream], _: object) -> tuple[Stream, ...]:
         return tuple(work(shot, camera, lambda number: None) for camera in (0, 1))  # what is compiled is shared
 
-    monkeypatch.setattr("rhot_app.evaluation.takes.for_each_camera", here)
-    one = take(Order(scene(), "rest", 0.1), tmp_path)
+    monkeypatch.setattr("rhot_app.evaluation.data_sets.for_each_camera", here)
+    one = data_set(Order(scene(), "rest", 0.1), tmp_path)
     _, frames = through_the_door(one, one.records())
     assert len(frames) >= 7 and (found_share(frames) == 1.0).all()
 
 
-def test_a_covered_camera_sees_nothing_and_a_silent_one_says_nothing(grasp: Take) -> None:
+def test_a_covered_camera_sees_nothing_and_a_silent_one_says_nothing(grasp: DataSet) -> None:
     records = alter.changed(grasp.records(), alter.blind(1, 0.5, 1.5))
     _, frames = through_the_door(grasp, records)
     covered = [frame for frame in frames if frame.camera == 0 and not np.isfinite(frame.pixels).any()]
@@ -149,7 +149,7 @@ def test_episodes_fill_their_share_of_the_time(lasting_s: tuple[float, float]) -
 
 
 @pytest.mark.parametrize("together", [True, False])
-def test_hidden_markers_are_lost_to_all_cameras_at_once_or_to_each_by_itself(grasp: Take, together: bool) -> None:
+def test_hidden_markers_are_lost_to_all_cameras_at_once_or_to_each_by_itself(grasp: DataSet, together: bool) -> None:
     change = alter.hidden(0.3, SECONDS, NODES, 6, seed=2, together=together)
     _, frames = through_the_door(grasp, alter.changed(grasp.records(), change))
     lost = [1.0 - found_share([frame for frame in frames if frame.camera == camera]) for camera in (0, 1)]
@@ -157,7 +157,7 @@ def test_hidden_markers_are_lost_to_all_cameras_at_once_or_to_each_by_itself(gra
     assert (np.abs(lost[0] - lost[1]).max() < 0.03) == together
 
 
-def test_mixed_up_markers_stand_in_each_others_places(grasp: Take) -> None:
+def test_mixed_up_markers_stand_in_each_others_places(grasp: DataSet) -> None:
     _, right = through_the_door(grasp, grasp.records())
     _, wrong = through_the_door(grasp, alter.changed(grasp.records(), alter.mixed_up((1, 2), 0.5, SECONDS, NODES, 4)))
     swapped = [np.allclose(a.pixels[1], b.pixels[2]) and np.allclose(a.pixels[2], b.pixels[1])
@@ -166,16 +166,16 @@ def test_mixed_up_markers_stand_in_each_others_places(grasp: Take) -> None:
     assert 0.1 < np.mean(swapped) < 0.9 and all(one != other for one, other in zip(swapped, same, strict=True))
 
 
-def test_a_late_start_leaves_the_clocks_known(grasp: Take) -> None:
+def test_a_late_start_leaves_the_clocks_known(grasp: DataSet) -> None:
     door, frames = through_the_door(grasp, alter.begun_at(grasp.records(), 1.0))
     assert len(frames) == pytest.approx(82, abs=3) and all(not link.door.dropped for link in door.links)
 
 
-def test_a_prolonged_log_goes_on_without_a_drop(grasp: Take) -> None:
+def test_a_prolonged_log_goes_on_without_a_drop(grasp: DataSet) -> None:
     door, frames = through_the_door(grasp, list(alter.prolonged(grasp.records(), 3)))
     count = sum(record.kind is RecordKind.DATAGRAM for record in grasp.records())
     assert len(frames) == 3 * count
     assert all(not link.door.dropped and not link.door.sequence.lost for link in door.links)
-    assert door.changes == LogDoor(grasp.rig).changes + 1, "one session, and no clock was set"
+    assert door.changes == LogValidator(grasp.rig).changes + 1, "one session, and no clock was set"
     times = tracked(alter.prolonged(grasp.records(), 3), grasp.rig).times_s
     assert (np.diff(times) > 0.0).all() and times[-1] > 3.0 * SECONDS

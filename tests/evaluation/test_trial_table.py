@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from rhot_app.evaluation.trial_table import legend, trial_table
+from rhot_app.evaluation.run_table import legend, run_table
 
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "trackers.py"
 BLIND = {"classic": {"tips_mm": 33.25, "within_3_sd_share": None},
@@ -14,7 +14,7 @@ BLIND = {"classic": {"tips_mm": 33.25, "within_3_sd_share": None},
 
 
 def test_a_table_lines_up_and_says_what_was_tried() -> None:
-    head, columns, classic, model = trial_table("blind", "grasp, 8 s", BLIND).rstrip("\n").splitlines()
+    head, columns, classic, model = run_table("blind", "grasp, 8 s", BLIND).rstrip("\n").splitlines()
     assert head == "blind: grasp, 8 s"
     assert columns.split() == ["tips_mm", "within_3_sd_share"] and len({len(columns), len(classic), len(model)}) == 1
     assert classic.split() == ["classic", "33.250", "-"] and model.split() == ["estimator", "1234", "0.990"]

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from tracked_log import states_of_log
 
-from rhot_app.evaluation.takes import LOG_NAME, Order, take
+from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
 from rhot_app.export.states import HandStates
 from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header, encode_record
-from rhot_app.simulator.node_log import T0_MASTER_NS
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 GAP_NS = T0_MASTER_NS + 700_000_000, T0_MASTER_NS + 1_400_000_000
 
@@ -21,7 +21,7 @@ GAP_NS = T0_MASTER_NS + 700_000_000, T0_MASTER_NS + 1_400_000_000
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """1.8 s of grasping, 40 pairs of frames a second."""
     order = Order(make_scene(twin_defaults(), 1), "grasp", 1.8, sketched=True)
-    return take(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME
+    return data_set(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME
 
 
 @pytest.fixture(scope="session")

@@ -17,12 +17,13 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, excess, slice_flexion, swing, unswing
 from rhot_app.hand.solvers.knuckles import shape_knuckles
 from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
-from rhot_app.hand.solvers.methods import Method, solve
-from rhot_app.hand.solvers.neighbours import (
+from rhot_app.hand.solvers.methods import (
     NEIGHBOURS,
     Difference,
+    Method,
     differences_of,
     share_out,
+    solve,
     solve_neighbours,
     violation,
 )

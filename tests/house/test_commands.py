@@ -16,7 +16,7 @@ MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
 OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot": ("--version", "demo", "engine", "replay", "simulate", "evaluate"),
     "rhot demo": ("--motion", "--seed"),
-    "rhot engine": ("--rig", "--log", "--video", "--output", "--web"),
+    "rhot engine": ("--rig", "--record", "--video", "--output", "--web"),
     "rhot replay": ("LOG", "--rig", "--keep", "--smooth"),
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from rhot_app import project
-from rhot_app.calibration import intrinsics_file
+from rhot_app.calibration.lens import intrinsics_file
 from rhot_app.hand import anatomy, articulated, couplings
 from rhot_app.tracking.state import HandState
 from rhot_node import config, markers

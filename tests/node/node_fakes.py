@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class FakeCamera:
         self.began_ns = clock.now_ns()
         self.closed = False
         self.rewound = 0
+        self.luma: np.ndarray | None = None  # of its pictures, unless they are grey
 
     @property
     def size(self) -> tuple[int, int]:
@@ -46,7 +48,10 @@ class FakeCamera:
         if isinstance(item, Exception):
             raise item
         t = self.began_ns + item * self.period_ns if self.period_ns else self.clock.now_ns()
-        return Frame(grey_image(), item, min(t, self.clock.now_ns()), self.clock.now_ns(), 4_000_000, 48_000)
+        image = grey_image()
+        if self.luma is not None:
+            image = replace(image, y=self.luma)
+        return Frame(image, item, min(t, self.clock.now_ns()), self.clock.now_ns(), 4_000_000, 48_000)
 
     def rewind(self) -> None:
         self.rewound += 1

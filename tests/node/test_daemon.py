@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from node_fakes import LOST_CAMERA, SIZE, FakeCamera, FakeDetector, FakeSender
 
@@ -262,3 +263,15 @@ def test_the_report_tells_of_the_camera_and_of_the_machine(tmp_path: Path) -> No
     node.cameras[0].report = lambda: {"sensor": "imx219"}  # type: ignore[attr-defined]
     assert node.daemon.report()["camera"] == {"sensor": "imx219"}
     assert node.daemon.report()["health"] == [trouble]
+
+
+def test_the_report_says_that_the_picture_is_black(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rhot_node.daemon, "_LIGHT_PERIOD_S", 0.0)
+    node = Node(tmp_path, range(9))
+    node.daemon.prepare()
+    lit, capped = np.full((480, 640), 90, np.uint8), np.full((480, 640), 18, np.uint8)
+    capped[:40, :40] = 200  # a reflection
+    for luma, codes in ((capped, ["black"]), (lit, [])):
+        node.cameras[0].luma = luma
+        node.step()
+        assert [trouble.code for trouble in node.daemon.report()["health"]] == codes

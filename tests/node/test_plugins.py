@@ -15,8 +15,7 @@ import pytest
 import zmq
 
 from rhot_node.capture.camera import Frame
-from rhot_node.capture.open import open_camera
-from rhot_node.capture.plugin import PluginCamera
+from rhot_node.capture.open import PluginCamera, open_camera
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings, load_settings, parse_settings, save_settings
 from rhot_node.detect.image import YuvImage

@@ -10,7 +10,7 @@ from streams import Stream
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import OutputSettings, Rig
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_node.files import resource_path
 
 

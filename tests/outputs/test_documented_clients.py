@@ -116,7 +116,7 @@ def test_lsl_client(stream: Callable[..., Stream], tmp_path: Path, monkeypatch: 
     del pylsl
     name = f"RHOT {os.getpid()}"
     code = ("import sys, time; sys.path.insert(0, sys.argv[1]); from streams import Stream; from rhot_app.simulator."
-            "synthetic_node import synthetic_rig; Stream(synthetic_rig(), sys.argv[2]); time.sleep(3600)")
+            "nodes.synthetic_node import synthetic_rig; Stream(synthetic_rig(), sys.argv[2]); time.sleep(3600)")
     with subprocess.Popen([sys.executable, "-c", code, str(Path(__file__).parent), f"lsl:{name}"]) as sender:
         try:
             with running(program("LSL", _RHOT=name)) as lines:

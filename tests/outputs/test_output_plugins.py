@@ -18,7 +18,7 @@ from rhot_app.errors import OutputError
 from rhot_app.outputs.outputs import make_sink
 from rhot_app.outputs.spec import parse_output
 from rhot_app.project import Rig, save_rig
-from rhot_app.simulator.synthetic_node import SyntheticNode
+from rhot_app.simulator.nodes.synthetic_node import SyntheticNode
 
 PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text()
 

@@ -11,7 +11,7 @@ from rhot_app.errors import RecordingError
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark, bookmark_record, read_bookmarks
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 
 DATAGRAM = Record(RecordKind.DATAGRAM, 1, 5, b"datagram")
 

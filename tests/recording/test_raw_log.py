@@ -20,7 +20,7 @@ from rhot_app.errors import RecordingError, RhotError
 from rhot_app.project import save_rig
 from rhot_app.recording.raw_log import LogReader, Losses, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 
 RECORDS = [Record(RecordKind.START, 0, 1, b"start"), Record(RecordKind.DATAGRAM, 1, -5, b""),
            Record(RecordKind.CLOCK_REQUEST, 2, 10**18, b"x" * 60000), Record(RecordKind.GAP, 0, 7, b"\1\0\0\0")]

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.simulator.body import PALM_GROUP, SKIN
-from rhot_app.simulator.controls import Controls
-from rhot_app.simulator.lamp import Lamp
-from rhot_app.simulator.moments import Shutter
-from rhot_app.simulator.painter import Solids
-from rhot_app.simulator.prop import Prop
-from rhot_app.simulator.render import Exposure, FrameRenderer, Optics
-from rhot_app.simulator.solids_painter import SolidsPainter
+from rhot_app.simulator.render.body import PALM_GROUP, SKIN
+from rhot_app.simulator.render.exposure_samples import Shutter
+from rhot_app.simulator.render.painter import Solids
+from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
+from rhot_app.simulator.render.solids_painter import SolidsPainter
+from rhot_app.simulator.scene.camera_controls import Controls
+from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.scene.rigid_target import RigidTarget
 
 Array = NDArray[np.float64]
 
@@ -37,10 +37,10 @@ class Gliding:
         return transforms, np.zeros((len(times_s), 21))
 
 
-def balls(radii: list[float], places: list[tuple[float, float, float]], painted: list[bool]) -> Prop:
+def balls(radii: list[float], places: list[tuple[float, float, float]], painted: list[bool]) -> RigidTarget:
     """Balls at fixed places about the prop's origin; painted ones (white) first, the others are black skin."""
     count = len(radii)
-    return Prop(
+    return RigidTarget(
         group=np.arange(count) % PALM_GROUP,
         marker=np.array([k if paint else SKIN for k, paint in enumerate(painted)]),
         size=np.array([[radius, 0.0, 0.0] for radius in radii]),

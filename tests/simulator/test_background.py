@@ -10,7 +10,7 @@ from simulator_solids import CAMERA, FOCAL
 
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.transforms import rigid
-from rhot_app.simulator.background import BACKGROUNDS, BEHIND_HAND_M, background_image
+from rhot_app.simulator.scene.background import BACKGROUNDS, BEHIND_HAND_M, background_image
 
 BASELINE_M = 0.075
 PINHOLE = replace(CAMERA, intrinsics=np.array([FOCAL, FOCAL, 319.5, 239.5, 0.0, 0.0, 0.0, 0.0, 0.0]))

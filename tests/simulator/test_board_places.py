@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import CalibrationError, SimulatorError
-from rhot_app.simulator.acts import make_act
-from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
-from rhot_app.simulator.shows import BoardShow, HandShow, MarkerShow, RulerShow
-from rhot_app.simulator.stations import MOVE_S, STILL_S, Stations
+from rhot_app.simulator.scene.board_motion import MOVE_S, STILL_S, BoardPoses
+from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
+from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow, RulerShow
+from rhot_app.simulator.scene.scene_objects import make_object
 
 SHOW = BoardShow()
 
@@ -25,9 +25,9 @@ def corners_px(scene: Scene, pose: np.ndarray, camera: int) -> np.ndarray:
 
 
 def test_places_cover_both_pictures_near_and_far_and_lean_every_way(scene: Scene) -> None:
-    act = make_act(SHOW, scene)
-    assert isinstance(act.source, Stations)
-    poses = act.source.poses
+    scene_object = make_object(SHOW, scene)
+    assert isinstance(scene_object.source, BoardPoses)
+    poses = scene_object.source.poses
     whole = np.zeros((len(poses), 2), dtype=bool)
     for camera in (0, 1):
         hits = np.zeros((6, 8))
@@ -47,8 +47,8 @@ def test_places_cover_both_pictures_near_and_far_and_lean_every_way(scene: Scene
 
 
 def test_pauses_are_still_and_moves_are_smooth(scene: Scene) -> None:
-    source = make_act(SHOW, scene).source
-    assert isinstance(source, Stations)
+    source = make_object(SHOW, scene).source
+    assert isinstance(source, BoardPoses)
     pause = source.sample(np.linspace(0.02, STILL_S - 0.02, 60))[0]
     pixels = np.array([corners_px(scene, pose, 0) for pose in pause])
     assert np.ptp(pixels, axis=0).max() < 0.5
@@ -59,14 +59,14 @@ def test_pauses_are_still_and_moves_are_smooth(scene: Scene) -> None:
 
 
 def test_seed_decides_the_places(scene: Scene) -> None:
-    one, again, other = (make_act(SHOW, s).source.sample(np.array([0.5]))[0]
+    one, again, other = (make_object(SHOW, s).source.sample(np.array([0.5]))[0]
                          for s in (scene, scene, make_scene(twin_defaults(), 2)))
     np.testing.assert_array_equal(one, again)
     assert np.abs(one - other).max() > 1e-3
 
 
 def test_table_board_lies_still_and_whole_before_both_cameras(scene: Scene) -> None:
-    source = make_act(BoardShow(on_table=True), scene).source
+    source = make_object(BoardShow(on_table=True), scene).source
     poses = source.sample(np.array([0.0, 3.0]))[0]
     np.testing.assert_array_equal(poses[0], poses[1])
     for camera in (0, 1):
@@ -77,8 +77,8 @@ def test_table_board_lies_still_and_whole_before_both_cameras(scene: Scene) -> N
 
 @pytest.mark.parametrize("distance", [0.2, 0.6, 1.5])
 def test_single_marker_is_at_its_distance_in_both_pictures(scene: Scene, distance: float) -> None:
-    act = make_act(MarkerShow(marker="ring", distance_m=distance), scene)
-    positions = act.thing.marker_positions(*act.source.sample(np.linspace(0.0, 5.0, 50)))  # type: ignore[union-attr]
+    scene_object = make_object(MarkerShow(marker="ring", distance_m=distance), scene)
+    positions = scene_object.thing.marker_positions(*scene_object.source.sample(np.linspace(0.0, 5.0, 50)))  # type: ignore[union-attr]
     ring = positions[:, scene.markers.ids.index("ring")]
     np.testing.assert_allclose(ring[:, 2], distance, atol=0.6e-3)
     assert np.isnan(np.delete(positions, 3, axis=1)).all()
@@ -92,9 +92,9 @@ def test_moving_marker_is_fast_and_stays_in_both_pictures(preset: str) -> None:
     settings = twin_defaults()
     scene = make_scene(type(settings)(**{name: getattr(settings, name) for name in settings.__struct_fields__}
                                       | {"preset": preset}), 1)
-    act = make_act(MarkerShow(moving=True), scene)
+    scene_object = make_object(MarkerShow(moving=True), scene)
     times = np.linspace(0.0, 30.0, 6001)
-    path = act.source.sample(times)[0][:, :3, 3]
+    path = scene_object.source.sample(times)[0][:, :3, 3]
     speed = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.diff(times)
     assert speed.max() > (1.5 if preset == "wide" else 0.5)
     for camera in (0, 1):
@@ -104,9 +104,9 @@ def test_moving_marker_is_fast_and_stays_in_both_pictures(preset: str) -> None:
 
 def test_what_cannot_be_shown_is_refused_with_a_sentence(scene: Scene) -> None:
     with pytest.raises(SimulatorError, match="toe"):
-        make_act(MarkerShow(marker="toe"), scene)
+        make_object(MarkerShow(marker="toe"), scene)
     with pytest.raises(CalibrationError, match="9 by"):
-        make_act(BoardShow(size="9 by"), scene)
+        make_object(BoardShow(size="9 by"), scene)
     with pytest.raises(SimulatorError, match="juggle"):
-        make_act(HandShow("juggle"), scene)
-    assert make_act(RulerShow(150.0), scene).name == "ruler of 150 mm"
+        make_object(HandShow("juggle"), scene)
+    assert make_object(RulerShow(150.0), scene).name == "ruler of 150 mm"

@@ -18,8 +18,8 @@ from patience import PATIENCE_MS, PATIENCE_S, eventually
 
 from rhot_app.keys import load_master_keys
 from rhot_app.project import load_rig
-from rhot_app.simulator.remote import TwinRemote
-from rhot_app.simulator.shows import BoardShow
+from rhot_app.simulator.nodes.remote import TwinRemote
+from rhot_app.simulator.scene.scene_description import BoardShow
 from rhot_node.keys import connect_with
 
 READY_S = 90.0
@@ -61,7 +61,7 @@ def twin(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
     """A live twin and its rig file."""
     rig = tmp_path / "live.rig.json"
     process = subprocess.Popen(
-        [sys.executable, "-m", "rhot_app.simulator.live", "--motion", "wave", "--seed", "3",
+        [sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", "wave", "--seed", "3",
          "--directory", str(tmp_path), "--rig", str(rig)], stdout=subprocess.PIPE)
     try:
         yield process, rig
@@ -89,7 +89,10 @@ def test_live_twin_obeys_heals_a_killed_node_and_ends_with_its_nodes(
         remote.show(BoardShow(on_table=True))
         eventually(lambda: remote.state().cameras["left"].exposure_us == 6000.0,
                    told=lambda: "what the node is told, the twin's sensor does")
-        assert remote.cover("left").covered == ("left",) and remote.cover().covered == ()
+        assert remote.cover("left").covered == ("left",)
+        eventually(lambda: "black" in [one["code"] for one in ask_node(rig_path, {"request": "state"})["health"]],
+                   told=lambda: "the node does not say that its picture is black")
+        assert remote.cover().covered == ()
     nodes = children(process.pid)
     assert len(nodes) == 2 and len(set(ports)) == 2 and udp_ports_open(ports)
 
@@ -110,8 +113,8 @@ def test_live_twin_obeys_heals_a_killed_node_and_ends_with_its_nodes(
 
 def test_unknown_motion_ends_with_a_sentence(tmp_path: Path) -> None:
     result = subprocess.run(
-        [sys.executable, "-m", "rhot_app.simulator.live", "--motion", "juggle", "--directory", str(tmp_path), "--rig",
-         str(tmp_path / "rig.json")], capture_output=True, text=True, timeout=READY_S, check=False)
+        [sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", "juggle", "--directory", str(tmp_path),
+         "--rig", str(tmp_path / "rig.json")], capture_output=True, text=True, timeout=READY_S, check=False)
     assert result.returncode == 2
     assert "juggle" in result.stderr and "Traceback" not in result.stderr
     assert not (tmp_path / "rig.json").exists()

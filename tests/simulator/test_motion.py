@@ -14,7 +14,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import ANGLES, HandPose
-from rhot_app.simulator.motion import FACING, load_motion, motion_names
+from rhot_app.simulator.scene.motion import FACING, load_motion, motion_names
 from rhot_node.files import resource_path
 
 CENTRE = np.array([0.0375, 0.0, 0.6])

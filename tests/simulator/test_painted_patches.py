@@ -14,11 +14,11 @@ from test_worn_markers import Shown
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.simulator.body import Look, build_body
-from rhot_app.simulator.scene import Scene, make_scene, twin_defaults
-from rhot_app.simulator.shot import make_shot
-from rhot_app.simulator.sights import SightNoise, sights
-from rhot_app.simulator.truth import true_act
+from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.render.body import Look, build_body
+from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
+from rhot_app.simulator.truth.ideal_observations import ObservationNoise, sights
+from rhot_app.simulator.truth.truth import true_object
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerFlag
@@ -146,8 +146,8 @@ def scene(**settings: Any) -> Scene:
 
 def test_the_truth_and_the_sketch_have_nails_where_the_hand_has_them() -> None:
     taken = make_shot(scene(facing="back"), "tap", 1.0)
-    frames, truth = sights(taken, 0, SightNoise(white=0.0, common=0.0, own=0.0))
-    true = true_act(taken.act, 1.0, (truth, truth))
+    frames, truth = sights(taken, 0, ObservationNoise(white=0.0, common=0.0, own=0.0))
+    true = true_object(taken.scene_object, 1.0, (truth, truth))
     camera = taken.scene.camera(0)
     plain = 0
     for number in (5, 15, 30):
@@ -165,7 +165,7 @@ def test_the_truth_and_the_sketch_have_nails_where_the_hand_has_them() -> None:
 
 
 def test_the_other_side_of_the_hand_faces_the_cameras_where_it_stood() -> None:
-    palm, back = (make_shot(scene(facing=side), "still", 0.5).act.source.sample(np.zeros(1))[0][0]
+    palm, back = (make_shot(scene(facing=side), "still", 0.5).scene_object.source.sample(np.zeros(1))[0][0]
                   for side in ("palm", "back"))
     np.testing.assert_allclose(palm[:3, 3], back[:3, 3])
     assert palm[2, 2] > 0.9 > -0.9 > back[2, 2], "the palm's z comes out of the back of the hand"

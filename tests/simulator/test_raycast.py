@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from rhot_app.simulator.body import CAPSULE, CYLINDER
-from rhot_app.simulator.raycast import NO_HIT, PREPARED, hit, lambert, prepare
+from rhot_app.simulator.render.body import CAPSULE, CYLINDER
+from rhot_app.simulator.render.raycast import NO_HIT, PREPARED, hit, lambert, prepare
 
 
 @njit

@@ -12,9 +12,9 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.simulator.landmarks import Landmarks, read_landmarks
-from rhot_app.simulator.motion import FACING, load_motion
-from rhot_app.simulator.recorded import fit_poses
+from rhot_app.simulator.scene.motion import FACING, load_motion
+from rhot_app.simulator.scene.recorded import fit_poses
+from rhot_app.simulator.truth.landmarks import Landmarks, read_landmarks
 from rhot_node.files import resource_path
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "hand_motion"

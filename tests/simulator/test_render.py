@@ -13,11 +13,11 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.hand.shape import segments
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.simulator.background import background_image
-from rhot_app.simulator.body import CAPSULE, SKIN, build_body
-from rhot_app.simulator.moments import Shutter
-from rhot_app.simulator.motion import FACING
-from rhot_app.simulator.rays import ray_table
+from rhot_app.simulator.render.body import CAPSULE, SKIN, build_body
+from rhot_app.simulator.render.exposure_samples import Shutter
+from rhot_app.simulator.render.rays import ray_table
+from rhot_app.simulator.scene.background import background_image
+from rhot_app.simulator.scene.motion import FACING
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

@@ -8,13 +8,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 from simulator_solids import CAMERA, NEUTRAL, OPTICS, STEADY, STILL, Gliding
 
-from rhot_app.calibration.board import Board, CharucoBoard, Chessboard
-from rhot_app.calibration.corners import detect
-from rhot_app.simulator.moments import Shutter
-from rhot_app.simulator.painter import PoseSource
-from rhot_app.simulator.render import Exposure, FrameRenderer
-from rhot_app.simulator.sheet import BLACK, WHITE, board_sheet, ruler_ends, ruler_sheet
-from rhot_app.simulator.sheet_painter import SheetPainter
+from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.corners import detect
+from rhot_app.simulator.render.exposure_samples import Shutter
+from rhot_app.simulator.render.painter import PoseSource
+from rhot_app.simulator.render.render import Exposure, FrameRenderer
+from rhot_app.simulator.render.sheet import BLACK, WHITE, board_sheet, ruler_ends, ruler_sheet
+from rhot_app.simulator.render.sheet_painter import SheetPainter
 
 CHESSBOARD, CHARUCO = Chessboard(9, 6, 0.03), CharucoBoard(8, 6, 0.035, 0.026)
 LEGACY = CharucoBoard(8, 6, 0.035, 0.026, legacy=True)

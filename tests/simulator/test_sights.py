@@ -9,17 +9,16 @@ import pytest
 
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.silhouette import point_rays
-from rhot_app.simulator.hidden_parts import spots
-from rhot_app.simulator.scene import Scene, make_scene, node_settings, twin_defaults
-from rhot_app.simulator.shot import Shot, make_renderer, make_shot
-from rhot_app.simulator.shows import BoardShow
-from rhot_app.simulator.sights import SightNoise, sights
-from rhot_app.simulator.truth import true_act
+from rhot_app.simulator.nodes.shot import Shot, make_renderer, make_shot
+from rhot_app.simulator.scene.scene import Scene, make_scene, node_settings, twin_defaults
+from rhot_app.simulator.scene.scene_description import BoardShow
+from rhot_app.simulator.truth.ideal_observations import ObservationNoise, sights, spots
+from rhot_app.simulator.truth.truth import true_object
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
 from rhot_node.wire.messages import MarkerFlag
 
-EXACT = SightNoise(white=0.0, common=0.0, own=0.0)
+EXACT = ObservationNoise(white=0.0, common=0.0, own=0.0)
 
 
 def shot(motion: str, seconds: float = 2.0, seed: int = 2) -> Shot:
@@ -34,7 +33,7 @@ def test_outlines_lead_back_to_the_markers_centres() -> None:
     taken = shot("rest", 1.0)
     frames, truth = sights(taken, 1, EXACT)
     camera = taken.scene.camera(1)
-    true = true_act(taken.act, 1.0, (truth, truth))
+    true = true_object(taken.scene_object, 1.0, (truth, truth))
     radius = 1e-3 * taken.scene.markers.markers[1].radius_mm
     for number in (0, 20, 39):
         seen = frames[number][1]
@@ -53,7 +52,7 @@ def test_hidden_parts_are_those_of_the_pictures() -> None:
     _, truth = sights(taken, 0)
     renderer = make_renderer(taken, 0)
     chosen = range(0, len(truth.times_s), 12)
-    painted = np.array([renderer.radiance(taken.act.source, truth.times_s[k], k)[2].copy() for k in chosen])
+    painted = np.array([renderer.radiance(taken.scene_object.source, truth.times_s[k], k)[2].copy() for k in chosen])
     sketched = truth.visible[list(chosen)]
     assert (painted < 0.8).sum() > 5, "something is hidden now and then"
     assert np.abs(painted - sketched).mean() < 0.04
@@ -67,7 +66,7 @@ def test_fingertips_are_as_large_as_in_pictures_wherever_they_are_and_however_th
     width, height = taken.scene.preset.width, taken.scene.preset.height
     ratios = []
     for number, t_s in enumerate(truth.times_s):
-        frame, _ = renderer.render(taken.act.source, t_s, number)
+        frame, _ = renderer.render(taken.scene_object.source, t_s, number)
         found = detector.detect(from_i420(frame, width, height))
         ratios += [one.diameter / other.diameter for one, other in zip(found[:5], frames[number], strict=False)
                    if one.flags == other.flags == 0]
@@ -89,12 +88,12 @@ def test_what_is_half_hidden_is_said_to_be_and_what_is_hidden_is_lost() -> None:
 
 def test_noise_is_as_large_as_wanted_and_the_cameras_share_most_of_the_bias() -> None:
     taken = shot("still", 30.0)
-    bias = [_offsets(taken, camera, SightNoise(white=0.0, common=0.05, own=0.02)) for camera in (0, 1)]
+    bias = [_offsets(taken, camera, ObservationNoise(white=0.0, common=0.05, own=0.02)) for camera in (0, 1)]
     assert np.sqrt(np.mean(np.square(bias))) == pytest.approx(np.hypot(0.05, 0.02), rel=0.15)
     assert np.abs(np.diff(bias[0], axis=0)).mean() < 0.02, "slowly"
     count = min(len(one) for one in bias)
     assert np.corrcoef(bias[0][:count].ravel(), bias[1][:count].ravel())[0, 1] > 0.7
-    white = _offsets(taken, 0, SightNoise(white=0.03, common=0.0, own=0.0))
+    white = _offsets(taken, 0, ObservationNoise(white=0.03, common=0.0, own=0.0))
     assert white.std() == pytest.approx(0.03, rel=0.05)
 
 
@@ -115,8 +114,8 @@ def test_a_board_cannot_be_sketched() -> None:
         sights(make_shot(scene(1), BoardShow(), 1.0), 0)
 
 
-def _offsets(taken: Shot, camera: int, noise: SightNoise) -> np.ndarray:
+def _offsets(taken: Shot, camera: int, noise: ObservationNoise) -> np.ndarray:
     """(F, 5, 2) px of the fingertips: with noise, less without."""
-    def places(one: SightNoise) -> np.ndarray:
+    def places(one: ObservationNoise) -> np.ndarray:
         return np.array([[(marker.x, marker.y) for marker in frame[:5]] for frame in sights(taken, camera, one)[0]])
     return places(noise) - places(EXACT)

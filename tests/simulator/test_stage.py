@@ -11,18 +11,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot_app.calibration.board import STANDARD_BOARD
-from rhot_app.calibration.corners import detect
+from rhot_app.calibration.board.boards import STANDARD_BOARD
+from rhot_app.calibration.board.corners import detect
 from rhot_app.errors import CalibrationError, SimulatorError
-from rhot_app.simulator.frame_socket import FrameSocket
-from rhot_app.simulator.lamp import Lamp
-from rhot_app.simulator.live_cameras import LiveCameras
-from rhot_app.simulator.remote import TwinRemote
-from rhot_app.simulator.scene import make_scene, twin_defaults
-from rhot_app.simulator.shows import BoardShow, HandShow, MarkerShow
-from rhot_app.simulator.stage import Stage
-from rhot_app.simulator.twin_door import TwinDoor
-from rhot_app.simulator.twin_requests import CoverRequest, LampRequest, ShowRequest, StateRequest
+from rhot_app.simulator.nodes.frame_socket import FrameSocket
+from rhot_app.simulator.nodes.live_cameras import LiveCameras
+from rhot_app.simulator.nodes.remote import TwinRemote
+from rhot_app.simulator.nodes.twin_requests import CoverRequest, LampRequest, ShowRequest, StateRequest
+from rhot_app.simulator.nodes.twin_server import TwinServer
+from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.scene.live_scene import LiveScene
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow
 from rhot_node.capture.stream import HEADER_BYTES, StreamHeader, pack_settings, unpack_header
 from rhot_node.config import CameraSettings
 
@@ -37,7 +37,7 @@ class Rig:
         wide = msgspec.structs.replace(settings.presets["wide"], width=WIDTH, height=HEIGHT)
         self.scene = make_scene(msgspec.structs.replace(settings, presets={"wide": wide}), 1)
         self.sockets = [FrameSocket(folder / f"{name}.frames") for name in self.scene.names]
-        self.stage = Stage(self.scene, HandShow("still"))
+        self.stage = LiveScene(self.scene, HandShow("still"))
         self.cameras = LiveCameras(self.scene, self.stage, self.sockets)
         self.node = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self.node.connect(str(folder / "left.frames"))
@@ -153,7 +153,7 @@ def test_a_node_that_talks_nonsense_is_cut_off_and_may_come_back(rig: Rig, tmp_p
 
 def test_remote_and_door_understand_each_other(rig: Rig, tmp_path: Path) -> None:
     rig.stage.report = {"cameras": rig.cameras.report(), "rate_hz": 21.5, "preset_hz": 40.0}
-    door = TwinDoor(tmp_path, rig.stage.perform)
+    door = TwinServer(tmp_path, rig.stage.perform)
     door.start()
     ending = threading.Event()
     running = threading.Thread(target=lambda: [rig.cameras.step() for _ in iter(ending.is_set, True)])
@@ -178,6 +178,6 @@ def test_remote_and_door_understand_each_other(rig: Rig, tmp_path: Path) -> None
 
 
 def test_no_twin_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rhot_app.simulator.remote.STATE_S", 0.05)
+    monkeypatch.setattr("rhot_app.simulator.nodes.remote.STATE_S", 0.05)
     with TwinRemote(tmp_path) as twin, pytest.raises(SimulatorError, match="gave no answer"):
         twin.state()

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.body import HandBody
-from rhot_app.simulator.scene import make_scene, twin_defaults
-from rhot_app.simulator.shot import make_shot
-from rhot_app.simulator.truth import FrameTruth, Truth, load_truth, save_truth, true_act
+from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.render.body import HandBody
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.simulator.truth.truth import FrameTruth, Truth, load_truth, save_truth, true_object
 
 
 def some_truth() -> Truth:
     shot = make_shot(make_scene(twin_defaults(), 1), "fast", 0.5)
     cameras = (FrameTruth(np.array([0.0, 0.1, 0.2]), np.array([[1.0, 0.5], [0.2, 1.0], [1.0, 1.0]])),
                FrameTruth(np.array([0.05, 0.15]), np.array([[0.9, 0.9], [0.8, 0.8]])))
-    truth = true_act(shot.act, shot.seconds, cameras)
+    truth = true_object(shot.scene_object, shot.seconds, cameras)
     assert isinstance(truth, Truth)
     return truth
 
@@ -26,12 +26,12 @@ def some_truth() -> Truth:
 def test_between_samples_the_hand_is_where_the_motion_says() -> None:
     shot, truth = make_shot(make_scene(twin_defaults(), 1), "fast", 0.5), some_truth()
     times = np.random.default_rng(1).uniform(0.0, 0.5, 50)
-    body = shot.act.thing
+    body = shot.scene_object.thing
     assert isinstance(body, HandBody)
-    joints, markers = body.joints_and_markers(*shot.act.source.sample(times))
+    joints, markers = body.joints_and_markers(*shot.scene_object.source.sample(times))
     np.testing.assert_allclose(truth.joints_at(times), joints, atol=2e-5)
     np.testing.assert_allclose(truth.markers_at(times), markers, atol=2e-5)
-    np.testing.assert_allclose(truth.angles_at(times), shot.act.source.sample(times)[1], atol=1e-4)
+    np.testing.assert_allclose(truth.angles_at(times), shot.scene_object.source.sample(times)[1], atol=1e-4)
 
 
 def test_wrist_marker_is_the_wrist_joint_and_tips_lie_on_their_fingers() -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.nodes import TwinNode
-from rhot_app.simulator.scene import make_scene, node_settings, twin_defaults
+from rhot_app.simulator.nodes.nodes import TwinNode
+from rhot_app.simulator.scene.scene import make_scene, node_settings, twin_defaults
 
 
 def node(folder: Path, camera: str) -> TwinNode:

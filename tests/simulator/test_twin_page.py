@@ -7,7 +7,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from rhot_app.simulator import controls, lamp, motion_file, pictures, scene, shot, shows
+from rhot_app.simulator import pictures
+from rhot_app.simulator.nodes import shot
+from rhot_app.simulator.scene import camera_controls as controls
+from rhot_app.simulator.scene import lamp, motion_file, scene
+from rhot_app.simulator.scene import scene_description as shows
 
 PAGE = (Path(__file__).parents[2] / "docs" / "twin.md").read_text()
 FORMATS: list[tuple[str, int, tuple[type[msgspec.Struct], ...]]] = [

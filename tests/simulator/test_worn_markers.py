@@ -10,8 +10,8 @@ from rhot_app.errors import RigError
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import HandModel, build_model, neutral_pose
 from rhot_app.hand.skeleton import ANGLES, JOINTS
-from rhot_app.simulator.body import build_body
-from rhot_app.simulator.motion import FACING
+from rhot_app.simulator.render.body import build_body
+from rhot_app.simulator.scene.motion import FACING
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 

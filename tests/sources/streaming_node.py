@@ -12,7 +12,7 @@ from trusted_node import TrustedNode
 
 from rhot_app.project import Broadcast, Rig
 from rhot_app.recording.raw_log import RecordKind
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.links import new_session
 from rhot_app.sources.udp_nodes import UdpNodes
 from rhot_app.tracking.tracker import CameraObservations

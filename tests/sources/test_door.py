@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rhot_app.project import Rig
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
-from rhot_app.sources.door import NodeDoor
+from rhot_app.sources.validation import DatagramValidator
 from rhot_node.clock import NodeClock
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation, Observations, Stop
@@ -45,13 +45,13 @@ def rig() -> Rig:
 
 
 @pytest.fixture
-def door(rig: Rig) -> NodeDoor:
-    door = NodeDoor(rig, 1, known_clock())
+def door(rig: Rig) -> DatagramValidator:
+    door = DatagramValidator(rig, 1, known_clock())
     door.expect_session(SESSION)
     return door
 
 
-def test_admitted_frame_is_in_master_time_and_rig_order(rig: Rig, door: NodeDoor) -> None:
+def test_admitted_frame_is_in_master_time_and_rig_order(rig: Rig, door: DatagramValidator) -> None:
     markers = list(message(rig).markers)
     markers[2] = MarkerObservation(2, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
     frame = door.admit(encode(message(rig, markers=tuple(markers))), NOW_NS)
@@ -79,13 +79,13 @@ def test_admitted_frame_is_in_master_time_and_rig_order(rig: Rig, door: NodeDoor
       NODE_CLOCK.from_host_ns(NOW_NS + 2 * 10**7)}, "time"),
     ({"sequence": 10**9}, None),  # the first number may be any
 ])
-def test_refused_by_reason(rig: Rig, door: NodeDoor, changes: dict[str, object], reason: str | None) -> None:
+def test_refused_by_reason(rig: Rig, door: DatagramValidator, changes: dict[str, object], reason: str | None) -> None:
     frame = door.admit(encode(message(rig, **changes)), NOW_NS)
     assert (frame is None) == (reason is not None)
     assert door.dropped == ({} if reason is None else {reason: 1})
 
 
-def test_refused_datagrams_leave_no_trace_in_the_sequence(rig: Rig, door: NodeDoor) -> None:
+def test_refused_datagrams_leave_no_trace_in_the_sequence(rig: Rig, door: DatagramValidator) -> None:
     for sequence, session in ((0, SESSION), (500, 5), (1, SESSION), (3, SESSION), (3, SESSION), (2, SESSION)):
         door.admit(encode(message(rig, sequence=sequence, session=session)), NOW_NS)
     assert door.dropped == {"session": 1, "duplicate": 1}
@@ -93,7 +93,7 @@ def test_refused_datagrams_leave_no_trace_in_the_sequence(rig: Rig, door: NodeDo
     assert door.accepted == 4
 
 
-def test_nothing_is_admitted_without_start_or_clock(rig: Rig, door: NodeDoor) -> None:
+def test_nothing_is_admitted_without_start_or_clock(rig: Rig, door: DatagramValidator) -> None:
     door.expect_session(0)
     assert door.admit(encode(message(rig)), NOW_NS) is None
     door.expect_session(SESSION)
@@ -102,7 +102,7 @@ def test_nothing_is_admitted_without_start_or_clock(rig: Rig, door: NodeDoor) ->
     assert door.dropped == {"not_started": 1, "no_clock": 1}
 
 
-def test_foreign_message_kinds_and_bytes_are_counted(door: NodeDoor) -> None:
+def test_foreign_message_kinds_and_bytes_are_counted(door: DatagramValidator) -> None:
     for data in (b"", b"12,34;5,6", encode(Stop(1, 1)), b"RHOT" + bytes(40)):
         assert door.admit(data, NOW_NS) is None
     assert door.received == 4
@@ -110,7 +110,7 @@ def test_foreign_message_kinds_and_bytes_are_counted(door: NodeDoor) -> None:
     assert {"length", "magic", "kind", "version"} >= set(door.dropped)
 
 
-def test_nothing_raises_whatever_the_bytes(rig: Rig, door: NodeDoor) -> None:
+def test_nothing_raises_whatever_the_bytes(rig: Rig, door: DatagramValidator) -> None:
     rng = random.Random(3)
     sound = encode(message(rig))
     for _ in range(3000):
@@ -126,7 +126,7 @@ def exchanged(model: NodeClockModel, clock: NodeClock, t1_ns: int) -> None:
     model.add(t1_ns, t2, t2, t1_ns + 200_000, 1)
 
 
-def streamed(rig: Rig, door: NodeDoor, clock: NodeClock, begin_ns: int, count: int,
+def streamed(rig: Rig, door: DatagramValidator, clock: NodeClock, begin_ns: int, count: int,
              travel_ns: int = 200_000) -> list[int]:
     """Errors, ns, of the times of the frames that are admitted, 100 a second; an exchange after every tenth."""
     errors = []
@@ -143,7 +143,7 @@ def streamed(rig: Rig, door: NodeDoor, clock: NodeClock, begin_ns: int, count: i
 
 
 @pytest.mark.parametrize("step_ns", [-40_000_000, -3_000_000, -1_800_000, 1_800_000, 40_000_000, 10**12])
-def test_a_clock_that_is_set_gives_no_frame_a_wrong_time(rig: Rig, door: NodeDoor, step_ns: int) -> None:
+def test_a_clock_that_is_set_gives_no_frame_a_wrong_time(rig: Rig, door: DatagramValidator, step_ns: int) -> None:
     assert len(streamed(rig, door, NODE_CLOCK, NOW_NS, 20)) == 20
     stepped = NodeClock(NODE_CLOCK.offset_ns + step_ns, 30.0, 0)
     errors = streamed(rig, door, stepped, NOW_NS + 200_000_000, 100)
@@ -151,7 +151,7 @@ def test_a_clock_that_is_set_gives_no_frame_a_wrong_time(rig: Rig, door: NodeDoo
     assert len(errors) >= 50, "and all is well again within half a second"
 
 
-def test_a_network_that_becomes_slow_is_believed_after_an_exchange(rig: Rig, door: NodeDoor) -> None:
+def test_a_network_that_becomes_slow_is_believed_after_an_exchange(rig: Rig, door: DatagramValidator) -> None:
     assert len(streamed(rig, door, NODE_CLOCK, NOW_NS, 20)) == 20
     assert len(streamed(rig, door, NODE_CLOCK, NOW_NS + 200_000_000, 50, 8_000_000)) == 40
     assert len(streamed(rig, door, NODE_CLOCK, NOW_NS + 700_000_000, 50, 2_000_000)) == 50
@@ -160,7 +160,7 @@ def test_a_network_that_becomes_slow_is_believed_after_an_exchange(rig: Rig, doo
 
 
 def test_frames_that_wait_for_the_clock_are_not_lost(rig: Rig) -> None:
-    door = NodeDoor(rig, 1, NodeClockModel())
+    door = DatagramValidator(rig, 1, NodeClockModel())
     door.expect_session(SESSION)
     for k in (0, 1, 2):
         assert door.admit(encode(message(rig, sequence=k)), NOW_NS) is None
@@ -175,7 +175,7 @@ def test_calibrated_time_offset_is_added(rig: Rig) -> None:
     shifted = msgspec.structs.replace(rig, nodes=(rig.nodes[0], node))
     times = []
     for one in (rig, shifted):
-        door = NodeDoor(one, 1, known_clock())
+        door = DatagramValidator(one, 1, known_clock())
         door.expect_session(SESSION)
         frame = door.admit(encode(message(one)), NOW_NS)
         assert frame is not None
@@ -185,13 +185,13 @@ def test_calibrated_time_offset_is_added(rig: Rig) -> None:
 
 class TestText:
     @pytest.fixture
-    def text_door(self, rig: Rig) -> NodeDoor:
+    def text_door(self, rig: Rig) -> DatagramValidator:
         node = msgspec.structs.replace(rig.nodes[0], text_datagrams=True)
-        door = NodeDoor(msgspec.structs.replace(rig, nodes=(node, rig.nodes[1])), 0, NodeClockModel())
+        door = DatagramValidator(msgspec.structs.replace(rig, nodes=(node, rig.nodes[1])), 0, NodeClockModel())
         door.expect_session(1)
         return door
 
-    def test_text_needs_no_clock(self, text_door: NodeDoor) -> None:
+    def test_text_needs_no_clock(self, text_door: DatagramValidator) -> None:
         frame = text_door.admit(b"1,2;3.5,4;-1,-1;,;639,479;7,8\n", NOW_NS)
         assert frame is not None
         assert (frame.t_row0_master_ns, frame.row_time_ns, frame.t_receive_ns) == (NOW_NS, 0, NOW_NS)
@@ -203,7 +203,7 @@ class TestText:
 
     def test_a_calibrated_delay_is_taken_off(self, rig: Rig) -> None:
         node = msgspec.structs.replace(rig.nodes[0], text_datagrams=True, time_offset_s=-0.040)
-        door = NodeDoor(msgspec.structs.replace(rig, nodes=(node, rig.nodes[1])), 0, NodeClockModel())
+        door = DatagramValidator(msgspec.structs.replace(rig, nodes=(node, rig.nodes[1])), 0, NodeClockModel())
         door.expect_session(1)
         frame = door.admit(b"1,2;3.5,4;-1,-1;,;639,479;7,8", NOW_NS)
         assert frame is not None
@@ -213,10 +213,10 @@ class TestText:
         (b"1,2;3,4", "count"), (b"a,b;3,4;5,6;7,8;9,10;11,12", "text"), (b"900,2;3,4;5,6;7,8;9,10;1,1", "marker"),
         (b"nan,2;3,4;5,6;7,8;9,10;1,1", "text"),
     ])
-    def test_broken_text_is_counted(self, text_door: NodeDoor, data: bytes, reason: str) -> None:
+    def test_broken_text_is_counted(self, text_door: DatagramValidator, data: bytes, reason: str) -> None:
         assert text_door.admit(data, NOW_NS) is None
         assert text_door.dropped == {reason: 1}
 
-    def test_text_where_it_is_off_is_malformed(self, door: NodeDoor) -> None:
+    def test_text_where_it_is_off_is_malformed(self, door: DatagramValidator) -> None:
         assert door.admit(b"1,2;3,4;5,6;7,8;9,10;11,12;1,2;3,4", NOW_NS) is None
         assert door.dropped == {"magic": 1}

@@ -12,7 +12,7 @@ from findable_nodes import findable, free_udp_port, presence
 from patience import eventually
 from streaming_node import Setup
 
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources import lost_nodes
 from rhot_app.sources.browse import Found
 from rhot_app.sources.find_socket import Sighting

@@ -13,9 +13,9 @@ from streaming_node import Setup
 
 from rhot_app.errors import SourceError
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.links import new_session
-from rhot_app.sources.replay import LogDoor
+from rhot_app.sources.replay import LogValidator
 from rhot_app.sources.udp_nodes import UdpNodes
 from rhot_node.keys import new_key_pair
 from rhot_node.link_keys import LinkKeys
@@ -44,7 +44,7 @@ def test_everything_that_is_said_is_tagged(setup: Setup) -> None:
 
 def test_a_log_of_tagged_datagrams_replays_without_the_key(setup: Setup) -> None:
     setup.run()
-    door = LogDoor(setup.rig)
+    door = LogValidator(setup.rig)
     frames = [frame for record in setup.records if (frame := door.feed(Record(*record))) is not None]
     assert len(frames) == setup.source.links[0].door.accepted > 0
     assert door.links[0].clock.offset_s is not None

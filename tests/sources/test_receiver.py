@@ -7,9 +7,8 @@ import pytest
 from patience import quickest
 
 from rhot_app.errors import SourceError
-from rhot_app.simulator.synthetic_node import synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
-from rhot_app.sources.door import NodeDoor
 from rhot_app.sources.receiver import (
     FRESH_NS,
     NEWEST,
@@ -18,6 +17,7 @@ from rhot_app.sources.receiver import (
     granted_buffer,
     open_data_socket,
 )
+from rhot_app.sources.validation import DatagramValidator
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.wire.codec import encode
@@ -50,7 +50,7 @@ def make_receiver() -> tuple[NodeReceiver, list[CameraObservations], socket.sock
     for k in range(4):
         t = now - (4 - k) * 10**8
         clock.add(t, t + 20_000_000, t + 20_000_000, t + 40_000_000, 1)  # a wide bound: this machine may be busy
-    door = NodeDoor(rig, 0, clock)
+    door = DatagramValidator(rig, 0, clock)
     door.expect_session(SESSION)
     frames: list[CameraObservations] = []
     receiver = NodeReceiver(open_data_socket(0, "left"), door, "left")

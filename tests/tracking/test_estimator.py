@@ -12,7 +12,7 @@ from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES
-from rhot_app.simulator.motion import FACING
+from rhot_app.simulator.scene.motion import FACING
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.make import make_tracker

@@ -11,7 +11,7 @@ import pytest
 from fake_backend import FakeBackend
 from patience import PATIENCE_S
 
-from rhot_app.ui.environment import cap_software_gl, choose_gl_platform
+from rhot_app.ui.app import cap_software_gl, choose_gl_platform
 
 choose_gl_platform()
 cap_software_gl()

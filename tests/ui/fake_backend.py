@@ -23,6 +23,7 @@ class FakeBackend:
         self.pace: TwinPace | None = None
         self.refuse = ""
         self.covered: tuple[str, ...] = ()
+        self.shown = "hand:grasp"
         self.gate = threading.Event()
         self.gate.set()
 
@@ -76,8 +77,17 @@ class FakeBackend:
     def cover_cameras(self, names: tuple[str, ...]) -> tuple[str, ...]:
         if self.refuse:
             raise SimulatorError(self.refuse)
-        self.covered = names
+        self.covered = self.engine.black = names
         return names
+
+    def shown_in_twin(self) -> str:
+        return self.shown
+
+    def show_in_twin(self, what: str) -> str:
+        if self.refuse:
+            raise SimulatorError(self.refuse)
+        self.shown = what
+        return what
 
     def give_up(self) -> None:
         self.calls.append("give up")

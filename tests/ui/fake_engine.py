@@ -10,6 +10,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ import cv2
 import msgspec
 import numpy as np
 
-from rhot_app.engine.advice import calibration_advice
+from rhot_app.engine.advice import NodeFacts, calibration_advice, node_advice
+from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.hand.anatomy import load_hand
@@ -83,6 +85,7 @@ class FakeEngine:
         self.clock = clock
         self.hidden: dict[str, str] = {}  # marker id -> "left", "right" or "both": who does not see it
         self.advice: tuple[Advice, ...] = ()
+        self.black: tuple[str, ...] = ()  # cameras whose picture is black
         self.node_words = {node.name: "ready" for node in self.rig.nodes}
         self.lost = {node.name: 0 for node in self.rig.nodes}
         self.dead = False
@@ -191,13 +194,20 @@ class FakeEngine:
             t_master_ns=round(t_s * 1e9), pid=4242, session=self.session, running=self.running,
             condition=self.condition().value, rig_name=self.rig.name, rig_path=self.rig_path,
             state_rate_hz=self.rate_hz if self.running else 0.0, nodes=nodes,
-            advice=(*self.advice, *calibration_advice(self.rig)),
+            advice=(*self.advice, *self._sight_advice(nodes), *calibration_advice(self.rig)),
             latency={stage: LatencySummary(value, 1.4 * value)
                      for stage, value in zip(LATENCY_STAGES, _STAGE_S, strict=True)},
             log_path=self.log_path, log_bytes=120_000 if self.log_path else 0,
             outputs=tuple(self.outputs.get(one.spec, OutputStatus(one.spec, one.kind, "running", sent=self.sequence))
                           for one in map(as_run, self.rig.outputs) if one.enabled),
             replaying=self.replaying)
+
+    def _sight_advice(self, nodes: tuple[NodeStatus, ...]) -> list[Advice]:
+        """What the engine says of cameras that see nothing because their picture is black."""
+        ids = self.rig.markers.ids
+        return [advice for node in nodes if node.name in self.black for advice in node_advice(
+            NodeFacts(replace(node, paired=True), Recent(80, 0, {}, 0), "127.0.0.1", 1, (640, 480), None, 1, 1,
+                      (9.0,) * len(ids), False, 0.0, black=True), ids, self.running)]
 
     def preview(self, camera: int, t_s: float) -> Preview:
         """A picture of the hand as a camera would see it: skin and painted tips on a cluttered desk."""

@@ -11,8 +11,8 @@ import pytest
 from patience import PATIENCE_MS
 from screen_pictures import check, picture_of
 
-from rhot_app.evaluation.takes import LOG_NAME, Order, take
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.ui.export_dialog import ExportDialog
 
 
@@ -20,7 +20,7 @@ from rhot_app.ui.export_dialog import ExportDialog
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """1.2 s of grasping."""
     order = Order(make_scene(twin_defaults(), 1), "grasp", 1.2, sketched=True)
-    return take(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME
+    return data_set(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME
 
 
 @pytest.fixture

@@ -69,7 +69,7 @@ def test_what_a_job_starts_is_not_as_nice_as_the_window():
     """In a process of its own, because niceness cannot be taken back."""
     program = """
 import os, subprocess, sys, threading
-from rhot_app.ui.environment import NICENESS, give_way
+from rhot_app.ui.app import NICENESS, give_way
 from rhot_app.ui.job import workers
 before = os.getpriority(os.PRIO_PROCESS, 0)
 workers()

@@ -28,6 +28,15 @@ def test_a_tick_covers_a_camera_and_another_click_uncovers_it(tracking):
     assert ticked(tracking) == []
 
 
+def test_a_covered_camera_is_said_to_be_black_and_nobody_is_sent_to_the_colours(tracking):
+    left = caps_of(tracking).actions()[0]
+    left.trigger()
+    tracking.until(lambda: "left is black: is the lens covered?" in tracking.window.advice.texts)
+    assert not any("colour" in text for text in tracking.window.advice.texts)
+    left.trigger()
+    tracking.until(lambda: tracking.window.advice.texts == ["Everything is in order."])
+
+
 def test_the_menu_shows_what_another_window_has_covered(tracking):
     tracking.backend.covered = ("right",)
     caps_of(tracking).aboutToShow.emit()

@@ -156,7 +156,7 @@ def test_simulated_cameras_that_stopped_can_be_started_again(tracking):
     tracking.backend.alive = False
     tracking.until(lambda: "The simulated cameras have stopped." in tracking.window.advice.texts)
     tracking.backend.alive = True
-    tracking.controller.act("twin")
+    tracking.controller.press("twin")
     tracking.until(lambda: tracking.backend.calls.count("twin grasp") == 1)
     tracking.until(lambda: tracking.window.toolbar.badge.word == "TRACKING")
     tracking.until(lambda: "The simulated cameras have stopped." not in tracking.window.advice.texts)
@@ -170,7 +170,7 @@ def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
 
     def escape():
         lit.append(button.grab().toImage() != idle)
-        tracking.press(Qt.Key.Key_Escape, button.menu())
+        tracking.press(Qt.Key.Key_Escape, tracking.window.toolbar.rig_menu)
 
     QCursor.setPos(button.mapToGlobal(button.rect().center()))
     QTimer.singleShot(200, escape)
@@ -181,8 +181,12 @@ def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
     QCursor.setPos(tracking.window.mapToGlobal(tracking.window.rect().center()))
 
 
-def test_the_calibrate_menu_shows_what_the_rig_says(tracking):
+def test_the_rig_menu_shows_what_the_rig_says(tracking):
     window = tracking.window
+    a = window.actions_
+    assert [entry.text() for entry in a.properties.actions()] == ["Cameras …", "Markers …", "Hand …"]
+    assert a.properties.menuAction() in window.toolbar.rig_menu.actions()
+    assert not {a.cameras, a.markers, a.hand} & set(window.toolbar.calibrate_menu.actions())
     for action, tab in ((window.actions_.cameras, 0), (window.actions_.markers, 1), (window.actions_.hand, 2)):
         action.trigger()
         dialog = next(w for w in tracking.window.children() if type(w).__name__ == "RigDialog" and w.isVisible())

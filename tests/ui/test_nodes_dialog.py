@@ -21,8 +21,7 @@ from rhot_app.sources.pairing import Introduction, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig
 from rhot_app.ui.job import CancelledError
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.nodes_dialog import NodesDialog
-from rhot_app.ui.pair_dialog import PairDialog
+from rhot_app.ui.nodes_dialog import NodesDialog, PairDialog
 from rhot_node.config import NodeSettings
 from rhot_node.control import ControlServer
 from rhot_node.files import resource_path

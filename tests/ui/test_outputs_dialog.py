@@ -23,8 +23,8 @@ from screen_pictures import check
 from rhot_app.engine.client import EngineClient
 from rhot_app.outputs.status import OutputStatus
 from rhot_app.project import OutputSettings, load_rig, save_rig
-from rhot_app.simulator.synthetic_node import SyntheticNode
-from rhot_app.simulator.synthetic_node import synthetic_rig as streaming_rig
+from rhot_app.simulator.nodes.synthetic_node import SyntheticNode
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig as streaming_rig
 from rhot_app.ui.backend.contract import Opened
 from rhot_app.ui.guide import page_of
 from rhot_app.ui.models.outputs import SendRates, web_hint

@@ -9,7 +9,7 @@ from patience import PATIENCE_MS
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QTableWidget
 
-from rhot_app.ui.rig_dialog import RigDialog
+from rhot_app.ui.dialogs import RigDialog
 
 
 @pytest.mark.parametrize("page", ["cameras", "markers", "hand"])

@@ -11,7 +11,7 @@ from fake_engine import FakeEngine, synthetic_rig
 from rhot_app.project import CameraPose
 from rhot_app.tracking.state import Knowledge
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.scene import stage
+from rhot_app.ui.scene import floor as stage
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice, EllipsoidMesh
 from rhot_app.ui.scene.frames import (
     DISPLAY_FROM_RIG,
@@ -21,8 +21,8 @@ from rhot_app.ui.scene.frames import (
     rotation_of,
     to_display,
 )
+from rhot_app.ui.scene.hand_actors import MarkerMesh
 from rhot_app.ui.scene.hand_mesh import HandMesh, SkeletonMesh, palm_hull
-from rhot_app.ui.scene.marker_mesh import MarkerMesh
 from rhot_app.ui.scene.meshes import capsule_template, elliptic_band, pose_capsules, sphere
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers

@@ -16,10 +16,9 @@ from rhot_app.sources.discovery import Search, conflicts, together
 from rhot_app.sources.find_socket import Sighting
 from rhot_app.sources.pairing import Introduction, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer
+from rhot_app.ui.dialogs import RigDialog
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.nodes_dialog import NodesDialog
-from rhot_app.ui.pair_dialog import PairDialog
-from rhot_app.ui.rig_dialog import RigDialog
+from rhot_app.ui.nodes_dialog import NodesDialog, PairDialog
 from rhot_node.files import resource_path
 from rhot_node.presence import Presence
 from rhot_node.wire.messages import NodeState, TrustState

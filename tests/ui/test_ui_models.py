@@ -15,7 +15,7 @@ from rhot_app.ui.models.label_layout import Box, place_at_sides, place_labels
 from rhot_app.ui.models.latency import STACKED, LatencyWindow
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import SCHEMES, contrast, visible_on
-from rhot_app.ui.models.rates import LossMeter, RateRows
+from rhot_app.ui.models.rates import LossMeter, RateRows, unused_frames
 from rhot_app.ui.models.rows import bytes_text, clock_text, marker_rows, node_row
 from rhot_app.ui.models.series import Series, to_csv
 from rhot_node.wire.messages import MarkerFlag
@@ -154,10 +154,17 @@ def test_a_half_hidden_marker_is_not_ok(engine):
 
 def test_node_rows_carry_units(engine):
     row = node_row(engine.status(1.0).nodes[0])
-    assert (row.rate, row.losses, row.clock) == ("40 /s", "0 lost", "clock ± 0.11 ms")
+    assert (row.rate, row.losses, row.clock) == ("40 /s", "", "clock ± 0.11 ms")
     text_node = replace(engine.status(1.0).nodes[0], text_datagrams=True, dropped={"length": 3})
     assert clock_text(text_node) == "no clock (text)"
-    assert "3 rejected" in node_row(text_node).losses and "3 × length" in node_row(text_node).tooltip
+    assert node_row(text_node).losses == "3 frames unused" and "3 × refused (length)" in node_row(text_node).tooltip
+
+
+def test_a_frame_that_came_too_late_is_counted_once_and_a_healthy_node_has_no_losses(engine):
+    node = replace(engine.status(1.0).nodes[0], received=4000, lost=14, dropped={"time": 14, "clock_in_doubt": 90})
+    assert unused_frames(node) == {"time": 14}
+    assert node_row(node).losses == "" and "14 × came too late" in node_row(node).tooltip
+    assert node_row(replace(node, received=700)).losses == "14 frames unused"
 
 
 def test_bytes_are_told_in_the_right_unit():

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
 from fake_backend import FakeBackend
 from fake_engine import FakeEngine, synthetic_rig
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QHelpEvent
+from PySide6.QtGui import QHelpEvent, QImage
 from PySide6.QtWidgets import QApplication, QToolButton, QToolTip
 from test_tracker_dialog import FLOATING
 
+from rhot_app.tracking.state import Knowledge
 from rhot_app.ui.models.spread import sd_number, worst_sd
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import to_display
@@ -66,6 +69,51 @@ def test_the_mouse_over_a_joint_tells_how_well_it_is_known(estimating):
     estimating.until(lambda: QToolTip.text().startswith("ring PIP joint"))
     assert scene.told_at(QPoint(2, 2)) == ""
     QToolTip.hideText()
+
+
+def picture(bench):
+    """What stands in the scene, (H, W, 3) grey levels."""
+    bench.run(0.1)
+    image = bench.window.screen_parts.scene.grabFramebuffer().convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine())
+    return rows[:, :3 * image.width()].reshape(image.height(), image.width(), 3).astype(float)
+
+
+def test_large_ellipsoids_of_guesses_leave_the_hand_in_sight(estimating):
+    """The little finger is guessed; its ellipsoids, ten times as large, reach over the whole hand."""
+    scene, engine = estimating.window.screen_parts.scene, estimating.backend.engine
+    estimating.window.actions_.names.setChecked(False)
+    engine.running = False
+    estimating.until(lambda: not scene._actors.items[0].visible())
+    state = engine.state(1.0)
+    scene.show_state(state)
+    scene.frame_hand()
+    scene.show_state(None)
+    guesses = replace(state, joint_covariances=np.where(
+        (state.joint_knowledge == Knowledge.GUESSED)[:, None, None], state.joint_covariances, np.nan))
+    scene.show_ellipsoids(EllipsoidChoice(fingertips=False, markers=False, factor=10))
+    blank = picture(estimating)
+    scene.show_state(guesses)
+    with_clouds = picture(estimating)
+    assert " ".join(scene._legend.rows[3:]).endswith("cut at 60 mm")
+    scene.show_state(replace(guesses, joint_covariances=np.full_like(state.joint_covariances, np.nan)))
+    alone = picture(estimating)
+    key = round(scene._legend._picture.deviceIndependentSize().height()) + 16
+    alone, with_clouds, blank = (image[:-key] for image in (alone, with_clouds, blank))
+    hand = np.abs(alone - blank).max(axis=2) > 20
+    covered = hand & (np.abs(with_clouds - alone).max(axis=2) > 2)
+    assert covered.sum() > 1000, "they do lie over the hand"
+    assert np.abs(with_clouds - alone)[covered].mean() < 12.0
+
+
+def test_the_key_of_the_scene_fits_it_and_names_the_tracker(estimating):
+    scene, actions = estimating.window.screen_parts.scene, estimating.window.actions_
+    estimating.click(button_for(estimating, actions.cloud_sizes[1]))
+    estimating.until(lambda: any("cut at 60 mm" in row for row in scene._legend.rows))
+    assert scene.tracker_word == "estimator"
+    estimating.window.resize(1024, 700)
+    estimating.until(lambda: scene._legend._picture.deviceIndependentSize().width() < scene.width())
+    assert " ".join(scene._legend.rows[3:]).replace(", ", " ") == "3 sigma drawn 10 × larger cut at 60 mm"
 
 
 def test_panels_tell_standard_deviations(estimating):

@@ -11,7 +11,7 @@ from PySide6.QtGui import QDesktopServices
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.backend.contract import TwinPace
 from rhot_app.ui.models.notice import Notice
-from rhot_app.ui.models.passing import PassingNotices
+from rhot_app.ui.models.transient_notices import TransientNotices
 from rhot_app.ui.settings import Settings
 
 
@@ -92,29 +92,35 @@ def test_slow_simulated_cameras_are_told_calmly(tracking):
     assert sentence not in tracking.window.advice.texts
 
 
-def test_the_bar_is_as_tall_as_its_sentences(bench):
+def test_the_bar_keeps_its_height_while_sentences_come_and_go(bench):
     advice = bench.window.advice
-    bench.until(lambda: advice.parentWidget().height() < 40)
+    bench.until(lambda: len(advice.texts) == 1 and advice.parentWidget().height() > 40)
+    height = advice.parentWidget().height()
     bench.window.tell(Notice("error", "Something is wrong."))
     bench.window.tell(Notice("info", "Something was done."))
-    bench.until(lambda: len(advice.texts) == 2 and advice.parentWidget().height() > 45)
+    bench.until(lambda: len(advice.texts) == 2)
+    bench.run(0.1)
+    assert advice.parentWidget().height() == height
     bench.window.passing.clear()
-    bench.until(lambda: advice.parentWidget().height() < 40)
-    assert "Something is wrong." not in advice.texts
+    bench.until(lambda: "Something is wrong." not in advice.texts)
+    bench.run(0.1)
+    assert advice.parentWidget().height() == height
 
 
-def test_the_bar_grows_with_a_sentence_that_takes_two_lines(bench):
+def test_a_long_sentence_takes_both_lines_and_the_others_wait_in_the_menu(bench):
     """As many sentences as before, one of them longer."""
     advice = bench.window.advice
-    bench.until(lambda: len(advice.texts) == 1 and advice.height() < 40)
-    label = advice._lines[0][2]
-    bench.window.tell(Notice("error", "The simulated cameras did not start. " * 8))
-    bench.until(lambda: len(advice.texts) == 1 and label.height() > 30)
-    assert label.height() >= label.heightForWidth(label.width())
+    bench.until(lambda: len(advice.texts) == 1)
+    height, label = advice.height(), advice._lines[0][2]
+    bench.window.tell(Notice("info", "Something was done."))
+    bench.window.tell(Notice("error", "The simulated cameras did not start. " * 5))
+    bench.until(lambda: label.height() > 30)
+    assert label.height() >= label.heightForWidth(label.width()) and advice.height() == height
+    assert [entry.text() for entry in advice.more.menu().actions()] == ["Something was done."]
 
 
 def test_a_sentence_passes_by():
-    passing, done, failed = PassingNotices(), Notice("info", "done"), Notice("error", "failed")
+    passing, done, failed = TransientNotices(), Notice("info", "done"), Notice("error", "failed")
     passing.show(done, 100.0)
     passing.show(failed, 101.0)
     assert passing.current(109.9) == [failed, done]

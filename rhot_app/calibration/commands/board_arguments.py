@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.standard_board import BOARD, CHARUCO, SQUARE_MM
+from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, SQUARE_MM
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.board import Board
+    from rhot_app.calibration.board.boards import Board
 
 
 def add_board_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,7 +27,7 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
 
 def board_of(args: argparse.Namespace) -> Board:
     """The board; raises CalibrationError for an impossible one."""
-    from rhot_app.calibration.board import DEFAULT_DICTIONARY, CharucoBoard, Chessboard, parse_size
+    from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, CharucoBoard, Chessboard, parse_size
 
     cols, rows = parse_size(args.board or (BOARD if args.marker_mm is None else CHARUCO))
     if args.marker_mm is None:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import add_json_argument, show
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.bones_report import BonesReport
-    from rhot_app.calibration.marker_places import MarkerTracks
+    from rhot_app.calibration.hand.bones_report import BonesReport
+    from rhot_app.calibration.hand.marker_places import MarkerTracks
     from rhot_app.hand.anatomy import HandAnatomy
 
 
@@ -88,7 +88,7 @@ class _Seats:
 
 def _move(args: argparse.Namespace) -> tuple[BonesReport, _Seats]:
     """The hand of a recording."""
-    from rhot_app.calibration.bones import solve_bones
+    from rhot_app.calibration.hand.bones import solve_bones
     from rhot_app.progress import ProgressLine
 
     line = ProgressLine("reading the recording")
@@ -102,14 +102,14 @@ def _move(args: argparse.Namespace) -> tuple[BonesReport, _Seats]:
 
 def _enter(args: argparse.Namespace, lengths: dict[str, float]) -> BonesReport:
     """The hand of a ruler."""
-    from rhot_app.calibration.bones_entry import enter_bones
+    from rhot_app.calibration.hand.bones_entry import enter_bones
 
     return enter_bones(_base(args, None, "" if args.hand is not None else "measured with a ruler"), lengths)
 
 
 def _tracks(args: argparse.Namespace) -> tuple[MarkerTracks, _Seats, HandAnatomy | None]:
     """The markers of the recording, where they sit, and the hand of its rig if there is one."""
-    from rhot_app.calibration.marker_places import tracks_of
+    from rhot_app.calibration.hand.marker_places import tracks_of
 
     roles = dict(_pairs(args.roles, "--roles m1=index_tip"))
     if args.tsv is not None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import add_json_argument, tell
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.rig_checks import RigReport
+    from rhot_app.calibration.check.checks import RigReport
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,8 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check and report; exit code 2 when the rig cannot be tracked with."""
-    from rhot_app.calibration.camera_calibration import calibration_text
-    from rhot_app.calibration.rig_checks import check_rig
+    from rhot_app.calibration.check.checks import check_rig
+    from rhot_app.calibration.lens.camera_calibration import calibration_text
     from rhot_app.project import load_rig
 
     rig = load_rig(args.rig)
@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _fields(report: RigReport) -> dict[str, Any]:
-    from rhot_app.calibration.rig_camera_checks import WORKING_DISTANCES_M
+    from rhot_app.calibration.check.camera_checks import WORKING_DISTANCES_M
 
     return {
         "cameras": [{"name": lens.name, "view_deg": [round(math.degrees(angle), 2) for angle in lens.view_rad],
@@ -47,7 +47,7 @@ def _fields(report: RigReport) -> dict[str, Any]:
 
 
 def _lines(report: RigReport) -> list[str]:
-    from rhot_app.calibration.rig_camera_checks import WORKING_DISTANCES_M
+    from rhot_app.calibration.check.camera_checks import WORKING_DISTANCES_M
 
     lines = [f"{lens.name}: sees {math.degrees(lens.view_rad[0]):.1f} x {math.degrees(lens.view_rad[1]):.1f} degrees"
              for lens in report.lenses]

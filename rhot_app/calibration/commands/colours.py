@@ -16,8 +16,8 @@ from rhot_node.compiled import announce_compilation
 if TYPE_CHECKING:
     import numpy as np
 
-    from rhot_app.calibration.colours import ColourReport
-    from rhot_app.calibration.paint_region import PaintRegion
+    from rhot_app.calibration.colour.colours import ColourReport
+    from rhot_app.calibration.colour.paint_region import PaintRegion
     from rhot_app.calibration.verdict import Finding
     from rhot_node.detect.image import YuvImage
 
@@ -65,8 +65,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Learn, judge, print and write. Raises CalibrationError or SettingsError before anything is printed."""
-    from rhot_app.calibration.colour_samples import ColourSamples
-    from rhot_app.calibration.colours import solve_colours
+    from rhot_app.calibration.colour.colours import solve_colours
+    from rhot_app.calibration.colour.samples import ColourSamples
     from rhot_app.calibration.verdict import judged_anew
     from rhot_app.progress import ProgressLine
     from rhot_node.markers import load_markers, save_markers
@@ -140,7 +140,7 @@ def _enlarged(what: str, image: YuvImage, boxes: list[tuple[int, int, int, int]]
 
 
 def _note_enlarged(enlarged: list[str]) -> list[Finding]:
-    from rhot_app.calibration.paint_region import ENOUGH
+    from rhot_app.calibration.colour.paint_region import ENOUGH
     from rhot_app.calibration.verdict import Finding, Grade
     from rhot_node.detect.colour import SAMPLES_MIN
 
@@ -204,7 +204,7 @@ def _corners(box: BoxArgument) -> tuple[int, int, int, int]:
 def _skin(boxes: list[BoxArgument], images: list[YuvImage | None], paths: list[Path]) -> np.ndarray:
     import numpy as np
 
-    from rhot_app.calibration.colours import NO_COLOURS
+    from rhot_app.calibration.colour.colours import NO_COLOURS
     from rhot_node.detect.colour import box_mask, colours_of
 
     found = [NO_COLOURS]

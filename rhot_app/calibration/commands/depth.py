@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rhot_app.calibration.depth import DepthGeometry, DepthReport
-    from rhot_app.calibration.depth_table import DepthRow
+    from rhot_app.calibration.depth.fit import DepthGeometry, DepthReport
+    from rhot_app.calibration.depth.table import DepthRow
     from rhot_app.project import Rig
 
 
@@ -35,8 +35,8 @@ def run(args: argparse.Namespace) -> int:
     """Fit and report; the rig is written only with ``--out``."""
     import msgspec
 
-    from rhot_app.calibration.depth import fit_depth
-    from rhot_app.calibration.depth_table import read_depth_table
+    from rhot_app.calibration.depth.fit import fit_depth
+    from rhot_app.calibration.depth.table import read_depth_table
     from rhot_app.errors import CalibrationError
     from rhot_app.project import load_rig
     from rhot_app.rig_history import accept
@@ -60,7 +60,7 @@ def _geometry(args: argparse.Namespace, rig: Rig | None) -> DepthGeometry:
     import math
     from dataclasses import replace
 
-    from rhot_app.calibration.depth import DepthGeometry, geometry_of
+    from rhot_app.calibration.depth.fit import DepthGeometry, geometry_of
     from rhot_app.errors import CalibrationError
 
     geometry = DepthGeometry() if rig is None else geometry_of(rig)

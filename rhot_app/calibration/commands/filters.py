@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import add_json_argument, show
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.filter_judgement import FilterTargets, MarkerFigures
-    from rhot_app.calibration.filter_tuning import FilterCurves, FilterReport
+    from rhot_app.calibration.filters.judgement import FilterTargets, MarkerFigures
+    from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Tune and report; the rig is written only with ``--out``."""
-    from rhot_app.calibration.filter_tuning import tune_filters
+    from rhot_app.calibration.filters.tuning import tune_filters
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
     from rhot_app.recording.observation_table import read_instants
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 def _targets(args: argparse.Namespace) -> FilterTargets:
     from dataclasses import replace
 
-    from rhot_app.calibration.filter_judgement import FilterTargets
+    from rhot_app.calibration.filters.judgement import FilterTargets
     from rhot_app.errors import CalibrationError
 
     targets = FilterTargets()

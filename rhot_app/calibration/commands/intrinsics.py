@@ -10,7 +10,7 @@ from rhot_app.calibration.commands.board_arguments import add_board_arguments, b
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.intrinsics import IntrinsicsReport
+    from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
     from rhot_app.project import Rig
 
 
@@ -28,10 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; files are written only when the verdict allows it."""
-    from rhot_app.calibration.camera_calibration import with_lens
-    from rhot_app.calibration.intrinsics import solve
-    from rhot_app.calibration.intrinsics_file import save_intrinsics
-    from rhot_app.calibration.views import matching_files, read_views
+    from rhot_app.calibration.lens.camera_calibration import with_lens
+    from rhot_app.calibration.lens.intrinsics import solve
+    from rhot_app.calibration.lens.intrinsics_file import save_intrinsics
+    from rhot_app.calibration.lens.views import matching_files, read_views
     from rhot_app.errors import CalibrationError
     from rhot_app.progress import ProgressLine, within
     from rhot_app.rig_history import accept
@@ -60,15 +60,15 @@ def run(args: argparse.Namespace) -> int:
 
 def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
     """The JSON's fields."""
-    from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M
-    from rhot_app.calibration.lens_fit import PARAMETERS
+    from rhot_app.calibration.lens.certainty import WORKING_DISTANCE_M
+    from rhot_app.calibration.lens.fit import PARAMETERS
 
     lens, errors = report.intrinsics, report.board_errors
     return {
         "rms_px": report.rms_px, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy,
         "distortion": list(lens.distortion), "size": list(report.size),
         "std": dict(zip(PARAMETERS, map(float, report.std), strict=True)),
-        "disagreement": report.disagreement,
+        "disagreement": report.error_inflation,
         "undetermined": list(report.undetermined),
         "views_used": len(report.views),
         "views_rejected": [{"name": each.name, "reason": each.reason, "code": each.code} for each in report.dropped],
@@ -84,14 +84,14 @@ def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
 
 def lines_of(report: IntrinsicsReport) -> list[str]:
     """The figures for people."""
-    from rhot_app.calibration.disagreement import what_is_stated
-    from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M
-    from rhot_app.calibration.lens_fit import PARAMETERS
+    from rhot_app.calibration.lens.certainty import WORKING_DISTANCE_M
+    from rhot_app.calibration.lens.fit import PARAMETERS
+    from rhot_app.calibration.robust_error import what_is_reported
 
     lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
     lines += [f"{name:<4}{value:12.4f} +- {std:.4f}" + (" px" if place < 4 else "")
               for place, (name, value, std) in enumerate(zip(PARAMETERS, report.lens, report.std, strict=True))]
-    lines.append(what_is_stated(report.disagreement))
+    lines.append(what_is_reported(report.error_inflation))
     cover = report.coverage
     lines.append(f"coverage, of what is needed: across {100 * cover.x:.0f} %, up and down {100 * cover.y:.0f} %, "
                  f"nearness {100 * cover.size:.0f} %, tilt {100 * cover.skew:.0f} %; corners in "

@@ -15,9 +15,9 @@ from rhot_app.calibration.commands.stereo_arguments import (
 )
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.lens_start import LensStart
-    from rhot_app.calibration.stereo_report import StereoReport
-    from rhot_app.calibration.world_frame import WorldFrame
+    from rhot_app.calibration.lens.start import LensStart
+    from rhot_app.calibration.stereo.report import StereoReport
+    from rhot_app.calibration.stereo.world_frame import WorldFrame
     from rhot_app.progress import Progress
     from rhot_app.project import Rig
 
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; a rig is written when it may be used and passes its own checks."""
     from rhot_app.calibration.commands.stereo_output import fields_of, lines_of
-    from rhot_app.calibration.stereo_rig import calibrated_rig, require_nodes, rig_verdict
+    from rhot_app.calibration.stereo.rig import calibrated_rig, require_nodes, rig_verdict
     from rhot_app.progress import ProgressLine
     from rhot_app.rig_history import accept
 
@@ -85,11 +85,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig,
                progress: Progress) -> tuple[StereoReport, WorldFrame | None]:
-    from rhot_app.calibration.lens_search import find_lens
-    from rhot_app.calibration.stereo import calibrate
-    from rhot_app.calibration.stereo_reading import read_shared, read_view
-    from rhot_app.calibration.stereo_rig import lens_of
-    from rhot_app.calibration.world_frame import place_world
+    from rhot_app.calibration.lens.search import find_lens
+    from rhot_app.calibration.stereo.calibrate import calibrate
+    from rhot_app.calibration.stereo.reading import read_shared, read_view
+    from rhot_app.calibration.stereo.rig import lens_of
+    from rhot_app.calibration.stereo.world_frame import place_world
 
     board = board_of(args)
     names = list(files)
@@ -110,7 +110,7 @@ def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig
 
 
 def _given_lenses(args: argparse.Namespace, names: list[str]) -> dict[str, LensStart]:
-    from rhot_app.calibration.intrinsics_file import load_intrinsics
+    from rhot_app.calibration.lens.intrinsics_file import load_intrinsics
 
     given = named_paths(args.intrinsics, "--intrinsics", names)
     for name, path in (("left", args.left_intrinsics), ("right", args.right_intrinsics)):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rhot_app.errors import CalibrationError
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.stereo import KnownLengths
+    from rhot_app.calibration.stereo.calibrate import KnownLengths
 
 
 def files_of(args: argparse.Namespace) -> dict[str, list[Path]]:
@@ -23,7 +23,7 @@ def files_of(args: argparse.Namespace) -> dict[str, list[Path]]:
     if len(patterns) < 2:
         raise CalibrationError("Pictures of at least two cameras are needed: --left PATTERN --right PATTERN, or "
                                "--camera NAME=PATTERN for each.")
-    from rhot_app.calibration.views import matching_files
+    from rhot_app.calibration.lens.views import matching_files
 
     found = {name: matching_files(pattern) for name, pattern in patterns.items()}
     for name, paths in found.items():
@@ -49,8 +49,8 @@ def known_lengths(args: argparse.Namespace, names: list[str]) -> KnownLengths:
     """The baseline by hand and the ruler."""
     import numpy as np
 
-    from rhot_app.calibration.ruler import RulerReading
-    from rhot_app.calibration.stereo import KnownLengths
+    from rhot_app.calibration.depth.ruler import RulerReading
+    from rhot_app.calibration.stereo.calibrate import KnownLengths
 
     for option, value in (("--baseline-mm", args.baseline_mm), ("--ruler-mm", args.ruler_mm)):
         if value is not None and not 0.0 < value < 1e5:

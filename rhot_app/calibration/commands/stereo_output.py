@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from rhot_app.calibration.disagreement import what_is_stated
-from rhot_app.calibration.stereo_report import MARKER_NOISE_PX, WORKING_DISTANCE_M, PairFigures, StereoReport
-from rhot_app.calibration.world_frame import WorldFrame
+from rhot_app.calibration.robust_error import what_is_reported
+from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M, PairFigures, StereoReport
+from rhot_app.calibration.stereo.world_frame import WorldFrame
 
 LENS_NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 
@@ -33,7 +33,7 @@ def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
                               "marker_noise_px": MARKER_NOISE_PX, "by_marker_noise": _number(by_noise * 1e3)},
         "std_method": "inverse of the bundle adjustment's normal equations at the corners' own spread, times the "
         "disagreement of the shots",
-        "disagreement": figures.disagreement,
+        "disagreement": figures.error_inflation,
         "cameras": [_camera(report, i) for i in range(len(figures.cameras))], "pairs": pairs,
         "views_used": len(figures.shots), "views_rejected": rejected,
         "shots": [{"name": shot.name, "rms_px": [_number(rms) for rms in shot.rms_px]} for shot in figures.shots],
@@ -60,7 +60,7 @@ def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
         shift, shift_std = _listed(pair.translation_m * 1e3), _listed(pair.translation_std_m * 1e3)
         lines.append(f"{pair.first} to {pair.second}: {pair.baseline_m * 1e3:.2f} mm; T ({shift}) +- ({shift_std}) mm, "
                      f"R ({_listed(pair.rotation_rad, 4)}) rad, epipolar {pair.epipolar_px:.2f} px")
-    lines.append(what_is_stated(figures.disagreement))
+    lines.append(what_is_reported(figures.error_inflation))
     squares = figures.squares
     lines.append(f"squares as the cameras see them: {squares.mean_m * 1e3:.3f} +- {squares.std_m * 1e3:.3f} mm, board "
                  f"flat to {squares.flatness_m * 1e3:.2f} mm")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
 from rhot_app.calibration.commands.output import require_folder
-from rhot_app.calibration.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and write the board."""
-    from rhot_app.calibration.board import Board, CharucoBoard, Chessboard, parse_size
-    from rhot_app.calibration.target import write_target
+    from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard, parse_size
+    from rhot_app.calibration.board.target import write_target
 
     require_folder(args.out)
     square_m = 1e-3 * args.square_mm

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import add_json_argument, show
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.time_offset import TimeReport
+    from rhot_app.calibration.time.offset import TimeReport
     from rhot_app.project import Rig
 
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Solve and report; the rig is written only with ``--out``."""
-    from rhot_app.calibration.time_offset import calibrate_times
+    from rhot_app.calibration.time.offset import calibrate_times
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
     from rhot_app.recording.observation_table import read_observations

@@ -117,6 +117,16 @@ class Backend(Protocol):
         """Cover these simulated cameras, and uncover the others; returns which are. Raises SimulatorError."""
         ...
 
+    def shown_in_twin(self) -> str:
+        """What stands before the simulated cameras, as `show_in_twin` takes it; "" for anything else. Raises
+        SimulatorError when there are none to ask."""
+        ...
+
+    def show_in_twin(self, what: str) -> str:
+        """Show something else, from its beginning; returns what is shown. `what`: ``hand:MOTION``, ``board``,
+        ``table`` (the board lies on it), ``ruler``, or ``marker:METRES``. Raises SimulatorError."""
+        ...
+
     def give_up(self) -> None:
         """End whatever is being started, so that a cancelled start leaves nothing behind."""
         ...

@@ -118,7 +118,7 @@ class Live:
             self.jitter.append(now_ns, np.full(len(self.jitter.names), np.nan))
             self.latency.append(now_ns, np.full(len(LATENCY_COLUMNS), np.nan))
 
-    def sight_at(self, t_master_ns: int) -> tuple[Array, NDArray[np.uint16]] | None:
+    def observation_at(self, t_master_ns: int) -> tuple[Array, NDArray[np.uint16]] | None:
         """Pixels (C, M, 2) and flags (C, M) of the state nearest to a preview's time; None when none is within 0.25 s.
 
         A preview is older than the newest state; drawn with the newest pixels, marks would run ahead of the picture.

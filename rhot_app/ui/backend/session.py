@@ -29,14 +29,15 @@ from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 
 if TYPE_CHECKING:
-    from rhot_app.simulator.remote import TwinRemote
+    from rhot_app.simulator.nodes.remote import TwinRemote
+    from rhot_app.simulator.scene.scene_description import Show
 
 ENGINE_ROLE = "engine"
 TWIN_ROLE = "simulated nodes"
 START_TIMEOUT_S = 360.0
 """The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
 
-TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.live")
+TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.nodes.live")
 TWIN_RIG = "simulated.rig.json"
 TWIN_OUTPUT = "twin.out"
 
@@ -120,6 +121,17 @@ class Session:
         with self._twin() as twin:
             return twin.cover(*names).covered
 
+    def shown_in_twin(self) -> str:
+        """What stands before the simulated cameras; raises SimulatorError when the twin gives no answer."""
+        with self._twin() as twin:
+            return _key_of(twin.state().show)
+
+    def show_in_twin(self, what: str) -> str:
+        """Show something else, from its beginning (`contract.Backend`); raises SimulatorError."""
+        show = _show_named(what)
+        with self._twin() as twin:
+            return _key_of(twin.show(show).show)
+
     def give_up(self) -> None:
         """End everything that the app started; what waits for it then fails and is forgotten."""
         self._twin_started = False
@@ -133,7 +145,7 @@ class Session:
                 if left else "")
 
     def _twin(self) -> TwinRemote:
-        from rhot_app.simulator.remote import TwinRemote  # with OpenCV, which most commands do without
+        from rhot_app.simulator.nodes.remote import TwinRemote  # with OpenCV, which most commands do without
 
         return TwinRemote(self._place.path)
 
@@ -187,6 +199,37 @@ class Session:
             report("Starting two simulated cameras …", 0.15 + 0.3 * min(1.0, (time.monotonic() - begin) / 15.0))
             time.sleep(0.05)
         raise SimulatorError(f"The simulated cameras were not ready within {START_TIMEOUT_S:.0f} s; see {errors}.")
+
+
+def _show_named(what: str) -> Show:
+    """The show of a key; raises SimulatorError for a key that is none."""
+    from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow, RulerShow
+
+    kind, _, detail = what.partition(":")
+    with contextlib.suppress(ValueError):
+        match kind:
+            case "hand":
+                return HandShow(detail)
+            case "board":
+                return BoardShow()
+            case "table":
+                return BoardShow(on_table=True)
+            case "ruler":
+                return RulerShow()
+            case "marker":
+                return MarkerShow(distance_m=float(detail))
+    raise SimulatorError(f"The simulated rig has no {what!r} to show.")
+
+
+def _key_of(show: Show) -> str:
+    """The key of a show; "" for one that has none."""
+    from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow, RulerShow
+
+    if isinstance(show, HandShow):
+        return f"hand:{show.motion}"
+    if isinstance(show, MarkerShow):
+        return f"marker:{show.distance_m:g}" if show == MarkerShow(distance_m=show.distance_m) else ""
+    return {BoardShow(): "board", BoardShow(on_table=True): "table", RulerShow(): "ruler"}.get(show, "")
 
 
 def _pace_in(output: Path) -> TwinPace | None:

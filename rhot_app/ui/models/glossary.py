@@ -8,7 +8,8 @@ TERMS: dict[str, str] = {
     "rig": "The rig file: cameras, lenses, marker set, hand and filters.",
     "node": "A small computer with a camera. It finds the markers in its picture and sends their places.",
     "node rate": "Frames per second that arrive from this node.",
-    "lost": "Datagrams that never arrived: gaps in the node's own count.",
+    "lost": "Frames that were not used since the start, shown when they are more than one in a hundred. The hint of "
+            "the card says why.",
     "dropped": "Datagrams that arrived and were rejected, with the reason.",
     "clock": "How well the node's clock is known: the true offset lies within this bound of the estimate. "
              "1 ms at 1 m/s is 1 mm.",

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.engine.status import EngineStatus
+from rhot_app.engine.status import EngineStatus, NodeStatus
 
 Array = NDArray[np.float64]
+
+_GAPS_TOO = ("time", "kernel_overflow")
+_AT_START = frozenset({"clock_in_doubt", "no_clock", "not_started", "session"})
 
 SETTLE_NS = 1_200_000_000
 
@@ -36,8 +39,20 @@ class LossMeter:
 
 
 def count_lost(status: EngineStatus) -> int:
-    """Datagrams that never came or were rejected, all nodes together."""
-    return sum(node.lost + sum(node.dropped.values()) for node in status.nodes)
+    """Frames that could not be used, all nodes together."""
+    return sum(sum(unused_frames(node).values()) for node in status.nodes)
+
+
+def unused_frames(node: NodeStatus) -> dict[str, int]:
+    """How many frames of a node could not be used, by reason ("lost": never arrived); each is counted once.
+
+    A frame that came too late is a gap in the sequence too. What comes before the clock and the session are agreed is
+    no loss: every start has some.
+    """
+    twice = sum(node.dropped.get(reason, 0) for reason in _GAPS_TOO)
+    found = {reason: count for reason, count in node.dropped.items() if count and reason not in _AT_START}
+    lost = max(node.lost - twice, 0)
+    return {**({"lost": lost} if lost else {}), **found}
 
 
 class RateRows:

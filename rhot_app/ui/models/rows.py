@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rhot_app.calibration.camera_calibration import KNOWN_EXACTLY, CalibrationError
+from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, CalibrationError
 from rhot_app.engine.status import NodeStatus
 from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.ui.models.rates import unused_frames
 from rhot_app.ui.models.spread import UNKNOWN, sd_number, sd_text, total_sd, worst_sd
 from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look
 
@@ -29,13 +30,31 @@ class NodeRow:
     tooltip: str
 
 
+_USUAL_LOSS = 0.01
+"""A hand moves on by some millimetres in a frame: one in a hundred that is missing changes nothing to be seen."""
+
+_UNUSED = {
+    "lost": "never arrived: the network lost them",
+    "time": "came too late: this computer or the network is busy",
+    "kernel_overflow": "could not be read in time: this computer is busy",
+    "marker_set": "of another marker set than the rig's",
+    "image_size": "of another picture size than the rig's",
+    "foreign_node": "of another node",
+    "duplicate": "came twice",
+    "tag": "not signed with the node's key",
+    "untagged": "not signed",
+}
+
+
 def node_row(node: NodeStatus) -> NodeRow:
     """Text of one node's card."""
     look = NODES.get(node.state, Look(node.state, "octagon", "fault", "This state is not known to this version."))
-    dropped = sum(node.dropped.values())
-    losses = f"{node.lost} lost" + (f", {dropped} rejected" if dropped else "")
-    reasons = "".join(f"\n  {count} × {reason}" for reason, count in sorted(node.dropped.items()))
-    tooltip = f"{look.meaning}\n{node.received} datagrams received." + (f"\nRejected:{reasons}" if reasons else "")
+    unused = unused_frames(node)
+    count, total = sum(unused.values()), node.received + unused.get("lost", 0)
+    losses = f"{count} frames unused" if count > _USUAL_LOSS * total else ""
+    reasons = "".join(f"\n  {many} × {_UNUSED.get(reason, f'refused ({reason})')}"
+                      for reason, many in sorted(unused.items()))
+    tooltip = f"{look.meaning}\n{node.received} frames received." + (f"\nUnused:{reasons}" if reasons else "")
     return NodeRow(
         name=node.name, look=look, rate=f"{node.rate_hz:.0f} /s" if node.rate_hz > 0 else DASH, losses=losses,
         clock=clock_text(node), message=node.message,

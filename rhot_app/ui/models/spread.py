@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.camera_calibration import CalibrationError
+from rhot_app.calibration.lens.camera_calibration import CalibrationError
 
 UNKNOWN = "?"
 """Stands for a standard deviation that nobody knows, because nobody knows how good the calibration is."""

@@ -219,7 +219,7 @@ class CameraPanel(QWidget):
     def _mark(self, view: CameraView, camera: int, preview: Preview, live: Live) -> None:
         assert self._rig is not None
         markers = self._rig.markers
-        sight = live.sight_at(preview.t_master_ns)
+        sight = live.observation_at(preview.t_master_ns)
         if sight is None or len(sight[0]) <= camera or sight[0].shape[1] != len(markers.ids):
             return
         colours = [visible_on(hex_of(marker.display_rgb), "#000000", 3.0) for marker in markers.markers]

@@ -4,25 +4,36 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QPainter
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QBrush, QColor, QFont, QFontMetrics, QPainter
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QButtonGroup,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
-from rhot_app.calibration.camera_calibration import KNOWN_EXACTLY, calibration_error
+from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.project import Rig
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.tracking.state import Condition, HandState, Knowledge
 from rhot_app.ui.models.glossary import tip
-from rhot_app.ui.models.hands import hand_names
+from rhot_app.ui.models.hands import each_hand, hand_names
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, angle_text, palm_text
 from rhot_app.ui.models.tracker_words import scale_text, size_known
-from rhot_app.ui.models.words import KNOWLEDGE
-from rhot_app.ui.panels.hand_choice import HandChoice
-from rhot_app.ui.shapes import ShapeMark
+from rhot_app.ui.models.words import KNOWLEDGE, Look, condition_look
+from rhot_app.ui.shapes import ShapeMark, shape_icon
 
 FINGER_HEADS = (("spread", "abduction"), ("MCP", "MCP"), ("PIP", "PIP"), ("DIP", "DIP"))
 THUMB_HEADS = (("spread", "abduction"), ("CMC", "CMC"), ("turn", "abduction"), ("MCP", "MCP"), ("IP", "IP"))
+
+_WIDEST, _WIDE = "-88 ±88°", "-88 ±8°"
 
 
 class AngleCell(QLabel):
@@ -34,7 +45,22 @@ class AngleCell(QLabel):
         self._knowledge = Knowledge.UNKNOWN
         self._title = name.replace("_", " ")
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.setContentsMargins(4, 1, 4, 1)
+        self.setContentsMargins(2, 1, 2, 1)
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """Room for every angle: a column that grew with what it says would move the whole dock."""
+        return self._room_for(_WIDEST)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        """Room for an angle that is known to less than ten degrees."""
+        return self._room_for(_WIDE)
+
+    def _room_for(self, text: str) -> QSize:
+        bold = QFont(self.font())
+        bold.setWeight(QFont.Weight.DemiBold)
+        margins = self.contentsMargins()
+        return QSize(QFontMetrics(bold).horizontalAdvance(text) + margins.left() + margins.right(),
+                     super().sizeHint().height())
 
     def show_angle(self, angle_rad: float, sd_rad: float, knowledge: Knowledge) -> None:
         """Another value with its standard deviation, NaN when that is not known."""
@@ -124,6 +150,7 @@ class HandPanel(QWidget):
     def _fill_whole(self) -> None:
         self._palm_mark, self.palm = ShapeMark(12), QLabel(DASH)
         self.palm.setToolTip(f"{tip('palm')}\n{tip('hand size')}")
+        self.palm.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # it must not widen the dock
         self._whole.addWidget(QLabel("palm"))
         self._whole.addSpacing(8)
         self._whole.addWidget(self._palm_mark)
@@ -134,7 +161,7 @@ class HandPanel(QWidget):
             label = QLabel(head)
             label.setProperty("muted", True)
             label.setAlignment(Qt.AlignmentFlag.AlignRight)
-            label.setContentsMargins(4, 0, 4, 0)
+            label.setContentsMargins(2, 0, 2, 0)
             label.setToolTip(tip(term) + ("" if term == "abduction" else "\n" + tip("flexion")))
             self._grid.addWidget(label, row, column)
 
@@ -178,3 +205,58 @@ class HandPanel(QWidget):
             self.palm.setText(text)
             look = KNOWLEDGE[knowledge]
             self._palm_mark.set_shape(look.shape, self._scheme.tone(look.tone))
+
+
+# -- which of two hands a panel tells of, and how each is tracked ------------------------------------------------------
+
+class HandChoice(QWidget):
+    """A button for each hand, with the shape of how it is tracked. Not shown while there is only one."""
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._scheme = scheme
+        self.buttons = [QPushButton(), QPushButton()]
+        self._looks: list[Look | None] = [None, None]
+        self._group = QButtonGroup(self)
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(0, 0, 0, 0)
+        self._row.setSpacing(4)
+        for button in self.buttons:
+            button.setProperty("flat", True)
+            button.setCheckable(True)
+            button.setIconSize(QSize(24, 18))
+            self._group.addButton(button)
+            self._row.addWidget(button, 1)
+        self.show_hands(("",))
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours; the shapes follow with the next state."""
+        self._scheme = scheme
+        self._looks = [None, None]
+
+    def show_hands(self, names: tuple[str, ...]) -> None:
+        """Hands of these names, the rig's first one first and chosen; left stands at the left."""
+        direction = QBoxLayout.Direction
+        self._row.setDirection(direction.LeftToRight if names == tuple(sorted(names)) else direction.RightToLeft)
+        for button, name in zip(self.buttons, names, strict=False):
+            button.setText(f"{name} hand")
+        self._looks = [None, None]
+        self.buttons[0].setChecked(True)
+        self.setVisible(len(names) > 1)
+        self.show_state(None)
+
+    def show_state(self, state: HandState | None) -> None:
+        """How each hand is tracked; a hand that the state does not tell of is idle."""
+        hands = each_hand(state)
+        for k, button in enumerate(self.buttons):
+            look = condition_look((hands[k].condition if k < len(hands) else Condition.IDLE).value)
+            if look != self._looks[k]:
+                self._looks[k] = look
+                button.setIcon(shape_icon(look.shape, self._scheme.tone(look.tone), self.devicePixelRatioF()))
+                button.setToolTip(f"Show the {button.text()}'s angles. It is {look.word}.")
+
+    def chosen(self, state: HandState | None) -> HandState | None:
+        """The chosen hand's part of `state`, None where that has none."""
+        if self.buttons[0].isChecked() or state is None:
+            return state
+        return state.other

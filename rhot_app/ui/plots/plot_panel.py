@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QGuiApplication, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QToolButton, QVBoxLayout, QWidget
 
 from rhot_app.ui.models.axis_range import round_top, usual_top
 from rhot_app.ui.models.glossary import tip
@@ -21,6 +21,54 @@ Array = NDArray[np.float64]
 SPAN_S = 30.0
 _OLD_S = 1.5  # a figure older than this is not the present one any more
 DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine, Qt.PenStyle.DashDotLine)
+
+
+class PlotHead(QWidget):
+    """Title and buttons; those that do not fit stand behind an arrow."""
+
+    def __init__(self, title: QLabel, buttons: list[QPushButton]) -> None:
+        super().__init__()
+        self._title, self._buttons = title, buttons
+        self.arrow = QToolButton()
+        self.arrow.setArrowType(Qt.ArrowType.RightArrow)
+        self.arrow.setAutoRaise(True)
+        self.arrow.setToolTip("More buttons")
+        self.arrow.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.arrow.setMenu(QMenu(self.arrow))
+        self._fill_menu()
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(title, 1)
+        for widget in (*buttons, self.arrow):
+            layout.addWidget(widget)
+        self.arrow.hide()
+
+    def _fill_menu(self) -> None:
+        menu = self.arrow.menu()
+        menu.clear()
+        for button in self._buttons[1:]:
+            menu.addAction(button.text()).triggered.connect(button.click)
+
+    def leave_out(self, button: QPushButton) -> None:
+        """Do without one of the buttons."""
+        button.hide()
+        self._buttons.remove(button)
+        self._fill_menu()
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        """Title, the first button and the arrow."""
+        least = [self._title, self._buttons[0], self.arrow]
+        return QSize(sum(widget.sizeHint().width() for widget in least),
+                     max(widget.sizeHint().height() for widget in least))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """All buttons, or the first one and the arrow."""
+        super().resizeEvent(event)
+        whole = sum(widget.sizeHint().width() for widget in (self._title, *self._buttons)) <= self.width()
+        for button in self._buttons[1:]:
+            button.setVisible(whole)
+        self.arrow.setVisible(not whole)
 
 
 class PlotPanel(QWidget):
@@ -70,11 +118,7 @@ class PlotPanel(QWidget):
         label.setProperty("title", True)
         label.setToolTip(tip(self.term))
         self.setToolTip(tip(self.term))
-        head = QHBoxLayout()
-        head.setSpacing(0)
-        head.addWidget(label, 1)
-        for button in (self.pause_button, self.reset_button, self.copy_button):
-            head.addWidget(button)
+        self.head = PlotHead(label, [self.pause_button, self.reset_button, self.copy_button])
         body = QHBoxLayout()
         body.setSpacing(6)
         body.addWidget(self.plot, 1)
@@ -82,7 +126,7 @@ class PlotPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 2, 8, 4)
         layout.setSpacing(0)
-        layout.addLayout(head)
+        layout.addWidget(self.head)
         layout.addLayout(body, 1)
 
     def _style_plot(self) -> None:

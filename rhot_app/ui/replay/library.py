@@ -20,7 +20,7 @@ from rhot_app.project import with_tracker
 from rhot_app.recording.bookmarks import bookmarks_of
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import videos_of
-from rhot_app.sources.replay import LogDoor
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.ui.recordings import LOG_SUFFIX
 from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, being_recorded, condition_bins
@@ -68,7 +68,7 @@ def summarise_log(log: Path, *, progress: Progress = silent) -> Summary:
         warm_up(tracker, rig)
         records = ReadableLog(reader, progress)
         times, codes = [], []
-        for state in replay_states(iter(records), LogDoor(rig), tracker):
+        for state in replay_states(iter(records), LogValidator(rig), tracker):
             times.append(state.t_master_ns)
             codes.append(CODES.get(condition_of(state), LOST))
         since_first_s = 1e-9 * (np.array(times, np.int64) - (records.first_ns or 0))

@@ -28,7 +28,7 @@ from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
-from rhot_app.sources.replay import LogDoor
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
 from rhot_app.tracking.state import Condition, HandState
@@ -86,7 +86,7 @@ def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress:
         records = ReadableLog(reader, progress)
         collected = _Collected(rig)
         with out.open("wb", buffering=0) as file:
-            door = LogDoor(rig)
+            door = LogValidator(rig)
             for state in (smoothed_states(iter(records), door, SmoothedTracker(rig)) if smooth
                           else replay_states(iter(records), door, tracker)):
                 _write(file, collected.take(state), out)

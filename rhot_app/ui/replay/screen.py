@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import time
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
+from rhot_app.hand.skeleton import FINGERS
 from rhot_app.tracking.state import Condition, HandState
 from rhot_app.ui.models.pacing import FramePacer
-from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
 from rhot_app.ui.panels.hand_panel import HandPanel
 from rhot_app.ui.panels.markers_panel import MarkersPanel
 from rhot_app.ui.plots.jitter_plot import JitterPlot
-from rhot_app.ui.plots.plot_panel import PlotPanel
-from rhot_app.ui.replay.difference_plot import DifferencePlot
+from rhot_app.ui.plots.legend import LegendEntry
+from rhot_app.ui.plots.overflow import Line
+from rhot_app.ui.plots.plot_panel import DASHES, PlotPanel, newest, number
+from rhot_app.ui.replay.comparison import Comparison
+from rhot_app.ui.replay.player import SPEEDS
 from rhot_app.ui.replay.session import Replay
 from rhot_app.ui.replay.timeline import Timeline
-from rhot_app.ui.replay.transport import Transport
 from rhot_app.ui.scene.view import SceneView
 from rhot_app.ui.settings import Settings
+from rhot_app.ui.shapes import shape_pixmap
 
 PANEL_S = 0.1
 PLOT_S = 0.25
@@ -40,7 +48,7 @@ class ReplayScreen(QWidget):
         self.jitter, self.difference = JitterPlot(scheme), DifferencePlot(scheme)
         self.plots: tuple[PlotPanel, ...] = (self.jitter, self.difference)
         for plot in self.plots:
-            plot.reset_button.hide()  # a recording's past is not forgotten
+            plot.head.leave_out(plot.reset_button)  # a recording's past is not forgotten
         self.timeline, self.transport = Timeline(scheme), Transport(scheme)
         self.pacer = FramePacer()
         self._shown: tuple[int | None, float] | None = None
@@ -134,3 +142,152 @@ class ReplayScreen(QWidget):
         if not self._framed and state is not None and state.condition is Condition.TRACKING:
             self._framed = True
             self.scene.frame_first()
+
+
+# -- difference plot -------------------------------------------------------------------------------------------------
+
+Array = NDArray[np.float64]
+
+
+class DifferencePlot(PlotPanel):
+    """One line per finger."""
+
+    term = "fingertip difference"
+    title = "Fingertip difference"
+    unit = "mm"
+    least_span = 1.0
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(scheme, ("now", "p50", "p95"), "000.0", parent)
+        self._whole: list[tuple[str, str]] = [("–", "–")] * len(FINGERS)
+        self._curves: list[pg.PlotDataItem] = []
+        self._colour()
+
+    def show_comparison(self, comparison: Comparison) -> None:
+        """Another pair of runs."""
+        median, p95 = comparison.percentiles_mm(50.0, 95.0)
+        self._whole = [(number(low, 1), number(high, 1)) for low, high in zip(median, p95, strict=True)]
+
+    def _colour(self) -> None:
+        for curve in self._curves:
+            self.plot.removeItem(curve)
+        self._curves, entries = [], []
+        for k, finger in enumerate(FINGERS):
+            colour = visible_on(STAGE_COLOURS[k], self._scheme.panel)
+            dash = DASHES[k % len(DASHES)]
+            self._curves.append(self.plot.plot(pen=pg.mkPen(colour, width=2, style=dash), connect="finite"))
+            entries.append(LegendEntry(finger, colour, dash))
+        self.legend.set_entries(entries)
+
+    def _draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+        if rows.shape[1] != len(self._curves):
+            rows = np.full((len(seconds), len(self._curves)), np.nan)
+        for k, curve in enumerate(self._curves):
+            curve.setData(seconds, rows[:, k])
+        self.legend.set_values([(number(newest(seconds, rows, k), 1), *whole) for k, whole in enumerate(self._whole)])
+        self._fit(seconds, [Line(entry.name, entry.colour, rows[:, k]) for k, entry in enumerate(self.legend.entries)])
+
+
+# -- the row of buttons under the timeline -----------------------------------------------------------------------------
+
+_ICON_PX = 16
+
+
+class Transport(QWidget):
+    """Says what is wanted; the window does it. `speed_chosen` gives times real time."""
+
+    play_asked = Signal()
+    step_asked = Signal(int)
+    first_asked = Signal()
+    last_asked = Signal()
+    speed_chosen = Signal(float)
+    loop_begin_asked = Signal()
+    loop_end_asked = Signal()
+    loop_clear_asked = Signal()
+    bookmark_asked = Signal()
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._signs: list[tuple[QPushButton, str]] = []
+        self._playing: bool | None = None
+        self.first_button = self._sign("first", "The beginning (Home).")
+        self.back_button = self._sign("previous", "One state back (left arrow).")
+        self.play_button = self._sign("play", "Play or pause (Space).")
+        self.on_button = self._sign("next", "One state on (right arrow).")
+        self.last_button = self._sign("last", "The end (End).")
+        self.speed_box = QComboBox()
+        self.speed_box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.speed_box.setToolTip("How fast it plays, times real time.")
+        for speed in SPEEDS:
+            self.speed_box.addItem(f"{speed:g} ×", speed)
+        self.speed_box.setCurrentIndex(SPEEDS.index(1.0))
+        self.loop_begin_button = self._word("Loop from here", "The range that is repeated begins here ([).")
+        self.loop_end_button = self._word("to here", "The range that is repeated ends here (]).")
+        self.loop_clear_button = self._word("No loop", "Repeat nothing.")
+        self.bookmark_button = self._word("Bookmark", "Write a few words about this moment into the recording (B).")
+        self.place = QLabel("")
+        widest = "00:00.00 of 00:00.00, state 00000 of 00000"
+        self.place.setMinimumWidth(self.place.fontMetrics().horizontalAdvance(widest))
+        self._lay_out()
+        self._connect()
+        self.set_scheme(scheme)
+
+    def _sign(self, shape: str, meaning: str) -> QPushButton:
+        button = self._word("", meaning)
+        button.setIconSize(QSize(_ICON_PX, _ICON_PX))
+        button.setAccessibleName(meaning)
+        self._signs.append((button, shape))
+        return button
+
+    def _word(self, text: str, meaning: str) -> QPushButton:
+        button = QPushButton(text)
+        button.setToolTip(meaning)
+        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves the space bar to the player
+        return button
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 0, 10, 8)
+        row.setSpacing(6)
+        for button, _ in self._signs:
+            row.addWidget(button)
+        row.addWidget(self.speed_box)
+        row.addSpacing(8)
+        row.addWidget(self.place)
+        row.addStretch(1)
+        for word in (self.loop_begin_button, self.loop_end_button, self.loop_clear_button, self.bookmark_button):
+            row.addWidget(word)
+
+    def _connect(self) -> None:
+        for button, signal in ((self.first_button, self.first_asked), (self.play_button, self.play_asked),
+                               (self.last_button, self.last_asked), (self.loop_begin_button, self.loop_begin_asked),
+                               (self.loop_end_button, self.loop_end_asked),
+                               (self.loop_clear_button, self.loop_clear_asked),
+                               (self.bookmark_button, self.bookmark_asked)):
+            button.clicked.connect(lambda checked=False, signal=signal: signal.emit())
+        self.back_button.clicked.connect(lambda: self.step_asked.emit(-1))
+        self.on_button.clicked.connect(lambda: self.step_asked.emit(1))
+        self.speed_box.activated.connect(lambda: self.speed_chosen.emit(float(self.speed_box.currentData())))
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        ratio = self.devicePixelRatioF()
+        for button, shape in self._signs:
+            button.setIcon(QIcon(shape_pixmap(shape, scheme.text, _ICON_PX, ratio)))
+        self._playing = None
+
+    @property
+    def is_playing(self) -> bool | None:
+        """What the play button shows; None before it shows anything."""
+        return self._playing
+
+    def show_replay(self, replay: Replay) -> None:
+        """Where it stands."""
+        player = replay.player
+        self.place.setText(replay.position_text)
+        self.loop_clear_button.setEnabled(player.loop is not None)
+        if player.playing != self._playing:
+            self._playing = player.playing
+            self.play_button.setIcon(QIcon(shape_pixmap("pause" if player.playing else "play", self._scheme.text,
+                                                        _ICON_PX, self.devicePixelRatioF())))

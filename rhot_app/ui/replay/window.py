@@ -22,7 +22,7 @@ from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.guide import GuideViewer
 from rhot_app.ui.models.notice import Level, Notice
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.models.passing import PassingNotices
+from rhot_app.ui.models.transient_notices import TransientNotices
 from rhot_app.ui.models.words import Look, condition_look
 from rhot_app.ui.panels.advice_bar import AdviceBar
 from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
@@ -60,7 +60,7 @@ class ReplayWindow(QMainWindow):
         self.dialog: RunDialog | None = None
         self.bookmarks = BookmarkWriter(self)
         self.guide: GuideViewer | None = None
-        self.passing = PassingNotices()
+        self.passing = TransientNotices()
         self.toolbar = ReplayToolBar(scheme, self)
         self.strip = WorkStrip()
         self.parts = ReplayScreen(settings, scheme)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.skeleton import JOINTS, TIP_ROLES
-from rhot_app.tracking.state import HandState
+from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.ui.models.palette import Scheme, rgb_of
 from rhot_app.ui.scene.frames import to_display
 from rhot_app.ui.scene.hand_mesh import TIPS, PosedMesh
@@ -27,7 +27,12 @@ LARGEST_M = 0.06
 LARGER = 10
 """The other choice beside true size: a good place is known to a millimetre, which is too small to see from afar."""
 
-_ALPHA = 90
+_ALPHA, _GUESSED_ALPHA = 90, 26
+"""How solid: the ellipsoid of a guess is large, so that only its rim may stand out from the hand inside."""
+
+_FINGER_M = 0.009
+"""Half the breadth of a finger: an ellipsoid that is larger than what it belongs to is fainter by as much."""
+
 _INNER = np.array([k for k in range(len(JOINTS)) if k not in TIPS])
 _TIPS = np.array(TIPS)
 
@@ -63,7 +68,8 @@ class EllipsoidMesh:
         rows += [marker.display_rgb for marker in markers.markers]
         count = len(self._sphere.vertices)
         self.faces: Faces = repeat_faces(self._sphere.faces, count, len(rows))
-        self.colours: Colours = np.repeat(np.array([(*rgb, _ALPHA) for rgb in rows], np.uint8), count, axis=0)
+        self._colours: Colours = np.repeat(np.array([(*rgb, _ALPHA) for rgb in rows], np.uint8), count, axis=0)
+        self._solid = np.ones(len(rows))
         self.cut = False
 
     def pose(self, state: HandState, choice: EllipsoidChoice) -> PosedMesh:
@@ -77,6 +83,7 @@ class EllipsoidMesh:
         semi = choice.factor * SIGMAS * np.sqrt(np.maximum(values, 1e-12))
         self.cut = bool((semi[shown] > LARGEST_M).any())
         semi = np.minimum(semi, LARGEST_M)
+        self._solid = np.clip(_FINGER_M / semi.max(axis=1), _GUESSED_ALPHA / _ALPHA, 1.0)
         vertices, normals = self._stretched(axes, semi)
         centres = np.where(shown[:, None], places, 0.0)[:, None]
         vertices = centres + shown[:, None, None] * vertices
@@ -84,6 +91,13 @@ class EllipsoidMesh:
                                     state.marker_knowledge]).astype(np.uint8)
         return PosedMesh(to_display(vertices.reshape(-1, 3)), to_display(normals.reshape(-1, 3)),
                          np.repeat(knowledge, len(self._sphere.vertices)))
+
+    def colours(self, posed: PosedMesh) -> Colours:
+        """(N, 4) bytes of the ellipsoids posed last: fainter where they are large or guessed."""
+        shown = self._colours.copy()
+        shown[:, 3] = np.repeat(np.rint(_ALPHA * self._solid), len(self._sphere.vertices))
+        shown[posed.knowledge == Knowledge.GUESSED, 3] = _GUESSED_ALPHA
+        return shown
 
     def _chosen(self, state: HandState, choice: EllipsoidChoice) -> NDArray[np.bool_]:
         """Which are wanted. A painted fingertip is one place: its marker's ellipsoid would flicker in the tip's own."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rhot_app.project import CameraPose, Intrinsics
 from rhot_app.tracking.state import HandState
-from rhot_app.ui.scene.stage import TABLE_ORIGIN
+from rhot_app.ui.scene.floor import TABLE_ORIGIN
 
 Array = NDArray[np.float64]
 

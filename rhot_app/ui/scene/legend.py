@@ -1,4 +1,4 @@
-"""The scene's key: what solid, translucent and hatched mean, and how large ellipsoids are drawn."""
+"""The scene's key: which tracker, what solid, translucent and hatched mean, and how large ellipsoids are drawn."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ KINDS = (Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED)
 _BONE_PX = (34.0, 13.0)
 _PAD_PX = 8.0
 _GAP_PX = 8.0
+_WIDEST_PX = 220.0  # of its words, so that the hand has the rest
 
 
 def ellipsoid_text(choice: EllipsoidChoice | None, *, cut: bool, pictures_alone: bool = False) -> str:
@@ -35,46 +36,70 @@ class Legend:
     def __init__(self) -> None:
         self._key: object = None
         self._picture = QPixmap()
+        self.rows: tuple[str, ...] = ()
 
-    def paint(self, painter: QPainter, height: int, scheme: Scheme, text: str) -> None:
-        """Into the lower left corner of a widget `height` px tall; `text` is about the ellipsoids, "" for none."""
+    def paint(self, painter: QPainter, size: tuple[int, int], scheme: Scheme, text: str, tracker: str) -> None:
+        """Into the lower left corner of a widget of that size, px; `text` is about the ellipsoids, "" for none;
+        `tracker` is the name of what makes a hand of the markers."""
         ratio = painter.device().devicePixelRatioF()
-        key = (scheme.name, text, ratio, painter.font().key())
+        key = (scheme.name, text, tracker, ratio, size[0], painter.font().key())
         if key != self._key:
-            self._key, self._picture = key, _draw(scheme, text, painter.font(), ratio)
-        painter.drawPixmap(QPointF(_PAD_PX, height - self._picture.deviceIndependentSize().height() - _PAD_PX),
+            widest = min(size[0] - 4 * _PAD_PX - _BONE_PX[0] - _GAP_PX, _WIDEST_PX)
+            self.rows = (*(KNOWLEDGE[kind].word for kind in KINDS),
+                         *_wrapped(text, QFontMetricsF(painter.font()), widest))
+            self._key = key
+            self._picture = _draw(scheme, self.rows, tracker, painter.font(), ratio)
+        painter.drawPixmap(QPointF(_PAD_PX, size[1] - self._picture.deviceIndependentSize().height() - _PAD_PX),
                            self._picture)
 
 
-def _draw(scheme: Scheme, text: str, font: QFont, ratio: float) -> QPixmap:
-    rows = [KNOWLEDGE[kind].word for kind in KINDS] + ([text] if text else [])
+def _wrapped(text: str, metrics: QFontMetricsF, widest: float) -> list[str]:
+    """`text` in rows no wider than `widest` px, broken after commas."""
+    rows: list[str] = []
+    for part in text.split(", ") if text else ():
+        longer = f"{rows[-1]}, {part}" if rows else part
+        if rows and metrics.horizontalAdvance(longer) <= widest:
+            rows[-1] = longer
+        else:
+            rows.append(part)
+    return rows
+
+
+def _draw(scheme: Scheme, rows: tuple[str, ...], tracker: str, font: QFont, ratio: float) -> QPixmap:
     metrics = QFontMetricsF(font)
     step = float(np.ceil(metrics.height())) + 3
     width = max(metrics.horizontalAdvance(row) for row in rows) + _BONE_PX[0] + _GAP_PX + 2 * _PAD_PX
-    box = QRectF(0, 0, np.ceil(width), len(rows) * step + _PAD_PX)
+    head = f"tracker: {tracker}" if tracker else ""
+    width = max(width, metrics.horizontalAdvance(head) + 2 * _PAD_PX)
+    above = 1 if head else 0
+    box = QRectF(0, 0, np.ceil(width), (above + len(rows)) * step + _PAD_PX)
     picture = QPixmap(round(box.width() * ratio), round(box.height() * ratio))
     picture.setDevicePixelRatio(ratio)
     picture.fill(Qt.GlobalColor.transparent)
     painter = QPainter(picture)
     painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.TextAntialiasing)
-    ground = QColor(scheme.scene)
-    ground.setAlpha(200)
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(ground)
-    painter.drawRoundedRect(box, 6, 6)
+    painter.setBrush(QColor(scheme.scene))  # solid: what is large in the scene must not cut the words
+    widths = [metrics.horizontalAdvance(head) if head else 0.0] * above
+    widths += [metrics.horizontalAdvance(row) + _BONE_PX[0] + _GAP_PX for row in rows]
+    for number, wide in enumerate(widths):  # no wider than its words: what is behind the rest stays in sight
+        painter.drawRect(QRectF(0, 0.5 * _PAD_PX + number * step, wide + 2 * _PAD_PX, step))
     painter.setFont(font)
     for number, row in enumerate(rows):
-        line = QRectF(_PAD_PX, 0.5 * _PAD_PX + number * step, box.width() - 2 * _PAD_PX, step)
+        line = QRectF(_PAD_PX, 0.5 * _PAD_PX + (above + number) * step, box.width() - 2 * _PAD_PX, step)
         sign = QRectF(0, 0, *_BONE_PX)
         sign.moveCenter(QPointF(line.left() + 0.5 * _BONE_PX[0], line.center().y()))
         if number < len(KINDS):
             paint_bone(painter, sign, KINDS[number], scheme)
-        else:
+        elif number == len(KINDS):
             painter.setPen(QPen(QColor(scheme.text), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawEllipse(sign.adjusted(3, 1, -3, -1))
         painter.setPen(QColor(scheme.text))
         painter.drawText(line.adjusted(_BONE_PX[0] + _GAP_PX, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, row)
+    if head:
+        painter.setPen(QColor(scheme.muted))
+        painter.drawText(QRectF(_PAD_PX, 0.5 * _PAD_PX, box.width(), step), Qt.AlignmentFlag.AlignVCenter, head)
     painter.end()
     return picture
 

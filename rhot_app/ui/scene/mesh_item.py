@@ -57,7 +57,8 @@ void main() {
     float diffuse = max(dot(n, normalize(vec3(-0.35, 0.55, 0.75))), 0.0);
     float light = mix(1.0, 0.42 + 0.62 * diffuse, u_lit);
     float rim = u_lit * pow(1.0 - n.z, 3.0);
-    vec4 colour = vec4(v_colour.rgb * light + 0.12 * rim, v_colour.a + 0.35 * rim * (1.0 - v_colour.a));
+    float edge = 0.35 * rim * (1.0 - v_colour.a) * min(1.0, 4.0 * v_colour.a);
+    vec4 colour = vec4(v_colour.rgb * light + 0.12 * rim, v_colour.a + edge);
     if (v_hatched > 0.5) {
         float stripe = step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / u_period));
         colour = vec4(colour.rgb * mix(0.62, 1.0, stripe), colour.a * mix(0.45, 1.0, stripe));

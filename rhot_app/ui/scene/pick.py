@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.camera_calibration import CalibrationError
+from rhot_app.calibration.lens.camera_calibration import CalibrationError
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.ui.models.hands import each_hand

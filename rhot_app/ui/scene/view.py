@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
@@ -10,16 +12,18 @@ from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtGui import QHelpEvent, QKeyEvent, QMatrix4x4, QPainter, QResizeEvent, QVector3D
 from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 
-from rhot_app.calibration.camera_calibration import KNOWN_EXACTLY, calibration_error
+from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.hands import each_hand, hand_names
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
-from rhot_app.ui.scene import stage
-from rhot_app.ui.scene.actors import Actors, second_actors
+from rhot_app.ui.models.tracker_words import KINDS
+from rhot_app.ui.scene import floor as stage
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import Up, camera_like, camera_like_state, frustum_lines, to_display
+from rhot_app.ui.scene.hand_actors import HandActors
+from rhot_app.ui.scene.hands import hands_of
 from rhot_app.ui.scene.labels import LabelPainter, TextStyle, pixels_of
 from rhot_app.ui.scene.legend import Legend, ellipsoid_text
 from rhot_app.ui.scene.pick import nearest, spots
@@ -216,6 +220,11 @@ class SceneView(GLViewWidget):
         self.update()
 
     @property
+    def tracker_word(self) -> str:
+        """What makes a hand of the markers; "" without a rig."""
+        return "" if self._rig is None else KINDS[self._rig.tracker.kind][0].lower()
+
+    @property
     def _up(self) -> Up:
         return "-y" if self._rig is None else self._rig.up
 
@@ -263,9 +272,48 @@ class SceneView(GLViewWidget):
         if self._actors is not None:
             text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self._actors.cut,
                                   pictures_alone=self._by_calibration.sd_m != 0.0)
-            self._legend.paint(painter, self.height(), self._scheme, text)
+            self._legend.paint(painter, size, self._scheme, text, self.tracker_word)
 
 
 def _of_rig(state: HandState | None, rig: Rig | None) -> HandState | None:
     """`state`, unless it has another rig's markers."""
     return state if state is None or rig is None or state.marker_ids == rig.markers.ids else None
+
+
+# -- what moves in the scene -------------------------------------------------------------------------------------------
+
+class Actors:
+    """The moving items of one rig in one colour scheme. `items` are to be added to the view.
+
+    `ellipsoids` chooses what is drawn of the uncertainty, None for nothing. `opacity` 0..1 is of everything.
+    """
+
+    def __init__(self, rig: Rig, scheme: Scheme, opacity: float = 1.0) -> None:
+        self._hands = tuple(HandActors(hand, scheme, opacity) for hand in hands_of(rig))
+        self.ellipsoids: EllipsoidChoice | None = EllipsoidChoice()
+        self.items = tuple(item for hand in self._hands for item in hand.items)
+
+    @property
+    def cut(self) -> bool:
+        """Whether an ellipsoid is drawn smaller than it is."""
+        return self.ellipsoids is not None and any(hand.cut for hand in self._hands)
+
+    def hide(self) -> None:
+        """Show nothing until the next pose."""
+        for hand in self._hands:
+            hand.hide()
+
+    def pose(self, state: HandState) -> None:
+        """Show everything at a state of this rig."""
+        for hand in self._hands:
+            hand.pose(state, self.ellipsoids)
+
+
+_SECOND_OPACITY = 0.45
+
+
+def second_actors(rig: Rig, scheme: Scheme) -> Actors:
+    """The hands of a second run of the same recording: translucent, in the accent colour, without ellipsoids."""
+    actors = Actors(rig, replace(scheme, hand=scheme.accent, text=scheme.accent), _SECOND_OPACITY)
+    actors.ellipsoids = None
+    return actors

@@ -10,8 +10,8 @@ from PySide6.QtCore import QLocale, QRegularExpression, QUrl
 from PySide6.QtGui import QDesktopServices, QRegularExpressionValidator
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton, QSpinBox, QWidget
 
-from rhot_app.calibration.standard_board import SQUARE_MM
-from rhot_app.calibration.target import write_target
+from rhot_app.calibration.board.standard_board import SQUARE_MM
+from rhot_app.calibration.board.target import write_target
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.memory import Memory
 from rhot_app.ui.wizards.models.board_form import (

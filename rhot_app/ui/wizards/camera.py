@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+
+from rhot_app.errors import RhotError
+from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.job import Job
 from rhot_app.ui.wizards.accept_page import AcceptPage
-from rhot_app.ui.wizards.camera_page import CameraPage
+from rhot_app.ui.wizards.control_row import ControlRow
 from rhot_app.ui.wizards.models.accept import AcceptStep
-from rhot_app.ui.wizards.models.camera_settings import CameraChoices
+from rhot_app.ui.wizards.models.camera_settings import CONTROLS, CameraChoices, Control, Value
 from rhot_app.ui.wizards.models.camera_steps import SettingsStep
 from rhot_app.ui.wizards.models.proposal import NodeChange
+from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.page import Page
 from rhot_app.ui.wizards.plan import Kit, Plan
-from rhot_app.ui.wizards.tryout import Settings, Tryout
 
 
 def make_plan(kit: Kit) -> Plan:
@@ -17,7 +29,8 @@ def make_plan(kit: Kit) -> Plan:
     choices = CameraChoices(kit.rig.nodes, kit.node_settings)
     step = SettingsStep(choices, kit.rig.markers)
     tryout = Tryout(kit.connect)
-    accept = AcceptStep(lambda: step.propose(kit.rig_path), missing="Nothing was changed: there is nothing to save.")
+    accept = AcceptStep(lambda: step.propose(kit.rig_path),
+                        missing="Nothing was changed, and the pictures are not good yet.")
     page = CameraPage(step, tryout)
     tryout.setParent(page)
 
@@ -32,3 +45,180 @@ def make_plan(kit: Kit) -> Plan:
         tryout.put_back(in_force)
 
     return Plan("Set the cameras", (page, AcceptPage(accept, kit.scheme)), put_back=put_back)
+
+
+# -- the knobs of the camera wizard ------------------------------------------------------------------------------------
+
+class CameraPage(Page):
+    """What is turned is tried out at once by the cameras chosen; nothing is saved."""
+
+    def __init__(self, step: SettingsStep, tryout: Tryout) -> None:
+        super().__init__(step)
+        self._settings = step
+        self._tryout = tryout
+        self._shown: object = None
+        self.which = QComboBox()
+        self.which.setToolTip("Whose settings are turned. Both at once keeps equal cameras equal.")
+        choices = step.choices
+        if len(choices.nodes) > 1:
+            self.which.addItem("All cameras", tuple(node.node_id for node in choices.nodes))
+        for node in choices.nodes:
+            self.which.addItem(node.name, (node.node_id,))
+        self.rows = {control.field: ControlRow(control) for control in CONTROLS}
+        knobs = QWidget()
+        knobs.setProperty("panel", False)
+        column = QVBoxLayout(knobs)
+        column.setContentsMargins(0, 0, 8, 0)
+        column.setSpacing(4)
+        for row in self.rows.values():
+            column.addWidget(row)
+            row.changed.connect(lambda value, goes_on, row=row: self._turn(row.control, value, goes_on=goes_on))
+        column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setWidget(knobs)
+        self.balance_button = QPushButton("Balance on grey")
+        self.balance_button.setToolTip("Drag over something grey or white in a picture first, a sheet of paper for "
+                                       "instance. Press again until nothing changes.")
+        self.balance_button.setAutoDefault(False)
+        self.balance_button.clicked.connect(self._balance)
+        self.undo_button = QPushButton("Undo")
+        self.undo_button.setToolTip("Ctrl+Z. The last change back.")
+        self.undo_button.setAutoDefault(False)
+        self.undo_button.clicked.connect(self._undo)
+        self.problem = QLabel()
+        self.problem.setWordWrap(True)
+        self.column.addWidget(self.which)
+        self.column.addWidget(scroll, 1)
+        self.column.addWidget(self.problem)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.balance_button)
+        buttons.addWidget(self.undo_button)
+        self.column.addLayout(buttons)
+        self.which.currentIndexChanged.connect(self._choose)
+        tryout.told.connect(self._told)
+        self.first_field = self.which
+        self.pickable = True
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """Node ids of the cameras that are being set."""
+        ids: tuple[int, ...] = self.which.currentData() or ()
+        return ids
+
+    def _choose(self) -> None:
+        self._shown = None
+        self.changed.emit()
+
+    def _turn(self, control: Control, value: Value, *, goes_on: bool) -> None:
+        try:
+            self._settings.choices.change(self.chosen, control, value, goes_on=goes_on)
+        except ValueError as exc:
+            self.problem.setText(str(exc))
+            return
+        self.changed.emit()
+
+    def _undo(self) -> None:
+        if self._settings.undo():
+            self.changed.emit()
+
+    def _balance(self) -> None:
+        if self._settings.balance():
+            self.changed.emit()
+
+    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+        """Something grey."""
+        self._settings.mark_grey(camera, (round(x), round(y), round(x + width), round(y + height)))
+
+    def _told(self, problem: str) -> None:
+        self._settings.note_told(time.monotonic_ns())
+        self.problem.setText(problem)
+
+    def show_view(self, view: StepView) -> None:
+        """Show the settings, and have the cameras try out what is new."""
+        choices = self._settings.choices
+        self.balance_button.setEnabled(bool(self._settings.balanceable))
+        if self._shown is choices.now:
+            return
+        self._shown = choices.now
+        for node_id in self._settings.untold():
+            self._tryout.want(node_id, self._settings.tell(node_id))
+        for row in self.rows.values():
+            values = {choices.value(node_id, row.control) for node_id in self.chosen}
+            row.fill(choices.value(self.chosen[0], row.control) if self.chosen else None)
+            row.told.setText(row.control.name if len(values) < 2 else f"{row.control.name} (they differ)")
+        self.undo_button.setEnabled(choices.undoable)
+
+
+# -- node settings tried out while a person turns a knob ---------------------------------------------------------------
+
+Settings = dict[str, Any]
+
+
+class Tryout(QObject):
+    """`want` as often as you like; at most one request is under way. `told` with "" or with what went wrong."""
+
+    told = Signal(str)
+
+    def __init__(self, connect: Callable[[], Asker], parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._connect = connect
+        self._wanted: dict[int, Settings] = {}
+        self._job: Job | None = None
+        self._tried: set[int] = set()
+        self._lock = threading.Lock()  # between the worker that sends and the one that puts back
+
+    @property
+    def under_way(self) -> bool:
+        """Whether the nodes have not been told everything yet."""
+        return self._job is not None
+
+    def want(self, node_id: int, settings: Settings) -> None:
+        """Have the node go by `settings` without saving them."""
+        self._wanted[node_id] = settings
+        self._tried.add(node_id)
+        self._begin()
+
+    def _begin(self) -> None:
+        if self._job is None and self._wanted:
+            wanted, self._wanted = self._wanted, {}
+            self._job = Job(lambda progress: self._send(wanted), self._sent, self._failed, None, self).start()
+
+    def _send(self, wanted: dict[int, Settings]) -> None:
+        with self._lock:
+            asker = self._connect()
+            try:
+                for node_id, settings in wanted.items():
+                    try_settings(asker, node_id, settings)
+            finally:
+                asker.close()
+
+    def _sent(self, _: None) -> None:
+        self._job = None
+        self.told.emit("")
+        self._begin()
+
+    def _failed(self, sentence: str) -> None:
+        self._job = None
+        self.told.emit(sentence)
+        self._begin()
+
+    def put_back(self, before: dict[int, Settings]) -> None:
+        """Have every node that was told anything go by `before` again; waits, so call it in a worker. A node that does
+        not answer is left: what was tried out ends with its process."""
+        self._wanted = {}
+        with self._lock:
+            asker = self._connect()
+            try:
+                for node_id in sorted(self._tried):
+                    try:
+                        try_settings(asker, node_id, before[node_id])
+                    except RhotError:
+                        continue
+            finally:
+                asker.close()
+
+
+def try_settings(asker: Asker, node_id: int, settings: Settings) -> None:
+    """Settings that are in force but not saved; raises EngineError with the node's sentence."""
+    asker.command("node", node_id=node_id, request={"request": "set_settings", "settings": settings, "save": False})

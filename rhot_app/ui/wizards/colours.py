@@ -2,13 +2,37 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from rhot_app.calibration.colour.colours import ColourReport
+from rhot_app.calibration.colour.separability import SKIN
+from rhot_app.calibration.colour.verdict import OVERLAP
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.theme import app_font
 from rhot_app.ui.wizards.accept_page import AcceptPage
-from rhot_app.ui.wizards.apart_page import ApartPage
-from rhot_app.ui.wizards.colour_page import BoundsPage, PickPage
+from rhot_app.ui.wizards.chart_view import ChartView
+from rhot_app.ui.wizards.colour_list import PaintList, PaintRow
+from rhot_app.ui.wizards.control_row import ControlRow
 from rhot_app.ui.wizards.models.accept import AcceptStep
-from rhot_app.ui.wizards.models.colour_bounds import BoundsStep
+from rhot_app.ui.wizards.models.camera_settings import Control, Value
+from rhot_app.ui.wizards.models.colour_bounds import BOUNDS, BoundsStep
 from rhot_app.ui.wizards.models.colour_pick import PickStep
-from rhot_app.ui.wizards.models.colour_result import ApartStep, propose
+from rhot_app.ui.wizards.models.colour_result import ApartStep, matrix_cells, propose
+from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.page import Page
 from rhot_app.ui.wizards.plan import Kit, Plan
 
 
@@ -22,4 +46,222 @@ def make_plan(kit: Kit) -> Plan:
                         "Pick the markers' colours first.")
     pages = (PickPage(picks, kit.scheme), BoundsPage(bounds, kit.scheme), ApartPage(apart, kit.scheme),
              AcceptPage(accept, kit.scheme))
-    return Plan("Colours of the markers", pages, solver="rhot_app.calibration.colours")
+    return Plan("Colours of the markers", pages, solver="rhot_app.calibration.colour.colours")
+
+
+# -- the page of the separability --------------------------------------------------------------------------------------
+
+_ROW_PX = 28
+_LEAST = 0.005  # less is shown as nothing
+
+
+class ApartPage(Page):
+    """Nothing to enter: what the person can do about it stands in the verdict."""
+
+    def __init__(self, step: ApartStep, scheme: Scheme) -> None:
+        super().__init__(step)
+        self._apart = step
+        self._shown: ColourReport | None = None
+        self._scheme = scheme
+        self.charts = ChartView(scheme)
+        self.table = QTableWidget()
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.table.setAccessibleName("Which colour is taken for which")
+        caption = QLabel("How much of each column's colour is taken for the marker of the row, in %, over all lamps "
+                         "that may come; of a marker's own colour by the lamp where that is least")
+        caption.setWordWrap(True)
+        self.centre = QWidget()
+        column = QVBoxLayout(self.centre)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.charts, 1)
+        column.addWidget(caption)
+        column.addWidget(self.table)
+        note = QLabel("The blue line shows which hues the room has, and how much of each. Where it rises inside a "
+                      "marker's band, the room has things of that marker's colour.")
+        note.setWordWrap(True)
+        note.setProperty("muted", True)
+        self.column.addWidget(note)
+        self.column.addStretch(1)
+
+    def show_view(self, view: StepView) -> None:
+        """The newest report."""
+        report = self._apart.report
+        if report is not self._shown:
+            self._shown = report
+            self.charts.show_charts(self._apart.charts)
+            if report is not None:
+                self._fill(*matrix_cells(report))
+
+    def _fill(self, heads: tuple[str, ...], rows: list[tuple[str, list[float]]]) -> None:
+        self.table.setColumnCount(len(heads))
+        self.table.setRowCount(len(rows))
+        self.table.setHorizontalHeaderLabels(list(heads))
+        self.table.setVerticalHeaderLabels([name for name, _ in rows])
+        for r, (name, shares) in enumerate(rows):
+            for c, share in enumerate(shares):
+                self.table.setItem(r, c, self._cell(share, own=heads[c] == name))
+            self.table.setRowHeight(r, _ROW_PX)
+        header = self.table.horizontalHeader().sizeHint().height()
+        self.table.setFixedHeight(header + _ROW_PX * len(rows) + 4)
+
+    def _cell(self, share: float, *, own: bool) -> QTableWidgetItem:
+        item = QTableWidgetItem(f"{100 * share:.0f}" if own or share >= _LEAST else "–")
+        item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
+        bad = not own and share >= OVERLAP
+        item.setFont(app_font(bold=own or bad))
+        tone = self._scheme.bad if bad else self._scheme.good if own else self._scheme.muted
+        item.setForeground(QColor(tone))
+        return item
+
+
+# -- the pages on which colours are picked and their bounds moved, beside the live mask --------------------------------
+
+_SHOWN = (("all", "Mask of all markers"), ("chosen", "Mask of the chosen marker"), ("none", "Picture without mask"))
+
+
+class MaskChoice(QComboBox):
+    """Whose mask lies over the pictures."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        for value, text in _SHOWN:
+            self.addItem(text, value)
+        self.setToolTip("The mask is what the detector really takes for each marker, pixel by pixel, in this light.")
+
+
+class PickPage(Page):
+    """Choose a marker in the list, click its paint in a picture."""
+
+    def __init__(self, step: PickStep, scheme: Scheme) -> None:
+        super().__init__(step)
+        self._picks = step
+        self.pickable = self.one_large = True
+        self.list = PaintList(scheme, ("marker", "pictures"))
+        self.list.setToolTip("Choose what to click next. The patches are the rig's colour and the one picked. A tick: "
+                             "enough places and angles were seen; a cross: the colour is another marker's or the "
+                             "skin's. Ctrl+Z takes the last click back; clicking a marker anew replaces what was "
+                             "gathered for it.")
+        self.mask_choice = MaskChoice()
+        self.hold = _button("Hold the pictures", "Space. Then click at leisure; Space again lets them go on.")
+        self.undo_button = _button("Undo", "Ctrl+Z. The last click back.")
+        for widget in (self.list, self.mask_choice, self.hold, self.undo_button):
+            self.column.addWidget(widget, 1 if widget is self.list else 0)
+        self.list.chosen.connect(self._choose)
+        self.mask_choice.currentIndexChanged.connect(self._show)
+        self.hold.clicked.connect(self._hold)
+        self.undo_button.clicked.connect(self._undo)
+
+    def _choose(self, name: str) -> None:
+        self._picks.chosen = name
+        self.changed.emit()
+
+    def _show(self) -> None:
+        self._picks.show = self.mask_choice.currentData()
+        self.changed.emit()
+
+    def _hold(self) -> None:
+        self._picks.capture()
+        self.changed.emit()
+
+    def _undo(self) -> None:
+        self._picks.undo()
+        self.changed.emit()
+
+    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+        """The chosen marker is there."""
+        self._picks.pick(camera, x, y, width, height)
+
+    def show_view(self, view: StepView) -> None:
+        """The list; the button says what it would do."""
+        self.list.show_rows(tuple(self._row(name) for name in self._picks.names), self._picks.chosen)
+        self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
+        self.undo_button.setEnabled(self._picks.undoable)
+
+    def _row(self, name: str) -> PaintRow:
+        gathering = self._picks.gathering
+        if name == SKIN:
+            count = len(gathering.skin)
+            return PaintRow(name, None, "tick" if count else "ring", "picked" if count else "not picked")
+        index = self._picks.base.ids.index(name)
+        before, now = (markers.markers[index].display_rgb for markers in (self._picks.base, self._picks.markers))
+        if name not in gathering.names:
+            return PaintRow(name, None, "ring", "not picked", before)
+        doubt = self._picks.doubt(name)
+        state = "cross" if doubt else "tick" if gathering.variety(name) >= 1.0 else "half"
+        return PaintRow(name, now, state, doubt or str(gathering.pictures(name)), before)
+
+
+class BoundsPage(Page):
+    """Choose a marker in the list, move its bounds."""
+
+    def __init__(self, step: BoundsStep, scheme: Scheme) -> None:
+        super().__init__(step)
+        self._bounds = step
+        self.one_large = True
+        self.list = PaintList(scheme, ("marker", "hue"))
+        self.mask_choice = MaskChoice()
+        self.rows = {control.field: ControlRow(control) for control in BOUNDS}
+        self.again = _button("As learnt", "The chosen marker's bounds as they were learnt from the samples.")
+        self.undo_button = _button("Undo", "Ctrl+Z. The last change back.")
+        self.column.addWidget(self.list, 1)
+        for row in self.rows.values():
+            self.column.addWidget(row)
+            row.changed.connect(lambda value, goes_on, row=row: self._move(row.control, value, goes_on=goes_on))
+        self.list.horizontalHeader().setVisible(False)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.again)
+        buttons.addWidget(self.undo_button)
+        self.column.addWidget(self.mask_choice)
+        self.column.addLayout(buttons)
+        self.list.chosen.connect(self._choose)
+        self.mask_choice.currentIndexChanged.connect(self._show)
+        self.again.clicked.connect(self._learn_again)
+        self.undo_button.clicked.connect(self._undo)
+
+    def _choose(self, name: str) -> None:
+        self._bounds.chosen = name
+        self.changed.emit()
+
+    def _show(self) -> None:
+        self._bounds.show = self.mask_choice.currentData()
+        self.changed.emit()
+
+    def _move(self, control: Control, value: Value, *, goes_on: bool) -> None:
+        if value is not None:
+            self._bounds.change(control, value, goes_on=goes_on)
+            self.changed.emit()
+
+    def _learn_again(self) -> None:
+        self._bounds.learn_again()
+        self.changed.emit()
+
+    def _undo(self) -> None:
+        self._bounds.undo()
+        self.changed.emit()
+
+    def show_view(self, view: StepView) -> None:
+        """The list, and the bounds of the marker chosen."""
+        step = self._bounds
+        self.list.show_rows(tuple(self._row(name) for name in step.names), step.chosen)
+        for row in self.rows.values():
+            row.fill(step.value(row.control))
+            row.setEnabled(step.report is not None)
+        self.again.setEnabled(step.chosen in step.given)
+        self.undo_button.setEnabled(step.undoable)
+
+    def _row(self, name: str) -> PaintRow:
+        step = self._bounds
+        marker = step.markers.markers[step.markers.ids.index(name)]
+        text = f"± {marker.chroma.hue_tolerance_deg:.0f}°"
+        return PaintRow(name, marker.display_rgb, "half" if name in step.given else "tick",
+                        f"{text}, by hand" if name in step.given else text)
+
+
+def _button(text: str, meaning: str) -> QPushButton:
+    button = QPushButton(text)
+    button.setAutoDefault(False)
+    button.setToolTip(meaning)
+    return button

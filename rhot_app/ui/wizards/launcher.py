@@ -10,22 +10,25 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QListWidget, QMenu, QPushButton, QVBoxLayout, QWidget
 
-from rhot_app.errors import EngineError
-from rhot_app.project import Rig, parse_rig
+from rhot_app import rig_history
+from rhot_app.errors import EngineError, RhotError
+from rhot_app.project import Rig, load_rig, parse_rig
+from rhot_app.rig_history import Version
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.job import Job
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.shapes import shape_icon
+from rhot_app.ui.wizards.accept_page import RowTable
 from rhot_app.ui.wizards.catalogue import WIZARDS, Wizard
 from rhot_app.ui.wizards.memory import Memory
 from rhot_app.ui.wizards.models.done import age_text, in_force
-from rhot_app.ui.wizards.models.proposal import Proposal
+from rhot_app.ui.wizards.models.proposal import Proposal, set_rig
+from rhot_app.ui.wizards.models.rig_rows import rig_rows
 from rhot_app.ui.wizards.plan import Kit
-from rhot_app.ui.wizards.versions_dialog import VersionsDialog
 from rhot_app.ui.wizards.window import WizardWindow
 
 _END_S = 5.0
@@ -55,6 +58,8 @@ class Launcher(QObject):
         self._scheme = scheme
         self._window = window
         self._job: Job | None = None
+        self.twin_menu: Callable[[QWidget], QMenu | None] = lambda parent: None
+        """Makes the menu of what the simulated hand does; None on a real rig."""
         self.wizard: WizardWindow | None = None
         self.versions: VersionsDialog | None = None
 
@@ -106,6 +111,7 @@ class Launcher(QObject):
         self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
         self.wizard.used.connect(lambda proposal, on: self._note(proposal, str(now.path or ""), on=on))
         self.wizard.finished.connect(self._forget)
+        self.wizard.frame.offer_twin(self.twin_menu(self.wizard))
         self.wizard.open()
 
     def _note(self, proposal: Proposal, path: str, *, on: bool) -> None:
@@ -151,3 +157,108 @@ def _node_settings(asker: Asker, rig: Rig) -> dict[int, dict[str, Any]]:
             except (EngineError, KeyError):
                 continue
     return found
+
+
+# -- earlier versions of the rig file, what was different in them, and a button that brings one back -------------------
+
+class VersionsDialog(QDialog):
+    """`rig_used` gives the rig that was brought back. Bringing back keeps what was there, so it can be undone here."""
+
+    rig_used = Signal(object)
+
+    def __init__(self, path: Path, rig: Rig, connect: Callable[[], Asker], scheme: Scheme,
+                 parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Earlier calibrations")
+        self.setProperty("guide", "calibration")
+        self.resize(1000, 560)
+        self._path = path
+        self._rig = rig
+        self._connect = connect
+        self._versions: list[Version] = []
+        self._job: Job | None = None
+        self.list = QListWidget()
+        self.list.setFixedWidth(300)
+        self.list.setSpacing(4)
+        self.list.setWordWrap(True)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.list.currentRowChanged.connect(self._show_version)
+        self.table = RowTable(scheme, ("", "now", "then"))
+        self.sentence = QLabel()
+        self.sentence.setWordWrap(True)
+        self.back_button = QPushButton("Bring it back")
+        self.back_button.setToolTip("Puts the chosen version into force. What is there now is kept, and can be brought "
+                                    "back the same way.")
+        self.back_button.clicked.connect(self.bring_back)
+        close = QPushButton("Close")
+        close.setAutoDefault(False)
+        close.clicked.connect(self.reject)
+        middle, buttons = QHBoxLayout(), QHBoxLayout()
+        middle.addWidget(self.list)
+        middle.addWidget(self.table, 1)
+        buttons.addWidget(self.sentence, 1)
+        buttons.addWidget(close)
+        buttons.addWidget(self.back_button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(16)
+        layout.addLayout(middle, 1)
+        layout.addLayout(buttons)
+        self._list_versions()
+
+    def _list_versions(self) -> None:
+        self._versions = rig_history.versions(self._path)
+        self.list.clear()
+        for version in self._versions:
+            self.list.addItem(f"{version.replaced_at.astimezone():%d %B %Y, %H:%M}\nbefore {version.replaced_by}")
+        self.back_button.setEnabled(bool(self._versions))
+        if self._versions:
+            self.list.setCurrentRow(0)
+        else:
+            self.sentence.setText("Nothing has been replaced yet: there is no earlier calibration of this rig.")
+
+    def _show_version(self, number: int) -> None:
+        if not 0 <= number < len(self._versions):
+            return
+        try:
+            rows = rig_rows(self._rig, load_rig(self._versions[number].path))
+        except RhotError as exc:
+            self.table.show_rows(())
+            self.sentence.setText(str(exc))
+            self.back_button.setEnabled(False)
+            return
+        self.table.show_rows(rows)
+        self.back_button.setEnabled(bool(rows))
+        self.sentence.setText("" if rows else "This version says the same as the rig does now.")
+
+    def bring_back(self) -> None:
+        """Put the chosen version into force, in a worker."""
+        number = self.list.currentRow()
+        if self._job is None and 0 <= number < len(self._versions):
+            version = self._versions[number]
+            self.back_button.setEnabled(False)
+            self._job = Job(lambda progress: self._restore(version), self._restored, self._failed, None, self).start()
+
+    def _restore(self, version: Version) -> Rig:
+        asker = self._connect()
+        try:
+            set_rig(asker.command, load_rig(version.path))
+            try:
+                return rig_history.restore(self._path, version)
+            except RhotError:
+                set_rig(asker.command, self._rig)
+                raise
+        finally:
+            asker.close()
+
+    def _restored(self, rig: Rig) -> None:
+        self._job = None
+        self._rig = rig
+        self._list_versions()
+        self.sentence.setText("It is back in force. What was there before stands first in the list now.")
+        self.rig_used.emit(rig)
+
+    def _failed(self, sentence: str) -> None:
+        self._job = None
+        self.back_button.setEnabled(True)
+        self.sentence.setText(sentence)

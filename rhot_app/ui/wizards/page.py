@@ -13,7 +13,8 @@ class Page(QWidget):
 
     `changed` tells the window that the person changed something, so that it asks the step anew. `centre` is a widget
     that takes the middle instead of the live pictures; None leaves the pictures there. `first_field` has the keyboard
-    when the page opens. `pickable` lets the person click and drag in the pictures, see `pick`.
+    when the page opens. `pickable` lets the person click and drag in the pictures, see `pick`. `one_large` shows one
+    picture as large as fits and the others small; a click on a small one makes it the large one.
     """
 
     changed = Signal()
@@ -24,6 +25,7 @@ class Page(QWidget):
         self.centre: QWidget | None = None
         self.first_field: QWidget | None = None
         self.pickable = False
+        self.one_large = False
         self.column = QVBoxLayout(self)
         self.column.setContentsMargins(0, 0, 0, 0)
         self.column.setSpacing(8)

@@ -5,15 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF
 
+from rhot_app.ui.models.label_layout import Box, place_at_sides
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.tag import paint_tag
-from rhot_app.ui.wizards.models.drawing import Array, Cells, Dots, Layer, Line, Mark, Overlay, Tag
+from rhot_app.ui.wizards.models.drawing import Array, Callout, Cells, Dots, Layer, Line, Mark, Overlay, Tag
 
 _CELL_ALPHA = 60
 _SHADE_ALPHA = 60
+_SIDE_PX = 4.0
+_PAINT_PX = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,31 @@ def paint_overlay(painter: QPainter, overlay: Overlay, place: Place, scheme: Sch
     painter.setClipRect(place.target)
     for mark in overlay:
         _paint(painter, mark, place, scheme)
+    _paint_callouts(painter, [mark for mark in overlay if isinstance(mark, Callout)], place)
     painter.restore()
+
+
+def callout_boxes(callouts: list[Callout], place: Place, metrics: QFontMetricsF) -> list[Box]:
+    """Where the words stand, from the picture's upper left corner: at its sides, none over another."""
+    anchors = [((mark.x + 0.5) * place.scale, (mark.y + 0.5) * place.scale) for mark in callouts]
+    sizes = [(metrics.horizontalAdvance(mark.text) + 8, metrics.height() + 2) for mark in callouts]
+    return place_at_sides(anchors, sizes, (place.target.width(), place.target.height()), _SIDE_PX)
+
+
+def _paint_callouts(painter: QPainter, callouts: list[Callout], place: Place) -> None:
+    if not callouts:
+        return
+    corner = place.target.topLeft()
+    boxes = callout_boxes(callouts, place, QFontMetricsF(painter.font()))
+    for colour, width in (("#000000", 3.0), ("#ffffff", 1.0)):
+        painter.setPen(QPen(QColor(colour), width))
+        for mark, box in zip(callouts, boxes, strict=True):
+            at = QPointF((mark.x + 0.5) * place.scale, (mark.y + 0.5) * place.scale)
+            line = QLineF(QPointF(*box.nearest((at.x(), at.y()))), at)
+            line.setLength(max(line.length() - _PAINT_PX, 0.0))  # the paint itself stays in sight
+            painter.drawLine(line.translated(corner))
+    for mark, box in zip(callouts, boxes, strict=True):
+        paint_tag(painter, corner + QPointF(box.x, box.y), mark.text)
 
 
 def _paint(painter: QPainter, mark: Mark, place: Place, scheme: Scheme) -> None:
@@ -70,6 +97,8 @@ def _paint(painter: QPainter, mark: Mark, place: Place, scheme: Scheme) -> None:
             height, width = mark.rgba.shape[:2]
             data = np.ascontiguousarray(mark.rgba)
             painter.drawImage(place.target, QImage(data.data, width, height, 4 * width, QImage.Format.Format_RGBA8888))
+        case Callout():
+            pass  # all together, when everything else is painted
         case Tag():
             corner = place.to_widget(np.array([[mark.x, mark.y]]))
             if corner:

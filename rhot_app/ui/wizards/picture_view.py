@@ -7,12 +7,12 @@ from collections.abc import Mapping
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPen, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.tag import paint_tag
 from rhot_app.ui.wizards.feed import LiveFeed, Picture
-from rhot_app.ui.wizards.models.drawing import Overlay
+from rhot_app.ui.wizards.models.drawing import Callout, Overlay
 from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.picture_painter import Place, fit, paint_overlay
 
@@ -20,18 +20,22 @@ FLASH_S = 0.25
 """How long the frame lights up when a picture was kept: long enough to be seen from two metres."""
 
 _FLASH_PX = 10
+_SMALL_PX = (160, 120)
+_ANY_PX = 16777215  # Qt's QWIDGETSIZE_MAX
 
 
 class PictureView(QWidget):
     """`picked` gives camera and rectangle (x, y, width, height) in px of the frame when a person has clicked or
-    dragged over the picture; a click is a rectangle without size. Only while `pickable`."""
+    dragged over the picture; a click is a rectangle without size. Only while `pickable`. A click on a `small` one only
+    gives `chosen`."""
 
     picked = Signal(str, float, float, float, float)
+    chosen = Signal(str)
 
     def __init__(self, name: str, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.name = name
-        self.pickable = False
+        self.pickable = self.small = False
         self._scheme = scheme
         self._picture: Picture | None = None
         self._image = QImage()
@@ -98,7 +102,7 @@ class PictureView(QWidget):
         painter.fillRect(place.target, QColor(self._scheme.scene))
         if not self._image.isNull():
             painter.drawImage(place.target, self._image)
-            paint_overlay(painter, self._overlay, place, self._scheme)
+            paint_overlay(painter, self._without_words() if self.small else self._overlay, place, self._scheme)
         paint_tag(painter, place.target.topLeft() + QPointF(6, 6), self.name, bold=True)
         if self._image.isNull() or self._problem:
             painter.setPen(QColor(self._scheme.text))
@@ -107,6 +111,15 @@ class PictureView(QWidget):
                              self._problem or "waiting for the first picture")
         self._paint_frames(painter, place)
         painter.end()
+
+    def _without_words(self) -> Overlay:
+        return tuple(mark for mark in self._overlay if not isinstance(mark, Callout))
+
+    def set_small(self, small: bool) -> None:
+        """Small beside a large one, or as large as there is room."""
+        self.small = small
+        self.setMaximumSize(*(_SMALL_PX if small else (_ANY_PX, _ANY_PX)))
+        self.setToolTip("A click shows this picture large." if small else "")
 
     def _paint_frames(self, painter: QPainter, place: Place) -> None:
         painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -119,7 +132,10 @@ class PictureView(QWidget):
             painter.drawRect(QRectF(*self._drag).normalized())
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
-        """The first corner."""
+        """The first corner, or the wish to see it large."""
+        if self.small:
+            self.chosen.emit(self.name)
+            return
         if self.pickable and self._picture is not None and event.button() == Qt.MouseButton.LeftButton:
             self._drag = (event.position(), event.position())
             self.update()
@@ -150,12 +166,21 @@ class PictureWall(QWidget):
         super().__init__(parent)
         self.views = {name: PictureView(name, scheme) for name in cameras}
         self._shown = cameras
+        self.large = ""  # the camera whose picture is large beside small ones; "" while all are alike
+        self._side = QWidget()
+        self._column = QVBoxLayout(self._side)
+        self._column.setContentsMargins(0, 0, 0, 0)
+        self._column.setSpacing(8)
+        self._column.addStretch(1)
+        self._side.hide()
         self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(8)
         for view in self.views.values():
             self._layout.addWidget(view, 1)
             view.picked.connect(self.picked)
+            view.chosen.connect(self._enlarge)
+        self._layout.addWidget(self._side)
 
     def show_cameras(self, cameras: tuple[str, ...] | None) -> None:
         """Show only these; None shows all."""
@@ -165,6 +190,22 @@ class PictureWall(QWidget):
             for name, view in self.views.items():
                 view.setVisible(name in wanted)
             self._arrange()
+
+    def show_one_large(self, on: bool) -> None:
+        """One picture as large as fits and the others small, or all alike."""
+        if on != bool(self.large) and len(self.views) > 1:
+            self._enlarge(next(iter(self.views)) if on else "")
+
+    def _enlarge(self, name: str) -> None:
+        self.large = name
+        for number, (camera, view) in enumerate(self.views.items()):
+            view.set_small(bool(name) and camera != name)
+            if view.small:
+                self._column.insertWidget(self._column.count() - 1, view)
+            else:
+                self._layout.insertWidget(0 if name else number, view, 1)
+        self._side.setVisible(bool(name))
+        self._arrange()
 
     def refresh(self, feed: LiveFeed, frozen: Mapping[str, Picture]) -> None:
         """Newest pictures; those in `frozen` instead of them."""
@@ -198,6 +239,9 @@ class PictureWall(QWidget):
         self._arrange()
 
     def _arrange(self) -> None:
+        if self.large:
+            self._layout.setDirection(QBoxLayout.Direction.LeftToRight)
+            return
         count = max(sum(not view.isHidden() for view in self.views.values()), 1)
         stacked = min(self.width(), 4 / 3 * self.height() / count)
         beside = min(self.width() / count, 4 / 3 * self.height())

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
+
 from rhot_app.ui.wizards.accept_page import AcceptPage
 from rhot_app.ui.wizards.board_page import MEMORY, BoardPage
-from rhot_app.ui.wizards.known_page import KnownPage
 from rhot_app.ui.wizards.models.accept import AcceptStep
 from rhot_app.ui.wizards.models.board_form import BoardStep, fields_from
 from rhot_app.ui.wizards.models.known_step import KnownStep
 from rhot_app.ui.wizards.models.proposal import Proposal
+from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.models.stereo_proposal import chosen_nodes, stereo_proposal
 from rhot_app.ui.wizards.models.stereo_steps import ShowStep, SolveStep, TableStep
 from rhot_app.ui.wizards.models.stereo_work import known_lenses
@@ -32,3 +34,72 @@ def make_plan(kit: Kit) -> Plan:
     accept = AcceptPage(AcceptStep(propose), kit.scheme)
     return Plan("Put the cameras together", (BoardPage(board, kit.memory), Page(show), KnownPage(known), Page(solve),
                                              Page(table), accept), solver="rhot_app.ui.wizards.models.stereo_work")
+
+
+# -- the fields of the second known length, and clicks on the ruler's ends ---------------------------------------------
+
+SKIP = "Skip: lengths stay unproven"
+
+
+class KnownPage(Page):
+    """Two lengths in mm; 0 says that it was not measured. With neither, a person must say so."""
+
+    def __init__(self, step: KnownStep) -> None:
+        super().__init__(step)
+        self._known = step
+        self.pickable = True
+        self.baseline = _length("The distance between the middles of the two lenses, measured by hand. 75 mm on the "
+                                "frame that the thesis describes.")
+        self.ruler = _length("The distance between two marks on a ruler, 200 mm for instance, that both cameras see.")
+        form = QFormLayout()
+        form.setSpacing(8)
+        form.addRow("Lens to lens", self.baseline)
+        form.addRow("Ruler", self.ruler)
+        self.hold = QPushButton("Hold the pictures")
+        self.hold.setToolTip("Space. Then click both ends of the ruler in each picture.")
+        self.hold.setAutoDefault(False)
+        self.hold.clicked.connect(self._hold)
+        self.column.addLayout(form)
+        self.skip = QPushButton(SKIP)
+        self.skip.setToolTip("If the size of the squares was typed wrong, every length is wrong by the same factor "
+                             "and nothing will tell.")
+        self.skip.setAutoDefault(False)
+        self.skip.clicked.connect(self._skip)
+        self.column.addWidget(self.hold)
+        self.column.addWidget(self.skip)
+        self.column.addStretch(1)
+        for box in (self.baseline, self.ruler):
+            box.valueChanged.connect(self._take)
+
+    def _take(self) -> None:
+        self._known.set_lengths(self.baseline.value(), self.ruler.value())
+        self.changed.emit()
+
+    def _skip(self) -> None:
+        self._known.skip(not self._known.skipped)
+        self.changed.emit()
+
+    def _hold(self) -> None:
+        self._known.capture()
+        self.changed.emit()
+
+    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+        """An end of the ruler; a drag is a click that slipped."""
+        self._known.pick(camera, x, y)
+
+    def show_view(self, view: StepView) -> None:
+        """The button says what it would do; there is nothing to skip once a length is known."""
+        self.skip.setEnabled(not view.done)
+        self.skip.setText("Do not skip" if self._known.skipped and not view.done else SKIP)
+        self.hold.setEnabled(self.ruler.value() > 0.0)
+        self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
+
+
+def _length(meaning: str) -> QDoubleSpinBox:
+    box = QDoubleSpinBox()
+    box.setRange(0.0, 5000.0)
+    box.setDecimals(1)
+    box.setSuffix(" mm")
+    box.setSpecialValueText("not measured")
+    box.setToolTip(meaning)
+    return box

@@ -27,4 +27,4 @@ def make_plan(kit: Kit) -> Plan:
     accept = AcceptStep(lambda: propose(solve.report, kit.rig, kit.rig_path, kit.node_settings),
                         "Record a movement first.")
     return Plan("Time of the cameras", (wave, ChartPage(solve, kit.scheme), AcceptPage(accept, kit.scheme)),
-                solver="rhot_app.calibration.time_offset", put_back=movements.end)
+                solver="rhot_app.calibration.time.offset", put_back=movements.end)

@@ -14,9 +14,9 @@ from rhot_app.ui.job import Job
 from rhot_app.ui.wizards.accept_page import AcceptPage
 from rhot_app.ui.wizards.feed import LiveFeed, Picture
 from rhot_app.ui.wizards.frame import WizardFrame
-from rhot_app.ui.wizards.looker import Looker
 from rhot_app.ui.wizards.models.accept import AcceptStep, State
 from rhot_app.ui.wizards.models.step import Step
+from rhot_app.ui.wizards.picture_worker import PictureWorker
 from rhot_app.ui.wizards.plan import Kit, Plan
 from rhot_app.ui.wizards.work import Work
 
@@ -45,7 +45,7 @@ class WizardWindow(QDialog):
         self.resize(*_SIZE)
         self.feed = LiveFeed({node.name: node.node_id for node in kit.rig.nodes if not node.text_datagrams},
                              kit.connect)
-        self.looker = Looker(self.feed)
+        self.looker = PictureWorker(self.feed)
         self.work = Work(self)
         self.frame = WizardFrame(plan, self.feed.cameras, self.work, kit.scheme, self)
         self.current = 0

@@ -7,22 +7,22 @@ from pathlib import Path
 
 import pytest
 
-from rhot_app.evaluation.takes import LOG_NAME, Order, Take, take
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.evaluation.data_sets import LOG_NAME, DataSet, Order, data_set
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.ui.replay.run import Run, track_log
 
 SECONDS = 4.0
 
 
 @pytest.fixture(scope="session")
-def grasp_take(tmp_path_factory: pytest.TempPathFactory) -> Take:
+def grasp_take(tmp_path_factory: pytest.TempPathFactory) -> DataSet:
     """Four seconds of two cameras at a hand that grasps, with the truth."""
     order = Order(make_scene(twin_defaults(), 3), "grasp", SECONDS, sketched=True)
-    return take(order, tmp_path_factory.mktemp("takes"))
+    return data_set(order, tmp_path_factory.mktemp("takes"))
 
 
 @pytest.fixture(scope="session")
-def grasp_log(grasp_take: Take) -> Path:
+def grasp_log(grasp_take: DataSet) -> Path:
     """The raw log of `grasp_take`."""
     return grasp_take.folder / LOG_NAME
 

@@ -12,11 +12,11 @@ from patience import PATIENCE_S
 from PySide6.QtTest import QTest
 from screen_pictures import SIZE, check, picture_of
 
-from rhot_app.evaluation.alterations import silent
-from rhot_app.evaluation.takes import LOG_NAME, Order, take
+from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
+from rhot_app.evaluation.fault_injection import silent
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
 from rhot_app.recording.raw_log import LogReader, encode_header, encode_record
-from rhot_app.simulator.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.replay.library_window import LibraryWindow
 from rhot_app.ui.replay.session import Choice
@@ -37,7 +37,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("recordings")
     for name, motion, seconds in (("two cups", "grasp", 12.0), ("pinch, first try", "pinch", 6.0)):
         order = Order(make_scene(twin_defaults(), 5), motion, seconds, sketched=True)
-        shutil.copy(take(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME, folder / f"{name}.rhotlog")
+        shutil.copy(data_set(order, tmp_path_factory.mktemp("takes")).folder / LOG_NAME, folder / f"{name}.rhotlog")
     reader = LogReader(folder / "two cups.rhotlog")
     records = list(reader)
     reader.close()

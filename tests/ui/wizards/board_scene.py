@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from rhot_app.calibration.board import STANDARD_BOARD, Chessboard
-from rhot_app.calibration.corners import BoardView, detect
+from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
+from rhot_app.calibration.board.corners import BoardView, detect
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid, rotation_from_quaternion
 from rhot_app.project import Rig
 

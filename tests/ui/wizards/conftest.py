@@ -14,7 +14,7 @@ from wizard_rig import FakeMemory
 
 from rhot_app.engine.process import started_processes
 from rhot_app.project import Rig, load_rig, save_rig
-from rhot_app.simulator.remote import TwinRemote
+from rhot_app.simulator.nodes.remote import TwinRemote
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_app.ui.models.palette import DARK

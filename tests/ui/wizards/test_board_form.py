@@ -15,8 +15,8 @@ from PySide6.QtGui import QDesktopServices
 from wizard_rig import FakeMemory
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.board import STANDARD_BOARD, CharucoBoard, Chessboard
-from rhot_app.calibration.board_size_check import Beyond
+from rhot_app.calibration.board.boards import STANDARD_BOARD, CharucoBoard, Chessboard
+from rhot_app.calibration.board.size_check import Beyond
 from rhot_app.ui.wizards.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.feed import Picture
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep, fields_from, remembered_fields
@@ -63,10 +63,11 @@ def test_an_impossible_board_is_a_sentence():
 
 def test_the_board_is_confirmed_by_what_is_seen(scene):
     step = BoardStep(MEASURED)
-    assert step.view().done and step.view().sentence.endswith("show it to check.")
+    assert not step.view().done and step.view().may_go_on, "no tick before anything was seen"
+    assert step.view().sentence == "Show the board to check it."
     step.take(step.see(pictures_of(scene)))
     view = step.view()
-    assert view.sentence == "Seen by left and right: this is the board."
+    assert view.sentence == "Seen by left and right: this is the board." and view.done
     dots = next(mark for mark in view.overlays["left"] if isinstance(mark, Dots))
     corners = scene.board.object_points() @ scene.world_from_board[:3, :3].T + scene.world_from_board[:3, 3]
     expected = 530.0 * corners[:, :2] / corners[:, 2:] + [319.5, 239.5]

@@ -10,19 +10,21 @@ import pytest
 from bones_twin import SIX, Sloppiness, person, record
 from fake_engine import FakeEngine
 from log_writing import write_log
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from synthetic_rig import WIDE, Sight, make_rig, observe
 from wizard_hand import HeldMarker, RecordingAsker
 from wizard_hands import Hands
 from wizard_rig import FakeMemory
 
-from rhot_app.calibration.bones import solve_bones
+from rhot_app.calibration.hand.bones import solve_bones
+from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.bones import make_plan
 from rhot_app.ui.wizards.models.bones_steps import SweepCoach, make_coach
 from rhot_app.ui.wizards.models.movement import QuietCoach
+from rhot_app.ui.wizards.models.step import Bar
 from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.window import WizardWindow
 
@@ -153,8 +155,22 @@ def test_the_coach_counts_what_each_finger_has_done():
     early = sum(bar.fraction for bar in coach.bars())
     for end in range(120, len(states), 60):
         coach.watch(states[end - 120:end])
-    assert len(coach.bars()) == 5 and sum(bar.fraction for bar in coach.bars()) > early + 1.0
+        assert all(bar.full for bar in coach.bars()) == (coach.shortfall() == ""), "bars and words agree"
+        for bar in coach.bars():
+            assert not (bar.full and f"the {bar.name}" in coach.sentence()), "what is ticked is not asked for again"
+        assert " s done" not in coach.sentence(), "the time that is left is said already"
+    assert len(coach.bars()) == 6 and sum(bar.fraction for bar in coach.bars()) > early + 1.0
     assert coach.sentence()
+
+
+def test_every_bar_of_the_movement_is_in_sight(hands):
+    """Time, sight and five fingers are more than the usual rows."""
+    hands.next()
+    bars = hands.window.frame.bars
+    bars.show_bars(tuple(Bar(name, 0.5) for name in ("time", "in sight", *FINGERS)))
+    hands.run(0.1)
+    last = bars.mapTo(hands.window, QPoint(0, len(bars.bars) * bars.row_px))
+    assert last.y() <= hands.window.frame._lower.geometry().bottom() and bars.height() >= len(bars.bars) * bars.row_px
 
 
 def test_markers_that_name_no_place_get_a_quiet_coach():

@@ -104,6 +104,19 @@ def test_from_a_dark_picture_to_saved_settings(hands, asker):
     assert exposures(asker) == [4000.0, 4000.0] and asker.saved == [1, 2, 2, 1]
 
 
+def test_a_good_check_is_a_result_and_ticks_the_menu(hands, asker):
+    asker.draw = lambda node_id, t_s: np.full((480, 640, 3), 130, np.uint8)
+    hands.until(lambda: hands.sentence == "The pictures are good: press Next.")
+    hands.until(lambda: hands.window.frame.steps.states[0] == "current" and hands.window.step.view().done)
+    told = []
+    hands.window.used.connect(lambda proposal, on: told.append((proposal.reason, proposal.rig, on)))
+    hands.next()
+    assert hands.window.page.table.rowCount() > 0
+    hands.next()
+    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    assert told == [("camera settings", None, True)] and asker.saved == []
+
+
 def test_closing_puts_back_what_was_tried_out(hands, asker, monkeypatch):
     monkeypatch.setattr(QMessageBox, "question", lambda *args: QMessageBox.StandardButton.Discard)
     row(hands, "exposure_us").box.setValue(20.0)
@@ -124,7 +137,7 @@ def test_too_bright_pictures_are_striped_and_told(hands, asker):
 
     hands.until(lambda: striped("left") and striped("right"))
     finding = next(f for f in hands.window.frame.verdict.verdict.findings if f.code == "over")
-    assert finding.figure.startswith(("left: ", "right: ")) and "exposure_us" in finding.remedy
+    assert finding.figure.startswith(("left: ", "right: ")) and "Shorten exposure to " in finding.remedy
 
 
 def test_one_camera_alone_undo_and_a_slider(hands, asker):
@@ -167,11 +180,11 @@ def test_grey_paper_balances_the_colours(hands, asker):
 
 def test_choices_say_only_what_differs(asker):
     choices = CameraChoices(asker.rig.nodes, node_settings(asker))
-    assert choices.changed == () and choices.rows() == ()
+    assert choices.changed == () and choices.rows(choices.changed) == ()
     choices.change((2,), RED, 1.5)
     assert [node.name for node in choices.changed] == ["right"]
     assert choices.differences(2) == ({"camera": {"red_gain": None}}, {"camera": {"red_gain": 1.5}})
-    assert next(r for r in choices.rows() if r.changed).before == "left to the camera"
+    assert next(r for r in choices.rows(choices.changed) if r.changed).before == "left to the camera"
     with pytest.raises(ValueError, match="0"):
         choices.change((2,), EXPOSURE, -1.0)
 

@@ -11,7 +11,7 @@ from colour_scenes import PAINTS, picture
 from fake_engine import synthetic_rig
 from paint_scene import PaintScene
 
-from rhot_app.calibration.colours import solve_colours
+from rhot_app.calibration.colour.colours import solve_colours
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import Rig
 from rhot_app.ui.wizards.feed import Picture
@@ -19,8 +19,8 @@ from rhot_app.ui.wizards.models.colour_bounds import BoundsStep
 from rhot_app.ui.wizards.models.colour_mask import MaskMaker
 from rhot_app.ui.wizards.models.colour_pick import PickStep
 from rhot_app.ui.wizards.models.colour_result import ApartStep, propose
+from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import to_bgr
-from rhot_node.detect.light import gains_of
 
 COLDER = (("gains", tuple(gains_of(-0.35))),)
 EMPTY: tuple = ("nothing",)

@@ -9,16 +9,19 @@ from colour_scenes import PAINTS, picture
 from fake_engine import synthetic_rig
 from paint_scene import PaintScene, compile_detector, other_colours
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QFontMetricsF
 from PySide6.QtTest import QTest
 from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
-from rhot_app.calibration.separability import SKIN
+from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.project import load_rig, save_rig
-from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.colours import make_plan
+from rhot_app.ui.models.palette import DARK, SCHEMES, contrast
+from rhot_app.ui.theme import apply_theme
+from rhot_app.ui.wizards.colours import MaskChoice, make_plan
 from rhot_app.ui.wizards.models.colour_result import hue_chart
-from rhot_app.ui.wizards.models.drawing import Layer, Tag
+from rhot_app.ui.wizards.models.drawing import Callout, Layer
+from rhot_app.ui.wizards.picture_painter import callout_boxes
 from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.window import WizardWindow
 from rhot_node.detect.fast import FastDetector
@@ -57,6 +60,9 @@ def hands(themed, scene, tmp_path):
 def click_at(hands, camera, x, y, to=None):
     """Click, or drag to another place, px of the frame."""
     view = hands.window.frame.wall.views[camera]
+    if view.small:
+        hands.click(view)
+        hands.until(lambda: not view.small and view.width() > 400)
     place = view._place()
     at = [QPoint(round(place.target.x() + (px + 0.5) * place.scale), round(place.target.y() + (py + 0.5) * place.scale))
           for px, py in ((x, y), to or (x, y))]
@@ -131,12 +137,59 @@ def move_a_bound(hands):
     hands.until(lambda: step._sights)
 
 
+def test_one_picture_is_large_and_a_click_enlarges_the_other(hands):
+    hands.window.resize(1280, 800)
+    views = hands.window.frame.wall.views
+    hands.until(lambda: views["left"].width() >= 540)
+    assert views["right"].width() <= 160 and views["right"].isVisible()
+    hands.click(views["right"])
+    hands.until(lambda: views["right"].width() >= 540 and views["left"].width() <= 160)
+    assert hands.window.step.gathering.names == (), "the click chose a picture, no paint"
+    hands.click(views["left"])
+    hands.until(lambda: views["left"].width() >= 540)
+
+
+def test_names_stand_at_the_side_and_leave_the_paint_in_sight(hands, scene):
+    pick_all(hands)
+    step, view = hands.window.step, hands.window.frame.wall.views["left"]
+    hands.until(lambda: all(mark.found for mark in step._sights["left"].seen))
+    place = view._place()
+    callouts = [mark for mark in step.view().overlays["left"] if isinstance(mark, Callout)]
+    boxes = callout_boxes(callouts, place, QFontMetricsF(view.font()))
+    assert len(boxes) >= len(PAINTS)
+    for box in boxes:
+        assert not any(box.covers(((mark.x + 0.5) * place.scale, (mark.y + 0.5) * place.scale), 10.0)
+                       for mark in callouts)
+
+
+@pytest.mark.parametrize("scheme", [DARK, SCHEMES["light"]], ids=["dark", "light"])
+def test_the_chosen_line_of_a_drop_down_can_be_read(qapp, qtbot, scheme):
+    box = MaskChoice()
+    qtbot.addWidget(box)
+    before = qapp.styleSheet(), qapp.palette()
+    apply_theme(qapp, scheme)
+    try:
+        box.show()
+        qtbot.waitExposed(box)
+        box.showPopup()
+        qtbot.waitUntil(box.view().isVisible)
+        row = box.view().visualRect(box.model().index(box.currentIndex(), 0))
+        image = box.view().viewport().grab(row).toImage()
+        found = {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
+        ground = image.pixelColor(image.width() - 3, image.height() // 2).name()
+        assert max(contrast(ground, colour) for colour in found) > 4.0
+        box.hidePopup()
+    finally:
+        qapp.setStyleSheet(before[0])
+        qapp.setPalette(before[1])
+
+
 def test_the_mask_is_what_the_detector_takes(hands, scene):
     pick_all(hands)
     step = hands.window.step
     hands.until(lambda: all(mark.found for mark in step._sights["left"].seen))
     layer, *marks = step.view().overlays["left"]
-    assert isinstance(layer, Layer) and {mark.text for mark in marks if isinstance(mark, Tag)} >= set(PAINTS)
+    assert isinstance(layer, Layer) and {mark.text for mark in marks if isinstance(mark, Callout)} >= set(PAINTS)
     labels = step._sights["left"].labels
     assert layer.rgba.shape == (120, 160, 4)
     assert np.array_equal(layer.rgba[..., 3] == 255, labels > 0)
@@ -268,8 +321,8 @@ def test_space_holds_the_pictures_for_a_click(hands, scene):
 
 
 def test_alike_paints_are_said_to_be_alike(hands, scene):
-    from rhot_app.calibration.colour_gathering import ColourGathering
-    from rhot_app.calibration.colours import solve_colours
+    from rhot_app.calibration.colour.colours import solve_colours
+    from rhot_app.calibration.colour.gathering import ColourGathering
 
     alike = {**PAINTS, "little": (26, 163, 204)}
     gathering = ColourGathering(("left",))

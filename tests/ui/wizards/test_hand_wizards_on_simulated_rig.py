@@ -9,9 +9,9 @@ from paint_scene import other_colours
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from rhot_app.calibration.separability import SKIN
+from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.project import FilterSettings, OneEuroSettings
-from rhot_app.simulator.shows import HandShow, MarkerShow
+from rhot_app.simulator.scene.scene_description import HandShow, MarkerShow
 from rhot_node.config import load_settings
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr

@@ -13,7 +13,7 @@ from PySide6.QtCore import Qt
 from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
-from rhot_app.calibration.board import STANDARD_BOARD
+from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.project import Intrinsics, load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.lens import LAST, make_plan

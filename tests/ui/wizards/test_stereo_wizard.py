@@ -12,8 +12,8 @@ from PySide6.QtTest import QTest
 from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
-from rhot_app.calibration.board import STANDARD_BOARD, Chessboard
-from rhot_app.calibration.rig_checks import check_rig
+from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
+from rhot_app.calibration.check.checks import check_rig
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig, save_rig
 from rhot_app.ui.models.palette import DARK

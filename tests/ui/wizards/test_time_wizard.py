@@ -76,7 +76,7 @@ def test_closing_while_it_records_ends_the_recording(hands):
 
 def test_a_wrong_row_time_is_told_to_its_node():
     from rhot_app.calibration.observations import ObservationCollector
-    from rhot_app.calibration.time_offset import calibrate_times
+    from rhot_app.calibration.time.offset import calibrate_times
     from rhot_app.ui.wizards.models.proposal import NodeChange
     from rhot_app.ui.wizards.models.time_steps import propose
 

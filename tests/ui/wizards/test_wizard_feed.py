@@ -17,8 +17,8 @@ from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.feed import LiveFeed
-from rhot_app.ui.wizards.looker import Looker
 from rhot_app.ui.wizards.models.step import Step
+from rhot_app.ui.wizards.picture_worker import PictureWorker
 from rhot_app.ui.wizards.solver import Solver, StoppedError
 
 
@@ -102,7 +102,7 @@ def test_a_stopped_feed_closes_its_connections(asker):
 
 
 def test_the_looker_gives_each_finding_once_and_only_to_its_step(feed):
-    looker, step, other = Looker(feed).start(), Counting(), Counting()
+    looker, step, other = PictureWorker(feed).start(), Counting(), Counting()
     looker.watch(step)
     found = []
 
@@ -127,7 +127,7 @@ def test_a_look_that_fails_does_not_end_the_live_view(feed):
             self.looks += 1
             raise ValueError("a strange picture")
 
-    looker, step = Looker(feed).start(), Clumsy()
+    looker, step = PictureWorker(feed).start(), Clumsy()
     looker.watch(step)
     eventually(lambda: step.looks >= 2)
     looker.watch(Counting())

@@ -9,7 +9,7 @@ from board_scene import compile_search
 from PySide6.QtCore import Qt
 
 from rhot_app.project import CameraPose
-from rhot_app.simulator.shows import BoardShow
+from rhot_app.simulator.scene.scene_description import BoardShow
 from rhot_node.config import load_settings
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rhot_app.calibration.board import Board
-from rhot_app.calibration.corners import BoardView
+from rhot_app.calibration.board.boards import Board
+from rhot_app.calibration.board.corners import BoardView
 from rhot_app.ui.models.palette import STAGE_COLOURS
 from rhot_app.ui.wizards.models.drawing import Array, Dots, Line, Overlay, Tag
 

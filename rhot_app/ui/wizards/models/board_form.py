@@ -9,11 +9,11 @@ from typing import Literal
 
 import msgspec
 
-from rhot_app.calibration.board import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard, parse_size
-from rhot_app.calibration.board_size_check import Beyond, look_beyond, size_finding
-from rhot_app.calibration.corners import BoardView, detect, to_gray
-from rhot_app.calibration.missing import why_missing
-from rhot_app.calibration.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
+from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard, parse_size
+from rhot_app.calibration.board.corners import BoardView, detect, to_gray
+from rhot_app.calibration.board.missing import why_missing
+from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding
+from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.models.board_drawing import board_marks
@@ -76,7 +76,7 @@ def remembered_fields(text: str) -> BoardFields:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BoardSight:
+class BoardObservation:
     """What one look saw: the board it looked for, the board by camera, whether its squares go on where they should end,
     and why no camera sees it, when that was looked into."""
 
@@ -99,6 +99,7 @@ class BoardStep(Step):
         self._views: dict[str, BoardView | None] = {}
         self._beyond: deque[Beyond] = deque(maxlen=_JUDGED)
         self._missing = ""
+        self._recognised = False
         self._next_why_s = 0.0  # the looker's own
         self.board: Board | None = None
         self.problem = ""
@@ -127,6 +128,7 @@ class BoardStep(Step):
     def forget_views(self) -> None:
         """What was seen is of another board or camera."""
         self._views, self._missing = {}, ""
+        self._recognised = False
         self._beyond.clear()
 
     def _build(self) -> None:
@@ -136,7 +138,7 @@ class BoardStep(Step):
         except CalibrationError as exc:
             self.board, self.problem = None, str(exc)
 
-    def see(self, pictures: Pictures) -> BoardSight | None:
+    def see(self, pictures: Pictures) -> BoardObservation | None:
         """Look for the board in each picture; where it is in none, find out why now and then, for that takes long."""
         board = self.board
         if board is None:
@@ -146,17 +148,18 @@ class BoardStep(Step):
         if seen:
             beyond = tuple(look_beyond(to_gray(pictures[name].bgr), view, board) for name, view in seen.items()
                            ) if isinstance(board, Chessboard) else ()
-            return BoardSight(board, views, beyond, "")
+            return BoardObservation(board, views, beyond, "")
         now_s = time.monotonic()
         if now_s < self._next_why_s:
-            return BoardSight(board, views)
+            return BoardObservation(board, views)
         self._next_why_s = now_s + _WHY_S
-        return BoardSight(board, views, missing=why_missing(to_gray(next(iter(pictures.values())).bgr), board))
+        return BoardObservation(board, views, missing=why_missing(to_gray(next(iter(pictures.values())).bgr), board))
 
-    def take(self, seen: BoardSight) -> None:
+    def take(self, seen: BoardObservation) -> None:
         """Where the board was seen."""
         if seen.board == self.board:
             self._views = seen.views
+            self._recognised = self._recognised or any(view is not None for view in seen.views.values())
             self._beyond.extend(seen.beyond)
             if seen.missing is not None:
                 self._missing = seen.missing
@@ -179,11 +182,12 @@ class BoardStep(Step):
         if self._fields.square_mm is None:
             hint = " ".join(filter(None, (UNMEASURED, self._hint(len(overlays)))))
             return StepView("Measure the squares and type their size.", hint=hint, overlays=overlays)
-        return StepView(self._sentence(len(overlays)), done=True, hint=self._hint(len(overlays)), overlays=overlays)
+        return StepView(self._sentence(len(overlays)), done=self._recognised, passable=True,
+                        hint=self._hint(len(overlays)), overlays=overlays)
 
     def _sentence(self, found: int) -> str:
         if found == 0:
-            return "Say which board you hold, and show it to check."
+            return "Show the board to check it." if not self._recognised else "Seen: this is the board. Press Next."
         names = " and ".join(name for name, view in self._views.items() if view is not None)
         return f"Seen by {names}: this is the board."
 

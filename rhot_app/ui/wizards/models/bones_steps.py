@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import msgspec
 import numpy as np
 
-from rhot_app.calibration.bones_entry import BONE_NAMES, enter_bones
-from rhot_app.calibration.marker_places import tracks_of
+from rhot_app.calibration.hand.bones_entry import BONE_NAMES, enter_bones
+from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import BONES, FINGERS
@@ -24,8 +24,8 @@ from rhot_app.ui.wizards.models.solve import SolveStep
 from rhot_app.ui.wizards.models.step import Bar, Step, StepView, Task
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.bones_collector import BonesCollector
-    from rhot_app.calibration.bones_report import BoneLength, BonesReport
+    from rhot_app.calibration.hand.bones_collector import BonesCollector
+    from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport
 
 REASON = "bones calibration"
 SECONDS = 60.0
@@ -139,7 +139,7 @@ class SweepCoach:
                                         state.marker_raw_positions[self._columns])
 
     def _begin(self, state: HandState) -> None:
-        from rhot_app.calibration.bones_collector import BonesCollector
+        from rhot_app.calibration.hand.bones_collector import BonesCollector
 
         self._first_s = 1e-9 * state.t_master_ns
         positions, (roles, painted) = state.marker_raw_positions[None], _roles(self._rig)
@@ -151,12 +151,21 @@ class SweepCoach:
         """One for each finger with a marker at its end."""
         if self._collector is None:
             return ()
-        return tuple(Bar(finger.finger, finger.fraction, f"bent and stretched {finger.sweeps} times")
-                     for finger in self._collector.progress.fingers if finger.seen)
+        from rhot_app.calibration.hand.bones_collector import LEAST_S
+
+        progress = self._collector.progress
+        fingers = (Bar(finger.finger, finger.fraction, f"bent and stretched {finger.sweeps} times; how far shows when "
+                       "the hand is fitted") for finger in progress.fingers if finger.seen)
+        return (Bar("in sight", min(progress.seconds / LEAST_S, 1.0), f"of {LEAST_S:.0f} s in which the cameras see "
+                    "the markers together"), *fingers)
 
     def sentence(self) -> str:
         """What to do next."""
         return self._collector.progress.sentence if self._collector is not None else "Show the hand to both cameras."
+
+    def shortfall(self) -> str:
+        """What has not moved enough."""
+        return "" if self._collector is not None and self._collector.progress.done else self.sentence()
 
 
 def make_coach(rig: Rig) -> Coach:
@@ -171,7 +180,7 @@ def make_coach(rig: Rig) -> Coach:
 
 def solve_log(log: Path, rig: Rig, base: HandAnatomy, *, progress: Progress) -> BonesReport:
     """What ``rhot calibrate bones`` does with a log."""
-    from rhot_app.calibration.bones import solve_bones
+    from rhot_app.calibration.hand.bones import solve_bones
     from rhot_app.recording.observation_table import read_instants
 
     progress("reading the recording", 0.0)

@@ -111,12 +111,12 @@ class CameraChoices:
         fields = [field for field in new if new[field] != old[field]]
         return {"camera": {field: old[field] for field in fields}}, {"camera": {field: new[field] for field in fields}}
 
-    def rows(self) -> tuple[Row, ...]:
-        """Every setting before and after, those of changed cameras only."""
+    def rows(self, nodes: tuple[RigNode, ...]) -> tuple[Row, ...]:
+        """Every setting of these cameras before and after."""
         return tuple(
             Row(f"{node.name}: {control.name.lower()}", value_text(control, self.before[node.node_id]),
                 value_text(control, self.now[node.node_id]))
-            for node in self.changed for control in CONTROLS)
+            for node in nodes for control in CONTROLS)
 
 
 def value_text(control: Control, settings: CameraSettings) -> str:

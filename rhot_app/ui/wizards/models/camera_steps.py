@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.camera_advice import CameraAdvice, CameraAdvisor
-from rhot_app.calibration.exposure import BRIGHT, DARK
+from rhot_app.calibration.check.camera_advice import CameraAdvice, CameraAdvisor
+from rhot_app.calibration.check.exposure import BRIGHT, DARK
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.feed import Picture
@@ -171,29 +171,33 @@ class SettingsStep(Step):
         return judge(f"{summary}.", [_of(name, finding) for name, one in advice.items()
                                      for finding in one.verdict.findings])
 
+    @property
+    def _good(self) -> bool:
+        return self.verdict is not None and self.verdict.grade is Grade.GOOD
+
     def view(self) -> StepView:
         """What to turn, and why."""
         if not self.cameras:
             return StepView("No camera answers.", hint="Look at the Nodes panel: its sentence says what is wrong.")
-        verdict = self.verdict
-        good = verdict is not None and verdict.grade is Grade.GOOD
+        verdict, good = self.verdict, self._good
         sentence = ("The pictures are good: press Next." if good else
                     "Turn the knobs until the verdict is good.")
-        return StepView(sentence, done=bool(self.choices.changed), hint=self._problem, verdict=verdict,
+        return StepView(sentence, done=good or bool(self.choices.changed), hint=self._problem, verdict=verdict,
                         overlays={name: look.overlay for name, look in self._looks.items()}, passable=True)
 
     def propose(self, rig_path: Path | None) -> Proposal | None:
-        """All changed cameras' settings; None when nothing was changed.
+        """All changed cameras' settings; settings that were checked and are good; None for neither.
 
         Poor light does not forbid to save: what is in force now was no better, and a lamp is not a setting.
         """
         if not self.choices.changed:
-            return None
+            return Proposal(REASON, self.verdict, self.choices.rows(self.choices.nodes)) if (
+                self.verdict is not None and self._good) else None
         verdict = self.verdict or judge("no picture has come since.", [])
         allowed = [replace(finding, grade=Grade.FAIR) if finding.grade is Grade.POOR else finding
                    for finding in verdict.findings]
         summary = verdict.sentence.partition(": ")[2]
-        return Proposal(REASON, judge(summary, allowed), self.choices.rows(),
+        return Proposal(REASON, judge(summary, allowed), self.choices.rows(self.choices.changed),
                         tuple(NodeChange(node.node_id, *self.choices.differences(node.node_id))
                               for node in self.choices.changed))
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import msgspec
 
-from rhot_app.calibration.colours import ColourReport, solve_colours
+from rhot_app.calibration.colour.colours import ColourReport, solve_colours
 from rhot_app.ui.wizards.models.camera_settings import Control
-from rhot_app.ui.wizards.models.colour_mask import MaskMaker, Sights, drift_of, mask_overlay
+from rhot_app.ui.wizards.models.colour_mask import MaskedPictures, MaskMaker, drift_of, mask_overlay
 from rhot_app.ui.wizards.models.colour_pick import PickStep, Show
 from rhot_app.ui.wizards.models.step import Pictures, Step, StepView, Task
 from rhot_node.markers import ChromaModel, MarkerSet
@@ -44,7 +44,7 @@ class BoundsStep(Step):
         self.markers: MarkerSet = picks.base
         self._revision = -1
         self._undone: list[dict[str, ChromaModel]] = []
-        self._sights: Sights = {}
+        self._sights: MaskedPictures = {}
         self._maker = MaskMaker()
 
     @property
@@ -124,11 +124,11 @@ class BoundsStep(Step):
             msgspec.structs.replace(marker, chroma=self.given.get(marker.id, marker.chroma))
             for marker in self.report.markers.markers))
 
-    def see(self, pictures: Pictures) -> Sights:
+    def see(self, pictures: Pictures) -> MaskedPictures:
         """The mask."""
         return self._maker.look(pictures, self.markers, (self.chosen,))
 
-    def take(self, seen: Sights) -> None:
+    def take(self, seen: MaskedPictures) -> None:
         """What was seen."""
         self._sights = seen
 

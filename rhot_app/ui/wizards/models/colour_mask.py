@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.colour_cause import Cause, Explainer
-from rhot_app.calibration.colour_drift import DriftReport, LightDrift, drift_findings
+from rhot_app.calibration.colour.cause import Cause, Explainer
+from rhot_app.calibration.colour.drift import DriftReport, IlluminantDrift, drift_findings
 from rhot_app.calibration.verdict import Finding
-from rhot_app.ui.wizards.models.drawing import Dots, Layer, Overlay, Tag
+from rhot_app.ui.wizards.models.drawing import Callout, Dots, Layer, Overlay
 from rhot_app.ui.wizards.models.step import Pictures
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_bgr
@@ -23,7 +23,7 @@ _FAINT = 70  # alpha of a marker's colour where it was not asked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class MaskedPicture:
     """One camera's picture as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none; `drift`:
     how the light of the last pictures stands to the one that the marker set was learnt in; `causes`: by index, why the
     markers that were asked for are not found, or found in doubt."""
@@ -40,7 +40,7 @@ class Sight:
         return "" if cause is None else f"{'doubtful' if self.seen[index].found else 'not found'}. {cause.sentence}"
 
 
-Sights = dict[str, Sight]
+MaskedPictures = dict[str, MaskedPicture]
 
 
 class MaskMaker:
@@ -49,10 +49,10 @@ class MaskMaker:
     def __init__(self) -> None:
         self._markers: MarkerSet | None = None
         self._detectors: dict[str, FastDetector] = {}
-        self._drifts: dict[str, LightDrift] = {}
+        self._drifts: dict[str, IlluminantDrift] = {}
         self._explainer: Explainer | None = None
 
-    def look(self, pictures: Pictures, markers: MarkerSet, asked: Sequence[str] = ()) -> Sights:
+    def look(self, pictures: Pictures, markers: MarkerSet, asked: Sequence[str] = ()) -> MaskedPictures:
         """What every camera's detector finds with `markers`, and why it does not find those that are `asked` for."""
         if markers is not self._markers:
             self._markers, self._detectors, self._drifts, self._explainer = markers, {}, {}, None
@@ -61,10 +61,10 @@ class MaskMaker:
             detector = self._detectors.setdefault(name, FastDetector(markers))
             image = from_bgr(picture.bgr)
             seen = detector.detect(image)
-            drift = self._drifts.setdefault(name, LightDrift(markers, detector))
+            drift = self._drifts.setdefault(name, IlluminantDrift(markers, detector))
             drift.update(image, seen)
             causes = self._causes(detector, image, seen, [marker for marker in asked if marker in markers.ids])
-            sights[name] = Sight(image, detector.labels(image), seen, drift.report(), causes)
+            sights[name] = MaskedPicture(image, detector.labels(image), seen, drift.report(), causes)
         return sights
 
     def _causes(self, detector: FastDetector, image: YuvImage, seen: tuple[MarkerObservation, ...],
@@ -83,12 +83,12 @@ class MaskMaker:
         return causes
 
 
-def drift_of(sights: Sights) -> tuple[Finding, ...]:
+def drift_of(sights: MaskedPictures) -> tuple[Finding, ...]:
     """What is to be said of the light."""
     return drift_findings({name: sight.drift for name, sight in sights.items()})
 
 
-def mask_overlay(sight: Sight, markers: MarkerSet, chosen: int | None) -> Overlay:
+def mask_overlay(sight: MaskedPicture, markers: MarkerSet, chosen: int | None) -> Overlay:
     """The mask over a dimmed picture, every marker in its own colour, those found with a ring and their name.
 
     `chosen`: the only marker that is shown in full; None shows all so.
@@ -97,10 +97,10 @@ def mask_overlay(sight: Sight, markers: MarkerSet, chosen: int | None) -> Overla
     palette[0, 3] = _DIMMED
     for index, marker in enumerate(markers.markers):
         palette[index + 1] = (*marker.display_rgb, 255 if chosen in (None, index) else _FAINT)
-    marks: list[Layer | Dots | Tag] = [Layer(palette[sight.labels])]
+    marks: list[Layer | Dots | Callout] = [Layer(palette[sight.labels])]
     for number, mark in enumerate(sight.seen):
         if mark.found and chosen in (None, mark.index):
             marks.append(Dots(np.array([[mark.x, mark.y]]), "text", radius=3.0))
             further = "" if number < len(markers.markers) else "?"  # something else of the marker's colour
-            marks.append(Tag(mark.x + 8.0, mark.y - 4.0, markers.ids[mark.index] + further))
+            marks.append(Callout(mark.x, mark.y, markers.ids[mark.index] + further))
     return tuple(marks)

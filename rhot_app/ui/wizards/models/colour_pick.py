@@ -6,13 +6,13 @@ from typing import Literal
 
 import msgspec
 
-from rhot_app.calibration.colour_gathering import ColourGathering
-from rhot_app.calibration.colour_identity import Identity, identify
-from rhot_app.calibration.separability import SKIN
+from rhot_app.calibration.colour.gathering import ColourGathering
+from rhot_app.calibration.colour.identity import Identity, identify
+from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.feed import Picture
-from rhot_app.ui.wizards.models.colour_mask import MaskMaker, Sights, drift_of, mask_overlay
+from rhot_app.ui.wizards.models.colour_mask import MaskedPictures, MaskMaker, drift_of, mask_overlay
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
 from rhot_node.detect.colour import learn_chroma_from_colours
 from rhot_node.markers import MarkerSet
@@ -39,7 +39,7 @@ class PickStep(Step):
         self.problem = ""
         self.held: dict[str, Picture] = {}
         self._live: Pictures = {}
-        self._sights: Sights = {}
+        self._sights: MaskedPictures = {}
         self._maker = MaskMaker()
         self._markers = markers
         self._learnt: dict[str, tuple[int, int]] = {}
@@ -60,11 +60,11 @@ class PickStep(Step):
         """Picking takes a person a minute."""
         return bool(self.gathering.names)
 
-    def see(self, pictures: Pictures) -> tuple[Pictures, Sights]:
+    def see(self, pictures: Pictures) -> tuple[Pictures, MaskedPictures]:
         """The mask; the detectors are the looker's own."""
         return pictures, self._maker.look(self.held or pictures, self._markers, tuple(self._learnt))
 
-    def take(self, seen: tuple[Pictures, Sights]) -> None:
+    def take(self, seen: tuple[Pictures, MaskedPictures]) -> None:
         """Gather where markers show something new."""
         self._live, self._sights = seen
         if not self.held:

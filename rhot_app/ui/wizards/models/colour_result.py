@@ -10,8 +10,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from rhot_app.calibration.colour_room import HUE_STEP_DEG
-from rhot_app.calibration.colours import ColourReport
+from rhot_app.calibration.colour.colours import ColourReport
+from rhot_app.calibration.colour.surroundings import HUE_STEP_DEG
 from rhot_app.calibration.verdict import Finding, judged_anew
 from rhot_app.project import Rig
 from rhot_app.ui.models.palette import hex_of

@@ -9,13 +9,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.depth import LEAST_ROWS, DepthReport, fit_depth, geometry_of
-from rhot_app.calibration.depth_table import DepthRow, DepthTable
+from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of
+from rhot_app.calibration.depth.table import DepthRow, DepthTable
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.wizards.models.chart import Chart, ChartedStep, Curve
-from rhot_app.ui.wizards.models.drawing import Dots, Overlay, Tag
+from rhot_app.ui.wizards.models.drawing import Callout, Dots, Overlay
 from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Bar, Step, StepView
 
@@ -102,7 +102,9 @@ class DistanceStep(Step):
         """What to do next, and how many distances there are."""
         bars = (Bar("distances", min(len(self.rows) / ENOUGH, 1.0), f"{len(self.rows)} of {ENOUGH} or more"),
                 Bar("spread", self._spread(), "from near to far: the farthest three times the nearest"))
-        return StepView(self._sentence(), done=self.report is not None, hint=self.problem, bars=bars,
+        enough = all(bar.full for bar in bars)
+        return StepView(self._sentence(), done=self.report is not None and enough, hint=self.problem, bars=bars,
+                        passable=self.report is not None,
                         overlays=self._overlays(), kept=len(self.rows))
 
     def _overlays(self) -> dict[str, Overlay]:
@@ -111,13 +113,15 @@ class DistanceStep(Step):
         if not states:
             return {}
         name, places = self.rig.markers.ids[self.marker], states[-1].camera_pixels[:, self.marker]
-        return {camera: (Dots(place[None, :]), Tag(float(place[0]), float(place[1]), name))
+        return {camera: (Dots(place[None, :]), Callout(float(place[0]), float(place[1]), name))
                 for camera, place in zip(states[-1].camera_names, places, strict=True) if np.isfinite(place).all()}
 
     def _sentence(self) -> str:
         if not self.rows:
             return "Hold the marker straight before the cameras, enter its distance, press Space."
-        return "Now at another distance." if len(self.rows) < ENOUGH else "Enough. Go on, or measure more."
+        if len(self.rows) < ENOUGH:
+            return "Now at another distance."
+        return "Enough. Go on, or measure more." if self._spread() >= 1.0 else "Now much nearer, or much farther away."
 
     def _spread(self) -> float:
         distances = [row.distance_m for row in self.rows]

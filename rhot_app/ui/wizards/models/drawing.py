@@ -59,5 +59,14 @@ class Tag:
     text: str
 
 
-Mark = Dots | Line | Cells | Layer | Tag
+@dataclass(frozen=True, slots=True)
+class Callout:
+    """A word at the side of the picture with a line to (`x`, `y`) px, so that it covers nothing there."""
+
+    x: float
+    y: float
+    text: str
+
+
+Mark = Dots | Line | Cells | Layer | Tag | Callout
 Overlay = tuple[Mark, ...]

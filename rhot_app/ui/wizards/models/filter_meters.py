@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rhot_app.calibration.filter_judgement import BRISK_M_S, MOVING_M_S
-from rhot_app.calibration.filter_meters import FilterMeter, MeterReading
+from rhot_app.calibration.filters.judgement import BRISK_M_S, MOVING_M_S
+from rhot_app.calibration.filters.meters import FilterMeter, MeterReading
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.wizards.models.step import Bar
 
 _READ_S = 0.25
-_ENOUGH_SPEED = 0.8  # of a brisk speed: go on waving
+_MOST = 0.7  # of the time: a hand may take a moment to come to rest, or to get going
 
 
 class LiveMeters:
@@ -54,11 +54,50 @@ class LiveMeters:
         return tuple((name, _text(1e3 * raw, 2), _text(1e3 * filtered, 2), _text(1e3 * lag, 1)) for name, raw, filtered,
                      lag in zip(self.names, one.raw_jitter_m, one.jitter_m, one.lag_s, strict=True))
 
-    def seen_bar(self) -> Bar:
-        """How many markers are located."""
-        jitter = self.reading.raw_jitter_m if self.reading is not None else np.zeros(0)
-        seen = float(np.isfinite(jitter).mean()) if len(jitter) else 0.0
-        return Bar("markers", seen, "markers that both cameras have seen in the last two seconds")
+
+class _Tally:
+    """In which share of the readings something was so."""
+
+    def __init__(self) -> None:
+        self._last: MeterReading | None = None
+        self._all = self._so = 0
+
+    def add(self, reading: MeterReading | None, so: bool) -> None:
+        """Take a reading once."""
+        if reading is not None and reading is not self._last:
+            self._last = reading
+            self._all += 1
+            self._so += so
+
+    @property
+    def share(self) -> float:
+        """0..1, as it was for most of the time: 1 is enough."""
+        return min(self._so / (_MOST * self._all), 1.0) if self._all else 0.0
+
+
+class _Sight:
+    """Which markers both cameras have seen since the recording began."""
+
+    def __init__(self, meters: LiveMeters) -> None:
+        self._meters = meters
+        self._seen = np.zeros(0, bool)
+
+    def look(self) -> None:
+        """Take the newest reading."""
+        reading = self._meters.reading
+        if reading is not None:
+            seen = np.isfinite(reading.raw_jitter_m)
+            self._seen = seen | self._seen if len(self._seen) == len(seen) else seen
+
+    def bar(self) -> Bar:
+        """How many of them."""
+        return Bar("markers", float(self._seen.mean()) if len(self._seen) else 0.0,
+                   "markers that both cameras have seen so far")
+
+    def shortfall(self) -> str:
+        """Those that were not seen."""
+        names = [name for name, seen in zip(self._meters.names, self._seen, strict=False) if not seen]
+        return f"Both cameras have not seen {', '.join(names)}." if names else ""
 
 
 class StillCoach:
@@ -66,19 +105,26 @@ class StillCoach:
 
     def __init__(self, meters: LiveMeters) -> None:
         self._meters = meters
+        self._still, self._sight = _Tally(), _Sight(meters)
 
     def watch(self, states: Sequence[HandState]) -> None:
         """See what is new."""
         self._meters.watch(states)
+        self._still.add(self._meters.reading, self._meters.speed_m_s <= MOVING_M_S)
+        self._sight.look()
 
     def bars(self) -> tuple[Bar, ...]:
-        """The markers in sight."""
-        return (self._meters.seen_bar(),)
+        """How much of the time the hand was at rest, and the markers in sight."""
+        return Bar("still", self._still.share, "of the time at rest that is needed"), self._sight.bar()
 
     def sentence(self) -> str:
         """Rest it, or go on so."""
         speed = self._meters.speed_m_s
         return "It moves: rest the hand on something." if speed > MOVING_M_S else "Good, hold still."
+
+    def shortfall(self) -> str:
+        """That it moved, or what was not seen."""
+        return self._sight.shortfall() if self._still.share >= 1.0 else "The hand moved: rest it on something."
 
 
 class FastCoach:
@@ -86,10 +132,13 @@ class FastCoach:
 
     def __init__(self, meters: LiveMeters) -> None:
         self._meters = meters
+        self._fast, self._sight = _Tally(), _Sight(meters)
 
     def watch(self, states: Sequence[HandState]) -> None:
         """See what is new."""
         self._meters.watch(states)
+        self._fast.add(self._meters.reading, self._share >= 1.0)
+        self._sight.look()
 
     @property
     def _share(self) -> float:
@@ -97,13 +146,17 @@ class FastCoach:
         return min(speed / BRISK_M_S, 1.0) if speed == speed else 0.0
 
     def bars(self) -> tuple[Bar, ...]:
-        """The speed, and the markers in sight."""
+        """The speed, how much of the time it was enough, and the markers in sight."""
         return (Bar("speed", self._share, f"of {BRISK_M_S:.1f} m/s, the fastest marker of the last two seconds"),
-                self._meters.seen_bar())
+                Bar("fast", self._fast.share, "of the time at that speed that is needed"), self._sight.bar())
 
     def sentence(self) -> str:
         """Faster, or go on so."""
-        return "Good, go on." if self._share >= _ENOUGH_SPEED else "Faster, 20 cm wide."
+        return "Good, go on." if self._share >= 1.0 else "Faster, 20 cm wide."
+
+    def shortfall(self) -> str:
+        """That it was slow, or what was not seen."""
+        return self._sight.shortfall() if self._fast.share >= 1.0 else "The hand was too slow."
 
 
 def _text(value: float, decimals: int) -> str:

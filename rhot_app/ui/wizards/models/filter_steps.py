@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rhot_app.calibration.filter_judgement import FilterTargets
+from rhot_app.calibration.filters.judgement import FilterTargets
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.ui.models.palette import hex_of
@@ -19,18 +19,18 @@ from rhot_app.ui.wizards.models.solve import SolveStep
 from rhot_app.ui.wizards.models.step import Task
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.filter_tuning import FilterCurves, FilterReport
+    from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport
 
 REASON = "filter tuning"
 STILL_S, FAST_S = 10.0, 15.0
 
-Stage = Literal["pixel", "position"]
-_UNITS: dict[Stage, str] = {"pixel": "px/s", "position": "m/s"}
+FilterStage = Literal["pixel", "position"]
+_UNITS: dict[FilterStage, str] = {"pixel": "px/s", "position": "m/s"}
 
 
 def solve_logs(still: Path, fast: Path, rig: Rig, targets: FilterTargets, *, progress: Progress) -> FilterReport:
     """What ``rhot calibrate filters`` does with two logs."""
-    from rhot_app.calibration.filter_tuning import tune_filters
+    from rhot_app.calibration.filters.tuning import tune_filters
     from rhot_app.recording.observation_table import read_instants
 
     progress("reading the recordings", 0.0)
@@ -45,7 +45,7 @@ class TuneStep(SolveStep):
         """`logs` gives the recordings of the hand held still and moved fast."""
         self.targets = FilterTargets()
         self.per_marker = False
-        self.stage: Stage = "position"
+        self.stage: FilterStage = "position"
         self._rig = rig
         self._logs = logs
         super().__init__(self._work, lambda report: report.verdict, self._charts)
@@ -64,14 +64,14 @@ class TuneStep(SolveStep):
         self.targets = FilterTargets(1e-3 * jitter_mm, 1e-3 * lag_ms)
         self.enter()
 
-    def show_stage(self, stage: Stage) -> None:
+    def choose_stage(self, stage: FilterStage) -> None:
         """The charts of the filter before depth, or of the one after it."""
         self.stage = stage
         if self.report is not None:
             self.charts = self._charts(self.report)
 
 
-def charts_of(report: FilterReport, rig: Rig, stage: Stage) -> tuple[Chart, ...]:
+def charts_of(report: FilterReport, rig: Rig, stage: FilterStage) -> tuple[Chart, ...]:
     """The thesis's two steps: jitter over min cutoff, lag over beta, with what is allowed and what is chosen."""
     curves: FilterCurves = getattr(report, stage)
     targets, half = report.targets, 0.5 if stage == "pixel" else 1.0

@@ -9,9 +9,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from rhot_app.calibration.camera_calibration import with_lens
-from rhot_app.calibration.intrinsics import IntrinsicsReport, solve
-from rhot_app.calibration.lens_certainty import WORKING_DISTANCE_M
+from rhot_app.calibration.lens.camera_calibration import with_lens
+from rhot_app.calibration.lens.certainty import WORKING_DISTANCE_M
+from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
 from rhot_app.project import Intrinsics, Rig
 from rhot_app.ui.wizards.feed import Image, Picture
 from rhot_app.ui.wizards.models.drawing import Dots, Line, Mark, Overlay, Tag

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rhot_app.calibration.board import Board
-from rhot_app.calibration.capture_guide import CaptureGuide
-from rhot_app.calibration.corners import BoardView, detect
-from rhot_app.calibration.coverage import Coverage
+from rhot_app.calibration.board.boards import Board
+from rhot_app.calibration.board.corners import BoardView, detect
+from rhot_app.calibration.lens.capture_guide import CaptureGuide
+from rhot_app.calibration.lens.coverage import Coverage
 from rhot_app.ui.wizards.models.board_drawing import board_marks
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
 from rhot_app.ui.wizards.models.drawing import Cells, Overlay

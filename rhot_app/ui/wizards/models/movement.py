@@ -38,6 +38,10 @@ class Coach(Protocol):
         """What to do now."""
         ...
 
+    def shortfall(self) -> str:
+        """What is missing in what was seen so far, as a sentence; "" when nothing is."""
+        ...
+
 
 class MovementStep(Step):
     """Space or the button begins, and ends. `log` is the finished recording; recording again forgets it."""
@@ -112,15 +116,20 @@ class MovementStep(Step):
             self._coach.watch(self._recent())
             if elapsed >= self.seconds:
                 self.capture()
-        return StepView(self._say(elapsed), done=self.phase == "recorded", hint=self.problem, bars=self._bars(elapsed),
-                        kept=self._number if self.phase == "recorded" else 0)
+        recorded = self.phase == "recorded"
+        return StepView(self._say(elapsed), done=recorded and not self._shortfall, passable=recorded, hint=self.problem,
+                        bars=self._bars(elapsed), kept=self._number if recorded else 0)
+
+    @property
+    def _shortfall(self) -> str:
+        return self._coach.shortfall() if self._coach is not None else ""
 
     def _say(self, elapsed_s: float) -> str:
         if self.phase == "recording":
             assert self._coach is not None
             return f"{self._coach.sentence()} {max(0.0, self.seconds - elapsed_s):.0f} s left."
         if self.phase == "recorded":
-            return "Recorded. Go on, or record again."
+            return f"{self._shortfall} Record again." if self._shortfall else "Recorded. Go on, or record again."
         return "One moment." if self.phase in ("beginning", "ending") else self._sentence
 
     def _bars(self, elapsed_s: float) -> tuple[Bar, ...]:
@@ -150,3 +159,7 @@ class QuietCoach:
     def sentence(self) -> str:
         """The one sentence."""
         return self._sentence
+
+    def shortfall(self) -> str:
+        """Nobody can tell."""
+        return ""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rhot_app.calibration.camera_calibration import calibration_text
+from rhot_app.calibration.lens.camera_calibration import calibration_text
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode
 from rhot_app.ui.models.tracker_words import settings_text

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rhot_app.calibration.camera_calibration import lengths_text
-from rhot_app.calibration.stereo_report import WORKING_DISTANCE_M, PairFigures, StereoFigures, StereoReport
-from rhot_app.calibration.stereo_rig import calibrated_rig, rig_findings
+from rhot_app.calibration.lens.camera_calibration import lengths_text
+from rhot_app.calibration.stereo.report import WORKING_DISTANCE_M, PairFigures, StereoFigures, StereoReport
+from rhot_app.calibration.stereo.rig import calibrated_rig, rig_findings
+from rhot_app.calibration.stereo.world_frame import WorldFrame
 from rhot_app.calibration.verdict import judge
-from rhot_app.calibration.world_frame import WorldFrame
 from rhot_app.project import Rig, RigNode
 from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.rig_rows import place_figures

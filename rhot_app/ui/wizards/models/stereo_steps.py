@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from rhot_app.calibration.board import Board
-from rhot_app.calibration.corners import BoardView, detect
-from rhot_app.calibration.lens_start import LensStart
-from rhot_app.calibration.stereo import KnownLengths
-from rhot_app.calibration.stereo_collector import Guidance, Offer, StereoCollector
-from rhot_app.calibration.stereo_report import StereoReport
-from rhot_app.calibration.stereo_views import SharedViews
-from rhot_app.calibration.world_frame import WorldFrame, place_world
+from rhot_app.calibration.board.boards import Board
+from rhot_app.calibration.board.corners import BoardView, detect
+from rhot_app.calibration.lens.start import LensStart
+from rhot_app.calibration.stereo.calibrate import KnownLengths
+from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollector
+from rhot_app.calibration.stereo.report import StereoReport
+from rhot_app.calibration.stereo.views import SharedViews
+from rhot_app.calibration.stereo.world_frame import WorldFrame, place_world
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.models.board_drawing import board_marks
 from rhot_app.ui.wizards.models.board_form import BoardStep
@@ -26,7 +26,7 @@ Views = dict[str, BoardView | None]
 FEWEST = 4  # shots; with fewer the solve refuses
 
 
-class BoardLooker(Step):
+class BoardFinder(Step):
     """Base of the steps that look for the chosen board in all cameras."""
 
     watches = True
@@ -57,7 +57,7 @@ class BoardLooker(Step):
         return {name: board_marks(view, self.board, colour) for name, view in self.seen.items() if view is not None}
 
 
-class ShowStep(BoardLooker):
+class ShowStep(BoardFinder):
     """Shared captures: kept by themselves when the board is still and somewhere new, or with Space."""
 
     title = "Show the board"
@@ -202,7 +202,7 @@ def _same_question(first: tuple[SharedViews, KnownLengths], second: tuple[Shared
     return same_shots and first[0].board == second[0].board and first[1] is second[1]
 
 
-class TableStep(BoardLooker):
+class TableStep(BoardFinder):
     """Where the world is: at the first camera, or on the table under the board."""
 
     title = "The table"

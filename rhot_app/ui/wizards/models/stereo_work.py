@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rhot_app.calibration.lens_search import find_lens
-from rhot_app.calibration.lens_start import LensStart
-from rhot_app.calibration.stereo import KnownLengths, calibrate
-from rhot_app.calibration.stereo_report import StereoReport
-from rhot_app.calibration.stereo_rig import lens_of
-from rhot_app.calibration.stereo_views import SharedViews
+from rhot_app.calibration.lens.search import find_lens
+from rhot_app.calibration.lens.start import LensStart
+from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate
+from rhot_app.calibration.stereo.report import StereoReport
+from rhot_app.calibration.stereo.rig import lens_of
+from rhot_app.calibration.stereo.views import SharedViews
 from rhot_app.progress import Progress
 from rhot_app.project import RigNode
 

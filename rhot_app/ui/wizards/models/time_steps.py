@@ -18,17 +18,18 @@ from rhot_app.ui.wizards.models.rig_rows import rig_rows
 from rhot_app.ui.wizards.models.step import Bar
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.time_offset import TimeReport
+    from rhot_app.calibration.time.offset import TimeReport
 
 SECONDS = 20.0
 REASON = "time calibration"
 
-_FAST_PX_S = 300.0  # a hand that crosses the picture in two seconds
+_FAST_PX_S = 120.0  # a hand that crosses half the picture in two seconds
+_REACH_PX = 250.0
 
 
 def solve_log(log: Path, rig: Rig, *, progress: Progress) -> TimeReport:
     """What ``rhot calibrate time`` does with a log."""
-    from rhot_app.calibration.time_offset import calibrate_times
+    from rhot_app.calibration.time.offset import calibrate_times
     from rhot_app.recording.observation_table import read_observations
 
     progress("reading the recording", 0.0)
@@ -61,11 +62,17 @@ class WaveCoach:
         """Speed now, and how much of the picture was used."""
         reach = max(self._high - self._low, 0.0) if np.isfinite(self._high - self._low) else 0.0
         return (Bar("speed", min(self._speed_px_s / _FAST_PX_S, 1.0), "how fast the markers move up and down now"),
-                Bar("reach", min(reach / 250.0, 1.0), "how much of the picture's height the markers have crossed"))
+                Bar("reach", min(reach / _REACH_PX, 1.0), "how much of the picture's height the markers have crossed"))
 
     def sentence(self) -> str:
-        """Faster, or go on."""
-        return "Faster: up and down." if self._speed_px_s < 0.4 * _FAST_PX_S else "Good, go on waving."
+        """Faster, farther, or go on."""
+        if self._speed_px_s < _FAST_PX_S:
+            return "Faster: up and down."
+        return "Good, go on waving." if self._high - self._low >= _REACH_PX else "Good speed: wave farther up and down."
+
+    def shortfall(self) -> str:
+        """What the verdict tells better: the work says how well the times are known."""
+        return ""
 
 
 def charts_of(report: TimeReport) -> tuple[Chart, ...]:

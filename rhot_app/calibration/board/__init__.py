@@ -1,0 +1,1 @@
+"""Calibration boards: printed, drawn, and found in pictures."""

@@ -1,0 +1,313 @@
+"""A board in one picture: its inner corners to a fraction of a pixel, in an order that the board alone decides."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.charuco_search import find_charuco
+from rhot_app.calibration.board.saddle import FIELDS, fit_saddles
+
+Array = NDArray[np.float64]
+Gray = NDArray[np.uint8]
+
+FEWEST_CORNERS = 6  # of a board that is seen in part
+SMALLEST_PX = 48  # the shorter side of a picture; smaller ones hold no board, and OpenCV's searches fail on them
+
+
+@dataclass(frozen=True, slots=True)
+class BoardView:
+    """The corners of one board in one picture.
+
+    `pixels` (N, 2) raw px and `ids` (N,) of the corners found, sorted by id (see `board`); `width`, `height` px of the
+    picture; `square_px` the shortest side of a square in the picture; `blur_px` the SD of the blur across the edges,
+    in the blurrier direction (1 is sharp, 2 and more is not), NaN when unknown; `source` the file or camera it came
+    from, for messages.
+    """
+
+    pixels: Array
+    ids: NDArray[np.int64]
+    width: int
+    height: int
+    square_px: float
+    blur_px: float
+    source: str = ""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture, px."""
+        return self.width, self.height
+
+    def object_points(self, board: Board) -> Array:
+        """(N, 3) m, the corners found in the board's frame."""
+        return board.object_points()[self.ids]
+
+    def grid(self, board: Board) -> Array:
+        """(rows, cols, 2) raw px, NaN where a corner was not found."""
+        return to_grid(self.pixels, self.ids, board)
+
+    def turned(self, board: Board) -> BoardView:
+        """The same corners counted from the other end; for boards that are not `one_way_up`."""
+        ids = board.count - 1 - self.ids[::-1]
+        return replace(self, pixels=self.pixels[::-1].copy(), ids=ids)
+
+
+def to_gray(image: NDArray[np.uint8]) -> Gray:
+    """A grey picture (H, W) uint8 of a grey (H, W) or BGR (H, W, 3) one."""
+    gray = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    return np.ascontiguousarray(gray, np.uint8)
+
+
+def detect(image: NDArray[np.uint8], board: Board, *, thorough: bool = True, source: str = "") -> BoardView | None:
+    """The board in `image`, (H, W) grey or (H, W, 3) BGR uint8; None when it is not there.
+
+    A chessboard is found whole or not at all, a ChArUco board in parts. `thorough` looks again, enlarged, where the
+    quick search fails: for pictures from files; live pictures come again.
+    """
+    gray = to_gray(image)
+    if min(gray.shape) < SMALLEST_PX:
+        return None
+    if isinstance(board, Chessboard):
+        rough = find_chessboard(gray, board, thorough=thorough)
+    else:
+        rough = find_charuco(gray, board)
+    if rough is None:
+        return None
+    grid, blur = refine(gray, rough, free=board.free_space)
+    if isinstance(board, Chessboard) and not _bordered(grid, gray.shape):
+        return None
+    return _view(grid, blur, gray.shape, source)
+
+
+def _bordered(grid: Array, shape: tuple[int, ...]) -> bool:
+    """Whether the picture shows most corners of each outer line of a plain board's grid (rows, cols, 2).
+
+    A board whose last line is beyond the picture's rim is found as well, put one line too far to either side.
+    """
+    inside = np.all((grid >= 0.0) & (grid <= np.array(shape[::-1]) - 1.0), axis=-1)
+    return min(line.mean() for line in (inside[0], inside[-1], inside[:, 0], inside[:, -1])) > 0.5
+
+
+def to_grid(pixels: Array, ids: NDArray[np.int64], board: Board) -> Array:
+    """(rows, cols, 2) px of `pixels` (N, 2) with `ids` (N,), NaN where a corner is absent."""
+    grid = np.full((board.count, 2), np.nan)
+    grid[ids] = pixels
+    return grid.reshape(board.rows, board.cols, 2)
+
+
+def _view(grid: Array, blur: float, shape: tuple[int, ...], source: str) -> BoardView | None:
+    height, width = shape
+    flat = grid.reshape(-1, 2)
+    inside = (flat >= 0.0).all(axis=1) & (flat[:, 0] <= width - 1) & (flat[:, 1] <= height - 1)
+    ids = np.flatnonzero(inside)
+    sides = side_px(grid)
+    if len(ids) < FEWEST_CORNERS or not len(sides):
+        return None
+    return BoardView(flat[ids], ids, width, height, float(sides.min()), blur, source)
+
+
+# -- finding a plain chessboard's inner corners, roughly, and putting them in the board's own order --------------------
+
+_EVEN_LIGHT = cv2.CALIB_CB_FAST_CHECK
+_UNEVEN_LIGHT = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+_QUICK = ((1.0, _EVEN_LIGHT), (0.4, cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_FAST_CHECK))  # scale, flags
+_THOROUGH = ((1.0, _UNEVEN_LIGHT), (0.5, _UNEVEN_LIGHT))
+_LARGE_PX, _SMALL_PX = 1500, 1000  # longest sides: also searched at a quarter, at twice the size
+_SECTORS = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
+_SAME_LEVEL = 1.0  # grey levels: nearer ones are the same colour
+
+
+def find_chessboard(gray: Gray, board: Chessboard, *, thorough: bool) -> Array | None:
+    """(rows, cols, 2) px in the board's order, good to a pixel or two; None when the whole board is not there.
+
+    Without `thorough` only what fits between two frames of a live picture is tried.
+    """
+    size = (board.cols, board.rows)
+    for scale, flags in (*_QUICK, *(_more(gray) if thorough else ())):
+        corners = _search(gray, size, scale, flags)
+        if corners is not None:
+            return in_order(gray, corners)
+    if thorough:
+        found, sectors = cv2.findChessboardCornersSB(gray, size, flags=_SECTORS)
+        if found:
+            return in_order(gray, np.asarray(sectors, float).reshape(board.rows, board.cols, 2))
+    return None
+
+
+def _more(gray: Gray) -> list[tuple[float, int]]:
+    """What else to try: squares of a few pixels survive the search's erosions when enlarged, blurred ones when not."""
+    longest = max(gray.shape)
+    more = list(_THOROUGH)
+    if longest > _LARGE_PX:
+        more.append((0.25, _UNEVEN_LIGHT))
+    if longest < _SMALL_PX:
+        more.append((2.0, _UNEVEN_LIGHT))
+    return more
+
+
+def _search(gray: Gray, size: tuple[int, int], scale: float, flags: int) -> Array | None:
+    scaled = gray
+    if scale != 1.0:
+        smooth = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC
+        scaled = np.asarray(cv2.resize(gray, None, fx=scale, fy=scale, interpolation=smooth), np.uint8)
+    found, corners = cv2.findChessboardCorners(scaled, size, flags=flags)
+    if not found:
+        return None
+    return (np.asarray(corners, float).reshape(size[1], size[0], 2) + 0.5) / scale - 0.5
+
+
+def in_order(gray: Gray, grid: Array) -> Array:
+    """`grid` (rows, cols, 2) px counted as `board.Chessboard` says, whatever end the search began at."""
+    if not _right_handed(grid):
+        grid = grid[:, ::-1]
+    turns = range(4) if grid.shape[0] == grid.shape[1] else (0, 2)
+    ways = [np.rot90(grid, turn) for turn in turns]
+    first = [first_square_darkness(gray, way) for way in ways]
+    darkest = max(first)
+    margin = max((darkest - min(first)) / 2, _SAME_LEVEL)
+    return max((way for way, dark in zip(ways, first, strict=True) if dark >= darkest - margin), key=_upright)
+
+
+def first_square_darkness(gray: Gray, grid: Array) -> float:
+    """How much darker the squares of the first one's colour are than the others, grey levels; negative when lighter."""
+    centres = (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:]) / 4
+    levels = cv2.remap(gray, centres[..., 0].astype(np.float32), centres[..., 1].astype(np.float32), cv2.INTER_LINEAR)
+    row, col = np.indices(levels.shape)
+    even = (row + col) % 2 == 0
+    return float(levels[~even].mean() - levels[even].mean())
+
+
+def _right_handed(grid: Array) -> bool:
+    """Whether x right, y down as the printed side shows it: the board is never seen from behind."""
+    along, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+    return bool(along[0] * down[1] - along[1] * down[0] > 0)
+
+
+def _upright(grid: Array) -> float:
+    along = grid[:, -1].mean(axis=0) - grid[:, 0].mean(axis=0)
+    return float(along[0] / (np.linalg.norm(along) + 1e-9))
+
+
+# -- corners to a fraction of a pixel ----------------------------------------------------------------------------------
+
+REACH = 0.45  # of the free space: the disc's radius
+WIDEST_PX, NARROWEST_PX = 12.0, 2.5  # radii of the disc: more only costs time; less does not determine a crossing
+_ASTRAY = 0.12  # of the free space: a corner farther than this from where its neighbours expect it is tried again
+_ASTRAY_PX = 0.5
+_BESIDE = 0.05  # of the free space: how well neighbours predict a corner that was not found
+_WORSE = 2.5  # times the misfit of the others
+_FAINTER = 0.6  # of the others' contrast, or the reverse: what has less is not the board
+
+
+def refine(gray: NDArray[np.uint8], grid: Array, *, free: float = 1.0) -> tuple[Array, float]:
+    """`grid` (rows, cols, 2) px, NaN where a corner is absent, moved to where the picture has the corners.
+
+    `free` says which part of the way to the next grid line is empty around a corner: less than 1 where squares hold
+    markers. Absent corners that the picture shows beside others are added. Returns the grid and the blur of the edges
+    (median SD in px, of the blurrier direction). A corner whose edges cannot be fitted becomes NaN.
+    """
+    fitted = _fit(gray, grid, grid, free)
+    expected = _expected(fitted[..., :2])
+    astray = _apart(fitted, expected) > np.maximum(_ASTRAY * clearance_px(grid), _ASTRAY_PX)
+    again = np.logical_and(astray | np.isnan(fitted[..., 0]), np.isfinite(grid[..., 0])).reshape(*astray.shape, 1)
+    fitted = np.where(again, _fit(gray, np.where(again, expected, np.nan), grid, free), fitted)
+    for _ in range(max(grid.shape) if np.isnan(grid).any() else 0):
+        more = _beside(gray, fitted, free)
+        if not np.isfinite(more[..., 0]).any():
+            break
+        fitted = np.where(np.isfinite(more), more, fitted)
+    blurs = fitted[..., 2:4].max(axis=-1)
+    return fitted[..., :2], float(np.nanmedian(blurs)) if np.isfinite(blurs).any() else float("nan")
+
+
+def _fit(gray: NDArray[np.uint8], starts: Array, grid: Array, free: float) -> Array:
+    """(rows, cols, 6) of `fit_saddles` from `starts` (rows, cols, 2) px, NaN for none, with the lines of `grid`."""
+    space = clearance_px(grid)
+    radii = np.where(np.isfinite(space), np.clip(REACH * free * space, NARROWEST_PX, WIDEST_PX), 0.0)
+    fitted = fit_saddles(gray, np.ascontiguousarray(starts).reshape(-1, 2), _directions(grid).reshape(-1, 2),
+                         radii.reshape(-1))
+    return fitted.reshape(*grid.shape[:2], FIELDS)
+
+
+def _beside(gray: NDArray[np.uint8], fitted: Array, free: float) -> Array:
+    """(rows, cols, 6), NaN for most: absent corners that the picture shows where their neighbours expect them.
+
+    They count when they fit like the others, at the place and with the contrast that the board has there: a finger or
+    the rim of a sheet does not.
+    """
+    known = np.isfinite(fitted[..., :1])
+    expected = np.where(known, np.nan, _expected(fitted[..., :2]))
+    inside = np.all((expected > 0.0) & (expected < np.array(gray.shape[::-1]) - 1.0), axis=-1, keepdims=True)
+    expected = np.where(inside, expected, np.nan)
+    filled = np.where(known, fitted[..., :2], expected)
+    found = _fit(gray, expected, filled, free)
+    row, col = np.indices(known.shape[:2])
+    sign = (-1.0) ** (row + col)
+    contrast = found[..., 4] * sign / np.nanmedian(fitted[..., 4] * sign)
+    good = (contrast > _FAINTER) & (contrast < 1.0 / _FAINTER) & (found[..., 5] < _WORSE * np.nanmedian(fitted[..., 5]))
+    good &= _apart(found, expected) < np.maximum(_BESIDE * clearance_px(filled), _ASTRAY_PX)
+    return np.where(good[..., None], found, np.nan)
+
+
+def _apart(fitted: Array, places: Array) -> Array:
+    """(rows, cols) px."""
+    return np.asarray(np.linalg.norm(fitted[..., :2] - places, axis=-1))
+
+
+def _expected(grid: Array) -> Array:
+    """(rows, cols, 2) px, where the corners within two steps along rows and columns expect each one (median)."""
+    wide = np.pad(grid, ((2, 2), (2, 2), (0, 0)), constant_values=np.nan)
+    rows, cols = grid.shape[:2]
+
+    def at(row: int, col: int) -> Array:
+        return wide[2 + row:2 + row + rows, 2 + col:2 + col + cols]
+
+    guesses = [(at(0, -1) + at(0, 1)) / 2, (at(-1, 0) + at(1, 0)) / 2]
+    guesses += [2 * at(row, col) - at(2 * row, 2 * col) for row, col in ((0, 1), (0, -1), (1, 0), (-1, 0))]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a corner without neighbours: NaN is the answer
+        return np.asarray(np.nanmedian(np.stack(guesses), axis=0))
+
+
+def side_px(grid: Array) -> Array:
+    """Lengths in px of all sides of squares between corners of `grid` (rows, cols, 2) that were found."""
+    sides = np.concatenate([np.linalg.norm(np.diff(grid, axis=axis), axis=-1).ravel() for axis in (0, 1)])
+    return sides[np.isfinite(sides)]
+
+
+def clearance_px(grid: Array) -> Array:
+    """(rows, cols) px, how far the nearest parallel grid line is from each corner of `grid` (rows, cols, 2).
+
+    inf for a corner that is absent (NaN) or has no whole square beside it.
+    """
+    along, down = np.diff(grid, axis=1), np.diff(grid, axis=0)
+    nearest = np.full(grid.shape[:2], np.inf)
+    first, last = slice(1, None), slice(None, -1)
+    for rows in (first, last):  # the four squares that meet in a corner
+        for cols in (first, last):
+            a, d = along[rows], down[:, cols]
+            area = np.abs(a[..., 0] * d[..., 1] - a[..., 1] * d[..., 0])
+            longest = np.maximum(np.linalg.norm(a, axis=-1), np.linalg.norm(d, axis=-1))
+            nearest[rows, cols] = np.fmin(nearest[rows, cols], area / np.maximum(longest, 1e-9))
+    return np.where(np.isfinite(grid).all(axis=-1), nearest, np.inf)
+
+
+def _directions(grid: Array) -> Array:
+    """(rows, cols, 2) rad, of the grid lines through each corner along x and y, from the neighbours there are."""
+    found = np.zeros(grid.shape)
+    for which, axis in ((0, 1), (1, 0)):
+        step = np.diff(grid, axis=axis)
+        pad = [(0, 0), (0, 0), (0, 0)]
+        pad[axis] = (1, 1)
+        padded = np.pad(step, pad, constant_values=np.nan)
+        count = padded.shape[axis]
+        both = np.stack([np.take(padded, range(count - 1), axis), np.take(padded, range(1, count), axis)])
+        there = np.isfinite(both).all(axis=-1, keepdims=True)
+        mean = np.where(there, both, 0.0).sum(axis=0)
+        found[..., which] = np.arctan2(mean[..., 1], mean[..., 0])
+    return found

@@ -1,0 +1,263 @@
+"""A calibration board laid out on a sheet of paper, with a ruler that tells whether the printer kept the scale."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.errors import CalibrationError
+from rhot_node.files import write_atomically
+
+PAPERS_MM: dict[str, tuple[float, float]] = {
+    "A5": (148.0, 210.0), "A4": (210.0, 297.0), "letter": (215.9, 279.4), "legal": (215.9, 355.6),
+    "A3": (297.0, 420.0), "tabloid": (279.4, 431.8), "A2": (420.0, 594.0), "A1": (594.0, 841.0), "A0": (841.0, 1189.0),
+}
+"""Short and long side."""
+
+MARGIN_MM = 6.0  # most printers leave about 5 mm white
+RULER_MM = 100.0
+
+_FOOT_MM = 15.0  # ruler and text below the board
+_TICKS_MM = {1: 2.0, 5: 3.0, 10: 4.5}
+_LINE_MM = 0.2
+_TEXT_MM = 3.2
+
+
+def draw_target(board: Board, paper: str = "A4") -> Drawing:
+    """The board in the middle of the sheet, the ruler and a line that names it below.
+
+    Raises CalibrationError when there is no such paper, or when the board does not fit on it: the sentence says which
+    squares or which paper would.
+    """
+    if paper not in PAPERS_MM:
+        raise CalibrationError(f"There is no paper {paper!r}; there are {', '.join(PAPERS_MM)}.")
+    width, height = _board_size_mm(board)
+    across = width >= height
+    page_width, page_height = _page(paper, across=across)
+    quiet = _quiet_mm(board)
+    if not _fits(board, paper):
+        raise CalibrationError(_refusal(board, paper))
+    left = 0.5 * (page_width - width)
+    room = page_height - MARGIN_MM - _FOOT_MM - quiet
+    top = MARGIN_MM + max(0.0, 0.5 * (room - MARGIN_MM - height))
+    foot = page_height - MARGIN_MM - _FOOT_MM
+    boxes = tuple(Box(left + box.x, top + box.y, box.width, box.height) for box in _board_boxes(board))
+    text_x = MARGIN_MM + RULER_MM + 6.0
+    texts = [Text(text_x, foot + 5.0, _TEXT_MM, board.text[0].upper() + board.text[1:]),
+             Text(text_x, foot + 10.0, _TEXT_MM,
+                  f"Print at 100 % on {paper}, glue it flat, measure the ruler: {RULER_MM:g} mm"),
+             *_ruler_numbers(foot)]
+    return Drawing(page_width, page_height, boxes + tuple(_ruler_boxes(foot)), tuple(texts), board.text)
+
+
+def write_target(out: Path, board: Board, paper: str = "A4") -> None:
+    """Draw the board and write it, whole or not at all, as PDF or SVG by the file's name.
+
+    Raises CalibrationError as `draw_target` does, for another ending, and when the file cannot be written.
+    """
+    suffix = out.suffix.lower()
+    if suffix not in (".pdf", ".svg"):
+        raise CalibrationError(f"{out}: the file's name must end in .pdf or .svg.")
+    drawing = draw_target(board, paper)
+    try:
+        write_atomically(out, drawing.to_pdf() if suffix == ".pdf" else drawing.to_svg())
+    except OSError as exc:
+        raise CalibrationError(f"{out}: cannot be written ({exc.strerror}).") from exc
+
+
+def _board_size_mm(board: Board) -> tuple[float, float]:
+    square = 1e3 * board.square_m
+    return square * (board.cols + 1), square * (board.rows + 1)
+
+
+def _quiet_mm(board: Board) -> float:
+    """White around the board: detectors need some to tell it from the foot."""
+    return min(max(4.0, 0.3 * 1e3 * board.square_m), 12.0)
+
+
+def _page(paper: str, *, across: bool) -> tuple[float, float]:
+    short, long = PAPERS_MM[paper]
+    return (long, short) if across else (short, long)
+
+
+def _fits(board: Board, paper: str) -> bool:
+    width, height = _board_size_mm(board)
+    page_width, page_height = _page(paper, across=width >= height)
+    return (width + 2.0 * MARGIN_MM <= page_width
+            and height + 2.0 * MARGIN_MM + _FOOT_MM + _quiet_mm(board) <= page_height)
+
+
+def _refusal(board: Board, paper: str) -> str:
+    width, height = _board_size_mm(board)
+    fitting = [name for name in PAPERS_MM if _fits(board, name)]
+    page = _page(paper, across=width >= height)
+    squares_mm = np.arange(1.0, 1e3 * board.square_m, 0.5)
+    square = max((side for side in squares_mm if _fits(_scaled(board, 1e-3 * side), paper)), default=0.0)
+    larger = f", or print it on {fitting[0]}" if fitting else ""
+    return (f"The {board.text} is {width:g} x {height:g} mm large and does not fit on {paper} ({page[0]:g} x "
+            f"{page[1]:g} mm) with its margins and the ruler. Squares of {square:g} mm "
+            f"would{larger}.")
+
+
+def _scaled(board: Board, square_m: float) -> Board:
+    """The same board with other squares."""
+    if isinstance(board, Chessboard):
+        return replace(board, square_m=square_m)
+    return replace(board, square_m=square_m, marker_m=board.marker_m * square_m / board.square_m)
+
+
+def _board_boxes(board: Board) -> Iterator[Box]:
+    square = 1e3 * board.square_m
+    white = {(x, y) for x, y, _ in _marker_squares(board)} if isinstance(board, CharucoBoard) else _white_squares(board)
+    for y in range(board.rows + 1):
+        for x in range(board.cols + 1):
+            if (x, y) not in white:
+                yield Box(x * square, y * square, square, square)
+    if isinstance(board, CharucoBoard):
+        for x, y, bits in _marker_squares(board):
+            yield from _marker_boxes(board, x, y, bits)
+
+
+def _white_squares(board: Chessboard) -> set[tuple[int, int]]:
+    """The upper left square is black: it lies outside the first inner corner."""
+    return {(x, y) for y in range(board.rows + 1) for x in range(board.cols + 1) if (x + y) % 2}
+
+
+def _marker_squares(board: CharucoBoard) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Column and row of every square with a marker, and the marker's cells, True where black, its border included."""
+    drawn, family = board.opencv(), board.marker_family()
+    cells = family.markerSize + 2
+    for number, corners in zip(np.ravel(drawn.getIds()), drawn.getObjPoints(), strict=True):
+        x, y = (np.asarray(corners)[:, :2].mean(axis=0) // board.square_m).astype(int)
+        yield int(x), int(y), family.generateImageMarker(int(number), cells) == 0
+
+
+def _marker_boxes(board: CharucoBoard, x: int, y: int, bits: np.ndarray) -> Iterator[Box]:
+    """Black runs of each row of cells."""
+    square, marker = 1e3 * board.square_m, 1e3 * board.marker_m
+    left, top, cell = (x + 0.5) * square - 0.5 * marker, (y + 0.5) * square - 0.5 * marker, marker / len(bits)
+    for row, cells in enumerate(bits):
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], cells, [False]]).astype(int)))
+        for begin, end in edges.reshape(-1, 2):
+            yield Box(left + begin * cell, top + row * cell, (end - begin) * cell, cell)
+
+
+def _ruler_boxes(foot: float) -> Iterator[Box]:
+    """The line and its ticks; the middles of the outermost ticks are RULER_MM apart."""
+    yield Box(MARGIN_MM - 0.5 * _LINE_MM, foot + 4.5 - 0.5 * _LINE_MM, RULER_MM + _LINE_MM, _LINE_MM)
+    for millimetre in range(int(RULER_MM) + 1):
+        length = next(_TICKS_MM[step] for step in (10, 5, 1) if millimetre % step == 0)
+        yield Box(MARGIN_MM + millimetre - 0.5 * _LINE_MM, foot + 4.5 - length, _LINE_MM, length)
+
+
+def _ruler_numbers(foot: float) -> Iterator[Text]:
+    for centimetre in range(int(RULER_MM) // 10 + 1):
+        yield Text(MARGIN_MM + 10.0 * centimetre - 1.0, foot + 8.5, 0.9 * _TEXT_MM, str(centimetre))
+
+
+# -- a printable page as rectangles and text in millimetres, written as PDF or SVG in true scale -----------------------
+
+_MM_PER_POINT = 25.4 / 72.0
+_FONT = "Helvetica"
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A black rectangle; its upper left corner and its size, mm, y down."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A line of text from (x, y) on its base line; `height` of the letters' font, mm."""
+
+    x: float
+    y: float
+    height: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """One page of `width` x `height` mm; everything that is not a box or text is white."""
+
+    width: float
+    height: float
+    boxes: tuple[Box, ...]
+    texts: tuple[Text, ...]
+    title: str
+
+    def to_svg(self) -> bytes:
+        """The page as SVG; one user unit is one millimetre."""
+        lines = [
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{_number(self.width)}mm" '
+            f'height="{_number(self.height)}mm" viewBox="0 0 {_number(self.width)} {_number(self.height)}">',
+            f"<title>{_escaped(self.title)}</title>",
+            f'<rect width="{_number(self.width)}" height="{_number(self.height)}" fill="white"/>',
+            '<g fill="black" shape-rendering="crispEdges">',
+            *(f'<rect x="{_number(box.x)}" y="{_number(box.y)}" width="{_number(box.width)}" '
+              f'height="{_number(box.height)}"/>' for box in self.boxes),
+            "</g>",
+            *(f'<text x="{_number(text.x)}" y="{_number(text.y)}" font-family="{_FONT}, Arial, sans-serif" '
+              f'font-size="{_number(text.height)}">{_escaped(text.text)}</text>' for text in self.texts),
+            "</svg>", ""]
+        return "\n".join(lines).encode()
+
+    def to_pdf(self) -> bytes:
+        """The page as PDF 1.4."""
+        box = f"[0 0 {_points(self.width)} {_points(self.height)}]"
+        content = self._pdf_content()
+        objects = [
+            b"<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
+            b"<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
+            (f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents 4 0 R "
+             "/Resources << /Font << /F 5 0 R >> >> >>").encode(),
+            b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content),
+            f"<< /Type /Font /Subtype /Type1 /BaseFont /{_FONT} /Encoding /WinAnsiEncoding >>".encode(),
+            b"<< /Title (" + _pdf_text(self.title) + b") >>",
+        ]
+        data, offsets = bytearray(b"%PDF-1.4\n"), []
+        for number, body in enumerate(objects, start=1):
+            offsets.append(len(data))
+            data += b"%d 0 obj\n%s\nendobj\n" % (number, body)
+        start = len(data)
+        data += b"xref\n0 %d\n0000000000 65535 f \n" % (len(objects) + 1)
+        data += b"".join(b"%010d 00000 n \n" % offset for offset in offsets)
+        data += b"trailer\n<< /Size %d /Root 1 0 R /Info 6 0 R >>\nstartxref\n%d\n%%%%EOF\n" % (len(objects) + 1, start)
+        return bytes(data)
+
+    def _pdf_content(self) -> bytes:
+        """The page's marks; PDF counts in points from the lower left corner."""
+        lines = [f"{_points(box.x)} {_points(self.height - box.y - box.height)} {_points(box.width)} "
+                 f"{_points(box.height)} re".encode() for box in self.boxes]
+        lines.append(b"f")
+        lines += [b"BT /F %s Tf %s %s Td (%s) Tj ET" % (
+            _points(text.height).encode(), _points(text.x).encode(), _points(self.height - text.y).encode(),
+            _pdf_text(text.text)) for text in self.texts]
+        return b"\n".join(lines)
+
+
+def _points(millimetres: float) -> str:
+    return _number(millimetres / _MM_PER_POINT)
+
+
+def _number(value: float) -> str:
+    """Four decimals are a ten-thousandth of a millimetre; no exponents, no trailing zeros."""
+    return f"{value:.4f}".rstrip("0").rstrip(".")
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def _pdf_text(text: str) -> bytes:
+    escaped = text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
+    return escaped.encode("cp1252", "replace")

@@ -1,0 +1,1 @@
+"""Depth from disparity without a board, from a marker at known distances."""

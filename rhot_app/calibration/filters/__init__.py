@@ -1,0 +1,1 @@
+"""The 1-euro filters' parameters, from a hand at rest and one that moves."""

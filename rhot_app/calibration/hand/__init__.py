@@ -1,0 +1,1 @@
+"""Bone lengths and marker places of a hand that moves."""

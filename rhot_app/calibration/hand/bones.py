@@ -1,0 +1,192 @@
+"""Bone lengths and marker places from a minute of free movement: chooses the method, solves, reports, judges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.hand import bones_judgement as judgement
+from rhot_app.calibration.hand.bones_report import (
+    BoneLength,
+    BonesReport,
+    Known,
+    bone_lengths,
+    finger_reaches,
+    marker_spots,
+    rigid_distances,
+)
+from rhot_app.calibration.hand.bundle_model import POSE, Poses, expected, in_segments
+from rhot_app.calibration.hand.fit import fit_hand
+from rhot_app.calibration.hand.marker_places import DISTAL, MarkerTracks
+from rhot_app.calibration.hand.rigid_segments import rigid_pairs
+from rhot_app.calibration.hand.shape import BONE_COUNT, HandUnknowns
+from rhot_app.calibration.time.track_noise import smooth
+from rhot_app.calibration.verdict import judge
+from rhot_app.errors import CalibrationError
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
+from rhot_app.progress import Progress, silent
+
+Array = NDArray[np.float64]
+
+
+def solve_bones(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = silent) -> BonesReport:
+    """The hand that wore these markers. `base` gives side, name, limits, and the proportions to begin from.
+
+    Markers whose coordinates outnumber a pose's unknowns show single bones; fewer show size and reaches. Raises
+    CalibrationError when the recording holds no hand at all.
+    """
+    if len(tracks.times_s) < 2:
+        raise CalibrationError("the recording is empty: no instant shows the markers.")
+    if 3 * len(tracks.places) > POSE:
+        return _by_movement(tracks, base, progress)
+    return _by_reach(tracks, base, progress)
+
+
+def _by_movement(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) -> BonesReport:
+    fit = fit_hand(tracks, base, progress=progress)
+    unknowns, bundle = fit.unknowns, fit.bundle
+    bones = bone_lengths(unknowns, bundle.vector, fit.covariance)
+    reaches, size, size_std = finger_reaches(unknowns, bundle.vector, fit.covariance)
+    pairs = rigid_pairs(tracks.positions, fit.raw_noise_m)
+    error_mm = 1e3 * fit.model_error_m
+    local = in_segments(unknowns, bundle.vector, bundle.poses, bundle.residuals)
+    spots = marker_spots(unknowns, bundle.vector, fit.covariance)
+    findings = [
+        *judgement.misplaced_findings(bundle.residuals, tracks.places), *judgement.order_findings(spots, bones),
+        *judgement.length_findings(tracks.duration_s), *judgement.side_findings(base.side, fit.other_side_cost),
+        *judgement.stillness_findings(bundle.poses.angles), *judgement.slip_findings(tracks),
+        *judgement.drift_findings(tracks.times_s[fit.instants], local, tracks.places,
+                                   fit.model_error_m),
+        *judgement.rigid_findings(pairs, tracks), *judgement.error_findings(error_mm),
+        *judgement.bone_findings(bones), *judgement.palm_findings(tracks.places),
+        *judgement.plausibility_findings(bones, size * 1e3 * unknowns.prior.mean[:BONE_COUNT])]
+    return BonesReport(
+        hand=unknowns.anatomy(bundle.vector), method="movement", size=size, size_std=size_std,
+        bones=bones, reaches=reaches, markers=spots,
+        rigid=rigid_distances(pairs, unknowns), residual_mm=_rms_mm(bundle.residuals),
+        noise_mm=1e3 * fit.raw_noise_m, error_mm=error_mm, seconds=tracks.duration_s, instants=len(fit.instants),
+        verdict=judge(f"{_count(bones)}; the hand is {100 * size:.1f} % of the base hand; beyond their noise the "
+                      f"markers are {error_mm:.1f} mm off.", findings))
+
+
+def _by_reach(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) -> BonesReport:
+    fit = fit_reach(tracks, base, progress=progress)
+    bones = bone_lengths(fit.unknowns, fit.vector, fit.covariance)
+    reaches, size, size_std = finger_reaches(fit.unknowns, fit.vector, fit.covariance)
+    findings = [*judgement.length_findings(tracks.duration_s), *judgement.bending_findings(fit.reach_m, fit.bending_m),
+                *judgement.few_marker_findings(len(tracks.places))]
+    return BonesReport(
+        hand=fit.unknowns.anatomy(fit.vector), method="reach", size=size, size_std=size_std, bones=bones,
+        reaches=reaches, markers=(), rigid=(), residual_mm=None, noise_mm=1e3 * fit.raw_noise_m,
+        error_mm=None, seconds=tracks.duration_s, instants=len(tracks.times_s),
+        verdict=judge(f"the hand is {100 * size:.1f} % of the base hand, to {100 * size_std:.1f} %; single bones "
+                      "are not observed.", findings))
+
+
+def _rms_mm(residuals: Array) -> float:
+    return 1e3 * float(np.sqrt(np.nanmean(np.square(residuals))))
+
+
+def _count(bones: tuple[BoneLength, ...]) -> str:
+    """How many bones are known how: "12 of 15 bones are observed, 2 in part, 1 not at all"."""
+    observed, partly, unseen = (sum(bone.known is known for bone in bones)
+                                for known in (Known.OBSERVED, Known.PARTLY, Known.PRIOR))
+    if observed == len(bones):
+        return f"all {observed} bones are observed"
+    if unseen == len(bones):
+        return "no bone is observed by itself"
+    parts = [f"{observed} of {len(bones)} bones are observed" if observed else "no bone is observed fully"]
+    parts += [f"{partly} in part"] if partly else []
+    parts += [f"{unseen} not at all"] if unseen else []
+    return ", ".join(parts)
+
+
+# -- what six markers can tell of a hand -------------------------------------------------------------------------------
+
+STRETCH_LOSS = (0.005, 0.01)
+"""By which part the farthest tip falls short of the straight finger, and the scatter of that: nobody stretches a finger
+to the last degree, and 8 degrees in every joint cost one hundredth."""
+
+_QUANTILE = 99.5  # of the distances: the last few are mistakes
+_LEAST_SAMPLES = 100
+_STEP_M = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class ReachFit:
+    """`vector` (G,) and `covariance` of the unknowns after the reaches were seen; per finger the `reach_m` (5,) from
+    the wrist to its marker, NaN where there is none, and how much shorter it gets when bent, `bending_m` (5,)."""
+
+    unknowns: HandUnknowns
+    vector: Array
+    covariance: Array
+    reach_m: Array
+    bending_m: Array
+    raw_noise_m: float
+
+
+def fit_reach(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = silent) -> ReachFit:
+    """Size and reaches from a wrist marker and fingertips. Raises CalibrationError without them."""
+    wrist = next((k for k, place in enumerate(tracks.places) if place.on_palm), None)
+    if wrist is None:
+        raise CalibrationError("no marker shows the palm or the wrist, so nothing can be said of any finger's length.")
+    progress("measuring how far the fingers reach", 0.0)
+    smoothed = smooth(tracks.times_s, tracks.positions)
+    reach, bending, columns = np.full(5, np.nan), np.full(5, np.nan), np.full(5, -1)
+    for k, place in enumerate(tracks.places):
+        if place.segment != DISTAL:
+            continue
+        distance = np.linalg.norm(smoothed.positions[:, k] - smoothed.positions[:, wrist], axis=1)
+        distance = distance[np.isfinite(distance)]
+        if len(distance) >= _LEAST_SAMPLES:
+            near, far = np.percentile(distance, [100.0 - _QUANTILE, _QUANTILE])
+            reach[place.finger], bending[place.finger], columns[place.finger] = far, far - near, k
+    if np.isnan(reach).all():
+        raise CalibrationError(f"no fingertip is seen together with {tracks.places[wrist].name} in at least "
+                               f"{_LEAST_SAMPLES} instants. Record a minute with the whole hand in sight.")
+    unknowns = HandUnknowns(base, tracks.places)
+    vector, covariance = _condition(unknowns, reach, columns, wrist, progress)
+    return ReachFit(unknowns, vector, covariance, reach, bending, smoothed.raw_noise_m)
+
+
+def _condition(unknowns: HandUnknowns, reach: Array, columns: NDArray[np.int64], wrist: int,
+               progress: Progress) -> tuple[Array, Array]:
+    """The prior given the reaches; twice, since a reach is not quite linear in the lengths."""
+    prior = unknowns.prior
+    seen = np.flatnonzero(np.isfinite(reach))
+    vector, covariance = prior.mean, prior.covariance
+    stretched = [_stretched_angles(unknowns, vector, int(columns[finger]), wrist, int(finger)) for finger in seen]
+    for turn in range(2):
+        progress("measuring how far the fingers reach", 0.3 + 0.3 * turn)
+        poses = Poses(np.tile(np.eye(4), (len(seen), 1, 1)), np.array(stretched))
+
+        def reaches(vector: Array, poses: Poses = poses) -> Array:
+            points = expected(unknowns, vector, poses)
+            rows = np.arange(len(seen))
+            return np.asarray(np.linalg.norm(points[rows, columns[seen]] - points[rows, wrist], axis=1))
+
+        at = reaches(vector)
+        slope = np.array([(reaches(vector + step) - at) / _STEP_M for step in _STEP_M * np.eye(unknowns.size)]).T
+        straight = reach[seen] * (1.0 + STRETCH_LOSS[0])
+        noise = np.diag((STRETCH_LOSS[1] * straight) ** 2)
+        gain = prior.covariance @ slope.T @ np.linalg.inv(slope @ prior.covariance @ slope.T + noise)
+        vector = prior.mean + gain @ (straight - at - slope @ (prior.mean - vector))
+        covariance = prior.covariance - gain @ slope @ prior.covariance
+    return vector, covariance
+
+
+def _stretched_angles(unknowns: HandUnknowns, vector: Array, marker: int, wrist: int, finger: int) -> Array:
+    """(21,) rad: of a grid of poses the one in which this finger's marker is farthest from the wrist marker."""
+    limits = unknowns.limits[ANGLE_SLICES[finger]]
+    # Only the first two joints turn the finger as a whole; those behind are straight, at zero, when it is longest.
+    count = 2 if FINGERS[finger] != "thumb" else 5
+    grids = [np.unique(np.clip(np.append(np.linspace(low, high, 7), 0.0), low, high)) for low, high in limits[:count]]
+    grid = np.array(list(product(*grids)))
+    angles = np.zeros((len(grid), 21))
+    angles[:, ANGLE_SLICES[finger].start:ANGLE_SLICES[finger].start + count] = grid
+    points = expected(unknowns, vector, Poses(np.tile(np.eye(4), (len(grid), 1, 1)), angles))
+    return np.asarray(angles[int(np.argmax(np.linalg.norm(points[:, marker] - points[:, wrist], axis=1)))])

@@ -1,0 +1,121 @@
+"""Where on the hand a marker sits: on which segment, by its name or by what the user says.
+
+A segment is the palm, or one of a finger's three bones. Known words: ``index_proximal``, ``index_medial``,
+``index_distal`` (``index_tip`` is the same bone; the thumb's are metacarpal, proximal and distal), ``index_middle`` for
+a marker on one of the two inner bones, whichever fits; anything that begins with ``hand_``, ``palm_`` or
+``back_of_hand`` for the palm; and ``wrist`` for a band round the wrist.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.hand.prior import BONES_M
+from rhot_app.errors import CalibrationError
+from rhot_app.hand.skeleton import BONES, FINGERS, WRIST_ROLE
+
+Array = NDArray[np.float64]
+
+PALM = -1
+DISTAL = 2
+_PALM_WORDS = ("hand_", "palm_", "back_of_hand")
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerPlace:
+    """One marker of a hand. `finger` indexes `FINGERS` and `segment` its bones; both PALM on the palm.
+
+    `painted`: the marker is the paint on the whole last bone, or a band round the wrist, so that its centre lies
+    inside the limb at a known part of it; else it is a dot somewhere on the skin.
+    """
+
+    name: str
+    finger: int
+    segment: int
+    painted: bool = False
+
+    @property
+    def on_palm(self) -> bool:
+        """Whether it moves with the palm."""
+        return self.finger == PALM
+
+    @property
+    def word(self) -> str:
+        """The segment in words: "index medial", "palm"."""
+        return "palm" if self.on_palm else f"{FINGERS[self.finger]} {BONES[self.finger][self.segment]}"
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerTracks:
+    """Identified markers over time: `times_s` (T,), `positions` (T, M, 3) m in any one frame, NaN = missing."""
+
+    times_s: Array
+    positions: Array
+    places: tuple[MarkerPlace, ...]
+
+    @property
+    def duration_s(self) -> float:
+        """From the first instant to the last, s."""
+        return float(self.times_s[-1] - self.times_s[0]) if len(self.times_s) else 0.0
+
+    def within(self, start_s: float, end_s: float) -> MarkerTracks:
+        """The part of the recording between two of its own times."""
+        inside = (self.times_s >= start_s) & (self.times_s < end_s)
+        return MarkerTracks(self.times_s[inside], self.positions[inside], self.places)
+
+
+def tracks_of(times_s: Array, positions: Array, names: Sequence[str], roles: Mapping[str, str] | None = None, *,
+              painted: frozenset[str] = frozenset()) -> MarkerTracks:
+    """The markers among `names` that sit on a hand, by `roles` (name -> role) or else by their own names.
+
+    `painted` names markers that are paint or bands. Raises CalibrationError when a role is no place on the hand, names
+    no marker, or no marker is on the hand.
+    """
+    roles = roles or {}
+    unknown = sorted(set(roles) - set(names))
+    if unknown:
+        raise CalibrationError(f"there is no marker {unknown[0]!r}; the recording has {', '.join(names)}.")
+    words = [roles.get(name, name) for name in names]
+    positions = np.asarray(positions, dtype=np.float64)
+    places, columns = [], []
+    for column, (name, word) in enumerate(zip(names, words, strict=True)):
+        spot = _spot(word, positions[:, column], {other: positions[:, k] for k, other in enumerate(words)})
+        if spot is None and name in roles:
+            raise CalibrationError(f"{word!r} is no place on the hand; say for example index_tip, index_medial, palm_1 "
+                                   "or wrist.")
+        if spot is not None:
+            places.append(MarkerPlace(name, *spot, name in painted or word == WRIST_ROLE))
+            columns.append(column)
+    if not places:
+        raise CalibrationError(f"none of the markers {', '.join(names)} names a place on the hand; give --roles "
+                               "NAME=ROLE, for example m1=index_tip.")
+    return MarkerTracks(np.asarray(times_s, dtype=np.float64), positions[:, columns], tuple(places))
+
+
+def _spot(word: str, track: Array, tracks: Mapping[str, Array]) -> tuple[int, int] | None:
+    """(finger, segment) of a role; None when it is no place on the hand."""
+    if word == WRIST_ROLE or word.startswith(_PALM_WORDS):
+        return PALM, PALM
+    name, _, segment = word.partition("_")
+    if name not in FINGERS:
+        return None
+    finger = FINGERS.index(name)
+    if segment == "tip":
+        return finger, DISTAL
+    if segment == "middle":
+        return finger, _inner_segment(finger, track, tracks.get(f"{name}_tip", tracks.get(f"{name}_distal")))
+    return (finger, BONES[finger].index(segment)) if segment in BONES[finger] else None
+
+
+def _inner_segment(finger: int, track: Array, tip: Array | None) -> int:
+    """Which of the two inner bones a marker sits on, by how far it is from the tip of the stretched finger."""
+    if tip is None:
+        return 1
+    inner, medial, distal = BONES_M[finger]
+    reach = float(np.nanpercentile(np.linalg.norm(track - tip, axis=1), 90.0))
+    on_medial = 0.75 * distal + 0.5 * medial
+    return 1 if reach < on_medial + 0.5 * (0.5 * medial + 0.5 * inner) else 0

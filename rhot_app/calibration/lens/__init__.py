@@ -1,0 +1,1 @@
+"""Lenses: intrinsics from views of a board."""

@@ -1,0 +1,136 @@
+"""Whether a rig's lenses and poses are calibrated, and the error of positions that their calibration leaves.
+
+``rhot check``, the engine's advice and the app all use these functions, so that they agree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.check.health_findings import HealthFinding
+from rhot_app.calibration.depth.ruler import lengths_finding
+from rhot_app.calibration.verdict import Finding, Grade
+from rhot_app.project import Intrinsics, Rig
+
+Array = NDArray[np.float64]
+
+NOT_CALIBRATED = "Not calibrated: millimetres are not reliable."
+_NO_TURN = 1e-9
+"""Vector part of a rotation's quaternion below which a pose is nominal. No solve finds cameras that parallel."""
+
+
+def calibration_finding(rig: Rig) -> HealthFinding | None:
+    """The most serious fault of a rig's lenses and poses, with the calibration to do next; None without a known one."""
+    if rig.depth.mode == "disparity":
+        return HealthFinding("stereo", Finding(
+            "disparity", Grade.FAIR, "Distances are estimates: the rig finds them from disparity, without a "
+            "calibration.", remedy="Put the cameras together with a board (Calibrate menu) for exact ones."))
+    if rig.calibration is not None and rig.calibration.method == "exact":
+        return None
+    nominal = [node.name for node in rig.nodes if node.intrinsics.nominal]
+    if nominal:
+        exact = " The estimator takes them as exact." if rig.tracker.kind != "classic" else ""
+        return HealthFinding("lens", Finding(
+            "nominal", Grade.FAIR, NOT_CALIBRATED, f"The lenses of {' and '.join(nominal)} are nominal.{exact}",
+            "Find each lens, then put the cameras together."))
+    if rig.calibration is not None and rig.calibration.method == "outdated":
+        return HealthFinding("stereo", Finding(
+            "outdated_poses", Grade.FAIR, NOT_CALIBRATED, "A lens was found anew after the cameras were put together.",
+            "Put the cameras together again with a board."))
+    if rig.calibration is None and _poses_nominal(rig):
+        return HealthFinding("stereo", Finding(
+            "nominal_poses", Grade.FAIR, NOT_CALIBRATED, "The cameras' poses are nominal: none is turned.",
+            "Put the cameras together with a board."))
+    if rig.calibration is not None and rig.calibration.lengths == "skipped":
+        return HealthFinding("stereo", lengths_finding())
+    return None
+
+
+def calibration_text(rig: Rig) -> str:
+    """How the cameras were calibrated, in one line."""
+    record = rig.calibration
+    if record is None:
+        return "not recorded"
+    if record.method != "board":
+        return "exact, as simulated" if record.method == "exact" else "with a board, before a lens was found anew"
+    error = "" if record.error_m is None else f", ± {1e3 * record.error_m:.2f} mm at {record.distance_m:g} m"
+    return f"with a board{error}; lengths {lengths_text(rig)}"
+
+
+def lengths_text(rig: Rig) -> str:
+    """How the size of the board's squares was checked against a second known length, in a few words."""
+    record = rig.calibration
+    if record is None:
+        return "not recorded"
+    if record.method == "exact":
+        return "exact, as simulated"
+    return {"skipped": "never checked against a ruler", "baseline": "checked by the baseline",
+            "ruler": "checked by a ruler"}[record.lengths]
+
+
+def with_lens(rig: Rig, camera: str, lens: Intrinsics) -> Rig:
+    """`rig` with another lens of `camera`; its calibration record then says that the poses are outdated."""
+    nodes = tuple(msgspec.structs.replace(node, intrinsics=lens) if node.name == camera else node for node in rig.nodes)
+    record = rig.calibration
+    if record is not None:
+        record = msgspec.structs.replace(record, method="outdated", error_m=None)
+    return msgspec.structs.replace(rig, nodes=nodes, calibration=record)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CalibrationError:
+    """What a rig's calibration adds to the uncertainty of positions.
+
+    `sd_m` is the standard deviation at `distance_m` from `middle` (3,) m, the middle of the cameras, in the rig frame.
+    It is NaN when it is unknown, and `reason` then says why in a sentence.
+    """
+
+    sd_m: float
+    distance_m: float
+    middle: Array
+    reason: str = ""
+
+    @property
+    def known(self) -> bool:
+        """Whether the standard deviation is known."""
+        return not self.reason
+
+    def at(self, positions: Array) -> Array:
+        """Standard deviations (...,) m at positions (..., 3) m of the rig frame.
+
+        They grow with the square of the distance, as the depth error of stereo does: dz = z^2 / (B f) dx.
+        """
+        away = np.linalg.norm(np.asarray(positions) - self.middle, axis=-1)
+        return np.asarray(self.sd_m * np.square(away / self.distance_m))
+
+
+KNOWN_EXACTLY = CalibrationError(0.0, 1.0, np.zeros(3))
+
+
+def calibration_error(rig: Rig | None) -> CalibrationError:
+    """What the calibration of `rig` adds. Nothing in disparity mode, whose covariances include it (docs/rig.md)."""
+    if rig is None or rig.depth.mode == "disparity":
+        return KNOWN_EXACTLY
+    found, record = calibration_finding(rig), rig.calibration
+    if found is not None and found.finding.figure == NOT_CALIBRATED:
+        return _unknown("Nobody knows how far places are off: the cameras are not calibrated.")
+    if record is not None and record.method == "exact":
+        return KNOWN_EXACTLY
+    if record is None or record.error_m is None:
+        return _unknown("Nobody knows how far places are off: the rig file does not say how well its cameras were "
+                        "calibrated. Put the cameras together again (Calibrate menu) to know it.")
+    middle = np.mean([node.pose.translation_m for node in rig.nodes], axis=0)
+    return CalibrationError(record.error_m, record.distance_m, middle)
+
+
+def _unknown(reason: str) -> CalibrationError:
+    return CalibrationError(float("nan"), 1.0, np.zeros(3), reason)
+
+
+def _poses_nominal(rig: Rig) -> bool:
+    """Whether two or more cameras all have the identity for their rotation."""
+    return len(rig.nodes) > 1 and all(np.abs(node.pose.rotation_wxyz[1:]).max() < _NO_TURN for node in rig.nodes)

@@ -1,0 +1,176 @@
+"""What is doubtful about a camera's intrinsics: each check gives findings with the figure, the cause and the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.board.boards import Board
+from rhot_app.calibration.board.errors import BoardErrors
+from rhot_app.calibration.lens.certainty import WORKING_DISTANCE_M, ExpectedErrors
+from rhot_app.calibration.lens.coverage import Coverage
+from rhot_app.calibration.robust_error import in_words
+from rhot_app.calibration.verdict import Finding, Grade
+
+Array = NDArray[np.float64]
+
+MORE_VIEWS = "Add views: the board near each corner of the picture, near and far, tilted each way."
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What the checks look at: a fit and what was measured on it, in px, rad and m (see `intrinsics`)."""
+
+    lens: Array
+    std: Array
+    size: tuple[int, int]
+    rms_px: float
+    views: int
+    outliers: int
+    coverage: Coverage
+    pattern_px: float
+    tilt_rad: float
+    undetermined: tuple[str, ...]
+    error_inflation: float
+    blind: float
+    errors: ExpectedErrors
+    board: Board
+    board_errors: BoardErrors | None
+    blur_px: float
+    square_px: float
+
+    @property
+    def coarseness(self) -> float:
+        """What a pixel is worth: 1 up to 1000 pixels of width, then in proportion."""
+        return max(1.0, self.size[0] / 1000.0)
+
+
+def check(figures: Figures) -> list[Finding]:
+    """All findings; none says that all is well."""
+    return [finding for each in CHECKS for finding in each(figures)]
+
+
+def _grade(value: float, fair: float, poor: float) -> Grade | None:
+    if not value > fair:  # NaN never passes for good: see `_certainty`
+        return None
+    return Grade.POOR if value > poor else Grade.FAIR
+
+
+def _number_of_views(f: Figures) -> Iterator[Finding]:
+    if f.views < 10:
+        yield Finding("few_views", Grade.POOR if f.views < 4 else Grade.FAIR, f"{f.views} views were used; 10 to 20 "
+                      "are good.", "", MORE_VIEWS)
+
+
+def _alike(f: Figures) -> Iterator[Finding]:
+    degrees = float(np.degrees(f.tilt_rad))
+    grade = _grade(-degrees, -25.0, -10.0)
+    if grade:
+        yield Finding("alike", grade, f"The board is seen from nearly the same side in all views: its tilts differ by "
+                      f"{degrees:.0f} degrees at most (30 and more are good).",
+                      "Focal length, principal point and distance then look alike and cannot be told apart.",
+                      "Add views with the board turned by 20 to 40 degrees about each of its axes.")
+
+
+def _covered(f: Figures) -> Iterator[Finding]:
+    grade = _grade(1.0 - f.coverage.share, 0.45, 0.8)
+    if grade:
+        yield Finding("coverage", grade, f"The views reach {100 * f.coverage.share:.0f} % of the picture (55 % and "
+                      "more are good).", "Where no corner was seen, the distortion is a guess.",
+                      "Bring the board to the edges and corners that the image map shows empty.")
+
+
+def _fits(f: Figures) -> Iterator[Finding]:
+    grade = _grade(f.rms_px, 0.5 * f.coarseness, 1.5 * f.coarseness)
+    if grade:
+        yield Finding("rms", grade, f"The corners are {f.rms_px:.2f} px rms from where they should be (0.3 is usual).",
+                      "A board of another size, mixed-up corners, a bent board, blur, or an autofocus that moved.",
+                      "Check the board's numbers of corners; glue it onto something flat; fix the focus; look at the "
+                      "worst views.")
+    if f.pattern_px > max(0.1 * f.coarseness, 0.5 * f.rms_px):
+        yield Finding("pattern", Grade.FAIR, f"{f.pattern_px:.2f} px of it follow a pattern over the picture.",
+                      "The lens is not described by this model (a fisheye, a digital stabiliser, a dewarped picture).",
+                      "Switch off corrections inside the camera, or use a lens of less than 100 degrees.")
+
+
+def _misfits(f: Figures) -> Iterator[Finding]:
+    if f.outliers > 0.2 * (f.views + f.outliers):
+        yield Finding("misfits", Grade.FAIR, f"{f.outliers} of {f.views + f.outliers} views did not fit the others.",
+                      "The board was bent or moved, or the focus changed.",
+                      "Hold the board still or lay it against something; fix the focus.")
+
+
+def _certainty(f: Figures) -> Iterator[Finding]:
+    focal = 100.0 * float(np.max(f.std[:2] / f.lens[:2]))
+    grade = _grade(focal, 0.3, 1.5)
+    if grade:
+        yield Finding("focal_length", grade, f"The focal length is known to {focal:.1f} % only (0.3 % is good).",
+                      "The views are few, far away, or little tilted.", MORE_VIEWS)
+    centre, width = float(np.max(f.std[2:4])), f.size[0]
+    grade = _grade(centre, 0.005 * width, 0.02 * width)
+    if grade:
+        yield Finding("principal_point", grade, f"The principal point is known to {centre:.1f} px only "
+                      f"({0.005 * width:.0f} px is good).", "The board was little tilted.", MORE_VIEWS)
+    if f.undetermined:
+        yield Finding("open_distortion", Grade.FAIR, f"The views leave {' and '.join(f.undetermined)} open; they are "
+                      "taken as near zero, as for most lenses.", "No view reaches far enough from the middle.",
+                      "Bring the board to the picture's corners.")
+    typical, worst = 1e3 * f.errors.typical_m, 1e3 * f.errors.worst_m
+    grade = Grade.POOR if not np.isfinite(typical) else _grade(typical, 1.0, 5.0) or _grade(worst, 5.0, np.inf)
+    if grade:
+        yield Finding("expected_error", grade, f"By the lens alone a point at {WORKING_DISTANCE_M:.1f} m may be off by "
+                      f"{typical:.1f} mm, in the picture's corners by {worst:.1f} mm (SD; 1 and 5 mm are good).",
+                      "The views determine the lens too loosely, most where none reaches."
+                      f" {in_words(f.error_inflation)}".rstrip(), f"Lay a stiff board against something. {MORE_VIEWS}"
+                      if in_words(f.error_inflation) else MORE_VIEWS)
+
+
+def _plausible(f: Figures) -> Iterator[Finding]:
+    middle = (np.array(f.size) - 1.0) / 2.0
+    off = float(np.max(np.abs(f.lens[2:4] - middle) / np.array(f.size)))
+    grade = _grade(off, 0.1, 0.25)
+    if grade:
+        yield Finding("off_centre", grade, f"The principal point ({f.lens[2]:.0f}, {f.lens[3]:.0f}) px is far from the "
+                      "picture's middle.", "The picture is a crop, or the views do not determine it.",
+                      "Use the whole sensor; add tilted views.")
+    stretch = float(f.lens[0] / f.lens[1] - 1.0)
+    if abs(stretch) > 0.01 and abs(stretch) > 4.0 * float(np.hypot(f.std[0] / f.lens[0], f.std[1] / f.lens[1])):
+        yield Finding("not_square", Grade.FAIR, f"Pixels are {100 * abs(stretch):.1f} % "
+                      f"{'wider' if stretch < 0 else 'narrower'} than high; cameras have square ones.",
+                      "The picture is scaled, or the board was printed with another scale in one direction.",
+                      "Measure the printed ruler along and across the sheet; check the camera's picture size.")
+    grade = _grade(f.blind, 0.0, 0.1)
+    if grade:
+        yield Finding("blind", grade, f"No ray belongs to {100 * f.blind:.0f} % of the picture: its distortion turns "
+                      "over there.", "No view reaches these parts.", "Bring the board to the picture's corners.")
+
+
+def _sharp(f: Figures) -> Iterator[Finding]:
+    if f.blur_px > 2.0 * f.coarseness:
+        yield Finding("blurred", Grade.FAIR, f"The board's edges are blurred by {f.blur_px:.1f} px (1 is sharp).",
+                      "Out of focus, moved, or noise reduction.", "More light, a shorter exposure, focus at arm's "
+                      "length; hold the board still.")
+    if f.square_px < 7.0:
+        yield Finding("small_squares", Grade.FAIR, f"Squares are {f.square_px:.0f} px small.",
+                      "The board is far away, or has many small squares.", "Bring it nearer, or print fewer, larger "
+                      "squares.")
+
+
+def _board(f: Figures) -> Iterator[Finding]:
+    if f.board_errors is None:
+        return
+    across, along = 1e3 * f.board_errors.across_m, 1e3 * f.board_errors.in_plane_m
+    limit = 0.01 * f.board.square_m * 1e3
+    large = max(across / 2.0, along) > limit
+    yield Finding("board_errors", Grade.FAIR if large else Grade.GOOD,
+                  f"The board's corners are off by {along:.2f} mm in its plane and {across:.2f} mm across it (SD); "
+                  "that was found from the views and taken into account.",
+                  "It is printed on paper that stretched, or not glued flat." if large else "",
+                  "Glue the sheet onto glass or a plate." if large else "")
+
+
+CHECKS: tuple[Callable[[Figures], Iterator[Finding]], ...] = (
+    _number_of_views, _alike, _covered, _fits, _misfits, _certainty, _plausible, _sharp, _board)

@@ -1,0 +1,157 @@
+"""From picture files to views of a board: what cannot be used is named and left out, the rest goes on."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.corners import BoardView, Gray, detect
+from rhot_app.calibration.board.missing import why_missing
+from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding
+from rhot_app.calibration.stereo.views import Dropped
+from rhot_app.calibration.verdict import Finding
+from rhot_app.errors import CalibrationError
+from rhot_app.progress import Progress, silent
+from rhot_node.files import read_input
+
+MOST_EXPLAINED = 8
+"""Pictures of one camera that are searched for the reason why they show no board: that takes a second each."""
+
+_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+_FORGIVEN = 0.25  # of a JPEG's bytes after its end mark: cameras append thumbnails and notes
+
+
+@dataclass(slots=True)
+class Read:
+    """One picture on its way: its view, or the trouble with it in words and its code ("file", "no_board").
+
+    `beyond` says whether the board goes on where it should end; `path` is None where a camera has no picture.
+    """
+
+    path: Path | None
+    view: BoardView | None = None
+    trouble: str = ""
+    code: str = ""
+    beyond: Beyond | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ViewSet:
+    """One camera's views in the order of its files, the pictures that were `dropped`, and what the pictures say about
+    the board's size, None when it is as said."""
+
+    views: tuple[BoardView, ...]
+    dropped: tuple[Dropped, ...]
+    size: Finding | None
+
+
+def read_views(files: Sequence[Path], board: Board, *, progress: Progress = silent) -> ViewSet:
+    """Find the board in the pictures of one camera. Raises CalibrationError when none shows it, and says why."""
+    if not files:
+        raise CalibrationError("There are no pictures. Give a pattern in quotes, such as 'left*.jpg'.")
+    reads = []
+    for number, path in enumerate(files):
+        progress(f"looking for the board in {path.name}", number / len(files))
+        reads.append(read_picture(path, board))
+    drop_other_sizes(reads)
+    progress("looking for what is wrong with the other pictures", 0.95)
+    explain(reads, board)
+    views = tuple(each.view for each in reads if each.view is not None)
+    if not views:
+        raise CalibrationError(no_board(f"{files[0].parent}", reads, board))
+    dropped = tuple(Dropped(each.path.name, each.trouble, each.code) for each in reads if each.path and each.trouble)
+    return ViewSet(views, dropped, size_of(reads, board))
+
+
+def read_picture(path: Path, board: Board) -> Read:
+    """Look for the board in one file."""
+    gray, trouble = open_picture(path)
+    if gray is None:
+        return Read(path, None, trouble, "file")
+    view = detect(gray, board, source=path.name)
+    if view is None:
+        return Read(path, None, f"the board ({board.text}) was not found", "no_board")
+    beyond = look_beyond(gray, view, board) if isinstance(board, Chessboard) else None
+    return Read(path, view, beyond=beyond)
+
+
+def open_picture(path: Path) -> tuple[Gray | None, str]:
+    """The picture in grey levels, or None and the reason: missing, no picture, or cut off."""
+    try:
+        data = read_input(path)
+    except OSError as exc:
+        return None, f"cannot be read ({exc.strerror})"
+    if data.startswith(_JPEG_START) and data.rfind(_JPEG_END) < (1.0 - _FORGIVEN) * len(data):
+        return None, "is cut off or damaged: its end is missing"  # the decoder would fill it up with grey
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
+    if image is None:
+        return None, "cannot be read as a picture" if data else "is empty"
+    return np.asarray(image, np.uint8), ""
+
+
+def drop_other_sizes(reads: Sequence[Read]) -> None:
+    """Take out the views of a camera whose pictures have another size than most: another camera, zoom or crop."""
+    sizes = Counter(each.view.size for each in reads if each.view is not None)
+    if len(sizes) < 2:
+        return
+    (width, height), _ = sizes.most_common(1)[0]
+    for each in reads:
+        if each.view is not None and each.view.size != (width, height):
+            each.trouble = f"is {each.view.width}x{each.view.height} px, the others are {width}x{height}"
+            each.code, each.view, each.beyond = "file", None, None
+
+
+def explain(reads: Sequence[Read], board: Board) -> None:
+    """Find out why pictures show no board; of many only the first `MOST_EXPLAINED`."""
+    lost = [each for each in reads if each.code == "no_board" and each.path is not None]
+    for each in lost[:MOST_EXPLAINED]:
+        assert each.path is not None
+        gray, _ = open_picture(each.path)
+        if gray is not None:
+            each.trouble = why_missing(gray, board)
+
+
+def no_board(name: str, reads: Sequence[Read], board: Board) -> str:
+    """The message for a camera none of whose pictures can be used; `reads` after `explain`."""
+    files = [each for each in reads if each.path is not None]
+    lost = [each.trouble for each in files if each.code == "no_board"][:MOST_EXPLAINED]
+    if not lost:
+        first = files[0]
+        return f"{name}: none of {len(files)} files can be used; {first.path and first.path.name} {first.trouble}."
+    reason, count = Counter(lost).most_common(1)[0]
+    return (f"{name}: no picture shows the board ({board.text}). Most often ({count} of {len(lost)} "
+            f"looked into): {reason}.")
+
+
+def size_of(reads: Sequence[Read], board: Board) -> Finding | None:
+    """What the pictures say about the board's size."""
+    beyond = [each.beyond for each in reads if each.beyond is not None]
+    return size_finding(beyond, board) if isinstance(board, Chessboard) else None
+
+
+def in_natural_order(files: Sequence[Path]) -> list[Path]:
+    """Sorted as people number them: left2 before left10."""
+    return sorted(files, key=lambda path: [(int(part), "") if part.isdigit() else (-1, part)
+                                           for part in re.split(r"(\d+)", path.name)])
+
+
+def matching_files(pattern: str) -> list[Path]:
+    """The files that a pattern names, in natural order; the folder is what stands before the first wildcard.
+
+    Raises CalibrationError when it names a folder.
+    """
+    if Path(pattern).is_dir():
+        raise CalibrationError(f"{pattern} is a folder; say which files in it, for example "
+                               f"'{pattern.rstrip('/')}/*.jpg'.")
+    parts = Path(pattern).parts
+    wild = next((i for i, part in enumerate(parts) if set(part) & set("*?[")), len(parts) - 1)
+    if not parts:
+        return []
+    return in_natural_order([path for path in Path(*parts[:wild]).glob("/".join(parts[wild:])) if path.is_file()])

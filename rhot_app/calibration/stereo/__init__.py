@@ -1,0 +1,1 @@
+"""Where the cameras stand: extrinsics from views of a board that several cameras share."""

@@ -1,0 +1,1 @@
+"""Time offsets between cameras, from a marker that moves."""

@@ -1,0 +1,193 @@
+"""Takes: motions filmed once and seen by the nodes' own detector, as raw logs with the truth beside them.
+
+Trackers are compared on takes: the same datagrams for every one of them, as often as wanted, without waiting. What was
+filmed once is kept in a folder and found again by its order. What films may have changed meanwhile: the log
+says so, and whoever shows figures should (`DataSet.outdated`); remove the folder to film anew.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+import msgspec
+import numpy as np
+
+from rhot_app.project import Rig, load_rig
+from rhot_app.recording.raw_log import LogReader, Record
+from rhot_app.simulator.nodes.camera_workers import Progress, Report, for_each_camera
+from rhot_app.simulator.nodes.film import TRUTH_NAME, new_folder
+from rhot_app.simulator.nodes.node_log import CABLE, Network, NodeSender, write_node_log
+from rhot_app.simulator.nodes.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
+from rhot_app.simulator.scene.scene import Scene, node_settings
+from rhot_app.simulator.truth.ideal_observations import ORDINARY, sights
+from rhot_app.simulator.truth.truth import FrameTruth, Truth, load_truth, save_truth, true_object
+from rhot_node.__main__ import make_detector
+from rhot_node.detect.image import from_i420
+from rhot_node.files import resource_path
+from rhot_node.wire.messages import MarkerObservation
+
+LOG_NAME: Final = "take.rhotlog"
+
+Told = Callable[[str], Progress | None]
+"""Says how the filming of a take goes: given what is filmed, who is told of its frames."""
+
+_SHOWN = "body", "motion", "node_log", "raycast", "recorded", "scene"
+_SEEN = (*_SHOWN, "background", "camera_controls", "edges", "lamp", "exposure_samples", "paint", "rays", "render",
+         "sensor", "solids_painter", "scanline_bounds", "trace")
+_SKETCHED = (*_SHOWN, "marker_rows", "ideal_observations")
+"""Modules of the twin that a take depends on besides its order: what moves, makes pictures or does without, and sends
+what was found in them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What a take shall show: a motion (name or file) in a scene, for how long, and over which network it is sent.
+    `sketched`: without pictures (`rhot_app.simulator.truth.ideal_observations`), a hundred times faster. `missing`: ids
+    of markers that the hand does not wear."""
+
+    scene: Scene
+    motion: str
+    seconds: float
+    network: Network = CABLE
+    sketched: bool = False
+    missing: frozenset[str] = frozenset()
+
+    @property
+    def title(self) -> str:
+        """What it is, for people."""
+        return f"{Path(self.motion).name}, {self.seconds:g} s, seed {self.scene.seed}"
+
+    def name(self) -> str:
+        """A folder name that differs with the order."""
+        facts = [msgspec.to_builtins(self.scene.settings), self.scene.seed, self.seconds, asdict(self.network),
+                 asdict(ORDINARY) if self.sketched else False, _motion_digest(self.motion)]
+        if self.scene.settings.markers.endswith(".json"):  # a file may say something else the next time
+            facts.append(msgspec.to_builtins(self.scene.markers))
+        if self.missing:
+            facts.append(sorted(self.missing))
+        digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+        kind = "sketched" if self.sketched else Path(self.scene.settings.markers).stem
+        return f"{Path(self.motion).stem}-{self.seconds:g}s-{kind}-{self.scene.seed}-{digest[:12]}"
+
+
+@dataclass(frozen=True, eq=False)
+class DataSet:
+    """A raw log, the rig that a perfect calibration would have found, and the truth. Scene time 0 is
+    `rhot_app.simulator.nodes.node_log.T0_MASTER_NS`. `outdated`: another detector or twin would film it today."""
+
+    folder: Path
+    rig: Rig
+    truth: Truth
+    seconds: float
+    outdated: bool
+
+    def records(self) -> list[Record]:
+        """All records of the log, in the order of arrival."""
+        reader = LogReader(self.folder / LOG_NAME)
+        try:
+            return list(reader)
+        finally:
+            reader.close()
+
+
+def data_sets_folder() -> Path:
+    """Where takes are kept unless told otherwise."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhot" / "takes"
+
+
+def data_set(order: Order, folder: Path, told: Told = lambda title: None) -> DataSet:
+    """The take in `folder`, filmed unless it is there already. Raises RhotError.
+
+    Filming takes about as long as what is filmed; an interrupted one leaves nothing behind.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    place = folder / order.name()
+    if not place.exists():
+        try:
+            _film(order, place, told(order.title))
+        except OSError:
+            if not place.exists():  # else somebody has filmed the same meanwhile
+                raise
+    reader = LogReader(place / LOG_NAME)
+    reader.close()
+    return DataSet(place, reader.rig, load_truth(place / TRUTH_NAME), order.seconds,
+                reader.about.get("sources") != _source_digest(order.sketched))
+
+
+def _film(order: Order, place: Path, progress: Progress | None) -> None:
+    shot = make_shot(order.scene, order.motion, order.seconds, order.missing)
+    with new_folder(place) as work:
+        save_shot(shot, work)
+        rig = load_rig(work / RIG_NAME)
+        if order.sketched:
+            streams = tuple(_sketch(rig, order.network, shot, index) for index in range(len(rig.nodes)))
+        else:
+            streams = for_each_camera(shot, functools.partial(_watch, rig, order.network), progress)
+        notes = {"simulated": shot.scene_object.name, "sources": _source_digest(order.sketched)}
+        write_node_log(work / LOG_NAME, rig, notes, [record for records, _ in streams for record in records])
+        truths = tuple(truth for _, truth in streams)
+        save_truth(work / TRUTH_NAME, true_object(shot.scene_object, shot.seconds, truths))
+
+
+Stream = tuple[list[Record], FrameTruth]
+"""What one node says of a shot, and what was true of its frames."""
+
+
+def _watch(rig: Rig, network: Network, shot: Shot, index: int, report: Report) -> Stream:
+    """Pictures, and what the detector finds in them."""
+    scene, preset = shot.scene, shot.scene.preset
+    detector = make_detector(node_settings(scene, index))
+    renderer = make_renderer(shot, index)
+    seen, visible = [], []
+    for number, t_ns in enumerate(scene.frame_times_ns(index, shot.seconds)):
+        frame, fractions = renderer.render(shot.scene_object.source, 1e-9 * t_ns, number)
+        seen.append(detector.detect(from_i420(frame, preset.width, preset.height)))
+        visible.append(fractions.copy())
+        report(number)
+    times_s = 1e-9 * np.array(scene.frame_times_ns(index, shot.seconds))
+    return _say(rig, network, shot, index, seen), FrameTruth(times_s, np.array(visible))
+
+
+def _sketch(rig: Rig, network: Network, shot: Shot, index: int) -> Stream:
+    """No pictures."""
+    seen, truth = sights(shot, index)
+    return _say(rig, network, shot, index, seen), truth
+
+
+def _say(rig: Rig, network: Network, shot: Shot, index: int,
+         seen: Sequence[Sequence[MarkerObservation]]) -> list[Record]:
+    """One node's clock exchanges, and a datagram for every frame that is not lost on its way."""
+    rng = np.random.default_rng([shot.scene.seed, index, 0x7A4E])
+    voice = NodeSender(shot.scene, rig, index, rng, network)
+    times_ns = shot.scene.frame_times_ns(index, shot.seconds)
+    sent = [voice.datagram(number, t_ns, markers) for number, (t_ns, markers) in
+            enumerate(zip(times_ns, seen, strict=True))]
+    return [*voice.exchanges(1e-9 * times_ns[-1]), *(record for record in sent if record is not None)]
+
+
+def _motion_digest(motion: str) -> str:
+    """Of the file that the motion comes from; of its name where it is neither a file nor shipped."""
+    for path in (resource_path("motions", f"{motion}.json"), Path(motion)):
+        if path.is_file():
+            return hashlib.sha256(path.read_bytes()).hexdigest()
+    return motion
+
+
+@functools.cache
+def _source_digest(sketched: bool) -> str:
+    root = Path(__file__).parents[2]
+    digest = hashlib.sha256()
+    simulator = root / "rhot_app" / "simulator"
+    paths = [path for name in (_SKETCHED if sketched else _SEEN) for path in simulator.glob(f"*/{name}.py")]
+    if not sketched:
+        paths += (root / "rhot_node" / "detect").glob("*.py")
+    for path in sorted(paths):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,1 @@
+"""Simulated cameras and nodes: films, live pictures, logs and bad networks."""

@@ -1,0 +1,1 @@
+"""From a scene to the pictures of a camera."""

@@ -1,0 +1,1 @@
+"""What stands before the simulated cameras, and how it moves."""

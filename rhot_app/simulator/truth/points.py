@@ -1,0 +1,122 @@
+"""The twin's ideal detector: what nodes would send if they found every marker, as a raw log, without any picture.
+
+Each marker is where it was at its own row's time, projected through the lens, with Gaussian noise; now and then one is
+lost. Nothing hides anything, and colours do not matter: the way to observe marker sets that no camera could tell apart.
+The log holds what a real one does - session, clock exchanges of clocks that disagree, datagrams with their delays - so
+that it goes through the same door.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rhot_app.errors import SimulatorError
+from rhot_app.project import Rig, load_rig
+from rhot_app.recording.raw_log import Record
+from rhot_app.simulator.nodes.camera_workers import Progress
+from rhot_app.simulator.nodes.film import TRUTH_NAME, new_folder
+from rhot_app.simulator.nodes.node_log import CABLE, NodeSender, write_node_log
+from rhot_app.simulator.nodes.shot import RIG_NAME, Shot, save_shot
+from rhot_app.simulator.render.sheet import Sheet
+from rhot_app.simulator.truth.marker_rows import at_own_rows
+from rhot_app.simulator.truth.truth import FrameTruth, save_truth, true_object
+from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
+
+Array = NDArray[np.float64]
+
+LOG_NAME: Final = "points.log"
+
+_GRID_HZ = 500.0  # of the splines through the markers' ways
+_RADIUS_M = 8e-3  # where the marker set gives none
+
+
+@dataclass(frozen=True, slots=True)
+class PointNoise:
+    """`sigma_px`: standard deviation of a position per axis. `loss`: probability that a marker is not found."""
+
+    sigma_px: float = 0.12
+    loss: float = 0.01
+
+
+def write_points(shot: Shot, folder: Path, noise: PointNoise, progress: Progress | None = None) -> None:
+    """Write ``points.log``, the truth, the rig and the shot into the new `folder`, which appears when all is complete.
+
+    Raises SimulatorError, also when what is shown wears no markers.
+    """
+    if isinstance(shot.scene_object.thing, Sheet):
+        raise SimulatorError(f"a {shot.scene_object.name} wears no markers; show a hand or a marker.")
+    with new_folder(folder) as work:
+        save_shot(shot, work)
+        rig = load_rig(work / RIG_NAME)
+        streams = [_Stream(shot, rig, index, noise) for index in range(len(rig.nodes))]
+        records = [record for done, stream in enumerate(streams)
+                   for record in _noted(stream, done, len(streams), progress)]
+        write_node_log(work / LOG_NAME, rig, {"simulated": shot.scene_object.name}, records)
+        truths = tuple(stream.truth() for stream in streams)
+        save_truth(work / TRUTH_NAME, true_object(shot.scene_object, shot.seconds, truths))
+
+
+def _noted(stream: _Stream, done: int, count: int, progress: Progress | None) -> Iterator[Record]:
+    yield from stream.records()
+    if progress is not None:
+        progress(done + 1, count)
+
+
+class _Stream:
+    """One node's part of the log."""
+
+    def __init__(self, shot: Shot, rig: Rig, index: int, noise: PointNoise) -> None:
+        self._scene, self._rig = shot.scene, rig
+        self._camera = shot.scene.camera(index)
+        self._noise = noise
+        self._rng = np.random.default_rng([shot.scene.seed, index, 0x901])
+        self._voice = NodeSender(shot.scene, rig, index, self._rng, CABLE)
+        self._times_ns = np.array(shot.scene.frame_times_ns(index, shot.seconds))
+        self._centres, self._pixels = self._observe(shot)
+
+    def truth(self) -> FrameTruth:
+        """The frames; every marker is whole, or it is not in the picture at all."""
+        return FrameTruth(1e-9 * self._times_ns, np.isfinite(self._pixels[:, :, 0]).astype(np.float64))
+
+    def records(self) -> Iterator[Record]:
+        """Clock exchanges and datagrams."""
+        yield from self._voice.exchanges(1e-9 * float(self._times_ns[-1]))
+        for number, t_ns in enumerate(self._times_ns):
+            record = self._voice.datagram(number, int(t_ns), [self._marker(number, index)
+                                                              for index in range(len(self._rig.markers.markers))])
+            if record is not None:
+                yield record
+
+    def _observe(self, shot: Shot) -> tuple[Array, Array]:
+        """(F, M, 3) m and (F, M, 2) px at the time of each marker's own row; NaN where it is not in the picture."""
+        assert not isinstance(shot.scene_object.thing, Sheet)
+        grid = np.arange(0.0, shot.seconds + 0.1, 1.0 / _GRID_HZ)
+        ways = shot.scene_object.thing.marker_positions(*shot.scene_object.source.sample(grid))
+        times, row_time_s = 1e-9 * self._times_ns, 1e-9 * self._scene.row_time_ns
+        centres = np.full((len(times), ways.shape[1], 3), np.nan)
+        pixels = np.full((len(times), ways.shape[1], 2), np.nan)
+        size = self._camera.width, self._camera.height
+        for marker in range(ways.shape[1]):
+            if np.isfinite(ways[:, marker]).all():
+                centres[:, marker], pixels[:, marker] = at_own_rows(
+                    CubicSpline(grid, ways[:, marker]), self._camera.project, times, row_time_s, size)
+        return centres, pixels
+
+    def _marker(self, number: int, index: int) -> MarkerObservation:
+        pixel, variance = self._pixels[number, index], self._noise.sigma_px**2
+        x, y = pixel + self._rng.normal(0.0, self._noise.sigma_px, 2)
+        if self._rng.random() < self._noise.loss or not np.isfinite(pixel).all():
+            return MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+        marker = self._rig.markers.markers[index]
+        radius = 1e-3 * marker.radius_mm if marker.radius_mm else _RADIUS_M
+        depth = (self._camera.camera_from_world @ np.append(self._centres[number, index], 1.0))[2]
+        diameter = 2.0 * radius * self._camera.intrinsics[0] / depth
+        return MarkerObservation(index, float(x), float(y), float(diameter), variance, 0.0, variance, 1.0, NO_FLAGS)

@@ -1,0 +1,242 @@
+"""The door of one node: every datagram, live or from a log, is verified here and counted, or becomes observations.
+
+No sockets and no threads. Nothing in a datagram raises past `DatagramValidator.admit`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rhot_app.project import Rig, RigNode
+from rhot_app.sources.authentication import ANYBODY
+from rhot_app.sources.clock import ClockEstimate, NodeClockModel
+from rhot_app.tracking.tracker import CameraObservations, Candidates
+from rhot_node.errors import WireError
+from rhot_node.wire.marker_table import MarkerTable
+from rhot_node.wire.messages import MarkerFlag, Observations
+from rhot_node.wire.sequence import SequenceWindow, Verdict
+from rhot_node.wire.text import parse_text
+
+OLDEST_FRAME_NS = 1_000_000_000
+"""A frame taken longer ago than this is not worth a state, or its time is wrong."""
+
+Verified = tuple[Observations, int, int, int, float] | CameraObservations
+"""A message with its row-0, send and receive times, master ns, and clock bound, s; text needs no second half."""
+
+_CLOCK_SLACK_NS = 1_000_000  # scheduling between the stamps at both ends
+
+
+class DatagramValidator:
+    """Verifies and counts one node's datagrams. Written by one thread; the counters may be read from others."""
+
+    def __init__(self, rig: Rig, camera: int, clock: NodeClockModel) -> None:
+        """`camera` is the node's index in the rig."""
+        self.clock = clock
+        self.admission = ANYBODY
+        self.sequence = SequenceWindow()
+        self.received = 0  # datagrams of any kind
+        self.accepted = 0
+        self.dropped: dict[str, int] = {}
+        self.image_size: tuple[int, int] | None = None  # of the last refused frame of another size
+        self.last_t_receive_ns = 0  # of the last accepted one
+        self._travel = TravelTimes()
+        self._session = 0
+        self.configure(rig, camera)
+
+    def configure(self, rig: Rig, camera: int) -> None:
+        """Expect what the rig says about this node: marker set, image size, text or binary."""
+        node: RigNode = rig.nodes[camera]
+        self._camera = camera
+        self._node_id = node.node_id
+        self._count = len(rig.markers.markers)
+        self._checksum = rig.markers.checksum
+        self._size = (node.intrinsics.width, node.intrinsics.height)
+        self._time_offset_ns = round(1e9 * node.time_offset_s)
+        self._text = TextReader(camera, self._count, self._size, self._time_offset_ns) if node.text_datagrams else None
+
+    @property
+    def clock_in_doubt(self) -> bool:
+        """Whether datagrams are dropped until another clock exchange has been made."""
+        return self._travel.in_doubt
+
+    def expect_session(self, session: int) -> None:
+        """Admit only datagrams of `session` from now on (0: none), counted from a new first number."""
+        self._session = session
+        self.sequence.restart()
+
+    def admit(self, data: bytes, t_receive_ns: int) -> CameraObservations | None:
+        """The datagram as observations, or None when it was dropped and counted."""
+        verified = self.verify(data, t_receive_ns)
+        return None if verified is None else self.convert(verified)
+
+    def drop(self, reason: str, count: int = 1) -> None:
+        """Count `count` datagrams as dropped for `reason`."""
+        self.dropped[reason] = self.dropped.get(reason, 0) + count
+
+    def verify(self, data: bytes, t_receive_ns: int) -> Verified | None:
+        """First half of `admit`, cheap enough for a flood: everything is counted, nothing is built yet."""
+        self.received += 1
+        try:
+            verified = self._verify_text(data, t_receive_ns) if self._text else self._verify(data, t_receive_ns)
+        except WireError as exc:
+            self.drop(exc.reason)
+            return None
+        if isinstance(verified, str):
+            self.drop(verified)
+            return None
+        self.accepted += 1
+        self.last_t_receive_ns = t_receive_ns
+        return verified
+
+    def convert(self, verified: Verified) -> CameraObservations:
+        """Second half of `admit`: arrays in the rig's marker order, times in master time."""
+        return verified if isinstance(verified, CameraObservations) else self._build(*verified)
+
+    def _verify_text(self, data: bytes, t_receive_ns: int) -> Verified | str:
+        if not self._session:
+            return "not_started"
+        assert self._text is not None
+        return self._text.read(data, t_receive_ns)
+
+    def _verify(self, data: bytes, t_receive_ns: int) -> Verified | str:
+        message = self.admission.open(data)
+        if not isinstance(message, Observations):
+            return "kind"
+        reason = self._objection(message)
+        if reason is not None:
+            return reason
+        estimate = self.clock.estimate_at(t_receive_ns)
+        if estimate is None:
+            self.sequence.take(message.sequence)  # it came, so it is not lost
+            return "no_clock"
+        t_row0_ns = estimate.to_master_ns(message.t_frame_node_ns) + self._time_offset_ns
+        t_send_ns = estimate.to_master_ns(message.t_send_node_ns)
+        bound_s = estimate.bound_s(t_receive_ns)
+        if not self._plausible(t_row0_ns, t_send_ns, t_receive_ns, bound_s):
+            return "time"
+        self.sequence.take(message.sequence)  # also what is refused for its clock has come
+        if not self._travel.believed(t_receive_ns - t_send_ns, t_receive_ns, estimate):
+            return "clock_in_doubt"
+        return message, t_row0_ns, t_send_ns, t_receive_ns, bound_s
+
+    def _objection(self, message: Observations) -> str | None:
+        """Why this message is not one of the stream we asked for; None when it is."""
+        if message.node_id != self._node_id:
+            return "foreign_node"
+        if message.session != self._session:
+            return "session" if self._session else "not_started"
+        verdict = self.sequence.judge(message.sequence)
+        if verdict is not Verdict.FRESH and verdict is not Verdict.LATE:
+            return verdict.name.lower()
+        if message.marker_checksum != self._checksum or message.marker_count != self._count:
+            return "marker_set"
+        if (message.width, message.height) != self._size:
+            self.image_size = (message.width, message.height)
+            return "image_size"
+        return None
+
+    def _plausible(self, t_row0_ns: int, t_send_ns: int, t_receive_ns: int, bound_s: float) -> bool:
+        """Whether a frame can have been taken and sent at these times: not in the future, not long ago."""
+        latest_ns = t_receive_ns + _CLOCK_SLACK_NS + round(1e9 * bound_s)
+        return (t_receive_ns - OLDEST_FRAME_NS <= t_row0_ns <= latest_ns + abs(self._time_offset_ns)
+                and t_send_ns <= latest_ns)
+
+    def _build(self, message: Observations, t_row0_ns: int, t_send_ns: int, t_receive_ns: int,
+               bound_s: float) -> CameraObservations:
+        assert isinstance(message.markers, MarkerTable)  # as everything that was decoded
+        count = self._count
+        pixels, covariances, diameters, qualities, flags = message.markers.columns()
+        further = None
+        if len(message.markers) > count:
+            further = Candidates(message.markers.indices()[count:], pixels[count:], covariances[count:],
+                                 diameters[count:], qualities[count:], flags[count:])
+        return CameraObservations(
+            camera=self._camera, t_row0_master_ns=t_row0_ns, row_time_ns=message.row_time_ns,
+            clock_bound_s=bound_s, t_receive_ns=t_receive_ns,
+            detect_s=1e-9 * message.processing_ns, network_s=1e-9 * (t_receive_ns - t_send_ns),
+            pixels=pixels[:count], covariances=covariances[:count], diameters=diameters[:count],
+            qualities=qualities[:count], flags=flags[:count], further=further)
+
+
+# -- the thesis's text datagrams (RHOT 6.4) as observations ------------------------------------------------------------
+
+VARIANCE_PX2 = 1.0
+"""Assumed variance of a text centroid per axis: the thesis measured 2-5 px peak deviation (RHOT figure 7.7)."""
+
+DIAMETER_PX = 16.0  # a painted fingertip at 0.6 m; the text does not say
+QUALITY = 0.5
+TIME_BOUND_S = 0.005
+"""The delay from exposure to here is not known; half of a 100 Hz frame is what pairing has to expect."""
+
+
+class TextReader:
+    """Reads text datagrams of one camera."""
+
+    def __init__(self, camera: int, count: int, size: tuple[int, int], time_offset_ns: int = 0) -> None:
+        """`count` markers in the rig's order, image `size` (width, height) px; the calibrated `time_offset_ns` is added
+        to the receive time, so a delay that a moving marker showed is taken off here."""
+        self._camera = camera
+        self._count = count
+        self._size = size
+        self._time_offset_ns = time_offset_ns
+
+    def read(self, data: bytes, t_receive_ns: int) -> CameraObservations:
+        """The observations of one datagram. Raises WireError (length, count, text, or marker: outside the image)."""
+        points = parse_text(data, self._count)
+        pixels = np.full((self._count, 2), np.nan)
+        for row, point in enumerate(points):
+            if point is not None:
+                if point[0] > self._size[0] or point[1] > self._size[1]:
+                    raise WireError("marker", f"{point} lies outside the image of {self._size} px")
+                pixels[row] = point
+        lost = np.isnan(pixels[:, 0])
+        return CameraObservations(
+            camera=self._camera, t_row0_master_ns=t_receive_ns + self._time_offset_ns, row_time_ns=0,
+            clock_bound_s=TIME_BOUND_S, t_receive_ns=t_receive_ns, detect_s=float("nan"), network_s=float("nan"),
+            pixels=pixels,
+            covariances=np.where(lost, 0.0, VARIANCE_PX2)[:, None, None] * np.eye(2),
+            diameters=np.where(lost, 0.0, DIAMETER_PX), qualities=np.where(lost, 0.0, QUALITY),
+            flags=np.where(lost, MarkerFlag.LOST, 0).astype(np.uint16))
+
+
+# -- how long a node's datagrams take to arrive ------------------------------------------------------------------------
+
+SLACK_NS = 1_000_000
+"""Scheduling at both ends: so much more, or less, than the longest and the shortest way so far is no jump."""
+
+FORGETTING = 1e-4
+"""Per datagram: the range narrows to what the network does now, in a minute or two; a busy machine is not doubted anew
+at every hiccup."""
+
+
+class TravelTimes:
+    """The range of one node's travel times that exchanges have confirmed. One thread."""
+
+    def __init__(self) -> None:
+        self._shortest_ns = self._longest_ns = 0.0
+        self._known = False
+        self._doubt_since_ns: int | None = None
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether the last datagram was not believed."""
+        return self._doubt_since_ns is not None
+
+    def believed(self, travel_ns: int, t_receive_ns: int, estimate: ClockEstimate) -> bool:
+        """Whether a datagram's times can be believed that took `travel_ns` by the clock `estimate`."""
+        if self._known:
+            slack_ns = SLACK_NS + 1e9 * estimate.bound_s(t_receive_ns)
+            if not self._shortest_ns - slack_ns <= travel_ns <= self._longest_ns + slack_ns:
+                if self._doubt_since_ns is None:
+                    self._doubt_since_ns = t_receive_ns
+                if estimate.t_master_ns <= self._doubt_since_ns:
+                    return False
+            self._shortest_ns += FORGETTING * (travel_ns - self._shortest_ns)
+            self._longest_ns += FORGETTING * (travel_ns - self._longest_ns)
+        else:
+            self._shortest_ns = self._longest_ns = travel_ns
+            self._known = True
+        self._doubt_since_ns = None
+        self._shortest_ns = min(self._shortest_ns, travel_ns)
+        self._longest_ns = max(self._longest_ns, travel_ns)
+        return True

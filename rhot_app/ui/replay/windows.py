@@ -1,0 +1,86 @@
+"""What the main window knows of recordings: one window that replays, one page that lists, opened and closed here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from rhot_app.project import Rig
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
+from rhot_app.ui.replay.library_window import LibraryWindow
+from rhot_app.ui.replay.window import ReplayWindow
+from rhot_app.ui.settings import Settings
+
+
+class ReplayWindows:
+    """`scheme` gives the colours of the moment, `rig` the rig that is open. What is open stays beside `parent` and ends
+    with it."""
+
+    def __init__(self, settings: Settings, scheme: Callable[[], Scheme], parent: QWidget,
+                 rig: Callable[[], Rig | None] = lambda: None) -> None:
+        self._settings, self._scheme, self._parent = settings, scheme, parent
+        self._rig = rig
+        self.window: ReplayWindow | None = None
+        self.library: LibraryWindow | None = None
+
+    def choose(self) -> None:
+        """Ask for a recording and replay it."""
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a recording", str(recordings_folder()), LOG_FILTER)
+        if name:
+            self.open(Path(name))
+
+    def open(self, path: Path) -> None:
+        """Replay a recording, in the window that replays already if there is one."""
+        if self.window is None or not self.window.isVisible():
+            self._end_window()
+            self.window = ReplayWindow(self._settings, self._scheme())
+        _bring_forward(self.window)
+        self.window.open(path)
+
+    def list(self) -> None:
+        """The page with all recordings."""
+        if self.library is None or not self.library.isVisible():
+            self._end_library()
+            self.library = LibraryWindow(self._scheme(), parent=self._parent, rig=self._rig)
+            self.library.open_asked.connect(self.open)
+            self.library.renamed.connect(self._follow)
+        else:
+            self.library.refresh()
+        _bring_forward(self.library)
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        for part in (self.window, self.library):
+            if part is not None:
+                part.set_scheme(scheme)
+
+    def close(self) -> None:
+        """Close both."""
+        self._end_window()
+        self._end_library()
+
+    def _follow(self, before: Path, after: Path) -> None:
+        """A recording that is open was renamed."""
+        if self.window is not None:
+            self.window.follow(before, after)
+
+    def _end_window(self) -> None:
+        if self.window is not None:
+            self.window.close()
+            self.window.deleteLater()
+            self.window = None
+
+    def _end_library(self) -> None:
+        if self.library is not None:
+            self.library.close()
+            self.library.deleteLater()
+            self.library = None
+
+
+def _bring_forward(window: QWidget) -> None:
+    window.show()
+    window.raise_()
+    window.activateWindow()

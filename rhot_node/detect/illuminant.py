@@ -1,0 +1,177 @@
+"""The light that the markers are seen in: how much warmer it is than the light their colours were learnt in.
+
+A camera with its white balance fixed, as it must be, shows every colour shifted when the lamp changes: a magenta paint
+learnt in daylight looks red by a light bulb. Black bodies, daylight and white LEDs lie near one curve, along which the
+camera's colour channels change by factors exp(WARMTH * warmth): one number tells the light. The markers themselves are
+the colour chart that it is read from, and the detector searches the picture as it would look in the light of the
+calibration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_node.detect.image import YuvImage
+from rhot_node.markers import Marker, MarkerSet
+
+Array = NDArray[np.float64]
+
+WARMTH = (0.55, 0.0, -1.0)
+"""Log gains of red, green and blue for a warmth of one: the direction of Planck's curve. 3000 and 6500 K are 1.2 apart
+in linear light, 0.54 in a picture with the usual gamma of 2.2."""
+WARMTH_MOST = 1.3
+DEAD_ZONE = 0.05  # less is no other light: hues move by 3 degrees at most
+STEP = 0.05  # of the table of predicted hues
+WARMTH_SIGMA = 0.35  # how far lights are from the light of the calibration
+HUE_SIGMA_DEG = 3.0  # how well a paint's hue is known
+HUE_CAP_DEG = 15.0  # a marker that is further off is not itself, and counts no more than this
+INFORMATION_LEAST = 50.0  # 1 / variance of a warmth that is worth as much as the last known one
+INFORMATION_SURE = 300.0  # the same of a warmth known to 0.06
+MARKERS_LEAST = 3  # the hues of fewer markers agree with several lights
+SWITCHED = 0.12  # of warmth in one frame: no lamp drifts so fast
+STRENGTH_LEAST = 0.3  # of the chroma that a paint should show in this light: less is something else, or deep shade
+MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
+
+RGB_FROM_YCC = np.array([[1.0, 0.0, 1.402], [1.0, -0.344136, -0.714136], [1.0, 1.772, 0.0]])
+YCC_FROM_RGB = np.array([[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
+
+
+def gains_of(temperature_shift: float) -> Array:
+    """(3,) factors of the red, green and blue of a picture; grey keeps its luma."""
+    gains = np.exp(temperature_shift * np.array(WARMTH))
+    return np.asarray(gains / (YCC_FROM_RGB[0] @ gains))
+
+
+def paint_rgb(marker: Marker) -> Array:
+    """(3,) grey levels of a marker's paint in the light it was learnt in: its chroma, with the luma that goes with it.
+
+    The file's display colour says how bright a paint of this chroma is.
+    """
+    shown = YCC_FROM_RGB @ np.array(marker.display_rgb, dtype=np.float64)
+    strength = marker.chroma.magnitude / max(float(np.hypot(shown[1], shown[2])), 1.0)
+    luma = min(max(float(shown[0]) * min(max(strength, 0.3), 3.0), 10.0), 245.0)
+    return np.clip(RGB_FROM_YCC @ np.array([luma, marker.chroma.cb, marker.chroma.cr]), 1.0, 255.0)
+
+
+class Illuminant:
+    """The light of the last frames, and pictures as they would look in the light of the calibration."""
+
+    def __init__(self, markers: MarkerSet) -> None:
+        self.temperature_shift = 0.0
+        self._grid = np.arange(-WARMTH_MOST, WARMTH_MOST + 0.5 * STEP, STEP)
+        self._hues = predicted_hues(markers.markers, self._grid)
+        self._strengths = np.hypot(*predicted_chroma(markers.markers, self._grid).transpose(2, 0, 1))
+        self._u = self._v = np.zeros((0, 0), dtype=np.uint8)
+
+    def balanced(self, image: YuvImage, step: int = 1, first: int = 0) -> YuvImage:
+        """The picture in the light of the calibration: its chroma corrected; `image` itself when that is the light.
+
+        Only every `step`-th chroma row from `first` on is valid, and only until the next call.
+        """
+        if abs(self.temperature_shift) < DEAD_ZONE:
+            return image
+        if self._u.shape != image.u.shape:
+            self._u, self._v = np.empty_like(image.u), np.empty_like(image.v)
+        balance(image.y, image.u, image.v, balance_matrix(self.temperature_shift), step, first, self._u, self._v)
+        return YuvImage(image.y, self._u, self._v)
+
+    def unbalanced(self, colours: Array) -> Array:
+        """(..., 3) Y, Cb, Cr as the camera shows them, of colours in a balanced picture."""
+        if abs(self.temperature_shift) < DEAD_ZONE:
+            return colours
+        balance = np.vstack([(1.0, 0.0, 0.0), balance_matrix(self.temperature_shift)])
+        return np.asarray(colours @ np.linalg.inv(balance).T)
+
+    def strong(self, indices: list[int], colours: Array) -> NDArray[np.bool_]:
+        """(N,) whether colours (N, 3) Y, Cb, Cr, as the camera shows them, are as strong as the paints of the markers
+        `indices` should be in this light."""
+        here = int(np.argmin(np.abs(self._grid - self.temperature_shift)))
+        expected = STRENGTH_LEAST * self._strengths[np.asarray(indices, dtype=np.intp), here]
+        return np.asarray(np.hypot(colours[:, 1], colours[:, 2]) >= np.maximum(expected, MAGNITUDE_MIN))
+
+    def read(self, indices: list[int], colours: Array, steady: float = 0.0) -> float:
+        """Read the light from the paint of the markers `indices`, (N, 3) Y, Cb, Cr as the camera shows them.
+
+        `steady`, 0 to 1: weight of the last known light, which also replaces what the colours do not determine. It is
+        0 when MARKERS_LEAST or more strong colours show that a lamp was switched. Returns by how much the warmth
+        changed.
+        """
+        chosen, strong = np.asarray(indices, dtype=np.intp), self.strong(indices, colours)
+        if not strong.any():
+            return 0.0
+        hues = np.degrees(np.arctan2(colours[strong, 2], colours[strong, 1]))
+        fitted, information = fit_temperature_shift(hues, self._hues[chosen[strong]], self._grid)
+        if np.count_nonzero(strong) >= MARKERS_LEAST and abs(fitted - self.temperature_shift) >= SWITCHED \
+                and information >= INFORMATION_SURE:
+            steady = 0.0
+        change = (1.0 - steady) * information / (information + INFORMATION_LEAST) * (fitted - self.temperature_shift)
+        self.temperature_shift += change
+        return abs(change)
+
+
+def predicted_chroma(markers: Sequence[Marker], warmths: Array) -> Array:
+    """(M, K, 2) Cb and Cr of every marker's paint in the light of every warmth (K,)."""
+    gains = np.array([gains_of(float(temperature_shift)) for temperature_shift in warmths])
+    colours = np.array([paint_rgb(marker) for marker in markers])
+    return np.asarray((colours[:, None, :] * gains) @ YCC_FROM_RGB[1:].T)
+
+
+def predicted_hues(markers: Sequence[Marker], warmths: Array) -> Array:
+    """(M, K) degrees: the hue of every marker's paint in the light of every warmth (K,)."""
+    chroma = predicted_chroma(markers, warmths)
+    return np.asarray(np.degrees(np.arctan2(chroma[..., 1], chroma[..., 0])))
+
+
+def balance_matrix(temperature_shift: float) -> Array:
+    """(2, 3): Cb and Cr in the light of the calibration from Y, Cb and Cr in a light of this warmth."""
+    return np.asarray(YCC_FROM_RGB[1:] @ np.diag(1.0 / gains_of(temperature_shift)) @ RGB_FROM_YCC)
+
+
+@njit(cache=True)
+def balance(y, u, v, matrix, step, first, out_u, out_v):
+    """Write every `step`-th row from `first` on of the chroma planes in another light, rounded and clipped to 8 bits.
+
+    `matrix` (2, 3) as `balance_matrix` gives it.
+    """
+    for row in range(first, u.shape[0], step):
+        for column in range(u.shape[1]):
+            luma = 0.25 * (np.float64(y[2 * row, 2 * column]) + y[2 * row, 2 * column + 1]
+                           + y[2 * row + 1, 2 * column] + y[2 * row + 1, 2 * column + 1])
+            cb, cr = np.float64(u[row, column]) - 128.0, np.float64(v[row, column]) - 128.0
+            out_u[row, column] = _byte(matrix[0, 0] * luma + matrix[0, 1] * cb + matrix[0, 2] * cr)
+            out_v[row, column] = _byte(matrix[1, 0] * luma + matrix[1, 1] * cb + matrix[1, 2] * cr)
+
+
+@njit(cache=True)
+def _byte(chroma):
+    return min(max(int(np.floor(chroma + 128.5)), 0), 255)
+
+
+@njit(cache=True)
+def fit_temperature_shift(hues, predicted, grid):
+    """The warmth (of the `grid` (K,), interpolated) that explains the hues (N,) deg best, and how much they tell of it.
+
+    Least squares over the difference to the `predicted` hues (N, K), each capped, and over the warmth itself. The
+    information is the curvature of the hues' share: 1 / variance.
+    """
+    best, best_cost = 0, np.inf
+    costs = np.zeros(len(grid))
+    for k in range(len(grid)):
+        cost = (grid[k] / WARMTH_SIGMA) ** 2
+        for n in range(len(hues)):
+            away = abs(hues[n] - predicted[n, k]) % 360.0
+            away = min(away, 360.0 - away, HUE_CAP_DEG)
+            cost += (away / HUE_SIGMA_DEG) ** 2
+        costs[k] = cost
+        if cost < best_cost:
+            best, best_cost = k, cost
+    if best == 0 or best == len(grid) - 1:
+        return grid[best], 0.0
+    step = grid[1] - grid[0]
+    bend = costs[best - 1] - 2.0 * costs[best] + costs[best + 1]
+    shift = 0.5 * (costs[best - 1] - costs[best + 1]) / bend if bend > 0.0 else 0.0
+    return grid[best] + shift * step, max(0.5 * bend / step**2 - 1.0 / WARMTH_SIGMA**2, 0.0)

@@ -1,0 +1,57 @@
+"""Names are the field's terms: modules and public identifiers without the retired words of the style guide."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("rhot_node", "rhot_app")
+
+RETIRED = frozenset((
+    "sight", "habits", "strangeness", "surprise", "agitation", "liveliness", "hiding", "outfit", "withholding",
+    "forgetting", "reappearing", "share", "desk", "slots", "lean", "company", "whereabouts", "litter", "strays",
+    "warmth", "door", "tap", "admission", "act", "stage", "prop", "stations", "spans", "moments", "honesty", "honest",
+    "alterations", "takes", "trial", "disagreement", "misfits", "voice", "teller", "passing", "looker", "theatre",
+    "clothes", "moods", "doubts"))
+"""Words of our own for what has a name: pose prior, gate, robust weight, occlusion, workspace, illuminant, validator,
+record sink, authentication, scene object, rigid target, board poses, exposure samples, consistency, fault injection,
+data set, run, outlier."""
+
+ALLOWED = frozenset((
+    "blind_share", "room_share", "share", "share_out", "measured_share", "known_share", "MARKER_SHARE",
+    "share_interpreter",  # of processor time
+    "moments",  # of a distribution
+    "STAGE_COLOURS", "LATENCY_STAGES", "stages", "choose_stage",  # of a pipeline
+    "passing_px"))
+"""Names in which such a word has its ordinary sense."""
+
+
+def words(name: str) -> list[str]:
+    """The parts of snake_case and CamelCase names, in small letters."""
+    return [part.lower() for part in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
+
+
+def public_names() -> Iterator[tuple[str, str]]:
+    """(name, where) of modules, classes, functions and fields."""
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            where = str(path.relative_to(ROOT))
+            yield path.stem, where
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.ClassDef | ast.FunctionDef):
+                    name = node.name
+                elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+                    name = node.target.id
+                else:
+                    continue
+                if not name.startswith("_"):
+                    yield name, f"{where}:{node.lineno}"
+
+
+def test_no_module_and_no_public_name_has_a_retired_word() -> None:
+    found = [f"{where} {name}" for name, where in public_names()
+             if RETIRED & set(words(name)) and name not in ALLOWED]
+    assert not found, "names with retired words:\n" + "\n".join(found)
