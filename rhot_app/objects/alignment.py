@@ -23,7 +23,8 @@ from scipy.stats import chi2
 
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.residual import Rows, stack, student
-from rhot_app.geometry.transforms import best_rotation, exp_so3, rigid, skew
+from rhot_app.geometry.transforms import best_rotation, rigid, skew
+from rhot_app.objects.alignment_model import GAP_S, ROTATION, TRANSLATION, AlignmentModel, Estimate
 from rhot_app.objects.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
@@ -35,20 +36,18 @@ SEARCH_S = 1.0
 STEP_S = 0.02
 """s: of the search. A hand moves with up to 5 Hz (`benchmarks/process_prior.py`): a tenth of that period."""
 
-GAP_S = 0.04
-"""s: no interpolation across longer intervals. A cubic spline errs by 5/384 h^4 |x''''| (de Boor 1978), here 0.3 mm for
-10 mm at 5 Hz."""
-
 OVERLAP_S = 2.0
 """s: streams that overlap less are not aligned; a movement of a hand takes as long."""
 
+LASTING_M = 0.5e-3
+"""m: error of a fingertip's position that lasts and goes with its pose (`tracking.marker_model.PAINT_SD_M`, of a
+disc)."""
+
+LASTING_S = 1.0
+"""s: correlation time of that error (`tracking.hand_process.BIAS_S`)."""
+
 INLIER_GATE = float(chi2.ppf(0.999, 3))
 """Squared Mahalanobis distance of an inlier: 99.9 % of Gaussian errors."""
-
-TRANSLATION, ROTATION, POINT, OFFSET, BODY = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10), slice(10, 13))
-"""Order of the covariance: rig_from_foreign's translation (m) and rotation (rad, along the rig's axes),
-tracker_from_body's translation (m, the device's axes), the time offset (s), and, if the rig reports poses,
-tracker_from_body's rotation (rad, the body's axes)."""
 
 _KERNEL = student(4.0)
 _NU, _DIMENSION = 4.0, 3
@@ -60,37 +59,22 @@ _ITERATIONS, _CONVERGED = 50, 1e-8
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
-    """The unknowns: `rotation` (3, 3) rig_from_foreign; `centre` (3,) m, where the rig sees the foreign point
-    `AlignmentModel.centre`; `point` (3,) m and `body` (3, 3), tracker_from_body; `offset_s`, rig less foreign clock."""
-
-    rotation: Array
-    centre: Array
-    point: Array
-    offset_s: float
-    body: Array
-
-    def moved(self, step: Array) -> Estimate:
-        """After a step (10,) or (13,) in the order of the covariance."""
-        body = self.body @ exp_so3(step[BODY]) if len(step) > 10 else self.body
-        return Estimate(exp_so3(step[ROTATION]) @ self.rotation, self.centre + step[TRANSLATION],
-                        self.point + step[POINT], self.offset_s + float(step[9]), body)
-
-
-@dataclass(frozen=True, slots=True)
 class Fit:
     """A solved alignment.
 
-    `covariance` (10, 10) or (13, 13) in the order of TRANSLATION ... BODY; `centre_covariance` (3, 3) m^2 of the
-    translation at the middle of the motion. `noise_m` and `noise_rad` (NaN without poses): standard deviation of an
-    axis' residual. `errors` (N, 3) m, `inlier` (N,); `kept`: share of the samples that agree with their neighbours.
-    `velocity` (N, 3) m/s of the body, `places` (N, 3) m of it in the rig frame, `device` (N, 3, 3) foreign_from_device.
+    `covariance` (10, 10) or (13, 13), by the noise of the residuals, and `lasting`, by errors that last (LASTING_M), in
+    the order of `alignment_model.TRANSLATION`. `centre` (3,) m, rig frame, is the middle of the motion;
+    `centre_covariance` (3, 3) m^2 of a position there, by both. `noise_m` and `noise_rad` (NaN without poses): standard
+    deviation of an axis' residual. `errors` (N, 3) m, `inlier` (N,); `kept`: share of the samples that agree with their
+    neighbours. `velocity` (N, 3) m/s and `places` (N, 3) m of the body, rig frame; `device` (N, 3, 3)
+    foreign_from_device.
     """
 
     rig_from_foreign: Array
     tracker_from_body: Array
     offset_s: float
     covariance: Array
+    lasting: Array
     centre: Array
     centre_covariance: Array
     noise_m: float
@@ -123,71 +107,6 @@ class OffsetSearch:
     offsets_s: Array
     median_m: Array
     scale: float
-
-
-class AlignmentModel:
-    """The residuals of two streams at the samples of the sparser one, whose noise is then hardly correlated."""
-
-    def __init__(self, foreign: MotionStream, rig: MotionStream) -> None:
-        self.foreign, self.rig = foreign, rig
-        self.poses = rig.has_rotations
-        self.size = 13 if self.poses else 10
-        self.at_rig = len(rig.times_s) / rig.duration_s <= len(foreign.times_s) / foreign.duration_s
-        self.centre = foreign.positions.mean(axis=0)
-        self._times = rig.times_s if self.at_rig else foreign.times_s
-
-    def select(self, offset_s: float) -> None:
-        """Use the instants at which both streams were sampled densely, if `offset_s` is about true."""
-        times = self.rig.times_s if self.at_rig else self.foreign.times_s
-        foreign_s, rig_s = (times - offset_s, times) if self.at_rig else (times, times + offset_s)
-        self._times = times[self.foreign.covers(foreign_s, GAP_S) & self.rig.covers(rig_s, GAP_S)]
-
-    @property
-    def count(self) -> int:
-        """Instants used."""
-        return len(self._times)
-
-    @property
-    def duration_s(self) -> float:
-        """From the first used instant to the last."""
-        return float(self._times[-1] - self._times[0])
-
-    def thin(self, count: int) -> None:
-        """Use at most so many instants."""
-        self._times = self._times[::max(1, math.ceil(len(self._times) / count))]
-
-    def sampled(self, offset_s: float) -> tuple[tuple[Array, Array, Array, Array], tuple[Array, Array, Array, Array]]:
-        """Position, velocity, rotation and angular velocity of the device and of the body at the used instants."""
-        foreign_s, rig_s = ((self._times - offset_s, self._times) if self.at_rig else
-                            (self._times, self._times + offset_s))
-        return self.foreign.at(foreign_s), self.rig.at(rig_s)
-
-    def linearise(self, estimate: Estimate) -> tuple[Array, Array, Array, Array]:
-        """Errors (N, 3) m with their Jacobian (N, 3, n), then rotation errors (N, 3) rad with theirs; N = 0 without
-        poses. A Jacobian is that of the predicted value: minus that of the error."""
-        (place, speed, device, turning), (seen, seen_speed, seen_rotation, seen_turning) = self.sampled(
-            estimate.offset_s)
-        arm = device @ estimate.point
-        predicted = (place - self.centre + arm) @ estimate.rotation.T
-        error = seen - predicted - estimate.centre
-        jacobian = np.zeros((len(error), 3, self.size))
-        jacobian[:, :, TRANSLATION] = np.eye(3)
-        jacobian[:, :, ROTATION] = -skews(predicted)
-        jacobian[:, :, POINT] = estimate.rotation @ device
-        jacobian[:, :, 9] = (-(speed + np.cross(turning, arm)) @ estimate.rotation.T if self.at_rig else -seen_speed)
-        if not self.poses:
-            return error, jacobian, np.empty((0, 3)), np.empty((0, 3, self.size))
-        predicted_rotation = estimate.rotation @ device @ estimate.body
-        turned = Rotation.from_matrix(seen_rotation @ predicted_rotation.transpose(0, 2, 1)).as_rotvec()
-        # a left turn d of the prediction changes the error by the inverse right Jacobian of SO(3), to fourth order
-        half = skews(turned)
-        turn = np.eye(3) + 0.5 * half + half @ half / 12.0
-        by = np.zeros((len(turned), 3, self.size))
-        by[:, :, ROTATION] = turn
-        by[:, :, BODY] = turn @ predicted_rotation
-        rate = -(turning @ estimate.rotation.T) if self.at_rig else -_left(turned, seen_turning)
-        by[:, :, 9] = np.einsum("nij,nj->ni", turn, rate) if self.at_rig else rate
-        return error, jacobian, turned, by
 
 
 def align(foreign: MotionStream, rig: MotionStream, search_s: float = SEARCH_S,
@@ -276,20 +195,6 @@ def linear_start(model: AlignmentModel, offset_s: float) -> tuple[Estimate, floa
     return estimate, median / max(float(sizes[1]), 1e-12), float(np.mean(sizes[:2]))
 
 
-def skews(vectors: Array) -> Array:
-    """(N, 3, 3) matrices of the cross products with vectors (N, 3)."""
-    out = np.zeros((len(vectors), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -vectors[:, 2], vectors[:, 1], -vectors[:, 0]
-    return out - out.transpose(0, 2, 1)
-
-
-def _left(turned: Array, rate: Array) -> Array:
-    """Change of rotation errors (N, 3) by a left turn at `rate` (N, 3) of the observed rotation: the inverse left
-    Jacobian of SO(3), to fourth order."""
-    half = skews(turned)
-    return np.asarray(np.einsum("nij,nj->ni", np.eye(3) - 0.5 * half + half @ half / 12.0, rate))
-
-
 def _rows(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float]) -> list[Rows]:
     error, jacobian, turned, by = model.linearise(estimate)
     rows = []
@@ -335,7 +240,9 @@ def _rescaled(model: AlignmentModel, estimate: Estimate, scales: tuple[float, fl
 
 def _finished(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float], kept: float) -> Fit:
     rows = _rows(model, estimate, scales)
-    covariance = _covariance(rows, model.size)
+    covariance, curvature = _covariance(rows, model.size)
+    # to a long recording an error of correlation time T is white noise of spectral density 2 T s^2
+    lasting = curvature * 2.0 * LASTING_S * (LASTING_M / scales[0]) ** 2 * model.count / model.duration_s
     offset = estimate.rotation @ model.centre
     change = np.eye(model.size)
     change[TRANSLATION, ROTATION] = skew(offset)
@@ -344,13 +251,14 @@ def _finished(model: AlignmentModel, estimate: Estimate, scales: tuple[float, fl
     inlier = np.sum(rows[0].error.reshape(-1, 3) ** 2, axis=1) < INLIER_GATE
     return Fit(
         rigid(estimate.rotation, estimate.centre - offset), rigid(estimate.body, estimate.point), estimate.offset_s,
-        change @ covariance @ change.T, estimate.centre, covariance[TRANSLATION, TRANSLATION], scales[0],
-        scales[1] if model.poses else math.nan, error, inlier, kept, -jacobian[:, :, 9], places, device,
-        model.duration_s, model.poses)
+        change @ covariance @ change.T, change @ lasting @ change.T, estimate.centre,
+        (covariance + lasting)[TRANSLATION, TRANSLATION], scales[0], scales[1] if model.poses else math.nan, error,
+        inlier, kept, -jacobian[:, :, 9], places, device, model.duration_s, model.poses)
 
 
-def _covariance(rows: list[Rows], size: int) -> Array:
-    """The sandwich covariance of an M-estimator (Huber 1967), its scores correlated over time (Newey and West 1987)."""
+def _covariance(rows: list[Rows], size: int) -> tuple[Array, Array]:
+    """Covariance and inverse Hessian of whitened rows. The first is the sandwich of an M-estimator (Huber 1967), its
+    scores correlated over time (Newey and West 1987)."""
     hessian, scores = np.zeros((size, size)), np.zeros((len(rows[0].error) // 3, size))
     for each in rows:
         error, slopes = each.error.reshape(-1, 3), each.jacobian.reshape(-1, 3, size)
@@ -368,7 +276,7 @@ def _covariance(rows: list[Rows], size: int) -> Array:
         middle += (1.0 - lag / (lags + 1.0)) * (product + product.T)
     sizes = np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-300))
     bread = np.linalg.pinv(hessian / np.outer(sizes, sizes), rcond=1e-12, hermitian=True) / np.outer(sizes, sizes)
-    return np.asarray(bread @ middle @ bread * count / max(count - size, 1))
+    return np.asarray(bread @ middle @ bread * count / max(count - size, 1)), np.asarray(bread)
 
 
 def _require_overlap(foreign: MotionStream, rig: MotionStream, search_s: float) -> None:
@@ -382,5 +290,5 @@ def _no_overlap(foreign: MotionStream, rig: MotionStream) -> CalibrationError:
     return CalibrationError(
         f"The streams do not overlap: the foreign one is from {foreign.times_s[0]:.3f} to {foreign.times_s[-1]:.3f} s, "
         f"the rig's from {rig.times_s[0]:.3f} to {rig.times_s[-1]:.3f} s. Record both at once, with times of one "
-        "clock, and without gaps.")
+        f"clock; the faster one needs a sample every {1e3 * GAP_S:.0f} ms.")
 

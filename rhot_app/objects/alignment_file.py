@@ -52,7 +52,7 @@ class Alignment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where another tracker's world is in the rig.
 
     `time_offset_s` is added to the other tracker's times. `covariance`: 10 or 13 rows in the order of
-    `rhot_app.objects.alignment.TRANSLATION`. `noise_m`: standard deviation of an axis' residual.
+    `rhot_app.objects.alignment_model.TRANSLATION`. `noise_m`: standard deviation of an axis' residual.
     """
 
     rig_from_foreign: RigidTransform
@@ -87,7 +87,7 @@ class Alignment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def to_alignment(report: AlignmentReport) -> Alignment:
     """What is kept of a calibration."""
     fit = report.fit
-    covariance = 0.5 * (fit.covariance + fit.covariance.T)
+    covariance = 0.5 * (report.covariance + report.covariance.T)
     return Alignment(_transform(fit.rig_from_foreign), _transform(fit.tracker_from_body), fit.offset_s,
                      tuple(tuple(map(float, row)) for row in covariance), fit.noise_m, fit.rms_m, fit.inlier_share,
                      datetime.now(UTC).isoformat(timespec="seconds"))

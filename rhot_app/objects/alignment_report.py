@@ -10,14 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
-from rhot_app.objects.alignment import OFFSET, POINT, ROTATION, SEARCH_S, STEP_S, Fit, OffsetSearch, align
+from rhot_app.objects.alignment import LASTING_M, SEARCH_S, STEP_S, Fit, OffsetSearch, align
+from rhot_app.objects.alignment_model import OFFSET, POINT, ROTATION
 from rhot_app.objects.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
-
-LASTING_M = 0.5e-3
-"""m: error of a fingertip's position that lasts and goes with its pose, so that no amount of samples averages it out
-(`tracking.marker_model.PAINT_SD_M`, of a disc)."""
 
 FAIR_M, POOR_M = 2e-3, 5e-3
 """m: requirement. A grasp is recognised to some millimetres; 5 mm is half the breadth of a fingertip."""
@@ -60,12 +57,14 @@ class Coverage:
 class AlignmentReport:
     """A solved alignment with its coverage and verdict.
 
+    `covariance` (n, n) in the order of `alignment_model.TRANSLATION`, by noise and by errors that last. Of it
     `place_sd_m`: of a position in the middle of the motion; `rotation_sd_rad`; `point_sd_m`: of tracker_from_body;
-    `offset_sd_s`. They are those of the covariance, without the error that lasts (LASTING_M).
+    `offset_sd_s`. `scale`: size of the foreign world in the rig's metres.
     """
 
     fit: Fit
     coverage: Coverage
+    covariance: Array
     place_sd_m: float
     rotation_sd_rad: float
     point_sd_m: float
@@ -84,19 +83,21 @@ def calibrate_alignment(foreign: MotionStream, rig: MotionStream, search_s: floa
 
 def judge_alignment(fit: Fit, search: OffsetSearch) -> AlignmentReport:
     """The report on a fit and the search that it began with."""
-    coverage = coverage_of(fit)
+    coverage, covariance = coverage_of(fit), fit.covariance + fit.lasting
     place, turn, point, offset = (math.sqrt(max(float(np.trace(block)), 0.0)) for block in (
-        fit.centre_covariance, fit.covariance[ROTATION, ROTATION], fit.covariance[POINT, POINT],
-        fit.covariance[OFFSET, OFFSET]))
+        fit.centre_covariance, covariance[ROTATION, ROTATION], covariance[POINT, POINT], covariance[OFFSET, OFFSET]))
     findings = [*_match(fit, search), *_rotation(coverage), *_translation(coverage, fit), *_time(coverage, offset, fit),
-                *_search(search, fit), *_statistics(place, turn, point)]
+                *_search(search, fit)]
+    if not findings:
+        findings += _statistics(place, turn, point)
     if fit.duration_s < SHORT_S:
         findings.append(Finding("short", Grade.FAIR, f"The recording is {fit.duration_s:.0f} s long.", "",
                                 "Record 20 s."))
     summary = (f"positions of the other tracker are known in the rig to ±{1e3 * place:.2f} mm and "
                f"±{math.degrees(turn):.3f} degrees, its clock to ±{1e3 * offset:.2f} ms; {1e3 * fit.rms_m:.2f} mm rms "
                f"remain, {100 * fit.inlier_share:.0f} % of the samples agree.")
-    return AlignmentReport(fit, coverage, place, turn, point, offset, search.scale, judge(summary, findings))
+    return AlignmentReport(fit, coverage, covariance, place, turn, point, offset, search.scale,
+                           judge(summary, findings))
 
 
 def coverage_of(fit: Fit) -> Coverage:
@@ -151,7 +152,7 @@ def _translation(coverage: Coverage, fit: Fit) -> list[Finding]:
 
 def _time(coverage: Coverage, offset_sd_s: float, fit: Fit) -> list[Finding]:
     """A lasting error e shifts the offset by e / speed."""
-    total = math.hypot(offset_sd_s, LASTING_M / max(coverage.speed_m_s, 1e-9))
+    total = max(offset_sd_s, LASTING_M / max(coverage.speed_m_s, 1e-9))
     grade = _grade(total * FAST_M_S)
     if grade is None:
         return []

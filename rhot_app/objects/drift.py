@@ -11,9 +11,9 @@ from scipy.ndimage import median_filter
 from scipy.stats import chi2
 
 from rhot_app.estimation.residual import student
-from rhot_app.objects.alignment import skews
+from rhot_app.objects.alignment import LASTING_M, LASTING_S
 from rhot_app.objects.alignment_file import Alignment
-from rhot_app.objects.alignment_report import LASTING_M
+from rhot_app.objects.alignment_model import skews
 
 Array = NDArray[np.float64]
 
@@ -23,9 +23,6 @@ millimetre show."""
 
 FALSE_ALARM = 1e-6
 """Probability of a test to call a true alignment stale: with one test a second, once in twelve days."""
-
-LASTING_S = 1.0
-"""s: correlation time of a fingertip's lasting error (`tracking.hand_process.BIAS_S`)."""
 
 SAMPLES = 50
 _DRIFT = np.array([0, 1, 2, 3, 4, 5, 9])  # columns that may drift: rig_from_foreign and the time offset
@@ -54,7 +51,11 @@ class DriftMonitor:
 
     def add(self, rig_s: float, position: Array, foreign_from_tracker: Array) -> None:
         """Take `position` (3,) m of the rig at `rig_s` and the pose (4, 4) of the other tracker at that instant, which
-        is at `rig_s - alignment.time_offset_s` of its clock."""
+        is at `rig_s - alignment.time_offset_s` of its clock. A pair with unknown values, or that is not later than the
+        one before, is left out."""
+        known = np.isfinite(position).all() and np.isfinite(foreign_from_tracker).all()
+        if not known or (self._pairs and not rig_s > self._pairs[-1][0]):
+            return
         self._pairs.append((rig_s, np.asarray(position, float), np.asarray(foreign_from_tracker, float)))
         while rig_s - self._pairs[0][0] > self._window_s:
             self._pairs.popleft()

@@ -41,7 +41,8 @@ class Shape(Protocol):
         ...
 
     def signed_distance(self, points: Array) -> tuple[Array, Array]:
-        """Distances (N,) m of points (N, 3), negative inside, and unit normals (N, 3): the gradient of the distance."""
+        """Distances (N,) m of points (N, 3), negative inside, and unit normals (N, 3): the gradient of the distance.
+        The distance from an unknown (NaN) point is NaN."""
         ...
 
 
@@ -259,6 +260,9 @@ def _mesh_distance(mesh: _MeshArrays, points: Array, distance: Array, normal: Ar
     to_centre, away, best_away = np.empty(count), np.empty(3), np.zeros(3)
     for n in range(points.shape[0]):
         x, y, z = points[n]
+        if not math.isfinite(x + y + z):
+            distance[n], normal[n] = math.nan, math.nan
+            continue
         nearest, start = math.inf, 0
         for f in range(count):
             dx, dy, dz = x - mesh.centre[f, 0], y - mesh.centre[f, 1], z - mesh.centre[f, 2]

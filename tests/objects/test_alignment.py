@@ -6,19 +6,22 @@ import json
 import subprocess
 import sys
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
-from aligned_streams import make_scene
+from aligned_streams import make_scene, random_pose
 from scipy.stats import chi2
 
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
-from rhot_app.objects.alignment import AlignmentModel, Estimate, align
+from rhot_app.geometry.transforms import apply, exp_so3, fit_rigid, inverse, log_so3, quaternion_from_rotation, rigid
+from rhot_app.objects.alignment import align
 from rhot_app.objects.alignment_file import load_alignment, save_alignment, to_alignment
+from rhot_app.objects.alignment_model import AlignmentModel, Estimate
 from rhot_app.objects.alignment_report import calibrate_alignment
 from rhot_app.objects.drift import DriftMonitor
 from rhot_app.objects.motion_stream import MotionStream, consistent, read_stream
+from rhot_app.recording.qualisys import read_qualisys
 
 SEEDS = 20
 
@@ -105,6 +108,15 @@ def test_good_motion_is_accepted():
     assert abs(report.fit.offset_s - scene.offset_s) < 1e-3 and abs(report.scale - 1.0) < 0.02
 
 
+@pytest.mark.parametrize("rates", [(12.0, 127.0), (60.0, 15.0), (100.0, 100.0)])
+def test_slow_streams_and_gaps_are_aligned(rates):
+    scene = make_scene(2, rates=rates)
+    there = scene.rig.times_s % 4.0 > 1.0
+    fit, _ = align(scene.foreign, MotionStream(scene.rig.times_s[there], scene.rig.positions[there]), search_s=0.1)
+    error = errors(fit, scene)
+    assert np.linalg.norm(error[6:9]) < 0.5e-3 and abs(error[9]) < 1e-3
+
+
 def test_millimetres_are_named():
     scene = make_scene(1)
     foreign = MotionStream(scene.foreign.times_s, 1e3 * scene.foreign.positions, scene.foreign.rotations)
@@ -116,6 +128,32 @@ def test_millimetres_are_named():
 def test_things_that_are_not_rigidly_connected_are_refused():
     verdict = calibrate_alignment(make_scene(1).foreign, make_scene(2).rig).verdict
     assert not verdict.acceptable and "not_rigid" in verdict.codes
+
+
+QUALISYS = Path(__file__).parents[3] / "shared" / "data" / "hand_motion" / "qualisys_hand_30s.tsv"
+
+
+@pytest.mark.skipif(not QUALISYS.exists(), reason="the recorded hand is not here")
+@pytest.mark.parametrize(("point", "rigid_on_it"), [("hand_top", True), ("middle_tip", False)])
+def test_a_recorded_hand_is_aligned_and_a_bending_finger_refused(point, rigid_on_it):
+    """The triad on the back of the hand in every other frame, and a marker in the frames between them."""
+    tracks = read_qualisys(QUALISYS)
+    triad = tracks.positions[:, [tracks.names.index(f"hand_{name}") for name in ("top", "left", "right")]]
+    seen = tracks.positions[:, tracks.names.index(point)]
+    known = np.isfinite(triad).all(axis=(1, 2)) & np.isfinite(seen).all(axis=1)
+    even, odd = (known & (np.arange(len(known)) % 2 == rest) for rest in (0, 1))
+    shape = triad[even][0] - triad[even][0].mean(axis=0)
+    rig_from_foreign = random_pose(np.random.default_rng(0), 1.0)
+    poses = np.array([inverse(rig_from_foreign) @ fit_rigid(shape, frame) for frame in triad[even]])
+    report = calibrate_alignment(MotionStream.of_poses(tracks.times_s[even] - 0.037, poses),
+                                 MotionStream(tracks.times_s[odd], seen[odd]))
+    fit = report.fit
+    assert report.verdict.acceptable == rigid_on_it and ("not_rigid" in report.verdict.codes) != rigid_on_it
+    if rigid_on_it:  # the hand hardly turns, which the verdict says
+        assert abs(fit.offset_s - 0.037) < 0.1e-3
+        away = apply(fit.rig_from_foreign, apply(inverse(rig_from_foreign), fit.centre)) - fit.centre
+        assert np.linalg.norm(away) < 0.5e-3 and np.linalg.norm(away) < 2.0 * report.place_sd_m
+        assert {"no_rotation", "slow"} <= report.verdict.codes
 
 
 def test_streams_that_do_not_overlap_are_refused():
@@ -209,8 +247,6 @@ def test_the_file_holds_the_alignment(tmp_path):
 
 def write_csv(path, stream):
     """As `rhot calibrate alignment` reads it."""
-    from rhot_app.geometry.transforms import quaternion_from_rotation
-
     columns, header = [stream.times_s[:, None], stream.positions], "t,x,y,z"
     if stream.rotations is not None:
         columns.append(np.array([quaternion_from_rotation(one) for one in stream.rotations]))

@@ -90,6 +90,13 @@ def test_on_the_surface_the_normal_is_outward():
     np.testing.assert_allclose(normal, [[1.0, 0.0, 0.0], np.full(3, 3**-0.5)], atol=1e-9)
 
 
+@pytest.mark.parametrize("shape", [Box((0.1, 0.1, 0.1)), Sphere(0.05), Cylinder(0.05, 0.1),
+                                   Mesh(*box_mesh((0.1, 0.1, 0.1)))])
+def test_unknown_points_have_unknown_distances(shape):
+    distance, _ = shape.signed_distance(np.array([[np.nan, 0.0, 0.0], [0.06, 0.0, 0.0]]))
+    assert np.isnan(distance[0]) and distance[1] == pytest.approx(0.01)
+
+
 @pytest.mark.parametrize("suffix", ["stl", "obj", "glb"])
 def test_files_are_read_in_their_unit(tmp_path, suffix):
     path = tmp_path / f"box.{suffix}"
