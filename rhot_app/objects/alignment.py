@@ -34,7 +34,7 @@ SEARCH_S = 1.0
 """s: the offset between the clocks is searched within this, either way."""
 
 STEP_S = 0.02
-"""s: of the search. A hand moves with up to 5 Hz (`benchmarks/process_prior.py`): a tenth of that period."""
+"""s: of the search, a tenth of a period at 5 Hz; hands wave more slowly."""
 
 OVERLAP_S = 2.0
 """s: streams that overlap less are not aligned; a movement of a hand takes as long."""

@@ -31,8 +31,8 @@ BEGIN_SD, END_SD = 0.0, 2.0 * float(norm.isf(SWITCHING))
 half, and ends beyond a distance that noise exceeds by SWITCHING from midway."""
 
 PULP_SD_M = 1e-3
-"""m: a pressed fingertip gives way by 1 to 3 mm within 1 N (Serina, Mote and Rempel 1997): as a residual, contact puts
-the pad on the surface within this."""
+"""m: as a residual, contact puts the pad on the surface within this; a pressed fingertip gives way by millimetres
+(Serina, Mote and Rempel 1997)."""
 
 CONTACT_KERNEL: Kernel = student(4.0)
 """A contact may be none: heavy tails, as of the markers."""
