@@ -14,6 +14,7 @@ KINDS: dict[str, str] = {
     "stereo": "two or more cameras from pictures of a board that they took together",
     "time": "when each camera sees, from a moving marker",
     "colours": "the markers' colours, from boxes on their paint in pictures",
+    "alignment": "where another tracker's world is in the rig, from two streams of one motion",
     "depth": "distance from disparity, without a board, from a table of measured distances",
 }
 """Name of each calibration, as of its module in `commands`, and what it is for."""

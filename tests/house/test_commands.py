@@ -28,6 +28,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                       "--kelvin"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json",
                       "--compare", "--motions", "--recording", "--seeds", "--trackers", "--sketched", "--logs"),
+    "rhot calibrate alignment": ("--foreign", "--rig-points", "--search", "--out", "--json"),
     "rhot calibrate bones": ("--log", "--tsv", "--rig", "--roles", "--hand", "--side", "--set", "--name", "--out",
                              "--json"),
     "rhot calibrate colours": ("--image", "--sample", "--markers", "--skin", "--out", "--json"),

@@ -11,6 +11,7 @@ import pytest
 from rhot_app import project
 from rhot_app.calibration.lens import intrinsics_file
 from rhot_app.hand import anatomy, articulated, couplings
+from rhot_app.objects import alignment_file
 from rhot_app.tracking.state import HandState
 from rhot_node import config, markers
 
@@ -24,6 +25,8 @@ PAGES: tuple[tuple[str, str, int, tuple[type[msgspec.Struct], ...]], ...] = (
         markers.MarkerSet, markers.Marker, markers.ChromaModel, markers.RangeModel)),
     ("calibration-files.md", intrinsics_file.FORMAT, intrinsics_file.VERSION, (
         intrinsics_file.IntrinsicsFile, intrinsics_file.BoardUsed)),
+    ("alignment.md", alignment_file.FORMAT, alignment_file.VERSION, (
+        alignment_file.Alignment, alignment_file.RigidTransform)),
     ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy, couplings.Coupling)),
     ("hand.md", articulated.FORMAT, articulated.VERSION, (
         articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, couplings.Coupling,

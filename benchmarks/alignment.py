@@ -1,0 +1,80 @@
+"""Errors of the alignment with another tracker, from simulated streams with noise and outliers, over random scenes.
+
+    python benchmarks/alignment.py [--seeds 20] [--seconds 20] [--json FILE]
+
+prints the median and the largest error of each unknown, against the target, for a fingertip (positions) and for a tag
+(poses). NEES is the mean squared error by the covariance, per parameter: 1 when the covariance is true.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "objects"))
+
+from aligned_streams import FOREIGN_HZ, OUTLIER_M, OUTLIERS, RIG_HZ, make_scene
+
+from rhot_app.geometry.transforms import apply, inverse, log_so3
+from rhot_app.objects.alignment_report import AlignmentReport, calibrate_alignment
+
+TARGETS = {"origin mm": 0.5, "motion mm": 0.5, "point mm": 0.5, "rotation deg": 0.1, "offset ms": 1.0}
+
+
+def errors_of(report: AlignmentReport, scene: Any) -> dict[str, float]:
+    """By name: of the other world's origin, of a position in the middle of the motion, of the point on the tracker, of
+    the rotation and the time offset; NEES; and the seconds that it took."""
+    fit, truth = report.fit, scene.rig_from_foreign
+    turn = log_so3(fit.rig_from_foreign[:3, :3] @ truth[:3, :3].T)
+    origin, point = (fit.rig_from_foreign - truth)[:3, 3], (fit.tracker_from_body - scene.tracker_from_body)[:3, 3]
+    offset = fit.offset_s - scene.offset_s
+    parameters = np.concatenate([origin, turn, point, [offset]])
+    away = apply(fit.rig_from_foreign, apply(inverse(truth), fit.centre)) - fit.centre
+    return {"origin mm": 1e3 * float(np.linalg.norm(origin)), "motion mm": 1e3 * float(np.linalg.norm(away)),
+            "point mm": 1e3 * float(np.linalg.norm(point)), "rotation deg": float(np.degrees(np.linalg.norm(turn))),
+            "offset ms": 1e3 * abs(offset),
+            "NEES": float(parameters @ np.linalg.solve(fit.covariance[:10, :10], parameters)) / 10}
+
+
+def main() -> int:
+    """Measure, print the table, write JSON when asked; exit code 1 when a target is missed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--json", type=Path, help="also write the figures here")
+    args = parser.parse_args()
+    print(f"{args.seconds:g} s, {RIG_HZ:g} and {FOREIGN_HZ:g} Hz, {100 * OUTLIERS:g} % outliers of "
+          f"{1e3 * OUTLIER_M:g} mm, {args.seeds} seeds")
+    print(f"{'rig reports':12s} {'error':14s} {'median':>8s} {'worst':>8s} {'target':>8s}")
+    found: dict[str, dict[str, list[float]]] = {}
+    missed = False
+    for name, poses in (("positions", False), ("poses", True)):
+        rows, durations, grades = [], [], []
+        for seed in range(args.seeds):
+            scene = make_scene(seed, poses, seconds=args.seconds)
+            start = time.perf_counter()
+            report = calibrate_alignment(scene.foreign, scene.rig)
+            durations.append(time.perf_counter() - start)
+            grades.append(report.verdict.grade.value)
+            rows.append(errors_of(report, scene))
+        found[name] = {key: [row[key] for row in rows] for key in rows[0]}
+        for key, target in TARGETS.items():
+            values = found[name][key]
+            missed = missed or max(values) > target
+            print(f"{name:12s} {key:14s} {np.median(values):8.3f} {max(values):8.3f} {target:8.3f}")
+        print(f"{name:12s} {'NEES':14s} {np.mean(found[name]['NEES']):8.2f} (mean); {grades.count('good')} good, "
+              f"{grades.count('fair')} usable; {np.median(durations):.2f} s each")
+    print(f"target: {'missed' if missed else 'met'}")
+    if args.json:
+        args.json.write_text(json.dumps({"errors": found, "targets": TARGETS}, indent=2) + "\n")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

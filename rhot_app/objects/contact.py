@@ -1,0 +1,166 @@
+"""Contact of fingertips with an object: signed distances, contact flags with hysteresis, and a residual.
+
+A fingertip pad is the capsule of the last segment (`rhot_app.hand.shape`), as three spheres on its axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from rhot_app.estimation.residual import Kernel, Rows, student
+from rhot_app.hand.dh import DhArrays, riding_points
+from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
+from rhot_app.hand.model import HandModel
+from rhot_app.hand.patches import segment_axis
+from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
+from rhot_app.objects.shape import Shape
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SWITCHING = 1e-3
+"""Probability with which noise alone changes the flag of a finger that hovers midway between the two thresholds, where
+it is largest. It is that of one sample."""
+
+BEGIN_SD, END_SD = 0.0, 2.0 * float(norm.isf(SWITCHING))
+"""Standard deviations of the distance: contact begins when the pad is within the surface with a probability of one
+half, and ends beyond a distance that noise exceeds by SWITCHING from midway."""
+
+PULP_SD_M = 1e-3
+"""m: as a residual, contact puts the pad on the surface within this; a pressed fingertip gives way by millimetres
+(Serina, Mote and Rempel 1997)."""
+
+CONTACT_KERNEL: Kernel = student(4.0)
+"""A contact may be none: heavy tails, as of the markers."""
+
+_SPHERES = 3  # of a pad: the ends of its axis and its middle
+_WORLD = 12  # numbers of a state before the angles: world_from_palm (3, 4), as `tracking.hand_process`
+
+
+@dataclass(frozen=True, slots=True)
+class FingertipPads:
+    """Three sphere centres per finger as points of a kinematic table, in the order of FINGERS; `radii` (5,) m."""
+
+    dh: DhArrays
+    radii: Array
+
+
+@dataclass(frozen=True, slots=True)
+class PadDistances:
+    """Of each of five fingers: `distance` (5,) m from the pad to the surface, negative within it; `sphere` (5,), the
+    point of the table that is nearest; `normal` (5, 3) outward, and `place` (5, 3) m of the nearest surface point, both
+    in the world frame."""
+
+    distance: Array
+    sphere: NDArray[np.int64]
+    normal: Array
+    place: Array
+
+
+def fingertip_pads(model: HandModel) -> FingertipPads:
+    """The pads of a hand."""
+    points = []
+    for finger in range(len(FINGERS)):
+        middle, half = segment_axis(model, finger)
+        row = int(model.dh.point_row[len(JOINTS) + finger])
+        points += [(row, (middle + shift * half, 0.0, 0.0)) for shift in (-1.0, 0.0, 1.0)]
+    return FingertipPads(riding_points(model.dh, points), model.radii[:, 2].copy())
+
+
+def pad_distances(pads: FingertipPads, points: Array, shape: Shape, world_from_object: Array) -> PadDistances:
+    """Distances of the pads whose sphere centres are `points` (15, 3) m, world frame, from an object's surface."""
+    rotation, origin = world_from_object[:3, :3], world_from_object[:3, 3]
+    distance, normal = shape.signed_distance((points - origin) @ rotation)
+    nearest = np.argmin(distance.reshape(-1, _SPHERES), axis=1)
+    sphere = nearest + _SPHERES * np.arange(len(nearest))
+    outward = normal[sphere] @ rotation.T
+    place = points[sphere] - distance[sphere, None] * outward
+    return PadDistances(distance[sphere] - pads.radii, sphere, outward, place)
+
+
+def pad_points(pads: FingertipPads, world_from_palm: Array, angles: Array) -> Array:
+    """(15, 3) m sphere centres of a hand at `world_from_palm` (4, 4) with `angles` (21,) rad, world frame."""
+    points = np.empty((len(pads.dh.point_row), 3))
+    forward_arrays(pads.dh, world_from_palm, angles, empty_frames(pads.dh), points)
+    return points
+
+
+def distance_sd(normal: Array, fingertip_covariances: Array, object_covariance: Array) -> Array:
+    """(5,) m standard deviations of distances along `normal` (5, 3), from covariances (5, 3, 3) of the fingertips and
+    (3, 3) or (5, 3, 3) of the object's surface, m^2."""
+    return np.asarray(np.sqrt(np.einsum("fi,fij,fj->f", normal, fingertip_covariances + object_covariance, normal)))
+
+
+class ContactTrigger:
+    """Contact flags of five fingers with hysteresis (Schmitt 1938)."""
+
+    def __init__(self) -> None:
+        self.touching: Flags = np.zeros(len(FINGERS), dtype=bool)
+
+    def update(self, distance: Array, sd: Array) -> Flags:
+        """The flags (5,) after distances (5,) m of standard deviations `sd` (5,) m; an unknown distance is none."""
+        begins, stays = distance <= BEGIN_SD * sd, distance < END_SD * sd
+        self.touching = begins | (self.touching & stays)
+        return self.touching.copy()
+
+
+@dataclass(frozen=True, slots=True)
+class ContactResidual:
+    """Touching fingertips lie on an object's surface; implements `estimation.residual.Residual`.
+
+    A state begins with world_from_palm (3, 4) and the 21 angles; its tangent space of `size` numbers begins with the
+    palm's translation and rotation along the world's axes and the angles (`tracking.hand_process`). `touching` (5,);
+    `sd_m` (5,) of the surface's position along its normal, without that of the pulp. The object's pose is given.
+    """
+
+    pads: FingertipPads
+    shape: Shape
+    world_from_object: Array
+    touching: Flags
+    sd_m: Array
+    size: int
+
+    def linearise(self, state: Array) -> Rows:
+        """A row, m, for each touching finger."""
+        dh, world = self.pads.dh, np.eye(4)
+        world[:3] = state[:_WORLD].reshape(3, 4)
+        frames, points = empty_frames(dh), np.empty((len(dh.point_row), 3))
+        slopes = np.empty((len(points), 3, TWIST + len(ANGLES)))
+        forward_arrays(dh, world, state[_WORLD:_WORLD + len(ANGLES)], frames, points)
+        jacobian_arrays(dh, world, frames, points, slopes)
+        found = pad_distances(self.pads, points, self.shape, self.world_from_object)
+        fingers = np.flatnonzero(self.touching)
+        jacobian = np.zeros((len(fingers), self.size))
+        jacobian[:, :slopes.shape[2]] = np.einsum("fi,fij->fj", found.normal[fingers], slopes[found.sphere[fingers]])
+        return Rows(-found.distance[fingers], jacobian, self.sd_m[fingers] ** 2 + PULP_SD_M**2, CONTACT_KERNEL)
+
+
+class ContactMonitor:
+    """Contacts of one hand with one object, from the tracker's states and the object's poses.
+
+    `as_observation`: whether `residual` offers the contacts to the estimator. It is off by default: a wrong shape or
+    pose of the object would then move the hand.
+    """
+
+    def __init__(self, model: HandModel, shape: Shape, *, as_observation: bool = False) -> None:
+        self.pads, self.shape, self.as_observation = fingertip_pads(model), shape, as_observation
+        self.trigger = ContactTrigger()
+
+    def update(self, world_from_palm: Array, angles: Array, fingertip_covariances: Array, world_from_object: Array,
+               object_covariance: Array) -> tuple[PadDistances, Array, Flags]:
+        """Distances, their standard deviations (5,) m and the contact flags (5,) of one instant."""
+        points = pad_points(self.pads, world_from_palm, angles)
+        found = pad_distances(self.pads, points, self.shape, world_from_object)
+        sd = distance_sd(found.normal, fingertip_covariances, object_covariance)
+        return found, sd, self.trigger.update(found.distance, sd)
+
+    def residual(self, world_from_object: Array, sd_m: Array, size: int) -> ContactResidual | None:
+        """The present contacts as a residual of a state whose tangent space has `size` numbers; None while nothing
+        touches, or when contacts are no observations. `sd_m` (5,) as of `ContactResidual`."""
+        if not self.as_observation or not self.trigger.touching.any():
+            return None
+        return ContactResidual(self.pads, self.shape, world_from_object, self.trigger.touching.copy(), sd_m, size)

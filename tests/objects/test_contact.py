@@ -1,0 +1,157 @@
+"""Distances of fingertip pads to objects, contact flags that do not chatter, and contact as a residual."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "estimation"))
+
+from hand_states import assert_jacobian, make_process, markers, natural_state, points_of, world_of
+from shapes_oracle import star
+
+from rhot_app.estimation.filter import update
+from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.hand.anatomy import load_hand
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.model import build_model, neutral_pose
+from rhot_app.hand.shape import segments
+from rhot_app.hand.skeleton import ANGLES as ANGLE_NAMES
+from rhot_app.objects.contact import (
+    END_SD,
+    PULP_SD_M,
+    ContactMonitor,
+    ContactResidual,
+    ContactTrigger,
+    fingertip_pads,
+    pad_distances,
+    pad_points,
+)
+from rhot_app.objects.shape import Box, Cylinder, Mesh, Sphere
+from rhot_app.tracking.hand_process import ANGLES, POSE, VELOCITY
+from rhot_node.files import resource_path
+
+ALL = np.ones(5, dtype=bool)
+SHAPES = [Box((0.06, 0.05, 0.12)), Sphere(0.04), Cylinder(0.03, 0.12), Mesh(*star(np.random.default_rng(3)))]
+
+
+def hand(side="right"):
+    return build_model(load_hand(resource_path("hands", f"{side}.json")))
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_pads_are_the_capsules_of_the_last_segments(side):
+    model = hand(side)
+    pose = neutral_pose(rigid(exp_so3([0.3, -0.5, 0.2]), [0.1, 0.0, 0.5]))
+    capsules = segments(model, pose, forward(model, pose))
+    tips = [k for k, name in enumerate(capsules.names) if name.endswith("_distal")]
+    pads = fingertip_pads(model)
+    points = pad_points(pads, pose.world_from_palm, pose.angles).reshape(5, 3, 3)
+    np.testing.assert_allclose(points[:, 0], capsules.start[tips], atol=1e-12)
+    np.testing.assert_allclose(points[:, 2], capsules.end[tips], atol=1e-12)
+    np.testing.assert_allclose(pads.radii, capsules.radius[tips])
+
+
+def test_the_distance_is_that_of_the_capsule_less_its_radius():
+    model, pose = hand(), neutral_pose()
+    pads = fingertip_pads(model)
+    points = pad_points(pads, pose.world_from_palm, pose.angles)
+    first, last = points[3], points[5]  # of the index
+    ball = rigid(np.eye(3), last + (0.02 + pads.radii[1] + 0.002) * (last - first) / np.linalg.norm(last - first))
+    found = pad_distances(pads, points, Sphere(0.02), ball)
+    assert found.distance[1] == pytest.approx(0.002)
+    np.testing.assert_allclose(np.linalg.norm(found.place - ball[:3, 3], axis=1), 0.02)
+    np.testing.assert_allclose(np.einsum("fi,fi->f", found.normal, points[found.sphere] - ball[:3, 3]),
+                               found.distance + pads.radii + 0.02)
+
+
+def residual_at(state, shape, touching=ALL, sd_m=1e-4):
+    """Of a state and an object beside its fingertips, turned any way."""
+    process = make_process()
+    tips = points_of(markers().model.dh, state)[[4, 8, 12, 16, 20]]
+    world = rigid(exp_so3([0.4, 1.1, -0.3]), tips.mean(axis=0) + np.array([0.02, 0.03, 0.01]))
+    return process, ContactResidual(fingertip_pads(markers().model), shape, world, touching, np.full(5, sd_m),
+                                    process.size)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=["box", "sphere", "cylinder", "mesh"])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_rows_have_the_right_jacobian(shape, seed):
+    state = natural_state(np.random.default_rng(seed))
+    process, residual = residual_at(state, shape)
+    assert len(residual.linearise(state).error) == 5
+    assert_jacobian(process, residual, state, rtol=1e-4, atol=1e-5)
+
+
+def test_the_state_is_that_of_the_hand_process():
+    """Contacts know the beginning of a state without importing the tracker."""
+    assert (12, len(ANGLE_NAMES), 27) == (ANGLES, VELOCITY - ANGLES, POSE)
+
+
+def test_only_touching_fingers_have_rows():
+    state = natural_state(np.random.default_rng(0))
+    _, residual = residual_at(state, SHAPES[0], touching=np.array([True, False, False, True, False]))
+    rows = residual.linearise(state)
+    assert rows.error.shape == (2,) and rows.jacobian.shape == (2, residual.size)
+    np.testing.assert_allclose(rows.noise, PULP_SD_M**2 + 1e-8)
+
+
+def test_an_update_puts_the_pads_on_the_surface():
+    rng = np.random.default_rng(1)
+    state = natural_state(rng)
+    index = np.arange(5) == 1
+    process, residual = residual_at(state, SHAPES[1], touching=index)
+    points = pad_points(residual.pads, world_of(state), state[ANGLES:VELOCITY])
+    found = pad_distances(residual.pads, points, SHAPES[1], residual.world_from_object)
+    residual.world_from_object[:3, 3] += (found.distance[1] - 6e-3) * found.normal[1]
+    _, covariance = process.start(world_of(state), process.mean, (0.01, 0.1))
+    after = update(process, 0.0, (state, covariance), [residual])
+    assert residual.linearise(state).error[0] == pytest.approx(-6e-3, abs=1e-4)
+    assert abs(residual.linearise(after.state).error[0]) < 0.5e-3
+
+
+SD_M = 0.5e-3
+
+
+def switches(trigger, distance, rng, count=6000):
+    """Changes of the flags of five fingers at `distance` under white noise; a hundred seconds at 60 Hz."""
+    before, changes = None, 0
+    for _ in range(count):
+        flags = trigger.update(distance + SD_M * rng.normal(size=5), np.full(5, SD_M))
+        changes += 0 if before is None else int(np.sum(flags != before))
+        before = flags
+    return changes
+
+
+@pytest.mark.parametrize("hover_sd", [-2.0, 0.0, 0.25 * END_SD, 0.5 * END_SD, 0.75 * END_SD, END_SD, END_SD + 2.0])
+def test_contact_does_not_chatter_under_noise(hover_sd):
+    """A single threshold would change 1500 times a finger."""
+    changes = switches(ContactTrigger(), hover_sd * SD_M * np.ones(5), np.random.default_rng(0))
+    assert changes / 5 <= 12  # 6000 samples, each with a probability of 0.001 midway
+
+
+def test_contact_begins_at_the_surface_and_ends_beyond_the_noise():
+    trigger, sd = ContactTrigger(), np.full(5, SD_M)
+    assert not trigger.update(np.full(5, 0.1e-3), sd).any()
+    assert trigger.update(np.full(5, -0.1e-3), sd).all()
+    assert trigger.update(np.full(5, 0.9 * END_SD * SD_M), sd).all()
+    assert not trigger.update(np.full(5, 1.1 * END_SD * SD_M), sd).any()
+    trigger.update(np.full(5, -1e-3), sd)
+    assert not trigger.update(np.full(5, np.nan), sd).any()
+
+
+def test_contacts_are_no_observations_unless_asked_for():
+    model, pose = hand(), neutral_pose()
+    points = pad_points(fingertip_pads(model), pose.world_from_palm, pose.angles)
+    world = rigid(np.eye(3), points[3:].mean(axis=0))
+    for as_observation in (False, True):
+        monitor = ContactMonitor(model, Sphere(0.06), as_observation=as_observation)
+        assert monitor.residual(world, np.full(5, 1e-3), 99) is None
+        found, sd, flags = monitor.update(pose.world_from_palm, pose.angles, np.tile(1e-6 * np.eye(3), (5, 1, 1)),
+                                          world, 3e-6 * np.eye(3))
+        np.testing.assert_allclose(sd, 2e-3)
+        assert flags.any() and (flags == (found.distance <= 0.0)).all()
+        assert (monitor.residual(world, np.full(5, 1e-3), 99) is not None) == as_observation
