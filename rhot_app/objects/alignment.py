@@ -94,7 +94,7 @@ class Fit:
         return float(np.sqrt(np.mean(np.sum(self.errors[self.inlier] ** 2, axis=1))))
 
     @property
-    def inlier_share(self) -> float:
+    def inlier_ratio(self) -> float:
         """Share of the samples that agree with the alignment and with their neighbours."""
         return self.kept * float(np.mean(self.inlier))
 

@@ -61,7 +61,7 @@ class Alignment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     covariance: Annotated[tuple[Numbers, ...], Meta(min_length=10, max_length=13)]
     noise_m: Positive
     rms_m: NotNegative | None = None
-    inlier_share: Share | None = None
+    inlier_ratio: Share | None = None
     calibrated: str = ""
     format: Literal["rhot-alignment"] = FORMAT
     version: Literal[1] = VERSION
@@ -89,7 +89,7 @@ def to_alignment(report: AlignmentReport) -> Alignment:
     fit = report.fit
     covariance = 0.5 * (report.covariance + report.covariance.T)
     return Alignment(_transform(fit.rig_from_foreign), _transform(fit.tracker_from_body), fit.offset_s,
-                     tuple(tuple(map(float, row)) for row in covariance), fit.noise_m, fit.rms_m, fit.inlier_share,
+                     tuple(tuple(map(float, row)) for row in covariance), fit.noise_m, fit.rms_m, fit.inlier_ratio,
                      datetime.now(UTC).isoformat(timespec="seconds"))
 
 

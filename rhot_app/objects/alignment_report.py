@@ -95,7 +95,7 @@ def judge_alignment(fit: Fit, search: OffsetSearch) -> AlignmentReport:
                                 "Record 20 s."))
     summary = (f"positions of the other tracker are known in the rig to ±{1e3 * place:.2f} mm and "
                f"±{math.degrees(turn):.3f} degrees, its clock to ±{1e3 * offset:.2f} ms; {1e3 * fit.rms_m:.2f} mm rms "
-               f"remain, {100 * fit.inlier_share:.0f} % of the samples agree.")
+               f"remain, {100 * fit.inlier_ratio:.0f} % of the samples agree.")
     return AlignmentReport(fit, coverage, covariance, place, turn, point, offset, search.scale,
                            judge(summary, findings))
 
@@ -171,7 +171,7 @@ def _match(fit: Fit, search: OffsetSearch) -> list[Finding]:
                              "Its positions are not in metres, or the rig's stereo calibration has a wrong scale.",
                              "Give metres, or calibrate the stereo geometry with a measured board."))
     grade = _grade(fit.rms_m)
-    share = fit.inlier_share
+    share = fit.inlier_ratio
     if share < FAIR_INLIERS:
         grade = Grade.POOR if share < POOR_INLIERS else grade or Grade.FAIR
     if grade is not None:

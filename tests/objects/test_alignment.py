@@ -53,7 +53,7 @@ def test_the_transform_and_the_offset_are_recovered_from_noisy_streams(poses):
         assert np.linalg.norm(error[3:6]) < np.radians(0.1)
         assert np.linalg.norm(error[6:9]) < 0.5e-3
         assert abs(error[9]) < 1e-3
-        assert 0.85 < fit.inlier_share < 0.93  # 5 % outliers in either stream, 2 samples at each end
+        assert 0.85 < fit.inlier_ratio < 0.93  # 5 % outliers in either stream, 2 samples at each end
 
 
 @pytest.mark.parametrize("poses", [False, True])

@@ -60,7 +60,7 @@ def _fields(report: AlignmentReport) -> dict[str, Any]:
         "point_in_tracker_mm": (1e3 * fit.tracker_from_body[:3, 3]).tolist(), "time_offset_ms": 1e3 * fit.offset_s,
         "sd": {"position_mm": 1e3 * report.place_sd_m, "rotation_deg": math.degrees(report.rotation_sd_rad),
                "point_mm": 1e3 * report.point_sd_m, "time_offset_ms": 1e3 * report.offset_sd_s},
-        "rms_mm": 1e3 * fit.rms_m, "inlier_share": fit.inlier_share, "samples": len(fit.errors),
+        "rms_mm": 1e3 * fit.rms_m, "inlier_ratio": fit.inlier_ratio, "samples": len(fit.errors),
         "coverage": {"rotation_deg": [math.degrees(turn) for turn in coverage.turn],
                      "spread_mm": (1e3 * coverage.spread_m).tolist(), "speed_mm_s": 1e3 * coverage.speed_m_s}}
 
