@@ -24,6 +24,7 @@ from rhot_node.wire.messages import (
 )
 from rhot_node.wire.plausible import (
     expect_everybody,
+    expect_frame,
     expect_length,
     expect_node,
     expect_session,
@@ -48,8 +49,6 @@ TYPE_HERE = 7
 MARKERS_MAX = 64
 DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
 FLAG_TRUNCATED = 1  # bit 0 of the observations' flags: there were more candidates than fit
-IMAGE_SIZE_MAX = 16384  # px
-FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
 
 _HEADER = Struct("<4sBBHIQI")
 _FLAGS_AT = 6  # offset of the header's flags
@@ -222,11 +221,7 @@ def _decode_observations(payload: memoryview, node_id: int, session: int, sequen
     expect_zeros(reserved)
     if flags & ~FLAG_TRUNCATED:
         raise WireError("flags", f"unknown flags of observations {flags:#04x}")
-    expect_time(t_frame, t_send)
-    if not 0 <= t_send - t_frame <= FRAME_AGE_MAX_NS:
-        raise WireError("time", f"sent {(t_send - t_frame) / 1e9:.3f} s after its exposure")
-    if not (0 < width <= IMAGE_SIZE_MAX and 0 < height <= IMAGE_SIZE_MAX):
-        raise WireError("size", f"{width} x {height} px")
+    expect_frame(t_frame, t_send, width, height)
     read = candidate_table if version == OBSERVATIONS_VERSION else marker_table
     markers = read(bytes(payload[_OBSERVATIONS.size:]), count, width, height)
     return Observations(node_id, session, sequence, t_frame, t_send, processing, exposure, row_time, width, height,
