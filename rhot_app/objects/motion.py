@@ -24,17 +24,16 @@ Indices = NDArray[np.intp]
 POSE, SIZE, STATE, VELOCITY = 6, 12, 18, 12
 """Numbers of a pose's tangent space, of a state's, and of a state; where its velocity begins."""
 
-PERIOD_S = 0.025
-"""s: frame period of the slower camera preset (`wide`, 40 frames/s)."""
+REST_ACCELERATION = 0.3, 5.0
+"""m/s^2 and rad/s^2 rms: accelerations of a held object at rest (`python benchmarks/object_motion.py`)."""
 
-ACCELERATION, ANGULAR_ACCELERATION = 40.0, 50.0
-"""m/s^2 and rad/s^2: those of an object in the fastest hand, the twin's motion `fast` (`tests/objects/test_motion.py`
-measures them)."""
+RATE = 20.0
+"""1/s: rms acceleration over speed of a moving object. The twin's motion `fast` reaches 37 m/s^2 at 2 m/s; recorded
+objects have 11 to 20 1/s at their highest speeds (`python benchmarks/object_motion.py`)."""
 
-DENSITY = np.array([ACCELERATION**2 * PERIOD_S / 3.0, ANGULAR_ACCELERATION**2 * PERIOD_S / 3.0])
-"""m^2/s^3 and rad^2/s^3: spectral density q of the white acceleration. The velocity changes by sqrt(q T) in a period T
-(Bar-Shalom, Li and Kirubarajan 2001, 6.2.2), here by a third of the greatest acceleration times T along each axis, in
-mean square."""
+START_SPEED = 1.0, 5.0
+"""m/s and rad/s: standard deviations of an object's velocity as it is first seen, half of the speed of the fastest hand
+(the twin's motion `fast`)."""
 
 CORNER_KERNEL = student(4.0)
 """Corners have heavy tails: fingers cut them. 4 degrees of freedom (Lange, Little and Taylor 1989)."""
@@ -69,13 +68,14 @@ def pose_of(state: Array) -> Array:
 
 
 class ObjectProcess:
-    """Implements `estimation.residual.Process`: white acceleration with spectral densities `density` (2,)."""
+    """Implements `estimation.residual.Process`: white acceleration that is the stronger, the faster the object moves.
+
+    An acceleration of variance s^2 along each axis and correlation time 1 / RATE is white noise of spectral density
+    2 s^2 / RATE at longer times (Singer 1970). Its mean square is that at rest plus RATE^2 times the expected square of
+    the speed, whose variance counts up to START_SPEED's.
+    """
 
     size = SIZE
-
-    def __init__(self, density: Array = DENSITY) -> None:
-        """`density`: m^2/s^3 and rad^2/s^3."""
-        self._density = np.asarray(density, dtype=np.float64)
 
     def retract(self, state: Array, step: Array) -> Array:
         """The state moved by `step` (12,)."""
@@ -91,7 +91,11 @@ class ObjectProcess:
         """State and covariance (12, 12) after `dt_s`."""
         move = self.transition(state, dt_s)
         noise = np.zeros((SIZE, SIZE))
-        for first, density in zip((0, 3), self._density, strict=True):
+        for first, rest, start in zip((0, 3), REST_ACCELERATION, START_SPEED, strict=True):
+            speed = state[VELOCITY + first:VELOCITY + first + 3]
+            spread = np.trace(covariance[POSE + first:POSE + first + 3, POSE + first:POSE + first + 3])
+            square = rest**2 + RATE**2 * (speed @ speed + min(spread, 3.0 * start**2))
+            density = 2.0 / RATE * square / 3.0
             for axis in range(first, first + 3):
                 noise[axis, axis] = density * dt_s**3 / 3.0
                 noise[axis, axis + POSE] = noise[axis + POSE, axis] = density * dt_s**2 / 2.0
@@ -146,6 +150,29 @@ class PointResidual:
         """With the chosen points only."""
         return PointResidual(self.points[chosen], self.pixels[chosen], self.covariances[chosen], self.late_s[chosen],
                              self.pose, self.intrinsics, self._kernel)
+
+
+class VelocityPrior:
+    """An object that is first seen moves by START_SPEED; implements `estimation.residual.Residual`."""
+
+    def linearise(self, state: Array) -> Rows:
+        """Six rows, by standard deviations."""
+        scale = 1.0 / np.repeat(START_SPEED, 3)
+        return Rows(-scale * state[VELOCITY:], np.hstack([np.zeros((POSE, POSE)), np.diag(scale)]), UNIT,
+                    first=np.zeros(1, np.int64))
+
+
+@dataclass(frozen=True, slots=True)
+class StatePrior:
+    """A prediction: `state` (18,) with `covariance` (12, 12); implements `estimation.residual.Residual`."""
+
+    state: Array
+    covariance: Array
+
+    def linearise(self, state: Array) -> Rows:
+        """Twelve rows; their Jacobian is 1 to first order in the deviation."""
+        return Rows(ObjectProcess().difference(self.state, state), np.eye(SIZE), self.covariance,
+                    first=np.zeros(1, np.int64))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,17 +8,27 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.estimation.residual import stack
+from rhot_app.estimation.residual import Residual, stack
 from rhot_app.geometry.camera import undistort_point, undistort_points
-from rhot_app.geometry.transforms import fit_rigid, inverse, log_so3, rigid
+from rhot_app.geometry.transforms import fit_rigid, inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
-from rhot_app.objects.motion import POSE, SIZE, CameraArrays, ObjectProcess, PointResidual, pose_of, state_of
+from rhot_app.objects.motion import (
+    POSE,
+    SIZE,
+    VELOCITY,
+    CameraArrays,
+    ObjectProcess,
+    PointResidual,
+    VelocityPrior,
+    pose_of,
+    state_of,
+)
 from rhot_app.objects.object_file import spans_plane
 from rhot_app.objects.observations import NO_TAG, ObjectPoints, ObjectView
 
@@ -52,24 +62,33 @@ class Validity(enum.StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """A pose that explains the observations: a local minimum of the cost.
+    """A state that explains the observations: a local minimum of the cost.
 
-    `world_from_object` (4, 4); `covariance` (6, 6) m^2 and rad^2: translation, then rotation about the object's origin,
-    world axes. `cost`: -2 log likelihood of `points` image points, up to a constant. `rms_px`: reprojection error.
-    `probability` among all modes.
+    `state` (18,) and `covariance` (n, n) in its tangent space as in `motion`: n is 6, the pose alone, or 12. `cost`:
+    -2 log posterior of `points` image points, up to a constant. `rms_px`: reprojection error. `probability` among all
+    modes.
     """
 
-    world_from_object: Array
+    state: Array
     covariance: Array
     cost: float
     points: int
     rms_px: float
     probability: float = 1.0
 
+    @property
+    def world_from_object(self) -> Array:
+        """(4, 4)."""
+        return pose_of(self.state)
+
 
 @dataclass(frozen=True, slots=True)
 class ObjectPose:
-    """The most probable pose of an object. Fields as in `Mode`; `second`: the next mode's pose, None without one."""
+    """The most probable pose of an object at rest.
+
+    `world_from_object` (4, 4). `covariance` (6, 6) m^2 and rad^2: translation, then rotation about the object's origin,
+    world axes. `rms_px`: reprojection error of `points` image points. `second`: the next mode's pose, None without one.
+    """
 
     name: str
     t_ns: int
@@ -83,7 +102,7 @@ class ObjectPose:
 
 
 def estimate_pose(points: ObjectPoints, cameras: CameraArrays, views: Sequence[ObjectView]) -> ObjectPose | None:
-    """The pose that explains all views, taken at one instant; None when they determine none."""
+    """The pose of an object at rest that explains all views; None when they determine none."""
     modes = find_modes(points, cameras, views)
     if not modes:
         return None
@@ -95,30 +114,37 @@ def estimate_pose(points: ObjectPoints, cameras: CameraArrays, views: Sequence[O
                       probability)
 
 
-def find_modes(points: ObjectPoints, cameras: CameraArrays, views: Sequence[ObjectView]) -> list[Mode]:
-    """The distinct poses that explain all views, the most probable first; none when the views determine none."""
-    residuals = [point_residual(points, cameras, view, moving=False) for view in views]
+def find_modes(points: ObjectPoints, cameras: CameraArrays, views: Sequence[ObjectView],
+               moving: bool = False) -> list[Mode]:
+    """The distinct states that explain all views, the most probable first; none when the views determine none.
+
+    At rest all views count as taken at one instant. A moving object's state is that at the first view's time, and each
+    point has its own time.
+    """
+    residuals = [point_residual(points, cameras, view, views[0].t_ns if moving else None) for view in views]
     starts = [start for view in views for start in _tag_starts(points, cameras, view)]
     starts += _triangulated_starts(points, cameras, views)
-    ranked = sorted((_cost(residuals, state_of(start)), number) for number, start in enumerate(starts))
+    size, priors = (SIZE, [VelocityPrior()]) if moving else (POSE, [])
+    ranked = sorted((_linearised(residuals, priors, state_of(start), size)[2], number)
+                    for number, start in enumerate(starts))
     modes: list[Mode] = []
     for _, number in ranked[:_STARTS]:
-        _add(modes, _refine(residuals, starts[number]))
+        _add(modes, refine(residuals, priors, state_of(starts[number]), size))
     modes.sort(key=lambda mode: mode.cost)
     if modes:
-        best = modes[0].world_from_object
+        best = modes[0].state
         for view in views:
-            _add(modes, _refine(residuals, _reversed(best, points.points[view.rows], cameras.centres[view.camera])))
+            _add(modes, refine(residuals, priors, reversed_state(points, cameras, view, best), size))
     possible = [mode for mode in modes if all(faces_camera(points, cameras, view, mode.world_from_object).all()
                                               for view in views)]
     return _weighed(possible)
 
 
-def point_residual(points: ObjectPoints, cameras: CameraArrays, view: ObjectView, moving: bool = True) -> PointResidual:
-    """The residual of a view. Not `moving`: all its points count as taken at one instant."""
-    return PointResidual(points.points[view.rows], view.pixels, view.covariances + FLOOR_PX**2 * np.eye(2),
-                         view.late_s if moving else np.zeros_like(view.late_s), cameras.poses[view.camera],
-                         cameras.intrinsics[view.camera])
+def point_residual(points: ObjectPoints, cameras: CameraArrays, view: ObjectView, t_ns: int | None) -> PointResidual:
+    """The residual of a view by the state at `t_ns`; None: of an object at rest."""
+    late_s = np.zeros_like(view.late_s) if t_ns is None else view.late_s + 1e-9 * (view.t_ns - t_ns)
+    return PointResidual(points.points[view.rows], view.pixels, view.covariances + FLOOR_PX**2 * np.eye(2), late_s,
+                         cameras.poses[view.camera], cameras.intrinsics[view.camera])
 
 
 def faces_camera(points: ObjectPoints, cameras: CameraArrays, view: ObjectView, world_from_object: Array) -> Array:
@@ -175,36 +201,37 @@ def _triangulated_starts(points: ObjectPoints, cameras: CameraArrays, views: Seq
     return [fit_rigid(source, np.array(list(found.values())))]
 
 
-def _reversed(world_from_object: Array, seen: Array, centre: Array) -> Array:
-    """The pose whose `seen` points (K, 3), if they lie in a plane, look nearly the same from `centre` (3,): the plane
-    turned by half a turn about its normal, then about the line of sight (Necker's reversal)."""
+def reversed_state(points: ObjectPoints, cameras: CameraArrays, view: ObjectView, state: Array) -> Array:
+    """The state whose points in a view, if they lie in a plane, look nearly the same: the plane turned by half a turn
+    about its normal, then about the line of sight (Necker's reversal)."""
+    world_from_object, seen = pose_of(state), points.points[view.rows]
     middle = seen.mean(axis=0)
     normal = np.linalg.svd(seen - middle)[2][2]
-    sight = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - centre
+    sight = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - cameras.centres[view.camera]
     half_turns = [2.0 * np.outer(axis, axis) / (axis @ axis) - np.eye(3) for axis in (sight, normal)]
     rotation = half_turns[0] @ world_from_object[:3, :3] @ half_turns[1]
-    return rigid(rotation, world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - rotation @ middle)
+    translation = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - rotation @ middle
+    out = state_of(rigid(rotation, translation))
+    out[VELOCITY:VELOCITY + 3], out[VELOCITY + 3:] = state[VELOCITY:VELOCITY + 3], half_turns[0] @ state[VELOCITY + 3:]
+    return out
 
 
-def _cost(residuals: Sequence[PointResidual], state: Array) -> float:
-    return _linearised(residuals, state)[2]
-
-
-def _linearised(residuals: Sequence[PointResidual], state: Array) -> tuple[Array, Array, float]:
-    """Normal matrix (6, 6) and right side (6,) of a Gauss-Newton step, and the cost: infinite with a point behind the
+def _linearised(residuals: Sequence[PointResidual], priors: Sequence[Residual], state: Array,
+                size: int) -> tuple[Array, Array, float]:
+    """Normal matrix (n, n) and right side (n,) of a Gauss-Newton step, and the cost: infinite with a point behind the
     camera that sees it."""
     rows = [residual.linearise(state) for residual in residuals]
-    error, jacobian, variances, cost, _ = stack(rows, SIZE, weigh=True)
-    if len(error) < sum(2 * len(residual.pixels) for residual in residuals):
-        cost = np.inf
-    weighted = jacobian[:, :POSE] / variances[:, None]
-    return weighted.T @ jacobian[:, :POSE], weighted.T @ error, cost
+    missing = sum(len(one.error) for one in rows) < sum(2 * len(one.pixels) for one in residuals)
+    error, jacobian, variances, cost, _ = stack([*rows, *(one.linearise(state) for one in priors)], SIZE, weigh=True)
+    weighted = jacobian[:, :size] / variances[:, None]
+    return weighted.T @ jacobian[:, :size], weighted.T @ error, np.inf if missing else cost
 
 
-def _refine(residuals: Sequence[PointResidual], start: Array) -> Mode | None:
-    """The nearest minimum of the robust cost (Levenberg-Marquardt); None where it is not determined."""
-    process, state, damping = ObjectProcess(), state_of(start), _DAMPING
-    normal, side, cost = _linearised(residuals, state)
+def refine(residuals: Sequence[PointResidual], priors: Sequence[Residual], state: Array, size: int) -> Mode | None:
+    """The nearest minimum of the robust cost over the first `size` numbers of the tangent space (Levenberg-Marquardt);
+    None where it is not determined."""
+    process, damping = ObjectProcess(), _DAMPING
+    normal, side, cost = _linearised(residuals, priors, state, size)
     if not np.isfinite(cost):
         return None
     for _ in range(STEPS):
@@ -212,28 +239,22 @@ def _refine(residuals: Sequence[PointResidual], start: Array) -> Mode | None:
             step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), side)
         except np.linalg.LinAlgError:
             return None
-        trial = process.retract(state, np.concatenate([step, np.zeros(POSE)]))
+        trial = process.retract(state, np.concatenate([step, np.zeros(SIZE - len(step))]))
         last = float(step @ normal @ step) < CONVERGED**2
-        trial_normal, trial_side, reached = _linearised(residuals, trial)
+        trial_normal, trial_side, reached = _linearised(residuals, priors, trial, size)
         if reached <= cost:
             state, normal, side, cost, damping = trial, trial_normal, trial_side, reached, 0.3 * damping
-        if last:
-            break
-        if reached > cost:
+        else:
             damping *= 10.0
-            if damping > 1e9:
-                break
-    return _mode(residuals, state, normal, cost)
-
-
-def _mode(residuals: Sequence[PointResidual], state: Array, normal: Array, cost: float) -> Mode | None:
+        if last or damping > 1e9:
+            break
     try:
         covariance = np.linalg.inv(normal)
         np.linalg.cholesky(covariance)
     except np.linalg.LinAlgError:
         return None
     pixels = np.concatenate([one.pixels - one.predict(state)[0] for one in residuals])
-    return Mode(pose_of(state), 0.5 * (covariance + covariance.T), cost, len(pixels),
+    return Mode(state, 0.5 * (covariance + covariance.T), cost, len(pixels),
                 float(np.sqrt(np.mean(np.sum(pixels**2, axis=1)))))
 
 
@@ -242,26 +263,31 @@ def _add(modes: list[Mode], mode: Mode | None) -> None:
     if mode is None:
         return
     for number, other in enumerate(modes):
-        step = _difference(mode, other)
-        nearer = min(step @ np.linalg.solve(one.covariance, step) for one in (mode, other))
-        if nearer < SAME_POSE**2:
+        if same_pose(mode.state, mode.covariance, other.state, other.covariance):
             if mode.cost < other.cost:
                 modes[number] = mode
             return
     modes.append(mode)
 
 
-def _difference(mode: Mode, other: Mode) -> Array:
-    a, b = mode.world_from_object, other.world_from_object
-    return np.concatenate([a[:3, 3] - b[:3, 3], log_so3(a[:3, :3] @ b[:3, :3].T)])
+def same_pose(state: Array, covariance: Array, other: Array, other_covariance: Array) -> bool:
+    """Whether two minima are one: nearer than SAME_POSE standard deviations of either."""
+    step = ObjectProcess().difference(state, other)[:POSE]
+    return bool(min(step @ np.linalg.solve(one[:POSE, :POSE], step)
+                    for one in (covariance, other_covariance)) < SAME_POSE**2)
+
+
+def log_mass(mode: Mode) -> float:
+    """Logarithm of a mode's posterior mass, up to a constant: that of its Gaussian (Laplace's approximation)."""
+    return float(-0.5 * mode.cost + 0.5 * np.linalg.slogdet(mode.covariance)[1])
 
 
 def _weighed(modes: Sequence[Mode]) -> list[Mode]:
-    """With their probabilities by Laplace's approximation (the mass of each one's Gaussian), the greatest first."""
+    """With their probabilities, the greatest first."""
     if not modes:
         return []
-    logs = np.array([-0.5 * mode.cost + 0.5 * np.linalg.slogdet(mode.covariance)[1] for mode in modes])
+    logs = np.array([log_mass(mode) for mode in modes])
     shares = np.exp(logs - logs.max())
-    weighed = [Mode(mode.world_from_object, mode.covariance, mode.cost, mode.points, mode.rms_px,
-                    float(share)) for mode, share in zip(modes, shares / shares.sum(), strict=True)]
+    shares /= shares.sum()
+    weighed = [replace(mode, probability=float(share)) for mode, share in zip(modes, shares, strict=True)]
     return sorted(weighed, key=lambda mode: -mode.probability)

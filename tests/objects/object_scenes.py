@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import build_model
 from rhot_app.objects.object_file import ObjectModel, cube, plate
 from rhot_app.objects.observations import FiducialFrame
-from rhot_app.simulator.motion import load_motion
+from rhot_app.simulator.motion import Motion, load_motion
 from rhot_app.simulator.scene import make_scene, twin_defaults
 from rhot_node.files import resource_path
 
@@ -34,9 +36,13 @@ def wide_cameras() -> list[CameraModel]:
 
 def hand_poses(motion: str, times_s: Array) -> Array:
     """(N, 4, 4) world_from_object of an object in the twin's hand, 0.6 m before the cameras."""
+    return np.asarray(_motion(motion).sample(times_s)[0] @ PALM_FROM_OBJECT)
+
+
+@cache
+def _motion(name: str) -> Motion:
     model = build_model(load_hand(resource_path("hands", "right.json")))
-    moving = load_motion(motion, model, np.array([0.0375, 0.0, 0.6]), 1)
-    return np.asarray(moving.sample(times_s)[0] @ PALM_FROM_OBJECT)
+    return load_motion(name, model, np.array([0.0375, 0.0, 0.6]), 1)
 
 
 def facing_tags(model: ObjectModel, world_from_object: Array, camera: CameraModel, most_deg: float = 75.0) -> list[int]:

@@ -10,9 +10,9 @@ from object_scenes import hand_poses, wide_cameras
 
 from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
 from rhot_app.objects.motion import (
-    ACCELERATION,
-    ANGULAR_ACCELERATION,
+    RATE,
     SIZE,
+    START_SPEED,
     VELOCITY,
     CameraArrays,
     ObjectProcess,
@@ -96,8 +96,7 @@ def test_a_prediction_in_two_halves_is_that_in_one() -> None:
     once = process.predict(state, covariance, 0.02)
     halves = process.predict(*process.predict(state, covariance, 0.01), 0.01)
     np.testing.assert_allclose(halves[0], once[0], atol=1e-12)
-    np.testing.assert_allclose(halves[1][:3, :3], once[1][:3, :3], rtol=1e-9)
-    np.testing.assert_allclose(halves[1], once[1], rtol=0.1, atol=2e-3)  # rotations do not commute
+    np.testing.assert_allclose(np.diag(halves[1]), np.diag(once[1]), rtol=0.25)  # the noise grows with the speed
 
 
 def test_the_process_covers_the_fastest_hand() -> None:
@@ -105,7 +104,9 @@ def test_the_process_covers_the_fastest_hand() -> None:
     poses = hand_poses("fast", np.arange(0.0, 0.9, step_s))
     velocity = np.diff(poses[:, :3, 3], axis=0) / step_s
     spin = np.array([log_so3(b @ a.T) for a, b in zip(poses[:-1, :3, :3], poses[1:, :3, :3], strict=True)]) / step_s
-    accelerations = [np.linalg.norm(np.diff(rates, axis=0) / step_s, axis=1).max() for rates in (velocity, spin)]
-    print(f"fast: {accelerations[0]:.0f} m/s^2, {accelerations[1]:.0f} rad/s^2")
-    assert 0.5 * ACCELERATION < accelerations[0] < ACCELERATION
-    assert accelerations[1] < ANGULAR_ACCELERATION
+    for name, rates, start in zip(("m/s", "rad/s"), (velocity, spin), START_SPEED, strict=True):
+        fastest = np.linalg.norm(rates, axis=1).max()
+        strongest = np.linalg.norm(np.diff(rates, axis=0) / step_s, axis=1).max()
+        print(f"fast: {fastest:.1f} {name}, {strongest:.0f} {name}^2, {strongest / fastest:.1f} 1/s")
+        assert fastest < 2.5 * start
+        assert strongest < 1.1 * RATE * fastest
