@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.objects.object_file import ObjectModel
-from rhot_node.wire.fiducials import Fiducials
+from rhot_node.wire.messages import Fiducials
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

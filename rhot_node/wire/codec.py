@@ -8,10 +8,12 @@ from struct import error as struct_error
 
 from rhot_node.errors import WireError
 from rhot_node.wire.discovery import decode_find, decode_here, encode_find, encode_here
+from rhot_node.wire.fiducials import decode_fiducials, encode_fiducials, fiducials_fit
 from rhot_node.wire.marker_table import candidate_table, marker_table
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    Fiducials,
     Find,
     Here,
     MarkerFlag,
@@ -45,6 +47,7 @@ TYPE_START = 4
 TYPE_STOP = 5
 TYPE_FIND = 6
 TYPE_HERE = 7
+TYPE_FIDUCIALS = 8
 
 MARKERS_MAX = 64
 DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
@@ -56,6 +59,7 @@ _TAGGED = FLAG_TAGGED.to_bytes(2, "little")
 _OBSERVATIONS = Struct("<qqIIIHHIIB3s")
 _MARKER = Struct("<HHfffffff")
 CANDIDATES_FIT = (DATAGRAM_MAX - _HEADER.size - _OBSERVATIONS.size - TAG_LENGTH) // _MARKER.size
+FIDUCIALS_FIT = fiducials_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 _CLOCK_REQUEST = Struct("<q")
 _CLOCK_REPLY = Struct("<qqqIB3s")
 _START = Struct("<B3s")
@@ -175,6 +179,9 @@ def _encode(message: Message) -> bytes:
             return _header(TYPE_FIND, message.node_id, 0, message.sequence) + encode_find(message)
         case Here():
             return _header(TYPE_HERE, message.node_id, 0, message.sequence) + encode_here(message)
+        case Fiducials():
+            return (_header(TYPE_FIDUCIALS, message.node_id, message.session, message.sequence)
+                    + encode_fiducials(message, FIDUCIALS_FIT))
 
 
 def _header(kind: int, node_id: int, session: int, sequence: int, version: int = VERSION) -> bytes:
@@ -282,4 +289,5 @@ _DECODERS: dict[int, Callable[[memoryview, int, int, int], Message]] = {
     TYPE_STOP: _decode_stop,
     TYPE_FIND: decode_find,
     TYPE_HERE: decode_here,
+    TYPE_FIDUCIALS: decode_fiducials,
 }

@@ -94,7 +94,7 @@ def test_a_swaying_tag_is_ambiguous_at_most_and_ends_right(seed: int) -> None:
     sure = [state for state in states[4:] if state.validity is Validity.TRACKED]
     angles = np.degrees(errors(sure, poses)[1])
     wrong = angles > 10.0
-    print(f"{len(sure)} of {len(states) - 4} decided, {wrong.sum()} wrong, the others within {angles[~wrong].max():.1f} deg")
+    print(f"{len(sure)} of {len(states) - 4} sure, {wrong.sum()} wrong, the rest within {angles[~wrong].max():.1f} deg")
     assert len(sure) > 0.9 * len(states)
     assert wrong.mean() < 0.01
     assert not wrong[-1]
