@@ -147,3 +147,21 @@ def test_colour_markers_in_two_cameras_have_a_pose_and_in_one_have_none() -> Non
         errors.append(np.linalg.norm(found.world_from_object[:3, 3] - pose[:3, 3]))
         assert estimate_pose(points, ARRAYS, marker_views(points, model, pose, (0,), rng)) is None
     assert np.sqrt(np.mean(np.square(errors))) < 2.5e-3
+
+
+def test_a_small_plane_of_markers_may_be_ambiguous_and_says_so() -> None:
+    rng = np.random.default_rng(8)
+    model = ObjectModel("square", markers=tuple(ObjectMarker(name, place) for name, place in (
+        ("red", (-8.0, -8.0, 0.0)), ("green", (8.0, -8.0, 0.0)), ("blue", (8.0, 8.0, 0.0)),
+        ("pink", (-8.0, 8.0, 0.0)))))
+    points, ambiguous, surely_wrong = ObjectPoints(model), 0, 0
+    for _ in range(100):
+        pose = random_pose(rng, (8.0, 15.0))
+        found = estimate_pose(points, ARRAYS, marker_views(points, model, pose, (0, 1), rng))
+        assert found is not None
+        ambiguous += found.validity is Validity.AMBIGUOUS
+        tilt_sd = np.degrees(np.sqrt(np.trace(found.covariance[3:, 3:])))
+        surely_wrong += found.validity is Validity.TRACKED and angle_deg(found.world_from_object, pose) > 5.0 * tilt_sd
+    print(f"16 mm square of markers: {ambiguous} of 100 ambiguous, {surely_wrong} surely wrong")
+    assert ambiguous >= 5
+    assert surely_wrong <= 1
