@@ -38,6 +38,7 @@ SUBCOMMANDS = {
     "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),
     "check": Subcommand("rhot_app.calibration.commands.check", "check a rig file for what cannot be"),
     "hand": Subcommand("rhot_app.hand.hand_command", "look at a hand file, or make one of a given length"),
+    "object": Subcommand("rhot_app.objects.object_command", "check an object file, or find the object in still images"),
     "nodes": Subcommand("rhot_app.sources.nodes_command", "look for nodes on the network"),
     "pair": Subcommand("rhot_app.sources.pair_command", "pair with a node by the code that it shows"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),

@@ -9,6 +9,10 @@ class RigError(RhotError):
     """A rig, hand or motion file is missing, unreadable, or says something that cannot be."""
 
 
+class ObjectError(RhotError):
+    """An object file or a pose stream is unreadable or says something that cannot be, or no image shows the object."""
+
+
 class SourceError(RhotError):
     """A port is taken or a node cannot be reached."""
 

@@ -1,1 +1,1 @@
-"""Objects beside the hand: other trackers' worlds, shapes of objects, and contact with them."""
+"""Tracked objects: rigid bodies with tags or markers, other trackers' worlds, shapes, and contact with the hand."""

@@ -8,10 +8,12 @@ from struct import error as struct_error
 
 from rhot_node.errors import WireError
 from rhot_node.wire.discovery import decode_find, decode_here, encode_find, encode_here
+from rhot_node.wire.fiducials import decode_fiducials, encode_fiducials, fiducials_fit
 from rhot_node.wire.marker_table import candidate_table, marker_table
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    Fiducials,
     Find,
     Here,
     MarkerFlag,
@@ -24,6 +26,7 @@ from rhot_node.wire.messages import (
 )
 from rhot_node.wire.plausible import (
     expect_everybody,
+    expect_frame,
     expect_length,
     expect_node,
     expect_session,
@@ -44,12 +47,11 @@ TYPE_START = 4
 TYPE_STOP = 5
 TYPE_FIND = 6
 TYPE_HERE = 7
+TYPE_FIDUCIALS = 8
 
 MARKERS_MAX = 64
 DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
 FLAG_TRUNCATED = 1  # bit 0 of the observations' flags: there were more candidates than fit
-IMAGE_SIZE_MAX = 16384  # px
-FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
 
 _HEADER = Struct("<4sBBHIQI")
 _FLAGS_AT = 6  # offset of the header's flags
@@ -57,6 +59,7 @@ _TAGGED = FLAG_TAGGED.to_bytes(2, "little")
 _OBSERVATIONS = Struct("<qqIIIHHIIB3s")
 _MARKER = Struct("<HHfffffff")
 CANDIDATES_FIT = (DATAGRAM_MAX - _HEADER.size - _OBSERVATIONS.size - TAG_LENGTH) // _MARKER.size
+FIDUCIALS_FIT = fiducials_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 _CLOCK_REQUEST = Struct("<q")
 _CLOCK_REPLY = Struct("<qqqIB3s")
 _START = Struct("<B3s")
@@ -176,6 +179,9 @@ def _encode(message: Message) -> bytes:
             return _header(TYPE_FIND, message.node_id, 0, message.sequence) + encode_find(message)
         case Here():
             return _header(TYPE_HERE, message.node_id, 0, message.sequence) + encode_here(message)
+        case Fiducials():
+            return (_header(TYPE_FIDUCIALS, message.node_id, message.session, message.sequence)
+                    + encode_fiducials(message, FIDUCIALS_FIT))
 
 
 def _header(kind: int, node_id: int, session: int, sequence: int, version: int = VERSION) -> bytes:
@@ -222,11 +228,7 @@ def _decode_observations(payload: memoryview, node_id: int, session: int, sequen
     expect_zeros(reserved)
     if flags & ~FLAG_TRUNCATED:
         raise WireError("flags", f"unknown flags of observations {flags:#04x}")
-    expect_time(t_frame, t_send)
-    if not 0 <= t_send - t_frame <= FRAME_AGE_MAX_NS:
-        raise WireError("time", f"sent {(t_send - t_frame) / 1e9:.3f} s after its exposure")
-    if not (0 < width <= IMAGE_SIZE_MAX and 0 < height <= IMAGE_SIZE_MAX):
-        raise WireError("size", f"{width} x {height} px")
+    expect_frame(t_frame, t_send, width, height)
     read = candidate_table if version == OBSERVATIONS_VERSION else marker_table
     markers = read(bytes(payload[_OBSERVATIONS.size:]), count, width, height)
     return Observations(node_id, session, sequence, t_frame, t_send, processing, exposure, row_time, width, height,
@@ -287,4 +289,5 @@ _DECODERS: dict[int, Callable[[memoryview, int, int, int], Message]] = {
     TYPE_STOP: _decode_stop,
     TYPE_FIND: decode_find,
     TYPE_HERE: decode_here,
+    TYPE_FIDUCIALS: decode_fiducials,
 }

@@ -192,4 +192,46 @@ class Here:
     name: str
 
 
-Message = Observations | ClockRequest | ClockReply | Start | Stop | Find | Here
+FAMILIES = (
+    "DICT_4X4_50", "DICT_4X4_100", "DICT_4X4_250", "DICT_4X4_1000", "DICT_5X5_50", "DICT_5X5_100", "DICT_5X5_250",
+    "DICT_5X5_1000", "DICT_6X6_50", "DICT_6X6_100", "DICT_6X6_250", "DICT_6X6_1000", "DICT_7X7_50", "DICT_7X7_100",
+    "DICT_7X7_250", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_16h5", "DICT_APRILTAG_25h9",
+    "DICT_APRILTAG_36h10", "DICT_APRILTAG_36h11", "DICT_ARUCO_MIP_36h12")
+"""cv2.aruco's dictionaries; a family is an index into them, which is also cv2's own number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fiducial:
+    """One fiducial tag in one frame.
+
+    `family`: index into FAMILIES. `corners`: x and y of the four corners, px, raw image, in the order top left, top
+    right, bottom right, bottom left of the upright tag. `covariances`: xx, xy, yy of each corner, px^2.
+    """
+
+    family: int
+    number: int
+    corners: tuple[float, ...]
+    covariances: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Fiducials:
+    """All fiducial tags of one frame. Times and image size are as in `Observations`; a corner at row y is later than
+    `t_frame_node_ns` by y * `row_time_ns`. `truncated`: some did not fit the datagram."""
+
+    node_id: int
+    session: int
+    sequence: int
+    t_frame_node_ns: int
+    t_send_node_ns: int
+    processing_ns: int
+    exposure_ns: int
+    row_time_ns: int
+    width: int
+    height: int
+    frame_number: int
+    fiducials: Sequence[Fiducial]
+    truncated: bool = False
+
+
+Message = Observations | ClockRequest | ClockReply | Start | Stop | Find | Here | Fiducials

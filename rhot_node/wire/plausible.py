@@ -5,6 +5,8 @@ from __future__ import annotations
 from rhot_node.errors import WireError
 
 TIME_MAX_NS = 1 << 62  # the difference of two times must fit 64 bits
+FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
+IMAGE_SIZE_MAX = 16384  # px
 
 
 def expect_length(payload: memoryview, expected: int) -> None:
@@ -48,3 +50,12 @@ def expect_time(*times_ns: int) -> None:
     for time_ns in times_ns:
         if not -TIME_MAX_NS < time_ns < TIME_MAX_NS:
             raise WireError("time", f"{time_ns} ns")
+
+
+def expect_frame(t_frame_ns: int, t_send_ns: int, width: int, height: int) -> None:
+    """Times and image size of one frame. Raises WireError 'time' or 'size'."""
+    expect_time(t_frame_ns, t_send_ns)
+    if not 0 <= t_send_ns - t_frame_ns <= FRAME_AGE_MAX_NS:
+        raise WireError("time", f"sent {(t_send_ns - t_frame_ns) / 1e9:.3f} s after its exposure")
+    if not (0 < width <= IMAGE_SIZE_MAX and 0 < height <= IMAGE_SIZE_MAX):
+        raise WireError("size", f"{width} x {height} px")

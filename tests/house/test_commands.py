@@ -48,6 +48,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
         "--ruler", "--table-image", "--rig-from", "--out", "--json"),
     "rhot hand": ("HAND", "--length", "--proportions", "--side", "--name", "--rows", "--out", "--rig", "--draw",
                   "--json"),
+    "rhot object": ("FILE", "--images", "--rig", "--json"),
     "rhot nodes": ("--seconds", "--json"),
     "rhot pair": ("NODE", "--rig", "--port", "--code"),
     "rhot-node pair": ("--settings",),

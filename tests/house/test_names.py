@@ -24,7 +24,7 @@ ALLOWED = frozenset((
     "blind_share", "room_share", "share", "share_out", "measured_share", "known_share", "MARKER_SHARE",
     "share_interpreter",  # of processor time
     "moments",  # of a distribution
-    "STAGE_COLOURS", "LATENCY_STAGES", "stages", "choose_stage",  # of a pipeline
+    "STAGE_COLOURS", "LATENCY_STAGES", "stages", "choose_stage", "spans_plane",  # of a pipeline
     "passing_px"))
 """Names in which such a word has its ordinary sense."""
 

@@ -15,6 +15,8 @@ from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    Fiducial,
+    Fiducials,
     Find,
     Here,
     MarkerFlag,
@@ -55,9 +57,17 @@ def candidates(draw: st.DrawFn, count: int) -> tuple[MarkerObservation, ...]:
 
 
 @st.composite
+def fiducials(draw: st.DrawFn) -> Fiducial:
+    corners = [draw(st.floats(-64, 543, width=32)) for _ in range(8)]
+    spread = [draw(st.floats(0.0009765625, 64.0, width=32)) for _ in range(4)]
+    return Fiducial(draw(st.integers(0, 21)), draw(st.integers(0, 65535)), tuple(corners),
+                    tuple(value for one in spread for value in (one, 0.5 * one, one)))
+
+
+@st.composite
 def messages(draw: st.DrawFn) -> Message:
     node_id, session, sequence = draw(st.integers(1, 2**32 - 1)), draw(st.integers(1, 2**64 - 1)), draw(u32)
-    match draw(st.integers(1, 7)):
+    match draw(st.integers(1, 8)):
         case 1:
             t_frame = draw(st.integers(-(2**61), 2**61))
             count = draw(st.integers(0, 12))
@@ -79,6 +89,11 @@ def messages(draw: st.DrawFn) -> Message:
             name = draw(st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=64))
             return Here(node_id, sequence, draw(u64), draw(u32), *(draw(st.integers(1, 65535)) for _ in range(4)),
                         draw(st.sampled_from(NodeState)), draw(st.sampled_from(TrustState)), name)
+        case 7:
+            t_frame = draw(st.integers(-(2**61), 2**61))
+            return Fiducials(node_id, session, sequence, t_frame, t_frame + draw(st.integers(0, 60 * 10**9)), draw(u32),
+                             draw(u32), draw(u32), 640, 480, draw(u32),
+                             tuple(draw(st.lists(fiducials(), max_size=16))), draw(st.booleans()))
         case _:
             return Stop(session, sequence)
 

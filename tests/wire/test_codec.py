@@ -11,13 +11,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wire_samples import KEY, PACKETS, SAMPLES, SESSION, SIX, TAGGED, VERSION_1, found, lost, observations, packet
+from wire_samples import (
+    KEY,
+    PACKETS,
+    SAMPLES,
+    SESSION,
+    SIX,
+    TAGGED,
+    VERSION_1,
+    fiducial,
+    fiducials,
+    found,
+    lost,
+    observations,
+    packet,
+)
 
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import asks_who_is_there, decode, decode_sealed, encode
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockRequest,
+    Fiducials,
     Find,
     MarkerFlag,
     MarkerObservation,
@@ -115,7 +130,7 @@ HEADER_FAULTS: list[Fault] = [
     (0, "<4s", (b"rhot",), "magic"),
     (4, "<B", (3,), "version"),
     (5, "<B", (0,), "type"),
-    (5, "<B", (8,), "type"),
+    (5, "<B", (9,), "type"),
     (6, "<H", (1,), "tag"),
     (6, "<H", (2,), "flags"),
     (6, "<H", (0x8001,), "flags"),
@@ -176,6 +191,20 @@ OTHER_FAULTS = [
     ("here", 46, "<H", (4,), "length"),
     ("here", 48, "<B", (27,), "range"),  # an escape sequence is no name
     ("here", 48, "<B", (255,), "range"),  # nor is what is not UTF-8
+    ("fiducials_two", 8, "<I", (0,), "header"),
+    ("fiducials_two", 12, "<Q", (0,), "header"),
+    ("fiducials_two", 32, "<q", (3_599_999_999_999,), "time"),  # sent before it was exposed
+    ("fiducials_two", 52, "<H", (0,), "size"),
+    ("fiducials_two", 60, "<B", (1,), "length"),
+    ("fiducials_two", 61, "<B", (2,), "flags"),
+    ("fiducials_two", 62, "<B", (1,), "reserved"),
+    ("fiducials_two", 64, "<B", (22,), "index"),
+    ("fiducials_two", 65, "<B", (1,), "reserved"),
+    ("fiducials_two", 68, "<f", (704.0,), "marker"),
+    ("fiducials_two", 72, "<f", (math.nan,), "marker"),
+    ("fiducials_two", 100, "<f", (0.0,), "marker"),
+    ("fiducials_two", 104, "<f", (1.0,), "marker"),  # not positive semi-definite
+    ("fiducials_two", 108, "<f", (math.inf,), "marker"),
     ("here_longest_name", 48, "<4s", (b"abcd",), "range"),  # more than 64 characters
 ]
 
@@ -234,6 +263,15 @@ def test_columns_say_what_the_markers_say() -> None:
         assert covariance.tolist() == [[marker.cov_xx, marker.cov_xy], [marker.cov_xy, marker.cov_yy]]
         assert (diameter, quality, bits) == (marker.diameter, marker.quality, marker.flags)
     assert message.markers[1:3] == list(message.markers)[1:3]
+
+
+def test_fiducials_that_do_not_fit_an_ethernet_frame_are_left_out() -> None:
+    many = fiducials(tuple(fiducial(3, k, 1.0, 2.0) for k in range(20)))
+    data = encode(many, Seal(KEY))
+    message = decode_sealed(data, Seal(KEY))
+    assert len(data) <= 1472
+    assert isinstance(message, Fiducials)
+    assert message.truncated and tuple(message.fiducials) == tuple(many.fiducials[:16])
 
 
 def test_an_answer_is_never_longer_than_its_question() -> None:

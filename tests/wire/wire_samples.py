@@ -10,6 +10,8 @@ from rhot_node.wire.messages import (
     NO_FLAGS,
     ClockReply,
     ClockRequest,
+    Fiducial,
+    Fiducials,
     Find,
     Here,
     MarkerFlag,
@@ -49,6 +51,18 @@ def observations(markers: tuple[MarkerObservation, ...], sequence: int = 7) -> O
         width=640, height=480, frame_number=41, marker_checksum=RHOT6_CHECKSUM, markers=markers)
 
 
+def fiducial(family: int, number: int, x: float, y: float, side: float = 32.0) -> Fiducial:
+    return Fiducial(family, number, (x, y, x + side, y + 0.5, x + side - 0.25, y + side, x - 0.5, y + side + 0.125),
+                    (0.0009765625, -0.000244140625, 0.001953125) * 4)
+
+
+def fiducials(found: tuple[Fiducial, ...], truncated: bool = False) -> Fiducials:
+    return Fiducials(
+        node_id=2, session=SESSION, sequence=7, t_frame_node_ns=FRAME_NS, t_send_node_ns=FRAME_NS + 27_000_000,
+        processing_ns=1_500_000, exposure_ns=4_000_000, row_time_ns=48_000, width=640, height=480, frame_number=41,
+        fiducials=found, truncated=truncated)
+
+
 SIX = tuple(found(i, 100.5 + 64.25 * i, 200.125 - 8.5 * i) for i in range(6))
 
 SAMPLES: dict[str, Message] = {
@@ -79,6 +93,9 @@ SAMPLES: dict[str, Message] = {
                  TrustState.PAIRED, "right"),
     "here_longest_name": Here(2**32 - 1, 2**32 - 1, 2**64 - 1, 1, 1, 65535, 2, 3, NodeState.FAULT, TrustState.OPEN,
                               "\U0001d4d7" * 64),
+    "fiducials_none": fiducials(()),
+    "fiducials_two": fiducials((fiducial(20, 586, 100.5, 200.125), fiducial(0, 49, -3.5, 440.25))),
+    "fiducials_truncated": fiducials(tuple(fiducial(3, 999 - k, 30.0 * k, 20.5 * k) for k in range(16)), True),
 }
 
 SIXTY_FOUR = observations(tuple(found(i, 8.0 * i, 4.0 * i) for i in range(64)), 2**32 - 1)

@@ -1,0 +1,280 @@
+"""How a tracked object moves, and where its points are seen: a constant-velocity process on SE(3) and its residuals.
+
+A state is 18 numbers: world_from_object (3, 4) row by row, then the velocity of the object's origin, m/s, and its
+angular velocity, rad/s, both along the world's axes. Its tangent space has 12: translation and rotation about the
+object's origin, world axes, then the changes of the two velocities.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.estimation.residual import UNIT, Kernel, Rows, student
+from rhot_app.geometry.camera import CameraModel, distort
+from rhot_app.geometry.transforms import log_so3
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+POSE, SIZE, STATE, VELOCITY = 6, 12, 18, 12
+"""Numbers of a pose's tangent space, of a state's, and of a state; where its velocity begins."""
+
+REST_ACCELERATION = 0.3, 5.0
+"""m/s^2 and rad/s^2 rms: accelerations of a held object at rest (`python benchmarks/object_motion.py`)."""
+
+RATE = 20.0
+"""1/s: rms acceleration over speed of a moving object. The twin's motion `fast` reaches 37 m/s^2 at 2 m/s; recorded
+objects have 11 to 20 1/s at their highest speeds (`python benchmarks/object_motion.py`)."""
+
+START_SPEED = 1.0, 5.0
+"""m/s and rad/s: standard deviations of an object's velocity as it is first seen, half of the speed of the fastest hand
+(the twin's motion `fast`)."""
+
+CORNER_KERNEL = student(4.0)
+"""Corners have heavy tails: fingers cut them. 4 degrees of freedom (Lange, Little and Taylor 1989)."""
+
+NEAREST_M = 0.02
+"""m: nearer to a camera's plane than its housing, nothing is seen."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraArrays:
+    """C cameras: `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 9) as `CameraModel`; `centres` (C, 3) m."""
+
+    poses: Array
+    intrinsics: Array
+    centres: Array
+
+    @classmethod
+    def of(cls, cameras: list[CameraModel]) -> CameraArrays:
+        """The arrays of camera models."""
+        return cls(np.array([one.camera_from_world[:3] for one in cameras]),
+                   np.array([one.intrinsics for one in cameras]), np.array([one.centre for one in cameras]))
+
+
+def state_of(world_from_object: Array) -> Array:
+    """(18,) the state at a pose (4, 4), at rest."""
+    return np.concatenate([world_from_object[:3].ravel(), np.zeros(6)])
+
+
+def pose_of(state: Array) -> Array:
+    """(4, 4) world_from_object of a state."""
+    return np.vstack([state[:VELOCITY].reshape(3, 4), np.eye(4)[3]])
+
+
+class ObjectProcess:
+    """Implements `estimation.residual.Process`: white acceleration that is the stronger, the faster the object moves.
+
+    An acceleration of variance s^2 along each axis and correlation time 1 / RATE is white noise of spectral density
+    2 s^2 / RATE at longer times (Singer 1970). Its mean square is that at rest plus RATE^2 times the expected square of
+    the speed, whose variance counts up to START_SPEED's.
+    """
+
+    size = SIZE
+
+    def retract(self, state: Array, step: Array) -> Array:
+        """The state moved by `step` (12,)."""
+        return np.asarray(_retract(state, step))
+
+    def difference(self, state: Array, origin: Array) -> Array:
+        """(12,) the step from `origin` to `state`."""
+        to, frm = state[:VELOCITY].reshape(3, 4), origin[:VELOCITY].reshape(3, 4)
+        return np.concatenate([to[:, 3] - frm[:, 3], log_so3(to[:, :3] @ frm[:, :3].T),
+                               state[VELOCITY:] - origin[VELOCITY:]])
+
+    def predict(self, state: Array, covariance: Array, dt_s: float) -> tuple[Array, Array]:
+        """State and covariance (12, 12) after `dt_s`."""
+        move = self.transition(state, dt_s)
+        noise = np.zeros((SIZE, SIZE))
+        for first, rest, start in zip((0, 3), REST_ACCELERATION, START_SPEED, strict=True):
+            speed = state[VELOCITY + first:VELOCITY + first + 3]
+            spread = np.trace(covariance[POSE + first:POSE + first + 3, POSE + first:POSE + first + 3])
+            square = rest**2 + RATE**2 * (speed @ speed + min(spread, 3.0 * start**2))
+            density = 2.0 / RATE * square / 3.0
+            for axis in range(first, first + 3):
+                noise[axis, axis] = density * dt_s**3 / 3.0
+                noise[axis, axis + POSE] = noise[axis + POSE, axis] = density * dt_s**2 / 2.0
+                noise[axis + POSE, axis + POSE] = density * dt_s
+        moved = _retract(state, np.concatenate([dt_s * state[VELOCITY:], np.zeros(POSE)]))
+        return moved, move @ covariance @ move.T + noise
+
+    def transition(self, state: Array, dt_s: float) -> Array:
+        """(12, 12) Jacobian of `predict`'s state by `state`."""
+        turn, left = np.empty((3, 3)), np.empty((3, 3))
+        _exponential(dt_s * state[15], dt_s * state[16], dt_s * state[17], turn, left)
+        move = np.eye(SIZE)
+        move[0:3, 6:9] = dt_s * np.eye(3)
+        move[3:6, 3:6] = turn
+        move[3:6, 9:12] = dt_s * left
+        return move
+
+    def remembered(self, state: Array) -> Array:
+        """(12, 12): everything is carried on."""
+        return np.eye(SIZE)
+
+
+class PointResidual:
+    """Image points of an object in one camera; implements `estimation.residual.Residual`.
+
+    `points` (K, 3) m, object frame, with `pixels` (K, 2), `covariances` (K, 2, 2) px^2 and `late_s` (K,), each point's
+    time less the state's. `pose` (3, 4) camera_from_world, `intrinsics` (9,).
+    """
+
+    def __init__(self, points: Array, pixels: Array, covariances: Array, late_s: Array, pose: Array, intrinsics: Array,
+                 kernel: Kernel = CORNER_KERNEL) -> None:
+        self.points, self.pixels, self.covariances, self.late_s = points, pixels, covariances, late_s
+        self.pose, self.intrinsics, self._kernel = pose, intrinsics, kernel
+        self.whitening = np.linalg.inv(np.linalg.cholesky(covariances))
+
+    def predict(self, state: Array) -> tuple[Array, Array]:
+        """Pixels (K, 2), NaN behind the camera, and their Jacobians (K, 2, 12)."""
+        pixels, jacobian = np.empty((len(self.points), 2)), np.empty((len(self.points), 2, SIZE))
+        _project(state, self.points, self.late_s, self.pose, self.intrinsics, pixels, jacobian)
+        return pixels, jacobian
+
+    def linearise(self, state: Array) -> Rows:
+        """Two rows for each point before the camera, by standard deviations."""
+        pixels, jacobian = self.predict(state)
+        ahead = np.isfinite(pixels[:, 0])
+        whitening = self.whitening[ahead]
+        error = (whitening @ (self.pixels - pixels)[ahead, :, None]).ravel()
+        return Rows(error, (whitening @ jacobian[ahead]).reshape(-1, SIZE), UNIT, self._kernel,
+                    np.arange(0, len(error), 2))
+
+    def only(self, chosen: NDArray[np.bool_]) -> PointResidual:
+        """With the chosen points only."""
+        return PointResidual(self.points[chosen], self.pixels[chosen], self.covariances[chosen], self.late_s[chosen],
+                             self.pose, self.intrinsics, self._kernel)
+
+
+class VelocityPrior:
+    """An object that is first seen moves by START_SPEED; implements `estimation.residual.Residual`."""
+
+    def linearise(self, state: Array) -> Rows:
+        """Six rows, by standard deviations."""
+        scale = 1.0 / np.repeat(START_SPEED, 3)
+        return Rows(-scale * state[VELOCITY:], np.hstack([np.zeros((POSE, POSE)), np.diag(scale)]), UNIT,
+                    first=np.zeros(1, np.int64))
+
+
+@dataclass(frozen=True, slots=True)
+class StatePrior:
+    """A prediction: `state` (18,) with `covariance` (12, 12); implements `estimation.residual.Residual`."""
+
+    state: Array
+    covariance: Array
+
+    def linearise(self, state: Array) -> Rows:
+        """Twelve rows; their Jacobian is 1 to first order in the deviation."""
+        return Rows(ObjectProcess().difference(self.state, state), np.eye(SIZE), self.covariance,
+                    first=np.zeros(1, np.int64))
+
+
+@dataclass(frozen=True, slots=True)
+class PoseResidual:
+    """A pose that another tracker measured; implements `estimation.residual.Residual`.
+
+    `world_from_object` (4, 4); `covariance` (6, 6) m^2 and rad^2, translation, then rotation, world axes.
+    """
+
+    world_from_object: Array
+    covariance: Array
+
+    def linearise(self, state: Array) -> Rows:
+        """Six rows: translation, m, and rotation, rad.
+
+        The rotation's error is log(R_measured R^T); its Jacobian by the state is the inverse right one, 1 to first
+        order in an error that a gate keeps small.
+        """
+        pose = state[:VELOCITY].reshape(3, 4)
+        error = np.concatenate([self.world_from_object[:3, 3] - pose[:, 3],
+                                log_so3(self.world_from_object[:3, :3] @ pose[:, :3].T)])
+        return Rows(error, np.eye(POSE, SIZE), self.covariance, first=np.zeros(1, np.int64))
+
+
+@njit(cache=True)
+def _exponential(x: float, y: float, z: float, turn: Array, left: Array) -> None:
+    """Fill the rotation (3, 3) of a rotation vector, rad, and its left Jacobian (3, 3)."""
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < 1e-4:
+        a, b, c = 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    else:
+        a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+        c = (1.0 - a) / square
+    vector = (x, y, z)
+    cross = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+    for i in range(3):
+        for j in range(3):
+            outer = vector[i] * vector[j]
+            same = 1.0 if i == j else 0.0
+            turn[i, j] = same * (1.0 - b * square) + a * cross[i][j] + b * outer
+            left[i, j] = same * (1.0 - c * square) + b * cross[i][j] + c * outer
+
+
+@njit(cache=True)
+def _retract(state: Array, step: Array) -> Array:
+    """The state moved by a step of its tangent space."""
+    turn, left, out = np.empty((3, 3)), np.empty((3, 3)), state.copy()
+    _exponential(step[3], step[4], step[5], turn, left)
+    for i in range(3):
+        for j in range(3):
+            out[4 * i + j] = 0.0
+            for k in range(3):
+                out[4 * i + j] += turn[i, k] * state[4 * k + j]
+        out[4 * i + 3] += step[i]
+    for i in range(6):
+        out[12 + i] += step[6 + i]
+    return out
+
+
+@njit(cache=True)
+def _project(state: Array, points: Array, late_s: Array, pose: Array, intrinsics: Array, pixels: Array,
+             jacobian: Array) -> None:
+    """Fill `pixels` (K, 2) and `jacobian` (K, 2, 12) of points seen `late_s` (K,) after the state's instant."""
+    turn, left, by_world, by_place = np.empty((3, 3)), np.empty((3, 3)), np.empty((2, 3)), np.empty((3, 12))
+    arm, here, y = np.empty(3), np.empty(3), np.empty(3)
+    for n in range(points.shape[0]):
+        late = late_s[n]
+        _exponential(late * state[15], late * state[16], late * state[17], turn, left)
+        for i in range(3):
+            y[i] = state[4 * i] * points[n, 0] + state[4 * i + 1] * points[n, 1] + state[4 * i + 2] * points[n, 2]
+        for i in range(3):
+            arm[i] = turn[i, 0] * y[0] + turn[i, 1] * y[1] + turn[i, 2] * y[2]
+        for i in range(3):
+            here[i] = pose[i, 3]
+            for k in range(3):
+                here[i] += pose[i, k] * (state[4 * k + 3] + late * state[12 + k] + arm[k])
+        if here[2] < NEAREST_M:
+            pixels[n, :] = math.nan
+            jacobian[n, :, :] = math.nan
+            continue
+        u, v = here[0] / here[2], here[1] / here[2]
+        xd, yd, xx, xy, yx, yy = distort(u, v, intrinsics[4:9])
+        pixels[n, 0] = intrinsics[0] * xd + intrinsics[2]
+        pixels[n, 1] = intrinsics[1] * yd + intrinsics[3]
+        for k in range(3):
+            du, dv = (pose[0, k] - u * pose[2, k]) / here[2], (pose[1, k] - v * pose[2, k]) / here[2]
+            by_world[0, k] = intrinsics[0] * (xx * du + xy * dv)
+            by_world[1, k] = intrinsics[1] * (yx * du + yy * dv)
+        for k in range(3):  # the place's change: translation, -[arm]x turn, velocity, -[arm]x left late
+            for i in range(3):
+                by_place[i, k] = 1.0 if i == k else 0.0
+                by_place[i, 6 + k] = late if i == k else 0.0
+            tx, ty, tz = turn[0, k], turn[1, k], turn[2, k]
+            by_place[0, 3 + k] = ty * arm[2] - tz * arm[1]
+            by_place[1, 3 + k] = tz * arm[0] - tx * arm[2]
+            by_place[2, 3 + k] = tx * arm[1] - ty * arm[0]
+            lx, ly, lz = late * left[0, k], late * left[1, k], late * left[2, k]
+            by_place[0, 9 + k] = ly * arm[2] - lz * arm[1]
+            by_place[1, 9 + k] = lz * arm[0] - lx * arm[2]
+            by_place[2, 9 + k] = lx * arm[1] - ly * arm[0]
+        for axis in range(2):
+            for k in range(12):
+                jacobian[n, axis, k] = (by_world[axis, 0] * by_place[0, k] + by_world[axis, 1] * by_place[1, k]
+                                        + by_world[axis, 2] * by_place[2, k])

@@ -1,0 +1,302 @@
+"""Tracks of several objects: every camera frame updates an iterated Kalman filter at its own time.
+
+An ambiguous start is followed as several hypotheses until the frames decide (a multiple-model estimator with static
+models; Bar-Shalom, Li and Kirubarajan 2001, 11.6.2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.estimation.filter import IteratedFilter, Knot
+from rhot_app.estimation.residual import Residual
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.objects.motion import POSE, SIZE, VELOCITY, CameraArrays, ObjectProcess, StatePrior, pose_of
+from rhot_app.objects.object_file import ObjectModel, require_distinct
+from rhot_app.objects.observations import FiducialFrame, MarkerPoints, ObjectPoints, ObjectView
+from rhot_app.objects.pose import (
+    AMBIGUOUS,
+    Mode,
+    Validity,
+    faces_camera,
+    find_modes,
+    log_mass,
+    point_residual,
+    refine,
+    reversed_state,
+    same_pose,
+)
+
+Array = NDArray[np.float64]
+
+GATE_2, GATE_6 = 13.816, 22.458
+"""Squared Mahalanobis distance of an innovation of 2 and of 6 numbers from which on it is rejected: 99.9 % quantiles of
+chi-squared."""
+
+REJECTIONS = 3
+"""Frames rejected in a row that are no outliers: most corners of three frames are rejected with a chance of 1e-9."""
+
+PREDICTED_AFTER_NS, LOST_AFTER_NS = 100_000_000, 500_000_000
+"""No accepted observation for so long: the state is predicted, and lost (as a hand, `estimator.LOST_AFTER_NS`)."""
+
+FORGET = 1e-4
+"""Probability under which a hypothesis is dropped: a hundredth of an ambiguous one's."""
+
+EXCLUDED = -2.0 * math.log(FORGET)
+"""Squared Mahalanobis distance from a prediction beyond which a second hypothesis is as improbable."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectState:
+    """An object at one instant, in the rig frame.
+
+    `world_from_object` (4, 4) m. `covariance` (6, 6) m^2 and rad^2: translation, then rotation about the object's
+    origin, world axes. `velocity` (6,): of the origin, m/s, and angular, rad/s, world axes. All NaN unless `tracked`.
+    """
+
+    name: str
+    t_master_ns: int
+    validity: Validity
+    world_from_object: Array
+    covariance: Array
+    velocity: Array
+
+    @property
+    def tracked(self) -> bool:
+        """Whether there is a pose."""
+        return self.validity not in (Validity.SEARCHING, Validity.LOST)
+
+
+@dataclass(frozen=True, slots=True)
+class Gated:
+    """A measurement's part that a prediction accepts: `residual`, None when it is rejected, and its -2 log likelihood
+    `cost` under the prediction."""
+
+    residual: Residual | None
+    cost: float
+
+
+class Measurement(Protocol):
+    """What a track takes: image points of one frame, or another tracker's pose."""
+
+    @property
+    def t_ns(self) -> int:
+        """Master time."""
+        ...
+
+    def modes(self) -> list[Mode]:
+        """The states that it determines without a prediction, the most probable first."""
+        ...
+
+    def gate(self, state: Array, covariance: Array) -> Gated:
+        """What a predicted state with covariance (12, 12) accepts of it."""
+        ...
+
+    def pair(self, state: Array, prediction: tuple[Array, Array]) -> tuple[Mode, Mode] | None:
+        """The estimate at `state` and another one that explains measurement and prediction; None without another."""
+        ...
+
+
+class PointMeasurement:
+    """Image points of one object in one frame. `others`: the newest views of other cameras, for objects that one camera
+    does not determine."""
+
+    def __init__(self, points: ObjectPoints, cameras: CameraArrays, view: ObjectView,
+                 others: Sequence[ObjectView] = ()) -> None:
+        self._points, self._cameras, self._view, self._others = points, cameras, view, others
+
+    @property
+    def t_ns(self) -> int:
+        """Master time of the points' mean row."""
+        return self._view.t_ns
+
+    def modes(self) -> list[Mode]:
+        """By this view alone, else with the other cameras' newest ones."""
+        alone = find_modes(self._points, self._cameras, [self._view], moving=True)
+        return alone or find_modes(self._points, self._cameras, [self._view, *self._others], moving=True)
+
+    def gate(self, state: Array, covariance: Array) -> Gated:
+        """The points within GATE_2 whose tags face the camera; nothing when these are less than half."""
+        residual = point_residual(self._points, self._cameras, self._view, self._view.t_ns)
+        pixels, jacobian = residual.predict(state)
+        whitened = residual.whitening @ jacobian
+        error = (residual.whitening @ (residual.pixels - pixels)[:, :, None])[:, :, 0]
+        total = whitened @ covariance @ whitened.swapaxes(1, 2) + np.eye(2)
+        accepted = faces_camera(self._points, self._cameras, self._view, pose_of(state)) & np.isfinite(error[:, 0])
+        distances = np.full(len(error), np.inf)
+        distances[accepted] = np.einsum("ki,ki->k", error[accepted],
+                                        np.linalg.solve(total[accepted], error[accepted][:, :, None])[:, :, 0])
+        accepted &= distances <= GATE_2
+        count = np.count_nonzero(accepted)
+        if 2 * count < len(error):
+            return Gated(None, GATE_2 * len(error))
+        cost = _innovation_cost(error[accepted].ravel(), whitened[accepted].reshape(2 * count, -1), covariance)
+        return Gated(residual.only(accepted), cost + GATE_2 * (len(error) - count))
+
+
+    def pair(self, state: Array, prediction: tuple[Array, Array]) -> tuple[Mode, Mode] | None:
+        """The estimate and its reversal, if the prediction does not exclude that: a tag's tilt may be taken for the
+        opposite one as it goes through the frontal pose."""
+        other = reversed_state(self._points, self._cameras, self._view, state)
+        step = ObjectProcess().difference(other, prediction[0])[:POSE]
+        if step @ np.linalg.solve(prediction[1][:POSE, :POSE], step) > EXCLUDED:
+            return None
+        residuals = [point_residual(self._points, self._cameras, self._view, self._view.t_ns)]
+        found = [refine(residuals, [StatePrior(*prediction)], start, SIZE) for start in (state, other)]
+        if found[0] is None or found[1] is None or same_pose(found[0].state, found[0].covariance, found[1].state,
+                                                             found[1].covariance):
+            return None
+        return found[0], found[1]
+
+
+def _innovation_cost(error: Array, jacobian: Array, covariance: Array) -> float:
+    """-2 log likelihood, up to a constant, of a whitened innovation (K,) with `jacobian` (K, 12)."""
+    total = jacobian @ covariance @ jacobian.T + np.eye(len(error))
+    return float(error @ np.linalg.solve(total, error) + np.linalg.slogdet(total)[1])
+
+
+@dataclass(slots=True)
+class _Hypothesis:
+    filter: IteratedFilter
+    log_weight: float
+
+
+class Track:
+    """The track of one object: it appears, is lost, and returns."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self._process = name, ObjectProcess()
+        self._hypotheses: list[_Hypothesis] = []
+        self._epoch_ns = self._accepted_ns = 0
+        self._rejected, self._ever = 0, False
+
+    def take(self, measurement: Measurement) -> bool:
+        """Weigh a measurement; whether it was accepted. One from before the oldest knot is not."""
+        t_ns = measurement.t_ns
+        if self._hypotheses and t_ns - self._accepted_ns > LOST_AFTER_NS:
+            self._hypotheses.clear()
+        if not self._hypotheses:
+            return self._start(measurement)
+        t_s = 1e-9 * (t_ns - self._epoch_ns)
+        if t_s < self._hypotheses[0].filter.knots[0].t_s:
+            return False
+        if self._update(measurement, t_s):
+            self._accepted_ns, self._rejected = max(self._accepted_ns, t_ns), 0
+            return True
+        self._rejected += 1
+        return self._rejected >= REJECTIONS and self._start(measurement)
+
+    def state(self, t_ns: int) -> ObjectState:
+        """The state at master time `t_ns`, or at the newest measurement's if that is later."""
+        if self._hypotheses and t_ns - self._accepted_ns > LOST_AFTER_NS:
+            self._hypotheses.clear()
+        if not self._hypotheses:
+            return ObjectState(self.name, t_ns, Validity.LOST if self._ever else Validity.SEARCHING,
+                               np.full((4, 4), np.nan), np.full((POSE, POSE), np.nan), np.full(POSE, np.nan))
+        best = self._hypotheses[0]
+        t_s = max(1e-9 * (t_ns - self._epoch_ns), best.filter.newest.t_s)
+        state, covariance = best.filter.predict(t_s)
+        validity = Validity.TRACKED
+        if len(self._hypotheses) > 1 and math.exp(self._hypotheses[1].log_weight) >= AMBIGUOUS:
+            validity = Validity.AMBIGUOUS
+        elif t_ns - self._accepted_ns > PREDICTED_AFTER_NS:
+            validity = Validity.PREDICTED
+        return ObjectState(self.name, self._epoch_ns + round(1e9 * t_s), validity, pose_of(state),
+                           covariance[:POSE, :POSE], state[VELOCITY:])
+
+    def _start(self, measurement: Measurement) -> bool:
+        modes = measurement.modes()
+        if not modes:
+            return False
+        self._epoch_ns = self._accepted_ns = measurement.t_ns
+        self._rejected, self._ever = 0, True
+        self._hypotheses.clear()
+        for mode in modes:
+            started = IteratedFilter(self._process)
+            started.start(0.0, mode.state, mode.covariance)
+            self._hypotheses.append(_Hypothesis(started, math.log(max(mode.probability, 1e-300))))
+        self._normalise()
+        return True
+
+    def _update(self, measurement: Measurement, t_s: float) -> bool:
+        """Update every hypothesis that accepts the measurement, and drop the others; False, and nothing is changed,
+        when none does."""
+        accepting = []
+        for hypothesis in self._hypotheses:
+            prediction = hypothesis.filter.predict(t_s)
+            gated = measurement.gate(*prediction)
+            if gated.residual is not None:
+                accepting.append((hypothesis, gated, prediction))
+        kept: list[_Hypothesis] = []
+        for hypothesis, gated, prediction in accepting:
+            assert gated.residual is not None
+            try:
+                knot = hypothesis.filter.add(t_s, [gated.residual], prediction)
+            except np.linalg.LinAlgError:  # the estimate contradicts itself
+                continue
+            hypothesis.log_weight -= 0.5 * gated.cost
+            kept.append(hypothesis)
+            if len(accepting) == 1 and knot is hypothesis.filter.newest:
+                kept += self._second(measurement, hypothesis, knot, prediction)
+        if not kept:
+            return False
+        self._hypotheses = kept
+        self._normalise()
+        return True
+
+    def _second(self, measurement: Measurement, first: _Hypothesis, knot: Knot,
+                prediction: tuple[Array, Array]) -> list[_Hypothesis]:
+        """Another hypothesis that explains the measurement at `knot` as well, if there is one."""
+        pair = measurement.pair(knot.state, prediction)
+        if pair is None:
+            return []
+        second = IteratedFilter(self._process)
+        second.start(knot.t_s, pair[1].state, pair[1].covariance)
+        return [_Hypothesis(second, first.log_weight + log_mass(pair[1]) - log_mass(pair[0]))]
+
+    def _normalise(self) -> None:
+        """Let the weights sum to 1, order by them, and forget what is too improbable."""
+        logs = np.array([hypothesis.log_weight for hypothesis in self._hypotheses])
+        logs -= logs.max() + math.log(np.exp(logs - logs.max()).sum())
+        for hypothesis, log_weight in zip(self._hypotheses, logs, strict=True):
+            hypothesis.log_weight = float(log_weight)
+        ranked, self._hypotheses = sorted(self._hypotheses, key=lambda one: -one.log_weight), []
+        for one in ranked:
+            here = one.filter.newest
+            if math.exp(one.log_weight) >= FORGET and not any(
+                    same_pose(here.state, here.covariance, other.filter.newest.state, other.filter.newest.covariance)
+                    for other in self._hypotheses):
+                self._hypotheses.append(one)
+
+
+class ObjectTracker:
+    """Tracks several objects with the cameras of one rig. Cameras need no synchronisation."""
+
+    def __init__(self, objects: Sequence[ObjectModel], cameras: Sequence[CameraModel]) -> None:
+        """Raises ObjectError when two objects cannot be told apart."""
+        require_distinct(objects, [one.name for one in objects])
+        self._cameras = CameraArrays.of(list(cameras))
+        self._points = [ObjectPoints(one) for one in objects]
+        self._tracks = [Track(one.name) for one in objects]
+        self._newest: list[dict[int, ObjectView]] = [{} for _ in objects]
+
+    def take(self, frame: FiducialFrame | MarkerPoints) -> list[ObjectState]:
+        """Weigh one frame; the state of every object after it, at the time of the object's points or of row 0."""
+        return [self._take(number, frame) for number in range(len(self._tracks))]
+
+    def _take(self, number: int, frame: FiducialFrame | MarkerPoints) -> ObjectState:
+        track, newest = self._tracks[number], self._newest[number]
+        view = self._points[number].view(frame)
+        if view is None:
+            return track.state(frame.t_row0_master_ns)
+        others = [other for camera, other in newest.items()
+                  if camera != view.camera and abs(view.t_ns - other.t_ns) < PREDICTED_AFTER_NS]
+        newest[view.camera] = view
+        track.take(PointMeasurement(self._points[number], self._cameras, view, others))
+        return track.state(view.t_ns)
