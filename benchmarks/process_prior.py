@@ -3,9 +3,10 @@
     python benchmarks/process_prior.py FILE [FILE ...]
 
 FILE: a recording of a hand (Qualisys .tsv, Leap Motion .csv). A Matérn 5/2 process of variance 1 and rate r has a
-velocity of standard deviation r / sqrt(3); the same holds of an integrated Matérn 3/2 process and its spread. So the
-rate of the angles follows from their velocity in standard deviations of the natural pose, over all files. With it, the
-spread of the palm follows from the speed of the file in which it is the highest.
+velocity of standard deviation r / sqrt(3). So the rate of the angles follows from their velocity in standard deviations
+of the natural pose, over all files. With the same white jerk, an integrated Matérn 3/2 process of spread 1 has a
+velocity of 2 r / sqrt(3). The spread of the palm is that of a hand twice as fast as the file in which it is the
+fastest: other hands are faster than those recorded.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ def matern52_noise(rate: float, dt: float, out: Array) -> None:
 
 @njit(cache=True)
 def integrated_noise(rate: float, dt: float, out: Array) -> None:
-    """The same of a value whose velocity is a Matérn 3/2 process, with the same jerk."""
+    """The same of a value whose velocity is a Matérn 3/2 process of variance 4/3 `rate`^2: the same white jerk."""
     transition = np.empty((3, 3))
     out[:] = 0.0
     for point in range(3):

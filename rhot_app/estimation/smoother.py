@@ -61,9 +61,11 @@ def _step_back(here: Estimate, after: Estimate, state: Array, covariance: Array)
     """Smoothed state and covariance at `here`; `state` and `covariance` are those at `after`.
 
     A later estimate says nothing of what a prediction does not carry on; a linearised gain would correct it all the
-    same. The covariance is in Joseph's form, which holds for every gain.
+    same. The covariance is in Joseph's form, for a gain that is not the best one.
     """
     process, dt_s = here.process, after.t_s - here.t_s
+    if dt_s <= 0.0:  # two frames of one instant: the same state
+        return state, covariance
     predicted, predicted_covariance = process.predict(here.state, here.covariance, dt_s)
     move = process.transition(here.state, dt_s)
     noise = predicted_covariance - move @ here.covariance @ move.T

@@ -194,9 +194,7 @@ class Track:
 
     def state(self, t_ns: int) -> ObjectState:
         """The state at master time `t_ns`, or at the newest measurement's if that is later."""
-        if self._hypotheses and t_ns - self._accepted_ns > LOST_AFTER_NS:
-            self._hypotheses.clear()
-        if not self._hypotheses:
+        if not self._hypotheses or t_ns - self._accepted_ns > LOST_AFTER_NS:
             return ObjectState(self.name, t_ns, Validity.LOST if self._ever else Validity.SEARCHING,
                                np.full((4, 4), np.nan), np.full((POSE, POSE), np.nan), np.full(POSE, np.nan))
         best = self._hypotheses[0]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import Rig
-from rhot_app.tracking.hand_process import ANGLES, VELOCITY, HandProcess
+from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, VELOCITY, HandProcess
 from rhot_app.tracking.marker_model import compile_markers, scaled_table
 from rhot_app.tracking.rig_arrays import rigs_of_hands
 from rhot_app.tracking.state import HandState
@@ -87,14 +87,15 @@ class _Hand:
         columns = self.columns if len(state.marker_ids) > len(self.columns) else np.arange(len(self.columns))
         positions, covariances = state.marker_positions.copy(), state.marker_covariances.copy()
         way_m = (dt_s * state.joint_velocity_sd + 0.5 * dt_s**2 * state.joint_acceleration_sd
-                 + math.sqrt(3.0) * strayed[0])  # of the palm's translation; that of angles is hardly more
+                 + math.sqrt(3.0) * strayed[0])  # the palm's; fast fingers may add some millimetres
         positions[columns] = points[26:]
         covariances[columns] = _grown(covariances[columns], way_m[self._joints])
         pose_sd = np.sqrt(np.concatenate([np.diag(state.palm_covariance), state.angle_sd**2]))
         way = dt_s * state.velocity_sd + 0.5 * dt_s**2 * state.acceleration_sd + strayed
         growth = 1.0 + way / np.maximum(pose_sd, 1e-12)
         return replace(
-            later, world_from_palm=world, angles=angles, joint_positions=points[:21], fingertip_positions=points[21:26],
+            later, world_from_palm=world, angles=angles, velocity=numbers[VELOCITY:ACCELERATION],
+            acceleration=numbers[ACCELERATION:], joint_positions=points[:21], fingertip_positions=points[21:26],
             marker_positions=positions, marker_covariances=covariances,
             joint_covariances=_grown(state.joint_covariances, way_m),
             fingertip_covariances=_grown(state.fingertip_covariances, way_m[_FINGERTIPS]),

@@ -39,7 +39,8 @@ REMEMBERED_M = 0.3e-3
 """m: how well a marker's place is remembered; paint is not known better (`marker_model.PAINT_SD_M`)."""
 
 PALM_SPREAD = np.array([0.055, 0.25])
-"""m and rad: how far a palm moves and turns within one correlation time (`python benchmarks/process_prior.py`)."""
+"""m and rad: how far a palm moves and turns within one correlation time, twice as fast as the recorded ones
+(`python benchmarks/process_prior.py`)."""
 
 SLOWEST, FASTEST = np.full(3, 3.4), 15.0
 """1/s: rates of a hand at rest (palm translation, palm rotation, angles; `python benchmarks/process_prior.py`), and of

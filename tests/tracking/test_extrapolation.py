@@ -44,6 +44,9 @@ def test_everything_of_the_hand_moves_and_is_known_less_well(fast):
         assert (np.linalg.eigvalsh(getattr(later, name)) > 0.0).all(), name
     assert (later.angle_sd > state.angle_sd).all()
     np.testing.assert_array_equal(later.joint_knowledge, state.joint_knowledge)
+    again = Extrapolator(RIG).at(later, later.t_master_ns + AHEAD_NS)
+    at_once = Extrapolator(RIG).at(state, state.t_master_ns + 2 * AHEAD_NS)
+    np.testing.assert_allclose(again.joint_positions, at_once.joint_positions, atol=2e-3)
     bones = [np.linalg.norm(np.diff(one.joint_positions[1:5], axis=0), axis=1) for one in (state, later)]
     np.testing.assert_allclose(*bones, atol=1e-9)
 
