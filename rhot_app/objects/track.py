@@ -139,7 +139,6 @@ class PointMeasurement:
         cost = _innovation_cost(error[accepted].ravel(), whitened[accepted].reshape(2 * count, -1), covariance)
         return Gated(residual.only(accepted), cost + GATE_2 * (len(error) - count))
 
-
     def pair(self, state: Array, prediction: tuple[Array, Array]) -> tuple[Mode, Mode] | None:
         """The estimate and its reversal, if the prediction does not exclude that: a tag's tilt may be taken for the
         opposite one as it goes through the frontal pose."""
@@ -225,8 +224,11 @@ class Track:
     def _update(self, measurement: Measurement, t_s: float) -> bool:
         """Update every hypothesis that accepts the measurement, and drop the others; False, and nothing is changed,
         when none does."""
-        accepting = []
+        accepting, younger = [], []
         for hypothesis in self._hypotheses:
+            if t_s < hypothesis.filter.knots[0].t_s:  # it began with a later frame of another camera
+                younger.append(hypothesis)
+                continue
             prediction = hypothesis.filter.predict(t_s)
             gated = measurement.gate(*prediction)
             if gated.residual is not None:
@@ -244,7 +246,9 @@ class Track:
                 kept += self._second(measurement, hypothesis, knot, prediction)
         if not kept:
             return False
-        self._hypotheses = kept
+        for hypothesis in younger:  # the frame tells nothing of it
+            hypothesis.log_weight -= 0.5 * min(gated.cost for _, gated, _ in accepting)
+        self._hypotheses = kept + younger
         self._normalise()
         return True
 
