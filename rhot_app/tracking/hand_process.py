@@ -150,7 +150,8 @@ class HandProcess:
         """Where a state goes in `dt_s` by itself; its paint biases may be left out."""
         after = state.copy()
         if dt_s > 0.0:
-            _advance(after, dt_s, self.mean, self._information, self._spread, self._slowest, self._fastest)
+            _transition(after, np.empty((self.size, 0)), dt_s, self.mean, self._information, self._spread,
+                        self._slowest, self._fastest, self._bias_s)
         return after
 
     def strayed(self, state: Array, dt_s: float) -> Array:
@@ -240,11 +241,11 @@ def _predict(state, covariance, dt, mean, pose_covariance, information, spread, 
                     for j in range(21):
                         covariance[POSE * a + 6 + i, POSE * b + 6 + j] += noise[2, a, b] * pose_covariance[i, j]
     _forget_bias(state, covariance, math.exp(-dt / bias_s), bias)
-    return rate[2]
 
 
 @njit(cache=True)
 def _transition(state, out, dt, mean, information, spread, slowest, fastest, bias_s):
+    """Move `state` by `dt` s, and multiply `out` (n, C) by the transition from the left; C may be 0."""
     blocks, turn, rate = np.empty((3, 3, 3)), np.empty((3, 3)), np.empty(3)
     left = dt
     while left > 0.0:
@@ -254,17 +255,6 @@ def _transition(state, out, dt, mean, information, spread, slowest, fastest, bia
         _carry(state, mean, rate, step, blocks, turn)
         _apply(blocks, turn, out)
     out[MOTION:] *= math.exp(-dt / bias_s)
-
-
-@njit(cache=True)
-def _advance(state, dt, mean, information, spread, slowest, fastest):
-    blocks, turn, rate = np.empty((3, 3, 3)), np.empty((3, 3)), np.empty(3)
-    left = dt
-    while left > 0.0:
-        _rates(state, information, spread, slowest, fastest, rate)
-        step = min(left, 0.5 / rate.max())
-        left -= step if left - step > 1e-9 else left
-        _carry(state, mean, rate, step, blocks, turn)
 
 
 @njit(cache=True)
