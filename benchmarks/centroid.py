@@ -29,9 +29,8 @@ from chroma_bound import place_bound  # noqa: E402
 from marker_rendering import SKIN, Canvas, disc, to_yuv  # noqa: E402
 from twin_frames import Pose, held_poses, twin_scene  # noqa: E402
 
-from rhot_node.detect.detector import Detector  # noqa: E402
 from rhot_node.detect.fast import FastDetector  # noqa: E402
-from rhot_node.detect.image import YuvImage  # noqa: E402
+from rhot_node.detect.image import Detector, YuvImage  # noqa: E402
 from rhot_node.detect.reference import ReferenceDetector  # noqa: E402
 from rhot_node.files import resource_path  # noqa: E402
 from rhot_node.markers import Marker, MarkerSet, load_markers  # noqa: E402

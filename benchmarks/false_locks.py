@@ -22,15 +22,15 @@ from typing import Any
 import numpy as np
 from twin_frames import twin_scene
 
+from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.replay_summary import replay_states
-from rhot_app.engine.warm_up import warm_up
 from rhot_app.evaluation.data_sets import DataSet, Order, data_set
 from rhot_app.evaluation.track import rig_with
 from rhot_app.project import TrackerSettings
 from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import Knowledge
+from rhot_app.tracking.trackers import make_tracker
 
 MOTIONS = ("grasp", "fast", "wave", "spread", "rest")
 SECONDS = 3.125  # of each scene: 125 frames a camera

@@ -18,15 +18,15 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.serve import prepare_process
-from rhot_app.engine.warm_up import warm_up
 from rhot_app.project import Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.receiver import NodeReceiver, open_data_socket
 from rhot_app.sources.validation import DatagramValidator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import MarkerObservation, Observations
 

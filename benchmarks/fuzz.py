@@ -24,7 +24,7 @@ import numpy as np
 from fuzz_targets import Door, NodeSide, Replies, Target, WronglyTakenError
 from numpy.typing import NDArray
 
-from rhot_node.wire.seal import TAG_LENGTH
+from rhot_node.wire.codec import TAG_LENGTH
 
 BATCH = 2048
 TENTHS = 10

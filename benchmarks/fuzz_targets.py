@@ -15,11 +15,10 @@ from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
 from rhot_node.errors import WireError
-from rhot_node.link import UdpLink
-from rhot_node.link_keys import Link, LinkKeys
-from rhot_node.presence import Presence
-from rhot_node.session import Sessions
-from rhot_node.wire.codec import encode
+from rhot_node.network.link import UdpLink
+from rhot_node.network.presence import Presence
+from rhot_node.network.session import Link, LinkKeys, Sessions
+from rhot_node.wire.codec import Seal, encode
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
@@ -34,7 +33,6 @@ from rhot_node.wire.messages import (
     Stop,
     TrustState,
 )
-from rhot_node.wire.seal import Seal
 
 NOW_NS = 5 * 10**12
 SLACK_NS = 5_000_000

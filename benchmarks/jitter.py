@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from rhot_app.evaluation.runner import evaluate_frames
+from rhot_app.evaluation.run import evaluate_frames
 from rhot_app.simulator.nodes.film import film
 from rhot_app.simulator.nodes.shot import make_shot
 from rhot_app.simulator.scene.scene import TwinSettings, make_scene, twin_defaults

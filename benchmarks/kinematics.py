@@ -26,8 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "hand"))
 from dh_oracle import frames_of, jacobian_of, lever_jacobian, points_of
 
 from rhot_app.hand.anatomy import load_hand
-from rhot_app.hand.articulated import load_articulated
-from rhot_app.hand.articulated_hand import articulated_hand
+from rhot_app.hand.articulated import articulated_hand, load_articulated
 from rhot_app.hand.articulated_model import (
     STATE_ROOT,
     ArticulatedModel,
@@ -40,7 +39,7 @@ from rhot_app.hand.articulated_model import (
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
 from rhot_app.hand.model import build_model
-from rhot_app.hand.openxr import OPENXR_JOINTS, openxr_arrays, openxr_map
+from rhot_app.outputs.openxr import OPENXR_JOINTS, openxr_arrays, openxr_map
 from rhot_node.files import resource_path
 
 Array = NDArray[np.float64]

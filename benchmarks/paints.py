@@ -30,7 +30,7 @@ import numpy as np
 from rhot_app.errors import RhotError
 from rhot_app.evaluation.compare import TRACKERS, judge
 from rhot_app.evaluation.data_sets import Order, data_set
-from rhot_app.evaluation.report import SETTLE_S
+from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.hand.skeleton import WRIST_ROLE
 from rhot_app.progress import ProgressLine
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults

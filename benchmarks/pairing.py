@@ -36,9 +36,9 @@ from rhot_app.simulator.nodes.nodes import NodePorts
 from rhot_app.simulator.nodes.shot import make_shot
 from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
 from rhot_app.simulator.truth.truth import load_truth
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import Knowledge
 from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.trackers import make_tracker
 from rhot_node.capture.yuv import FRAMES_NAME, read_header
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_i420

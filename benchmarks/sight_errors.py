@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import RhotError
 from rhot_app.evaluation.compare import MOTIONS, orders
 from rhot_app.evaluation.data_sets import DataSet, data_set, data_sets_folder
-from rhot_app.evaluation.report import SETTLE_S
+from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.progress import ProgressLine
 from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults

@@ -31,15 +31,12 @@ import numpy as np
 from numpy.typing import NDArray
 from solvers_chart import draw_chart
 
-from rhot_app.hand.anatomy import load_hand
-from rhot_app.hand.couplings import DIP_PER_PIP
-from rhot_app.hand.finger_chain import chain_points
-from rhot_app.hand.ik_status import Status
+from rhot_app.hand.anatomy import DIP_PER_PIP, load_hand
+from rhot_app.hand.finger_chain import Status, chain_points
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.model import HandModel, build_model, neutral_pose
+from rhot_app.hand.model import HandModel, build_model, inter_finger, neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint
-from rhot_app.hand.solvers.knuckles import shape_knuckles
+from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, shape_knuckles
 from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
 from rhot_app.hand.solvers.methods import (
     COARSE,
@@ -52,7 +49,6 @@ from rhot_app.hand.solvers.methods import (
     solve_neighbours,
 )
 from rhot_app.hand.solvers.problem import Problem, make_problem
-from rhot_app.hand.variants import inter_finger
 from rhot_node.files import resource_path
 
 Array = NDArray[Any]

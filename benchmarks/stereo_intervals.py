@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "calibrat
 
 from stereo_twin import SIZE, Twin, stereo_twin
 
-from rhot_app.calibration.lens.start import LensStart
+from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import calibrate
 from rhot_app.geometry.transforms import log_so3
 

@@ -28,10 +28,9 @@ import numpy as np
 from rhot_app.errors import RhotError
 from rhot_app.evaluation import scenarios
 from rhot_app.evaluation.accuracy import Figures
-from rhot_app.evaluation.compare import TRACKERS
+from rhot_app.evaluation.compare import TRACKERS, Results, legend, run_table
 from rhot_app.evaluation.data_sets import DataSet, Order, data_set, data_sets_folder
 from rhot_app.evaluation.fault_injection import EPISODE_S
-from rhot_app.evaluation.run_table import Results, legend, run_table
 from rhot_app.evaluation.track import rig_with
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.skeleton import TIP_ROLES

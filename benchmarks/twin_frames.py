@@ -10,8 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.geometry.camera import CameraModel, undistort_point
-from rhot_app.geometry.silhouette import ellipsoid
+from rhot_app.geometry.camera import CameraModel, ellipsoid, undistort_point
 from rhot_app.simulator.nodes.shot import make_renderer, make_shot
 from rhot_app.simulator.render.body import CYLINDER, HandBody
 from rhot_app.simulator.render.painter import PoseSource

@@ -22,15 +22,15 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.lens.start import LensStart
+from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import calibrate
 from rhot_app.calibration.stereo.views import SharedViews, Shot
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.session import Session, TwinChoice
-from rhot_app.ui.wizards.feed import LiveFeed
-from rhot_app.ui.wizards.solver import Solver
+from rhot_app.ui.wizards.framework.feed import LiveFeed
+from rhot_app.ui.wizards.framework.solver import Solver
 
 NOISE_PX = 0.05
 LENS = np.array([530.0, 530.0, 319.5, 239.5, -0.1, 0.05, 0.0, 0.0, 0.0])

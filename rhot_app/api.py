@@ -16,8 +16,7 @@ from rhot_app.calibration.stereo.report import StereoReport
 from rhot_app.engine.client import EngineClient
 from rhot_app.errors import CalibrationError, EngineError, ExportError, RecordingError, RhotError, RigError
 from rhot_app.export.export import Exported, export_log
-from rhot_app.export.frames import Frame
-from rhot_app.export.plan import ExportOptions, Hand, Tracker, Units
+from rhot_app.export.plan import ExportOptions, Frame, Hand, Tracker, Units
 from rhot_app.export.recording import TrackedLog, read_log
 from rhot_app.export.resample import Resampler, checked_rate
 from rhot_app.export.states import HandStates, joined
@@ -159,11 +158,17 @@ def calibrate_stereo(pictures: Mapping[str, Sequence[str | Path]], board: Board,
 
     Raises CalibrationError when the pictures cannot be put together. The command is ``rhot calibrate stereo``.
     """
-    from rhot_app.calibration.lens.intrinsics_file import load_intrinsics
-    from rhot_app.calibration.lens.search import find_lens
-    from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate
+    from rhot_app.calibration.lens.fit import find_lens
+    from rhot_app.calibration.lens.intrinsics import load_intrinsics
+    from rhot_app.calibration.stereo.calibrate import (
+        KnownLengths,
+        calibrate,
+        calibrated_rig,
+        lens_of,
+        require_nodes,
+        rig_verdict,
+    )
     from rhot_app.calibration.stereo.reading import read_shared
-    from rhot_app.calibration.stereo.rig import calibrated_rig, lens_of, require_nodes, rig_verdict
 
     names = list(pictures)
     require_nodes(rig, names)

@@ -16,9 +16,7 @@ from platformdirs import user_config_path
 
 from rhot_node.errors import TrustError
 from rhot_node.files import decode_document
-from rhot_node.keys import HexKey, KeyPair, Name, new_key_pair
-from rhot_node.private_files import create_private, read_private, write_private
-from rhot_node.trust import Master
+from rhot_node.keys import HexKey, KeyPair, Master, Name, create_private, new_key_pair, read_private, write_private
 
 FORMAT: Final = "rhot-master-keys"
 VERSION: Final = 1

@@ -17,11 +17,11 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.board.corners import detect
-from rhot_app.calibration.filters.simulation import OFF, Footage, simulate
+from rhot_app.calibration.filters.tuning import OFF, Footage, simulate
 from rhot_app.calibration.hand.bundle_model import POSE, Poses, linearise
 from rhot_app.calibration.hand.marker_places import PALM, MarkerPlace
 from rhot_app.calibration.hand.shape import HandUnknowns
-from rhot_app.engine.warm_up import warm_up as rehearse_tracker
+from rhot_app.engine.pipeline import warm_up as rehearse_tracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import ANGLES
@@ -30,7 +30,7 @@ from rhot_app.project import Rig, TrackerSettings, load_rig
 from rhot_app.simulator.nodes.shot import make_renderer, make_shot
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, HandShow
-from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.trackers import make_tracker
 from rhot_node.compiled import mark_complete
 from rhot_node.detect.fast import FastDetector
 from rhot_node.files import resource_path

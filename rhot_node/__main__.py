@@ -23,9 +23,9 @@ from rhot_node.errors import NodeError, printable_lines
 
 if TYPE_CHECKING:
     from rhot_node.config import NodeSettings
-    from rhot_node.detect.detector import Detector
-    from rhot_node.pairing_offer import OfferFile
-    from rhot_node.trust import NodeTrust
+    from rhot_node.detect.image import Detector
+    from rhot_node.keys import NodeTrust
+    from rhot_node.network.pairing import OfferFile
 
 PR_SET_PDEATHSIG = 1
 ENDING_HELP = """When ready it prints one line of JSON on standard output, with its real ports. It ends with code 0
@@ -113,21 +113,20 @@ def _serve(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     """Put the parts together and loop until the end."""
-    from rhot_node.announce import Announcer
     from rhot_node.capture.open import data_set_settings, open_camera
-    from rhot_node.control import ControlServer
     from rhot_node.daemon import NodeDaemon
-    from rhot_node.detector_plugin import DetectorChoice
+    from rhot_node.health.checks import HealthMonitor
     from rhot_node.health.machine import Machine
-    from rhot_node.health.monitor import HealthMonitor
-    from rhot_node.link import UdpLink
-    from rhot_node.link_keys import LinkKeys
-    from rhot_node.pairing_offer import OfferFile, offer_path
-    from rhot_node.presence import Presence
-    from rhot_node.reception import Reception
-    from rhot_node.requests import Responder, SettingsStore
+    from rhot_node.keys import trust_state
+    from rhot_node.network.announce import Announcer
+    from rhot_node.network.control import ControlServer
+    from rhot_node.network.link import UdpLink
+    from rhot_node.network.pairing import OfferFile, Reception, offer_path
+    from rhot_node.network.presence import Presence
+    from rhot_node.network.requests import Responder, SettingsStore
+    from rhot_node.network.session import LinkKeys
+    from rhot_node.plugins import DetectorChoice
     from rhot_node.service.notify import ServiceManager
-    from rhot_node.trust import trust_state
     from rhot_node.video.recorder import VideoRecorder, video_folder
 
     clock = settings.clock.clock(time.monotonic_ns())
@@ -179,7 +178,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
 
 def _trust(path: Path, settings: NodeSettings) -> NodeTrust | None:
     """Whom the node trusts, and a word about it on the console; None when it is open. Raises TrustError."""
-    from rhot_node.trust import NodeTrust, keys_path
+    from rhot_node.keys import NodeTrust, keys_path
     log = logging.getLogger(__name__)
     if settings.trust == "open":
         log.warning('this node is open ("trust" in its settings): whoever reaches it may see its pictures and steer it')

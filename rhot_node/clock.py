@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+import struct
 import time
 from dataclasses import dataclass
 
@@ -29,3 +31,68 @@ class NodeClock:
         """Inverse of `from_host_ns`, to the nanosecond rounding."""
         elapsed = (t_node_ns - self.offset_ns - self.origin_ns) / (1.0 + self.drift_ppm * 1e-6)
         return self.origin_ns + round(elapsed)
+
+
+# -- When the kernel received a datagram, on this machine's monotonic clock --------------------------------------------
+# The kernel stamps with the wall clock (SO_TIMESTAMPNS). It is brought to the monotonic clock by their difference
+# measured right after the read; when the wall clock was set in between, the stamp is not used.
+
+SO_TIMESTAMPNS = 35  # Linux; not in the socket module of Python 3.11
+SO_RXQ_OVFL = 40
+ANCILLARY_SIZE = socket.CMSG_SPACE(16) + socket.CMSG_SPACE(4)
+
+_TIMESPEC = struct.Struct("@ll")
+_COUNT = struct.Struct("@I")
+_STEP_NS = 300_000  # more than reading two clocks can differ by
+_PAUSE_NS = 20_000  # between two looks at clocks: somebody else had the processor
+_ATTEMPTS = 4
+_SLEW = 1e-3  # time services turn the wall clock's rate by 500 ppm at most
+_OLDEST_NS = 10_000_000_000  # no datagram waits longer in a socket that is being read
+
+Ancillary = list[tuple[int, int, bytes]]
+
+
+def ask_for_times(sock: socket.socket) -> None:
+    """Have the kernel stamp every datagram and tell how many it had to drop."""
+    sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+    sock.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+
+
+class KernelTime:
+    """Turns one socket's ancillary data into monotonic receive times. One thread only."""
+
+    def __init__(self) -> None:
+        self.overflowed = 0  # datagrams the kernel dropped because the buffer was full
+        self._difference_ns, self._measured_ns = _measure()
+
+    def receive_time_ns(self, ancillary: Ancillary) -> tuple[int, int]:
+        """Monotonic time at which the kernel received the datagram that was just read, and now, ns."""
+        stamp_ns = None
+        for _, kind, data in ancillary:
+            if kind == SO_TIMESTAMPNS and len(data) >= _TIMESPEC.size:
+                seconds, nanoseconds = _TIMESPEC.unpack_from(data)
+                stamp_ns = seconds * 1_000_000_000 + nanoseconds
+            elif kind == SO_RXQ_OVFL and len(data) >= _COUNT.size:
+                self.overflowed = _COUNT.unpack_from(data)[0]
+        difference_ns, now_ns = _measure()
+        change_ns = abs(difference_ns - self._difference_ns)
+        steady = change_ns < _STEP_NS + _SLEW * (now_ns - self._measured_ns)
+        self._difference_ns, self._measured_ns = difference_ns, now_ns
+        if stamp_ns is None or not steady:
+            return now_ns, now_ns
+        t_ns = stamp_ns - difference_ns
+        # The difference is read with some noise: a datagram cannot have come after now.
+        return (min(t_ns, now_ns) if now_ns - _OLDEST_NS < t_ns < now_ns + _STEP_NS else now_ns), now_ns
+
+
+def _measure() -> tuple[int, int]:
+    """(wall clock - monotonic clock, monotonic now), ns. Asked again when this program had to wait in between."""
+    looks = []
+    for _ in range(_ATTEMPTS):
+        before_ns = time.monotonic_ns()
+        wall_ns = time.time_ns()
+        now_ns = time.monotonic_ns()
+        looks.append((now_ns - before_ns, wall_ns - (before_ns + now_ns) // 2))
+        if looks[-1][0] < _PAUSE_NS:
+            break
+    return min(looks)[1], now_ns

@@ -12,13 +12,12 @@ from typing import Any, Protocol
 from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting, Rewindable
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings
-from rhot_node.detect.detector import Detector
+from rhot_node.detect.image import Detector
 from rhot_node.errors import CameraError
-from rhot_node.health.check import Check
-from rhot_node.health.checks import BLACK_PICTURE, is_black
-from rhot_node.pictures import PictureBox
-from rhot_node.requests import SettingsStore
-from rhot_node.session import Sessions, Stream
+from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
+from rhot_node.network.pictures import PictureBox
+from rhot_node.network.requests import SettingsStore
+from rhot_node.network.session import Sessions, Stream
 from rhot_node.wire.messages import MarkerObservation, NodeState, Observations
 
 log = logging.getLogger(__name__)

@@ -13,8 +13,9 @@ from rhot_node.capture.sensors import PRESETS
 from rhot_node.compiled import is_compiled_in
 from rhot_node.config import NodeSettings, load_settings
 from rhot_node.errors import CameraError, NodeError, TrustError
-from rhot_node.health.check import LEVELS, Check, worst
 from rhot_node.health.checks import (
+    LEVELS,
+    Check,
     check_clock,
     check_heat,
     check_memory,
@@ -22,10 +23,11 @@ from rhot_node.health.checks import (
     check_network,
     check_power,
     check_speed,
+    worst,
 )
 from rhot_node.health.machine import Machine
-from rhot_node.service.unit import NAME, STATE_FOLDER
-from rhot_node.trust import NodeTrust, keys_path
+from rhot_node.keys import NodeTrust, keys_path
+from rhot_node.service.install import NAME, STATE_FOLDER
 
 SUMMARY = ("Look at everything that a node needs: power, heat, memory, clock, network, camera, compiled code, pairing "
            "and the service. Exit code 0: all is well; 1: something could be better; 2: something is wrong.")

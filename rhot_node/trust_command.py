@@ -7,11 +7,9 @@ from pathlib import Path
 
 from rhot_node.config import NodeSettings, load_settings
 from rhot_node.errors import TrustError
-from rhot_node.pairing import show_code
-from rhot_node.pairing_offer import TRIES, VALID_S, Offer, OfferFile, offer_path
-from rhot_node.private_files import remove_private
+from rhot_node.keys import keys_path, remove_private
+from rhot_node.network.pairing import TRIES, VALID_S, Offer, OfferFile, offer_path, show_code
 from rhot_node.service.install import SETTINGS
-from rhot_node.trust import keys_path
 
 SUMMARIES = {
     "pair": "Show a fresh one-time code to pair a master with; the code before it is void.",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rhot_node.detect.detector import Detector
-from rhot_node.detect.image import YuvImage
+from rhot_node.detect.image import Detector, YuvImage
 from rhot_node.markers import MarkerSet
 
 DISC_RADIUS = 10  # px

@@ -9,7 +9,7 @@ from rhot_app.calibration.lens.camera_calibration import NOT_CALIBRATED, calibra
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus
 from rhot_app.project import Rig
-from rhot_node.addresses import is_loopback
+from rhot_node.network.presence import is_loopback
 
 UNSEEN_S = 3.0
 """A marker that one camera has not seen for so long is worth a sentence."""

@@ -20,9 +20,8 @@ import numpy as np
 from rhot_app.engine.advice import disk_advice, hands_advice, moved_advice
 from rhot_app.engine.observer import NodeBlack, NodeMessage, Observer
 from rhot_app.engine.output_process import OutputProcess
-from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work
+from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work, warm_up
 from rhot_app.engine.status import Advice, EngineStatus
-from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmark_record

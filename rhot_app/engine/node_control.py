@@ -15,7 +15,7 @@ import msgspec
 import zmq
 
 from rhot_app.engine.commands import Answer, Arguments, refusal
-from rhot_app.engine.node_health import health_advice, sees_black
+from rhot_app.engine.node_meter import health_advice, sees_black
 from rhot_app.engine.status import Advice, EngineStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode

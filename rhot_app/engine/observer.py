@@ -12,8 +12,7 @@ import numpy as np
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.calibration.verdict import Grade
 from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
-from rhot_app.engine.node_health import most_urgent_first
-from rhot_app.engine.node_meter import NodeMeter
+from rhot_app.engine.node_meter import NodeMeter, most_urgent_first
 from rhot_app.engine.pipeline import Pipeline
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus
 from rhot_app.project import Rig

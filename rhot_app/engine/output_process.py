@@ -26,11 +26,10 @@ from typing import IO, Final
 import msgspec
 import zmq
 
-from rhot_app.engine.codec import TOPIC_STATE, decode
+from rhot_app.engine.status import TOPIC_STATE, decode
 from rhot_app.errors import OutputError
 from rhot_app.outputs.outputs import Outputs, check_output
-from rhot_app.outputs.spec import as_run
-from rhot_app.outputs.status import SECRET_VARIABLE, OutputStatus
+from rhot_app.outputs.spec import SECRET_VARIABLE, OutputStatus, as_run
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.tracking.state import HandState
 

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.engine.command import add_serving_arguments, asked_outputs, print_addresses
+from rhot_app.engine.serve import add_serving_arguments, asked_outputs, print_addresses
 from rhot_app.errors import RecordingError
 from rhot_node.compiled import announce_compilation
 
@@ -45,15 +45,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay; with clients to serve, until the log's end, SIGTERM, SIGINT or the command ``quit``."""
-    from rhot_app.engine.replay_summary import summarise
+    from rhot_app.engine.replay_summary import SmoothedReplay, summarise
     from rhot_app.engine.serve import serving
-    from rhot_app.engine.smoothed_replay import SmoothedReplay
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogReplay
-    from rhot_app.tracking.make import make_tracker
     from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
+    from rhot_app.tracking.trackers import make_tracker
 
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
     reader = LogReader(args.path)

@@ -6,16 +6,29 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rhot_app.evaluation.accuracy import Figures, accuracy, pooled
-from rhot_app.evaluation.consistency import DEGREES, Consistency, Squares, consistency, squares
+from rhot_app.errors import SimulatorError
+from rhot_app.evaluation.accuracy import (
+    DEGREES,
+    Consistency,
+    Figures,
+    Squares,
+    accuracy,
+    band,
+    consistency,
+    deviations,
+    pooled,
+    ratio,
+    squares,
+    worn_by,
+)
 from rhot_app.evaluation.data_sets import DataSet, Order, Told, data_set
-from rhot_app.evaluation.deviations import deviations, worn_by
-from rhot_app.evaluation.report import SETTLE_S
+from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.progress import Progress, silent
 from rhot_app.project import TrackerSettings
 from rhot_app.simulator.nodes.node_log import CABLE, Network
 from rhot_app.simulator.scene.scene import Scene, make_scene
+from rhot_node.files import read_json
 
 MOTIONS = ("rest", "wave", "grasp", "pinch", "fast")
 TRACKERS = {"classic": TrackerSettings(kind="classic"), "estimator": TrackerSettings(kind="estimator")}
@@ -112,3 +125,201 @@ def as_fields(comparison: Comparison) -> dict[str, object]:
             "honesty": {motion: {name: {quantity: asdict(one)
                                         for quantity, one in comparison.covariance_consistency(motion, name).items()}
                                  for name in names} for motion in comparison.motions()}}
+
+
+# -- The table of `rhot evaluate --compare`: trackers side by side, and the last one's figure as a part of the ---------
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One figure: its key, its heading, its form, and whether a ratio says anything."""
+
+    key: str
+    heading: str
+    form: str
+    compared: bool = True
+
+
+COLUMNS = (
+    Column("tip_visible_mm", "tips visible mm", ".2f"), Column("tip_measured_mm", "tips measured mm", ".2f"),
+    Column("tip_display_mm", "tips displayed mm", ".2f"),
+    Column("tip_predicted_mm", "tips predicted mm", ".2f", compared=False),
+    Column("predicted_3_sd_share", "predicted 3 sg", ".3f", compared=False), Column("marker_mm", "markers mm", ".2f"),
+    Column("angles_deg", "angles deg", ".1f"), Column("palm_turn_deg", "palm turn deg", ".1f"),
+    Column("swaps", "swaps", ".0f", compared=False), Column("measured_share", "measured", ".3f", compared=False),
+    Column("states_per_s", "states/s", ".0f", compared=False),
+)
+_CELL = 7
+
+LEGEND = """\
+Root mean squares over all states after the first second; ratio: the last tracker's figure to the first one's.
+  tips       fingertips: visible to both cameras in truth, called measured by the tracker, as a 60 Hz display shows them
+             (the newest state), and as the tracker predicts them at the display's instants;
+             predicted 3 sg: part of their axes within three of its standard deviations
+  markers    that both cameras see in truth
+  angles     joint angles of the fingers that wear markers
+  palm turn  between the palm and the true one
+  swaps      states that show one fingertip where another one is, once each time it happens
+  measured   part of what both cameras see that the tracker calls measured
+  states/s   states per second: the classic tracker makes one per pair of frames, the estimator one per frame
+NEES is 1 where covariances are true, more where they are too small, less where they are too large."""
+
+
+def table(comparison: Comparison, columns: Sequence[Column] = COLUMNS) -> str:
+    """One line per run, and one for all seeds of each motion; under each figure the trackers and the ratio of the last
+    tracker's to the first one's."""
+    trackers = comparison.trackers()
+    names = [_name(run) for motion in comparison.motions() for run in comparison.of(motion)]
+    width = max(len(name) for name in [*names, *comparison.motions()]) + 2
+    lines = _heads(width, trackers, columns)
+    for motion in comparison.motions():
+        runs = comparison.of(motion)
+        if len(runs) > 1:
+            lines += [_line(_name(run), width, [run.judged[name].figures for name in trackers], columns)
+                      for run in runs]
+        lines.append(_line(motion, width, [comparison.together(motion, name) for name in trackers], columns))
+    return "\n".join(lines)
+
+
+def consistency_table(comparison: Comparison) -> str:
+    """Per motion and tracker: average NEES by quantity, its share inside the band, and what is within 3 sigma."""
+    seeds = len(comparison.of(comparison.motions()[0]))
+    heads = "".join(f"{quantity + ' ' + _span(seeds, degrees):>22}" for quantity, degrees in DEGREES.items())
+    words = f"{'NEES':>8}{'inside':>7}{'3 sg':>7}"
+    margin = max(len(motion) for motion in comparison.motions()) + 1
+    lines = [f"NEES by its degrees of freedom, with the 95 % band of the mean of {seeds} seeds; part of the instants "
+             "inside it; part of what is called measured (of palms: of all) within 3 sigma",
+             " " * (margin + 8) + heads, " " * (margin + 8) + words * len(DEGREES)]
+    for motion in comparison.motions():
+        for tracker in comparison.trackers():
+            found = comparison.covariance_consistency(motion, tracker)
+            cells = "".join(f"{cell(one.average, '.2f'):>8}{cell(one.inside, '.2f'):>7}{cell(one.within, '.3f'):>7}"
+                            for one in found.values())
+            lines.append(f"{motion:<{margin}}{tracker[:7]:<8}{cells}")
+    return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """Figures kept of an earlier tracker, by motion; `name` says which."""
+
+    name: str
+    motions: dict[str, Figures]
+
+
+def read_baseline(path: Path) -> Baseline:
+    """Raises SimulatorError for a file that keeps no figures by motion."""
+    document = read_json(path, SimulatorError)
+    kept = document.get("motions") if isinstance(document, dict) else None
+    if not isinstance(kept, dict) or not all(isinstance(figures, dict) for figures in kept.values()):
+        raise SimulatorError(f"{path}: not a baseline, which has figures by motion; see benchmarks/baselines.")
+    return Baseline(f"{path.name}: {document.get('tracker', 'unnamed')}", kept)
+
+
+def baseline_table(comparison: Comparison, baseline: Baseline) -> str:
+    """The last tracker's figures over those of the baseline, by motion."""
+    tracker, columns = comparison.trackers()[-1], [column for column in COLUMNS if column.form != ".0f"]
+    lines = [f"{tracker} over the baseline ({baseline.name})",
+             " " * 8 + "".join(f"{column.heading:>19}" for column in columns)]
+    for motion in comparison.motions():
+        now, before = comparison.together(motion, tracker), baseline.motions.get(motion, {})
+        lines.append(f"{motion:<8}" + "".join(
+            f"{cell(ratio(now[column.key], before.get(column.key)), '.2f'):>19}" for column in columns))
+    return "\n".join(lines)
+
+
+def _span(seeds: int, degrees: int) -> str:
+    low, high = band(seeds, degrees)
+    return f"{low:.2f}-{high:.2f}"
+
+
+def cell(value: float | None, form: str) -> str:
+    """A figure, or a dash where there is none."""
+    return "-" if value is None or value != value else format(value, form)
+
+
+def _name(run: Run) -> str:
+    return f"  {run.motion} {run.seed}"
+
+
+def _heads(margin: int, trackers: Sequence[str], columns: Sequence[Column]) -> list[str]:
+    first, second = " " * margin, " " * margin
+    for column in columns:
+        under = [*trackers, "ratio"] if _has_ratio(column, trackers) else list(trackers)
+        words = "".join(word[:_CELL].rjust(_CELL + 1) for word in under)
+        width = _width(column, trackers)
+        first += "  " + column.heading.rjust(width)
+        second += "  " + words.rjust(width)
+    return [first, second]
+
+
+def _line(name: str, width: int, figures: Sequence[Figures], columns: Sequence[Column]) -> str:
+    line = name.ljust(width)
+    for column in columns:
+        values = [one[column.key] for one in figures]
+        cells = [cell(value, column.form) for value in values]
+        if _has_ratio(column, figures):
+            cells.append(cell(ratio(values[-1], values[0]), ".2f"))
+        line += "  " + "".join(text.rjust(_CELL + 1) for text in cells).rjust(_width(column, figures))
+    return line
+
+
+def _width(column: Column, trackers: Sequence[object]) -> int:
+    """Of a figure's cells, one for each tracker and perhaps one for the ratio, or of its heading."""
+    return max(len(column.heading), (_CELL + 1) * (len(trackers) + _has_ratio(column, trackers)))
+
+
+def _has_ratio(column: Column, trackers: Sequence[object]) -> bool:
+    return column.compared and len(trackers) > 1
+
+
+# -- What `benchmarks/trackers.py` prints of a trial: what was tried, a line per tracker, and what the columns ---------
+
+Results = dict[str, Figures]
+"""Figures of each tracker."""
+
+MEANINGS: tuple[tuple[str, str], ...] = (
+    ("tips_mm", "fingertips off the truth, root mean square"),
+    ("tips_max_mm", "the farthest that one of them was off, in any take"),
+    ("known_share", "part of the fingertips' states that tell a place at all; what is not told is in no other column"),
+    ("within_3_sd_share", "part of the fingertips' axes within three stated standard deviations; 0.997 when honest"),
+    ("states_per_s", "states per second while the camera is covered or silent"),
+    ("back_after_s", "s until every fingertip in sight is within 5 mm again, the slowest take"),
+    ("swaps", "states that show one fingertip where another one is, once each time it happens"),
+    ("swaps_measured", "those of them that are called measured"),
+    ("palm_turn_deg", "palm turned off the truth, root mean square"),
+    ("stated_deg", "standard deviation of that as stated"),
+    ("sd_mm", "standard deviation of a still hand's fingertips in space; sd_x, sd_y, sd_z: along the rig's axes"),
+    ("lag_ms", "shift of the truth in time that fits best; more than 0: the tracker is late"),
+    ("still_sd_mm", "standard deviation of a still hand's fingertips in space; ramp_, fast_: of those movements"),
+    ("median_s", "time until every visible fingertip is within 5 mm, over all starts; p95_s, max_s: the slow ones"),
+    ("never", "starts after which no hand was found"),
+    ("median_us", "time from a datagram's bytes to its state, by the clock; p99_us: one in a hundred takes longer; "
+                  "cpu_: of the processor"),
+    ("rss_growth_mb", "memory gained since the log's first lap; objects_growth: Python's own, in blocks"),
+    ("error_at_5s_percent", "how far the size is off after 5 s, and so on; stated_percent: its stated deviation"),
+    ("within_2_percent_after_s", "s after which the size stays within 2 % of the truth, the slowest take"),
+    ("max_off_in_sd", "the most that the size was off, in stated standard deviations"),
+)
+"""What columns say that their names do not, in the order in which they are told."""
+
+
+def run_table(name: str, about: str, results: Results) -> str:
+    """A trial's table: its name and what it was tried on, the columns, a line per tracker."""
+    keys = list(next(iter(results.values())))
+    width = max(len(row) for row in results)
+    lines = [f"{name}: {about}", " " * width + "".join(f"  {key:>8}" for key in keys)]
+    lines += [row.ljust(width) + "".join(f"  {_form(figures[key]):>{max(8, len(key))}}" for key in keys)
+              for row, figures in results.items()]
+    return "\n".join(lines) + "\n"
+
+
+def legend(trials: Iterable[Results]) -> str:
+    """What the columns of these trials mean."""
+    shown = {key for results in trials for figures in results.values() for key in figures}
+    told = [(key, meaning) for key, meaning in MEANINGS if key in shown]
+    width = max((len(key) for key, _ in told), default=0)
+    return "\n".join(f"  {key.ljust(width)}  {meaning}" for key, meaning in told)
+
+
+def _form(value: float | None) -> str:
+    return cell(value, ".0f" if value is not None and abs(value) >= 1000.0 else ".3f")

@@ -21,8 +21,7 @@ import numpy as np
 
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.simulator.nodes.camera_workers import Progress, Report, for_each_camera
-from rhot_app.simulator.nodes.film import TRUTH_NAME, new_folder
+from rhot_app.simulator.nodes.film import TRUTH_NAME, Progress, Report, for_each_camera, new_folder
 from rhot_app.simulator.nodes.node_log import CABLE, Network, NodeSender, write_node_log
 from rhot_app.simulator.nodes.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
 from rhot_app.simulator.scene.scene import Scene, node_settings

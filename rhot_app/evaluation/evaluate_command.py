@@ -62,8 +62,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _evaluate(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
-    from rhot_app.evaluation.report import SETTLE_S, details, table
-    from rhot_app.evaluation.runner import evaluate, evaluate_frames
+    from rhot_app.evaluation.run import SETTLE_S, details, evaluate, evaluate_frames, table
 
     seconds = 20.0 if args.seconds is None else args.seconds
     if not SETTLE_S + _JUDGED_S <= seconds <= SECONDS_MAX and args.frames is None:
@@ -101,10 +100,20 @@ def _motions_of(args: argparse.Namespace, usual: Sequence[str]) -> list[str]:
 
 def _compare(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
-    from rhot_app.evaluation.compare import MOTIONS, TRACKERS, as_fields, compare, orders
-    from rhot_app.evaluation.compare_table import LEGEND, baseline_table, consistency_table, read_baseline, table
+    from rhot_app.evaluation.compare import (
+        LEGEND,
+        MOTIONS,
+        TRACKERS,
+        as_fields,
+        baseline_table,
+        compare,
+        consistency_table,
+        orders,
+        read_baseline,
+        table,
+    )
     from rhot_app.evaluation.data_sets import data_sets_folder
-    from rhot_app.evaluation.report import SETTLE_S
+    from rhot_app.evaluation.run import SETTLE_S
     from rhot_app.progress import ProgressLine
     from rhot_app.simulator.nodes.node_log import Network
 

@@ -15,15 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.replay_summary import replay_states
-from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import SimulatorError
 from rhot_app.evaluation import fault_injection as alter
-from rhot_app.evaluation.accuracy import Figures
-from rhot_app.evaluation.consistency import axes_within
+from rhot_app.evaluation.accuracy import Deviations, Figures, WornMarkers, axes_within, deviations, distances, worn_by
 from rhot_app.evaluation.data_sets import DataSet
-from rhot_app.evaluation.deviations import Deviations, WornMarkers, deviations, distances, worn_by
-from rhot_app.evaluation.report import SETTLE_S
+from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.evaluation.score import VISIBLE_FRACTION, count_swaps, rms
 from rhot_app.evaluation.track import Timed, Track, tracked
 from rhot_app.hand.skeleton import WRIST_ROLE
@@ -31,8 +29,8 @@ from rhot_app.project import Rig
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.simulator.truth.truth import Truth
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.tracker import Tracker
+from rhot_app.tracking.trackers import make_tracker
 
 Array = NDArray[np.float64]
 

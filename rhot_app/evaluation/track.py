@@ -11,17 +11,17 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.replay_summary import replay_states
-from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import SimulatorError
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import Tracker
+from rhot_app.tracking.trackers import make_tracker
 
 Array = NDArray[np.float64]
 

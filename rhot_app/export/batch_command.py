@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
+from rhot_app.export.export import READ_WITH_LOSSES, add_export_arguments, options_of
 
 if TYPE_CHECKING:
     from rhot_app.export.batch import Job, Outcome
@@ -92,7 +92,7 @@ def _processors() -> int:
 
 def _compile(jobs: list[Job]) -> None:
     """Compile what is not compiled yet, once, before several processes would do so side by side."""
-    from rhot_app.engine.warm_up import warm_up
+    from rhot_app.engine.pipeline import warm_up
     from rhot_app.errors import RhotError
     from rhot_app.export.recording import TrackedLog
     from rhot_node.compiled import announce_compilation, is_complete

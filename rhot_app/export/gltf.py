@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import ExportError
 from rhot_app.export.bones import PARENTS, TIPS, TURNING, Skeleton, skeleton_of
-from rhot_app.export.frames import file_from_frame, frame_up, quaternions
-from rhot_app.export.plan import Plan, require
+from rhot_app.export.plan import Plan, file_from_frame, frame_up, quaternions, require
 from rhot_app.export.states import HandStates
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import forward

@@ -11,8 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.export.frames import quaternions
-from rhot_app.export.plan import Plan, require
+from rhot_app.export.plan import Plan, quaternions, require
 from rhot_app.export.states import CONDITIONS, HandStates
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import OTHER_HAND

@@ -17,9 +17,9 @@ from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.observation_table import why_none
 from rhot_app.recording.raw_log import LogReader, Record
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.trackers import make_tracker
 
 RATE_AFTER_S = 5.0
 """The cameras' rate is that of this much of a log: some hundred frames have a good median."""

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.export.frames import quaternions
-from rhot_app.export.plan import Plan, require
+from rhot_app.export.plan import Plan, quaternions, require
 from rhot_app.export.states import ARRAYS, HandStates
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND

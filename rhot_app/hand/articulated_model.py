@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.hand.articulated import Articulated, Box, Capsule, Frame
 from rhot_app.hand.dh import FIXED, ROOT, DhArrays, DhRow, compile_table, riding_points
 from rhot_app.hand.kinematics import add_angle_columns, add_turn, empty_frames, forward_arrays
-from rhot_app.hand.variants import Variant, linear_variant
+from rhot_app.hand.model import Variant, linear_variant
 
 Array = NDArray[np.float64]
 

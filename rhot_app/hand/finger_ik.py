@@ -13,8 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import chain_points, distance, fabrik_within, miss
-from rhot_app.hand.ik_status import MISSING, Status, status_of
+from rhot_app.hand.finger_chain import MISSING, Status, chain_points, distance, fabrik_within, miss, status_of
 from rhot_app.hand.linear import solve_in_box
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose

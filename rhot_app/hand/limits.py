@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.couplings import DIP_PER_PIP
+from rhot_app.hand.anatomy import DIP_PER_PIP
 from rhot_app.hand.skeleton import ANGLES, FINGERS
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from rhot_app.estimation.residual import Kernel, Rows, student
 from rhot_app.hand.dh import DhArrays, riding_points
 from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.patches import segment_axis
+from rhot_app.hand.places import segment_axis
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.objects.shape import Shape
 

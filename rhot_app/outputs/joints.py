@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model, neutral_pose
-from rhot_app.hand.openxr import OPENXR_JOINTS, OUR_JOINTS, openxr_hand, openxr_map
 from rhot_app.hand.skeleton import JOINTS, HandPose
+from rhot_app.outputs.openxr import OPENXR_JOINTS, OUR_JOINTS, openxr_hand, openxr_map
 from rhot_app.project import Rig
 from rhot_app.tracking.state import Codes, HandState
 
@@ -142,3 +143,31 @@ def _product(a: Array, b: Array) -> Array:
     w, x, y, z = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     return np.stack([a[0] * w - a[1] * x - a[2] * y - a[3] * z, a[0] * x + a[1] * w + a[2] * z - a[3] * y,
                      a[0] * y - a[1] * z + a[2] * w + a[3] * x, a[0] * z + a[1] * y - a[2] * x + a[3] * w], axis=-1)
+
+
+# -- A sample as a JSON object, the message of WebSocket, Zenoh and the web view. docs/outputs.md lists the ------------
+
+_DIGITS = 6  # micrometres, and as fine for quaternions
+
+
+def json_message(sample: Sample) -> bytes:
+    """The whole sample. An unknown joint is null, as is the age of a replayed state."""
+    age_s = None if math.isnan(sample.age_s) else round(sample.age_s, _DIGITS)
+    return msgspec.json.encode({
+        "sequence": sample.state.sequence, "t_master_ns": sample.state.t_master_ns, "age_s": age_s,
+        "joint_set": sample.joint_set, "joints": sample.joints, "hands": [_hand(hand) for hand in sample.hands]})
+
+
+def _hand(hand: HandSample) -> dict[str, Any]:
+    document = {
+        "name": hand.name, "side": hand.side, "condition": hand.condition, "positions": _rows(hand.positions),
+        "knowledge": hand.knowledge.tolist(), "palm_position": _rows(hand.palm_position[None])[0],
+        "palm_orientation": _rows(hand.palm_orientation[None])[0]}
+    if hand.orientations is not None and hand.radii is not None:
+        document |= {"orientations": _rows(hand.orientations), "radii": np.round(hand.radii, _DIGITS).tolist()}
+    return document
+
+
+def _rows(values: NDArray[np.float64]) -> list[list[float] | None]:
+    rows: list[list[float]] = np.round(values, _DIGITS).tolist()
+    return [row if all(map(math.isfinite, row)) else None for row in rows]

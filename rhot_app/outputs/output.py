@@ -15,7 +15,7 @@ from typing import Final, Protocol, runtime_checkable
 
 from rhot_app.errors import OutputError
 from rhot_app.outputs.joints import JointConverter, Sample
-from rhot_app.outputs.status import OutputStatus, OutputWord
+from rhot_app.outputs.spec import OutputStatus, OutputWord
 from rhot_app.project import OutputSettings
 from rhot_app.tracking.state import HandState
 

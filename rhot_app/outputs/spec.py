@@ -6,7 +6,8 @@ The rig's types are imported inside the functions, so that ``--help`` stays fast
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import msgspec
 
@@ -14,6 +15,7 @@ from rhot_app.errors import OutputError
 
 if TYPE_CHECKING:
     from rhot_app.project import OutputSettings
+
 
 HELP: Final = """output specs, KIND:TARGET, each with ?joints=own|openxr|mediapipe and &hz=RATE behind it if wanted:
   osc:HOST:PORT      OSC messages by UDP
@@ -100,3 +102,28 @@ def _rate(value: str, text: str) -> float:
         raise OutputError(f"output {text!r}: {value} is not a rate above 0 and up to 1000 states/s; leave hz out for "
                           "every state.")
     return rate
+
+
+# -- The status of outputs that an engine publishes; apart, because clients load neither sinks nor the hand ------------
+
+SECRET_VARIABLE: Final = "RHOT_WEB_SECRET"
+"""Environment variable in which the engine keeps the secret of all its web views, so that a page that is open finds
+them again whenever its outputs are started anew."""
+
+OutputWord = Literal["starting", "running", "failed", "stopped"]
+
+
+@dataclass(frozen=True, slots=True)
+class OutputStatus:
+    """How an output goes. `spec`: as typed behind ``--output``. `sent` and `dropped` count states: a state that came
+    too soon for the output's rate is neither. `clients` is None for an output that nobody connects to."""
+
+    spec: str
+    kind: str
+    state: OutputWord
+    message: str = ""  # why it failed, or is slow
+    sent: int = 0
+    dropped: int = 0
+    clients: int | None = None
+    url: str = ""
+    fixed: bool = False  # of the command line: no other rig closes it

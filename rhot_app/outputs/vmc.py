@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.hand.openxr import OPENXR_JOINTS
 from rhot_app.outputs.joints import HandSample, Sample
+from rhot_app.outputs.openxr import OPENXR_JOINTS
 from rhot_app.outputs.osc import UdpSink, bundles, osc_message
 from rhot_app.project import OutputSettings
 

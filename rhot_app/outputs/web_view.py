@@ -23,14 +23,12 @@ from websockets.http11 import Request, Response
 
 from rhot_app.errors import OutputError
 from rhot_app.keys import keys_path
-from rhot_app.outputs.joints import Sample
-from rhot_app.outputs.json_message import json_message
-from rhot_app.outputs.spec import WEB_PORT, host_and_port
-from rhot_app.outputs.status import SECRET_VARIABLE
+from rhot_app.outputs.joints import Sample, json_message
+from rhot_app.outputs.spec import SECRET_VARIABLE, WEB_PORT, host_and_port
 from rhot_app.outputs.web_server import WebServer, http_answer, text_answer
 from rhot_app.project import OutputSettings
-from rhot_node.addresses import is_loopback, own_interfaces
 from rhot_node.files import resource_path, write_atomically
+from rhot_node.network.presence import is_loopback, own_interfaces
 
 STATES: Final = "states"
 """Below the secret: the WebSocket that every state is sent to, as JSON (docs/outputs.md)."""

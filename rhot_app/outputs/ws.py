@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from websockets.http11 import Request, Response
 
-from rhot_app.outputs.joints import Sample
-from rhot_app.outputs.json_message import json_message
+from rhot_app.outputs.joints import Sample, json_message
 from rhot_app.outputs.spec import host_and_port
 from rhot_app.outputs.web_server import WebServer, text_answer
 from rhot_app.project import OutputSettings

@@ -7,8 +7,7 @@ import json
 from typing import Any, Final
 
 from rhot_app.errors import OutputError
-from rhot_app.outputs.joints import Sample
-from rhot_app.outputs.json_message import json_message
+from rhot_app.outputs.joints import Sample, json_message
 from rhot_app.outputs.spec import host_and_port
 from rhot_app.project import OutputSettings
 

@@ -20,10 +20,10 @@ from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.trackers import make_tracker
 
 
 def read_observations(path: Path, rig: Rig | None = None) -> tuple[Rig, ObservationTable]:

@@ -4,18 +4,60 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import math
 import os
 import struct
 import threading
 import time
+from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
-from rhot_app.recording.disk_watch import DiskWatch
 from rhot_app.recording.raw_log import PAYLOAD_MAX, Record, RecordKind, encode_header, encode_record
+
+# -- How long the disk lasts at the rate at which a log grows, so that the person is told before it is full ------------
+
+WINDOW_S = 10.0
+"""The rate is that of the last seconds: nodes may be started and stopped while a log is written."""
+
+_LEAST_S = 2.0  # of growth before it is a rate
+
+
+def free_bytes(folder: Path) -> int:
+    """What an ordinary user may still write in `folder`; raises OSError."""
+    facts = os.statvfs(folder)
+    return facts.f_bavail * facts.f_frsize
+
+
+class DiskWatch:
+    """`look` is called by the thread that writes, because a slow disk may keep it waiting; anybody may read."""
+
+    def __init__(self, folder: Path, free: Callable[[Path], int] = free_bytes) -> None:
+        self.seconds_left = math.inf
+        self._folder, self._free = folder, free
+        self._sizes: deque[tuple[float, int]] = deque()
+
+    def look(self, size: int, now_s: float) -> None:
+        """The log has `size` bytes now."""
+        self._sizes.append((now_s, size))
+        while now_s - self._sizes[0][0] > WINDOW_S:
+            self._sizes.popleft()
+        begun_s, before = self._sizes[0]
+        if now_s - begun_s < _LEAST_S:
+            return
+        try:
+            left = self._free(self._folder)
+        except OSError:
+            self.seconds_left = math.inf
+            return
+        self.seconds_left = left * (now_s - begun_s) / (size - before) if size > before else math.inf
+
+
+# -- Writes the raw log in a thread of its own, so that a slow disk never delays a sample ------------------------------
 
 QUEUE_LIMIT = 65_536
 """Records that may wait for the disk: six seconds of a 10,000 datagrams/s flood."""

@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.simulator.scene.scene_arguments import add_show_arguments, show_of
+from rhot_app.simulator.scene.scene_description import add_show_arguments, show_of
 
 if TYPE_CHECKING:
-    from rhot_app.simulator.nodes.camera_workers import Progress
+    from rhot_app.simulator.nodes.film import Progress
     from rhot_app.simulator.nodes.shot import Shot
     from rhot_app.simulator.scene.scene import Scene
 
@@ -161,8 +161,7 @@ def _check(args: argparse.Namespace) -> None:
 
 def _write_depth_table(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
-    from rhot_app.simulator.truth.distances import TABLE_NAME, write_distances
-    from rhot_app.simulator.truth.points import PointNoise
+    from rhot_app.simulator.truth.points import TABLE_NAME, PointNoise, write_distances
 
     try:
         distances = [0.01 * float(text) for text in args.depth_table.split(",")]

@@ -15,10 +15,9 @@ from collections.abc import Sequence
 import msgspec
 
 from rhot_app.project import RigNode
-from rhot_app.sources.browse import Browse, Found, ZeroconfBrowser
-from rhot_app.sources.find_socket import FindSocket, Sighting
+from rhot_app.sources.discovery import Browse, FindSocket, Found, Sighting, ZeroconfBrowser
 from rhot_app.sources.node_link import NodeLink
-from rhot_node.addresses import is_loopback
+from rhot_node.network.presence import is_loopback
 
 LOST_NS = 2_000_000_000
 """A node that has answered nothing for so long is looked for."""

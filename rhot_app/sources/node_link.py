@@ -6,12 +6,10 @@ No sockets. Live links and replayed logs feed the same object.
 from __future__ import annotations
 
 from rhot_app.project import Rig
-from rhot_app.sources.authentication import NOBODY_YET, holder_of
 from rhot_app.sources.clock import NodeClockModel
-from rhot_app.sources.validation import DatagramValidator
-from rhot_node.wire.codec import encode
+from rhot_app.sources.validation import NOBODY_YET, DatagramValidator, holder_of
+from rhot_node.wire.codec import Seal, encode
 from rhot_node.wire.messages import ClockReply, ClockRequest, Message, NodeState
-from rhot_node.wire.seal import Seal
 
 SILENT_NS = 700_000_000
 """A node that neither answers nor sends for so long is called silent."""

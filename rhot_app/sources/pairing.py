@@ -1,4 +1,4 @@
-"""Asking nodes who they are, and pairing with one by the code that it shows: the other side of `rhot_node.reception`.
+"""Asking nodes who they are, and pairing with one by the code that it shows: the other side of the node's.
 
 Functions that wait; call them in a worker or a command.
 """
@@ -20,8 +20,7 @@ from rhot_app.keys import KnownNode, MasterKeys, remember_node
 from rhot_node.errors import printable
 from rhot_node.files import PRINTABLE, decode_message
 from rhot_node.keys import Name
-from rhot_node.pairing import NONCE_LENGTH, Transcript, proof, proves, read_code
-from rhot_node.reception import NO_CODE
+from rhot_node.network.pairing import NO_CODE, NONCE_LENGTH, Transcript, proof, proves, read_code
 
 PAIRING_PORT = 47803
 TIMEOUT_S = 2.0

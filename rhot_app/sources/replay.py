@@ -11,10 +11,10 @@ from pathlib import Path
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
-from rhot_app.sources.authentication import RECORDED
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
-from rhot_app.sources.record_sink import RecordSink
+from rhot_app.sources.source import RecordSink
+from rhot_app.sources.validation import RECORDED
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.errors import WireError
 from rhot_node.wire.messages import ClockReply, ClockRequest, Start

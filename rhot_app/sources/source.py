@@ -6,10 +6,21 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from rhot_app.project import Rig
+from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver
-from rhot_app.sources.record_sink import RecordSink
 
+# -- What a recorder must offer to the sources: they hand it every datagram, as it came or went ------------------------
+
+class RecordSink(Protocol):
+    """Takes records. Must return at once and never raise: it is called between a sample and its state."""
+
+    def put(self, kind: RecordKind, node_id: int, t_master_ns: int, data: bytes) -> None:
+        """Take one datagram with its kernel receive time, or the time of sending."""
+        ...
+
+
+# -- Where frames come from: live nodes or a log, the same to the engine -----------------------------------------------
 
 class ObservationSource(Protocol):
     """Delivers verified frames of all cameras of a rig from threads of its own."""

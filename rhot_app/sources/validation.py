@@ -5,17 +5,51 @@ No sockets and no threads. Nothing in a datagram raises past `DatagramValidator.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
 from rhot_app.project import Rig, RigNode
-from rhot_app.sources.authentication import ANYBODY
 from rhot_app.sources.clock import ClockEstimate, NodeClockModel
 from rhot_app.tracking.tracker import CameraObservations, Candidates
 from rhot_node.errors import WireError
+from rhot_node.wire.codec import Seal, decode, decode_sealed, decode_verified, is_tagged
 from rhot_node.wire.marker_table import MarkerTable
-from rhot_node.wire.messages import MarkerFlag, Observations
+from rhot_node.wire.messages import MarkerFlag, Message, Observations
 from rhot_node.wire.sequence import SequenceWindow, Verdict
 from rhot_node.wire.text import parse_text
+
+# -- Which datagrams of a node are taken: anybody's, the holder's of one key, nobody's yet, or what a log holds --------
+
+@dataclass(frozen=True, slots=True)
+class Authentication:
+    """`open` gives a datagram's message or raises WireError; `genuine` says whether it comes from whom we listen to,
+    whatever it says: only that is recorded."""
+
+    open: Callable[[bytes], Message]
+    genuine: Callable[[bytes], bool]
+
+
+def holder_of(seal: Seal) -> Authentication:
+    """Only what `seal` tagged."""
+    return Authentication(functools.partial(decode_sealed, seal=seal), seal.verifies)
+
+
+def _refuse(data: bytes) -> Message:
+    if is_tagged(data):
+        raise WireError("no_key", "the node has not given the key yet")
+    raise WireError("untagged", "no tag where one is required")
+
+
+ANYBODY = Authentication(decode, lambda data: True)
+NOBODY_YET = Authentication(_refuse, lambda data: False)
+RECORDED = Authentication(decode_verified, lambda data: True)
+
+
+# -- The door of one node: every datagram, live or from a log, is verified here and counted, or becomes ----------------
+# No sockets and no threads. Nothing in a datagram raises past `DatagramValidator.admit`.
 
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""

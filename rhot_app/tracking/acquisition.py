@@ -16,7 +16,7 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
-from rhot_app.tracking import schedule
+from rhot_app.tracking import pairing
 from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.marker_model import MarkerModel
 from rhot_app.tracking.pairing import Paired, Pairing
@@ -35,7 +35,7 @@ UNFIT_M = 0.06
 """Markers so far from where the hand has them are something else. A first fit of a moving hand may be 3 cm off."""
 
 _TARGET_SD_M = 1e-3
-_WAITING = schedule.FRAMES  # frames of each camera; those before would tell nothing more of an instant
+_WAITING = pairing.FRAMES  # frames of each camera; those before would tell nothing more of an instant
 
 
 class Located(NamedTuple):

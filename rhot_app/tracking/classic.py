@@ -18,11 +18,11 @@ from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, tra
 from rhot_app.hand.places import with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.project import Rig
-from rhot_app.tracking import stages, trust
+from rhot_app.tracking import locate, trust
 from rhot_app.tracking.association import MarkerAssociation
+from rhot_app.tracking.locate import Sheet
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
-from rhot_app.tracking.stages import Sheet
 from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -105,7 +105,7 @@ class ClassicTracker:
         """Raw positions decide what to believe; believed pixels are filtered and located again."""
         rig, shapes = self._rig, self._shapes()
         markers = Sheet(len(rig.cameras), len(rig.marker_ids))
-        stages.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
+        locate.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
                           rig.cameras, rig.focal, shapes, rig.law, rig.reach, self._memory, self._confirmed,
                           markers.used, markers.doubtful, markers.believed, markers.restarted, markers.raw,
                           markers.covariances, markers.errors)
@@ -115,13 +115,13 @@ class ClassicTracker:
             return markers
         pixel, position = self._pixel_filter, self._position_filter
         pixels = np.empty_like(paired.pixels)
-        stages.filter_pixels(t_s, markers.used, markers.restarted, paired.pixels, pixel.parameters, pixel.state,
+        locate.filter_pixels(t_s, markers.used, markers.restarted, paired.pixels, pixel.parameters, pixel.state,
                              position.state, pixel.gap_s, pixels)
         clock.lap("filter")
-        stages.locate_filtered(pixels, paired.covariances, markers.used, rig.intrinsics, rig.cameras, rig.focal,
+        locate.locate_filtered(pixels, paired.covariances, markers.used, rig.intrinsics, rig.cameras, rig.focal,
                                shapes, rig.law, markers.positions)
         clock.lap("triangulate")
-        stages.filter_positions(t_s, markers.positions, position.parameters, position.state, position.gap_s,
+        locate.filter_positions(t_s, markers.positions, position.parameters, position.state, position.gap_s,
                                 markers.believed)
         clock.lap("filter")
         return markers
@@ -131,14 +131,14 @@ class ClassicTracker:
         pose, band = self._hand.pose, self._rig.band_half_axes
         if pose is None or band is None:
             return self._rig.shapes
-        stages.turn_band(pose.world_from_palm, band, self._turned_shapes[self._rig.wrist])
+        locate.turn_band(pose.world_from_palm, band, self._turned_shapes[self._rig.wrist])
         return self._turned_shapes
 
     def _solve_hand(self, t_s: float, markers: Sheet) -> SolvedHand:
         """Say how each marker is known, those out of sight too, and solve the hand that wears them."""
         rig = self._rig
         wrist, tips, tip_knowledge = np.empty(3), np.empty((5, 3)), np.empty(5, np.uint8)
-        measured, wrist_knowledge = stages.conclude(
+        measured, wrist_knowledge = locate.conclude(
             t_s, self._memory, markers.believed, markers.doubtful, self._anchors, markers.positions,
             markers.covariances, markers.knowledge, rig.wrist, rig.tips, wrist, tips, tip_knowledge)
         if measured:

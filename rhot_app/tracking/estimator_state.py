@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
-from rhot_app.tracking import stages
+from rhot_app.tracking import locate
 from rhot_app.tracking.association import GATE
 from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
 from rhot_app.tracking.locate import locate_all
@@ -171,7 +171,7 @@ class EstimatorStates:
         if rig.band_half_axes is not None:
             world = np.eye(4)
             world[:3] = state[:ANGLES].reshape(3, 4)
-            stages.turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
+            locate.turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
         locate_all(aligned, sightings.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
                    rig.cameras, rig.focal, self._shapes, raw, raw_covariances, errors)
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)

@@ -13,10 +13,9 @@ from rhot_app.errors import RigError
 from rhot_app.geometry.camera import CameraModel, distort
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import NaturalPose
-from rhot_app.hand.model import HandModel, build_model
+from rhot_app.hand.model import HandModel, VariantName, build_model, limit_set, make_variant
 from rhot_app.hand.places import Place, place_of, with_markers
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
-from rhot_app.hand.variants import VariantName, limit_set, make_variant
 from rhot_app.project import Rig
 from rhot_app.tracking.rig_arrays import band_axes
 from rhot_node.markers import FLAT_PATCHES, Marker

@@ -15,19 +15,17 @@ from typing import TypeVar
 
 import numpy as np
 
-from rhot_app.estimation.filter import Knot
-from rhot_app.estimation.smoother import ChunkedSmoother, Estimate
+from rhot_app.estimation.filter import ChunkedSmoother, Estimate, Knot
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
 from rhot_app.tracking.hand_process import HandProcess
-from rhot_app.tracking.make import require_estimator
 from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.two_hands import TwoHands
+from rhot_app.tracking.trackers import TwoHands, require_estimator
 
 Kept = TypeVar("Kept")
 

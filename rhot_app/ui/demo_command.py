@@ -8,7 +8,7 @@ from pathlib import Path
 from rhot_app.errors import SimulatorError
 from rhot_app.ui.app import add_window_arguments, open_window
 from rhot_app.ui.backend.contract import TwinChoice
-from rhot_app.ui.models.motions import shipped_motions
+from rhot_app.ui.models.words import shipped_motions
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,29 +16,24 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.actions import Actions, MainToolBar
-from rhot_app.ui.appearance import Appearance
+from rhot_app.ui.appearance import Appearance, DisplayPrediction
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.controller import Controller
-from rhot_app.ui.dialogs import Dialogs
-from rhot_app.ui.display_prediction import DisplayPrediction
-from rhot_app.ui.docks import Docks
+from rhot_app.ui.dialogs.dialogs import Dialogs
 from rhot_app.ui.guide import page_of
-from rhot_app.ui.lens_caps import LensCaps
-from rhot_app.ui.models.notice import Notice
-from rhot_app.ui.models.transient_notices import TransientNotices
+from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.recordings import SHOW_FOLDER, Recordings
 from rhot_app.ui.replay.windows import ReplayWindows
-from rhot_app.ui.rig_watch import RigWatch
 from rhot_app.ui.scene.page import ScenePage
-from rhot_app.ui.screen import Screen
+from rhot_app.ui.screen import Docks, Screen
 from rhot_app.ui.settings import Settings
 from rhot_app.ui.shapes import show_overflow
-from rhot_app.ui.status_words import label_of, look_of, notices_of
+from rhot_app.ui.simulated_rig_menus import LensCaps, TwinShows
+from rhot_app.ui.status_words import RigWatch, label_of, look_of, notices_of
 from rhot_app.ui.theme import scheme_named
-from rhot_app.ui.twin_shows import TwinShows
 from rhot_app.ui.welcome import WelcomePage
-from rhot_app.ui.wizards.catalogue import OPEN_WIZARD, WIZARDS, wizard_named
+from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, WIZARDS, wizard_named
 from rhot_app.ui.wizards.launcher import Launcher
 
 TICK_MS = 16

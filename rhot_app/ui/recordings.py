@@ -10,12 +10,30 @@ from pathlib import Path
 from platformdirs import user_documents_path
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QInputDialog, QWidget
 
-from rhot_app.ui.bookmark_dialog import BookmarkDialog
 from rhot_app.ui.controller import Controller
 from rhot_app.ui.models.notice import Level, Notice
 from rhot_app.ui.models.rows import bytes_text
+
+# -- Asks for a few words about a moment, while a recording is made or replayed ----------------------------------------
+
+NO_WORDS = "bookmark"
+"""What a bookmark says when nothing was typed: hands full of paint type nothing."""
+
+
+class BookmarkDialog(QInputDialog):
+    """Asks once; `taken` hears the words. Nothing waits for it."""
+
+    def __init__(self, taken: Callable[[str], None], parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Bookmark")
+        self.setLabelText("What happens here?")
+        self.textValueSelected.connect(lambda text: taken(text.strip() or NO_WORDS))
+        self.open()
+
+
+# -- Recordings as the person at the screen makes them: a new file each, and a word about it when it is ----------------
 
 LOG_SUFFIX = ".rhotlog"
 LOG_FILTER = f"Recordings (*{LOG_SUFFIX});;All files (*)"

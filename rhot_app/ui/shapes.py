@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QBrush, QColor, QIcon, QPainter, QPen, QPixmap, QPolygonF
+from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QIcon, QPainter, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QToolBar, QToolButton, QWidget
 
 
@@ -176,3 +176,19 @@ class ShapeMark(QWidget):
             ratio = self.devicePixelRatioF()
             painter.drawPixmap(0, 0, shape_pixmap(self._shape, self._colour.name(), self._side, ratio))
             painter.end()
+
+
+# -- A word on a dark ground, readable over any picture ----------------------------------------------------------------
+
+def paint_tag(painter: QPainter, corner: QPointF, text: str, *, bold: bool = False) -> None:
+    """A word on a dark ground."""
+    font = painter.font()
+    font.setBold(bold)
+    painter.setFont(font)
+    metrics = QFontMetricsF(font)
+    box = QRectF(corner.x(), corner.y(), metrics.horizontalAdvance(text) + 8, metrics.height() + 2)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(0, 0, 0, 150))
+    painter.drawRoundedRect(box, 3, 3)
+    painter.setPen(QColor("#ffffff"))
+    painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.backend.contract import TwinChoice
-from rhot_app.ui.models.motions import shipped_motions
+from rhot_app.ui.models.words import shipped_motions
 from rhot_app.ui.theme import app_font
 from rhot_node.compiled import is_cold
 

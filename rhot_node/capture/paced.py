@@ -9,8 +9,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from rhot_node.capture.camera import EndOfRecording, Frame
-from rhot_node.capture.pace import NS_PER_S, available_delay_ns, sleep_until
+from rhot_node.capture.camera import NS_PER_S, EndOfRecording, Frame, available_delay_ns, sleep_until
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_bgr

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rhot_node.capture.camera import Frame
-from rhot_node.capture.pi_controls import make_controls
-from rhot_node.capture.sensors import Box, choose_preset, mid_exposure_ns, read_out
+from rhot_node.capture.sensors import Box, choose_preset, make_controls, mid_exposure_ns, read_out
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import from_i420

@@ -14,8 +14,7 @@ from typing import Any, Protocol
 import cv2
 import numpy as np
 
-from rhot_node.capture.camera import Frame
-from rhot_node.capture.pace import available_delay_ns
+from rhot_node.capture.camera import Frame, available_delay_ns
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, from_bgr

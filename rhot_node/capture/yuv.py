@@ -18,8 +18,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from rhot_node.capture.camera import EndOfRecording, Frame
-from rhot_node.capture.pace import NS_PER_S, available_delay_ns, sleep_until
+from rhot_node.capture.camera import NS_PER_S, EndOfRecording, Frame, available_delay_ns, sleep_until
 from rhot_node.clock import NodeClock
 from rhot_node.detect.image import Plane, from_i420
 from rhot_node.errors import CameraError

@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numba import njit
 
-from rhot_node.detect.contour_columns import (
+from rhot_node.detect.contour_pixels import (
     AGE,
     AREA,
     AT_NODE,
@@ -75,8 +75,9 @@ from rhot_node.detect.contour_columns import (
     WIDTH,
     X,
     Y,
+    gather,
+    smooth_around,
 )
-from rhot_node.detect.contour_pixels import gather, smooth_around
 
 _TABLE_HALF, _TABLE_STEPS = 4.0, 128  # the edge's profile, tabulated to 4 blurs on either side
 _AT = (np.arange(2 * int(_TABLE_HALF) * _TABLE_STEPS + 2) / _TABLE_STEPS - _TABLE_HALF)

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect.find import DOUBTFUL, SEARCH_STEP, Finder
-from rhot_node.detect.gate import Labels
+from rhot_node.detect.gate import Labels, guess_illuminant
 from rhot_node.detect.illuminant import DEAD_ZONE, MARKERS_LEAST, SWITCHED, Illuminant
-from rhot_node.detect.illuminant_guess import guess_illuminant
 from rhot_node.detect.image import YuvImage
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
@@ -29,7 +28,7 @@ LIGHT_PASSES = 3  # of finding the markers and reading the light from them, in a
 
 class FastDetector:
     """Finds the candidates of every marker in one YUV420 image after the other; see
-    `rhot_node.detect.detector.Detector`."""
+    `rhot_node.detect.image.Detector`."""
 
     def __init__(self, markers: MarkerSet, *, precise: bool = True) -> None:
         """`precise` False: markers in plain view are placed by their soft centroid, without a fit of the outline."""

@@ -13,16 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect import measure as m
+from rhot_node.detect.colour import directions, sector_table
 from rhot_node.detect.follow import learn_noise, noise_level
 from rhot_node.detect.followed import Followed
 from rhot_node.detect.gate import AREA_MIN, ColourGate, merits
 from rhot_node.detect.illuminant import Illuminant
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.labels import directions, sector_table
 from rhot_node.detect.outline import INTERIOR, OUTSIDE
-from rhot_node.detect.reported_covariance import FLOOR_VARIANCE, mask_variance
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
-from rhot_node.detect.track import ALIVE, EXTENT, MARGIN, TRACK_COLUMNS, Track, lost_observation
+from rhot_node.detect.track import (
+    ALIVE,
+    EXTENT,
+    FLOOR_VARIANCE,
+    MARGIN,
+    TRACK_COLUMNS,
+    Track,
+    lost_observation,
+    mask_variance,
+)
 from rhot_node.detect.track import X as TRACK_X
 from rhot_node.detect.track import Y as TRACK_Y
 from rhot_node.markers import MarkerSet

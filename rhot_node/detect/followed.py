@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect import contour_columns as c
+from rhot_node.detect import contour_pixels as c
 from rhot_node.detect import position as p
 from rhot_node.detect.contour import fit
 from rhot_node.detect.contour_pixels import project
@@ -20,29 +20,26 @@ from rhot_node.detect.follow import (
     AREA_LEAST,
     DONE,
     ELONGATED,
-    MISFIT_MOST,
-    MISFIT_NOISE,
-    NOISE_MOST,
-    OUT_COLUMNS,
-    follow,
-    noise_level,
-)
-from rhot_node.detect.followed_band import (
     IS_BAND,
     LIMB_LEFT,
     LIMB_TAKEN,
     MARK_COLUMNS,
+    MISFIT_MOST,
+    MISFIT_NOISE,
+    NOISE_MOST,
     OFF_AXIS,
+    OUT_COLUMNS,
     READY,
     SAG,
     SAG_FRAMES,
     SAG_VARIANCE,
     SAG_ZERO,
+    follow,
+    noise_level,
 )
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.position import BLUR_VARIANCE
-from rhot_node.detect.reported_covariance import LIMB_OF_SHAPE, OFF_AXIS_SD
-from rhot_node.detect.track import FITTED
+from rhot_node.detect.track import FITTED, LIMB_OF_SHAPE, OFF_AXIS_SD
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import MarkerObservation
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from rhot_node.wire.messages import MarkerObservation
 
 Plane = NDArray[np.uint8]
 
@@ -62,3 +65,18 @@ def to_bgr(image: YuvImage) -> Plane:
     chroma = [cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR) for plane in (image.v, image.u)]
     bgr = cv2.cvtColor(cv2.merge([image.y, *chroma]), cv2.COLOR_YCrCb2BGR)
     return np.asarray(bgr, dtype=np.uint8)
+
+
+# -- What every detector offers: one image in, the candidates of every marker of its set out ---------------------------
+
+class Detector(Protocol):
+    """A detector keeps small state between frames (windows, sizes); frames must come in order of time."""
+
+    def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """The best candidate of every marker, in the order of the marker set, lost markers reported as lost; then
+        further candidates, if any: at most CANDIDATES_MAX of a marker in all."""
+        ...
+
+    def reset(self) -> None:
+        """Forget all tracks: the next frame is searched as a whole."""
+        ...

@@ -28,7 +28,7 @@ VALUE_MIN = 50  # RHOT 6.3.2: at least 50
 
 
 class ReferenceDetector:
-    """Finds every marker as the thesis does; see `rhot_node.detect.detector.Detector`."""
+    """Finds every marker as the thesis does; see `rhot_node.detect.image.Detector`."""
 
     def __init__(self, markers: MarkerSet, roi_margin: int = ROI_MARGIN) -> None:
         self._ranges = [range_of(marker) for marker in markers.markers]

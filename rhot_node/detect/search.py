@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_node.detect.colour import Table
 from rhot_node.detect.image import Plane
-from rhot_node.detect.labels import Table
 
 RUNS_MAX = 16384  # more runs than this is noise or foliage, not markers; the rest of the frame is not searched
 BLOBS_MAX = 512

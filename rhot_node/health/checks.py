@@ -2,11 +2,44 @@
 
 from __future__ import annotations
 
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.health.check import Check
 from rhot_node.health.machine import Machine, Throttled
+
+# -- One thing that was looked at: its level, what was found, what to do -----------------------------------------------
+
+Level = Literal["ok", "warning", "error"]
+LEVELS: tuple[Level, ...] = ("ok", "warning", "error")
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """`code` is a short key, `text` a sentence on what was found, `remedy` one on what to do; empty when ok."""
+
+    code: str
+    level: Level
+    text: str
+    remedy: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """What was found and what to do."""
+        return f"{self.text} {self.remedy}".rstrip()
+
+
+def worst(checks: list[Check]) -> Level:
+    """The highest level among `checks`; ok for none."""
+    return max((check.level for check in checks), key=LEVELS.index, default="ok")
+
+
+# -- What a machine's values mean for a node: one function per thing, from values to a `Check`. Pure but for -----------
 
 HOT_C = 75.0
 TOO_HOT_C = 80.0  # here the firmware begins to slow the processor down
@@ -119,3 +152,45 @@ def check_network(machine: Machine) -> list[Check]:
         found.append(Check("receive_buffer", "warning", f"Sockets may buffer {buffer // 1024} KiB only.",
                            "Allow more: `sudo sysctl -w net.core.rmem_max=212992`."))
     return found
+
+
+# -- What the daemon tells the master of its machine: only what is wrong now, or became wrong a moment ago -------------
+
+LOOK_S = 2.0  # between looks at the machine, however often it is asked
+RECENT_S = 60.0  # a brown-out between two looks is told for so long
+
+
+class HealthMonitor:
+    """Looks at the machine when asked, which is in the control channel's thread: the frame loop pays nothing."""
+
+    def __init__(self, machine: Machine, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._machine = machine
+        self._now_s = now_s
+        self._lock = threading.Lock()
+        self._known = machine.throttled(ask_commands=False) or Throttled(0)  # what had been before the node started
+        self._noticed: dict[Throttled, float] = {}
+        self._troubles: list[Check] = []
+        self._looked_s = -LOOK_S
+
+    def troubles(self) -> list[Check]:
+        """Everything that is not as it should be; empty on a well machine."""
+        with self._lock:
+            now_s = self._now_s()
+            if now_s - self._looked_s >= LOOK_S:
+                self._looked_s = now_s
+                self._troubles = self._look(now_s)
+            return self._troubles
+
+    def _look(self, now_s: float) -> list[Check]:
+        flags = self._machine.throttled(ask_commands=False)
+        if flags is not None:
+            for flag in flags & ~self._known & ~NOW:
+                self._noticed[flag] = now_s
+            self._known |= flags
+            recent = [flag for flag, noticed_s in self._noticed.items() if now_s - noticed_s < RECENT_S]
+            flags &= NOW
+            for flag in recent:
+                flags |= flag
+        checks = (check_power(flags), check_heat(self._machine.temperature_c(), flags),
+                  check_memory(self._machine.available_bytes()))
+        return [check for check in checks if check.level != "ok"]

@@ -6,8 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from rhot_node.service.install import Host, Wish, install, service_for, uninstall
-from rhot_node.service.unit import unit_text
+from rhot_node.service.install import Host, Wish, install, service_for, uninstall, unit_text
 
 SUMMARIES = {
     "install": "Make the node a system service (systemd): started at boot, restarted when it ends or hangs, held in "

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 from scipy.special import erf
 
-from rhot_app.calibration.hand import prior as hand_prior
+from rhot_app.calibration.hand import marker_places as hand_prior
 from rhot_app.calibration.hand.bundle_model import Poses, expected
 from rhot_app.calibration.hand.marker_places import PALM, MarkerPlace, MarkerTracks
 from rhot_app.calibration.hand.shape import MARKERS, HandUnknowns

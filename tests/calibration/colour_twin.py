@@ -15,7 +15,7 @@ from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.simulator.nodes.shot import make_renderer, make_shot
 from rhot_app.simulator.render.body import SKIN_RGB, HandBody
 from rhot_app.simulator.render.render import FrameRenderer
-from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.scene.camera_controls import Lamp
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_objects import SceneObject
 from rhot_node.detect.colour import box_mask, colours_of

@@ -12,8 +12,7 @@ from bones_twin import RICH, SIX, TRIAD, Sloppiness, base_hand, bones_mm, person
 
 from rhot_app.__main__ import main
 from rhot_app.calibration.hand import fit as hand_fit
-from rhot_app.calibration.hand.bones import solve_bones
-from rhot_app.calibration.hand.bones_entry import enter_bones
+from rhot_app.calibration.hand.bones import enter_bones, solve_bones
 from rhot_app.calibration.hand.bones_report import BonesReport, Known
 from rhot_app.calibration.hand.marker_places import MarkerTracks, tracks_of
 from rhot_app.errors import CalibrationError

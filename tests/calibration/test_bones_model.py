@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from bones_twin import RICH, base_hand, free_movement, person, record
 
-from rhot_app.calibration.hand import prior as hand_prior
+from rhot_app.calibration.hand import marker_places as hand_prior
+from rhot_app.calibration.hand.bones_collector import find_slip, rigid_bodies, rigid_pairs
 from rhot_app.calibration.hand.bundle_model import Poses, expected, in_segments, linearise
 from rhot_app.calibration.hand.fit import choose_instants
 from rhot_app.calibration.hand.marker_places import tracks_of
-from rhot_app.calibration.hand.rigid_segments import find_slip, rigid_bodies, rigid_pairs
 from rhot_app.calibration.hand.shape import MARKERS, HandUnknowns
-from rhot_app.calibration.time.track_noise import _smooth_all, smooth
+from rhot_app.calibration.time.tracks import _smooth_all, smooth
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model

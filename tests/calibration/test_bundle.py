@@ -7,8 +7,14 @@ import pytest
 from stereo_twin import SIZE, Twin, stereo_twin
 
 from rhot_app.calibration.stereo.bundle import adjust
-from rhot_app.calibration.stereo.bundle_layout import Layout, LensFreedom
-from rhot_app.calibration.stereo.bundle_model import BundleState, Observations, linearise, residuals
+from rhot_app.calibration.stereo.bundle_model import (
+    BundleState,
+    Layout,
+    LensFreedom,
+    Observations,
+    linearise,
+    residuals,
+)
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import inverse

@@ -7,7 +7,7 @@ import pytest
 from colour_scenes import PAINTS, box, picture
 
 from rhot_app.calibration.colour.colours import solve_colours
-from rhot_app.calibration.colour.drift import DriftReport, IlluminantDrift
+from rhot_app.calibration.colour.illuminant import DriftReport, IlluminantDrift
 from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.calibration.verdict import Grade
 from rhot_node.detect.fast import FastDetector

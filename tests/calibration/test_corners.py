@@ -13,7 +13,7 @@ from stereo_pictures import NUMBERS, needs_pictures, picture
 
 from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
 from rhot_app.calibration.board.corners import detect
-from rhot_app.calibration.board.missing import why_missing
+from rhot_app.calibration.board.size_check import why_missing
 
 BOARD = Chessboard(9, 6, 0.03)
 TURN = (0.3, -0.35, 0.15)

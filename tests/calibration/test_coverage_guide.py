@@ -10,8 +10,7 @@ from board_rendering import LENS, corners_px, pose
 from intrinsics_twin import BOARD, seen, twin_views
 
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.lens.capture_guide import CaptureGuide
-from rhot_app.calibration.lens.coverage import CELLS, board_corners_px, cover, place
+from rhot_app.calibration.lens.coverage import CELLS, CaptureGuide, board_corners_px, cover, place
 
 
 def view_at(x: float, y: float, depth: float, turn: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> BoardView:

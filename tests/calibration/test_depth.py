@@ -10,11 +10,10 @@ import pytest
 from synthetic_rig import make_rig
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.depth.fit import DepthGeometry, fit_depth, geometry_of
+from rhot_app.calibration.depth.fit import DepthGeometry, depth_from_disparity, fit_depth, geometry_of
 from rhot_app.calibration.depth.table import DepthTable, read_depth_table
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.disparity import depth_from_disparity
 from rhot_app.project import load_rig, save_rig
 from rhot_app.rig_history import versions
 

@@ -7,8 +7,7 @@ import pytest
 from colour_scenes import PAINTS, picture, place
 from marker_rendering import Canvas
 
-from rhot_app.calibration.check.exposure import measure_exposure
-from rhot_app.calibration.colour.white_balance import balance_on_grey
+from rhot_app.calibration.check.exposure import balance_on_grey, measure_exposure
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_node.config import CameraSettings

@@ -10,8 +10,8 @@ from board_rendering import LENS, corners_px, pose
 from intrinsics_twin import BOARD, seen, twin_views
 
 from rhot_app.calibration.board.boards import CharucoBoard
-from rhot_app.calibration.lens.certainty import expected_errors
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, residual_field, solve
+from rhot_app.calibration.lens.intrinsics_checks import expected_errors
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 

@@ -10,7 +10,7 @@ import pytest
 from stereo_pictures import FOLDER, needs_pictures
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.lens.intrinsics_file import load_intrinsics
+from rhot_app.calibration.lens.intrinsics import load_intrinsics
 from rhot_app.errors import CalibrationError
 from rhot_app.project import load_rig
 from rhot_app.rig_history import versions

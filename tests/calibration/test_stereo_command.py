@@ -17,7 +17,7 @@ from stereo_pictures import FOLDER, needs_pictures, picture
 from rhot_app import rig_history
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.boards import STANDARD_BOARD, CharucoBoard
-from rhot_app.calibration.commands.board_arguments import add_board_arguments, board_of
+from rhot_app.calibration.commands.output import add_board_arguments, board_of
 from rhot_app.project import load_rig, save_rig
 from rhot_node.files import resource_path
 

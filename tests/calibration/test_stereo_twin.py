@@ -11,7 +11,7 @@ from stereo_twin import BOARD, LENSES, RIGHT_FROM_LEFT, SIZE, Twin, stereo_twin,
 
 from rhot_app.calibration.board.boards import CharucoBoard, Chessboard
 from rhot_app.calibration.depth.ruler import RulerReading, read_ruler
-from rhot_app.calibration.lens.start import LensStart
+from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.calibrate import calibrate, solve
 from rhot_app.calibration.stereo.points import locate

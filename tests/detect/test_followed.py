@@ -11,7 +11,7 @@ import pytest
 from marker_rendering import SKIN, Canvas, Rgb, disc
 
 from rhot_node.detect import contour_pixels
-from rhot_node.detect.contour_columns import COSINES, HALF_COSINES, HALF_SINES, NODES, SINES
+from rhot_node.detect.contour_pixels import COSINES, HALF_COSINES, HALF_SINES, NODES, SINES
 from rhot_node.detect.fast import GLANCE, FastDetector
 from rhot_node.detect.illuminant import Illuminant, gains_of
 from rhot_node.detect.image import YuvImage

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from marker_rendering import to_yuv
 
-from rhot_node.detect.labels import acquisition_table, sector_table
+from rhot_node.detect.colour import acquisition_table, sector_table
 from rhot_node.files import resource_path
 from rhot_node.markers import ChromaModel, Marker, MarkerSet, load_markers
 

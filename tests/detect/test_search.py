@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rhot_node.detect import search as s
-from rhot_node.detect.labels import acquisition_table
+from rhot_node.detect.colour import acquisition_table
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from marker_rendering import SKIN, to_yuv
 
-from rhot_node.detect import reported_covariance as st
+from rhot_node.detect import track as st
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage
 from rhot_node.files import resource_path

@@ -23,8 +23,8 @@ from rhot_app.project import Broadcast, CameraPose, Intrinsics, Rig, RigNode, sa
 from rhot_app.tracking.state import HandState
 from rhot_node.config import ClockSettings, NodeSettings, save_settings
 from rhot_node.files import resource_path
+from rhot_node.keys import keys_path, pair_beforehand
 from rhot_node.markers import load_markers
-from rhot_node.trust import keys_path, pair_beforehand
 
 BASELINE_M = 0.075
 WIDTH, HEIGHT, FPS = 640, 480, 40.0

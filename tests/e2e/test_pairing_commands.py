@@ -18,8 +18,7 @@ from scene import Scene
 from rhot_app.keys import load_master_keys
 from rhot_app.project import load_rig, save_rig
 from rhot_app.sources.pairing import Introduction, NodeAddress, ask_who
-from rhot_node.keys import connect_with
-from rhot_node.trust import keys_path
+from rhot_node.keys import connect_with, keys_path
 
 
 def command(module: str, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -23,9 +23,8 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.tracking.state import Knowledge
 from rhot_node.clock import NodeClock
 from rhot_node.keys import KeyPair, connect_with, new_key_pair
-from rhot_node.wire.codec import encode
+from rhot_node.wire.codec import Seal, encode
 from rhot_node.wire.messages import ClockRequest, MarkerObservation, Message, Observations, Start, StartEntry, Stop
-from rhot_node.wire.seal import Seal
 
 SILENCE_S = 0.4  # a master is answered within milliseconds
 

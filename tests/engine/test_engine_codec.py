@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from patience import quickest
 
-from rhot_app.engine import codec
+from rhot_app.engine import status
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
@@ -43,29 +43,29 @@ def assert_same(got: HandState, sent: HandState) -> None:
 @pytest.mark.parametrize(("markers", "cameras"), [(6, 2), (1, 1), (64, 16)])
 def test_state_round_trip(markers: int, cameras: int) -> None:
     state = make_state(markers, cameras)
-    back = codec.decode(codec.TOPIC_STATE, codec.encode(state))
+    back = status.decode(status.TOPIC_STATE, status.encode(state))
     assert isinstance(back, HandState)
     assert_same(back, state)
 
 
 def test_state_encodes_fast() -> None:
     state = make_state()
-    assert quickest(lambda: codec.encode(state), 120e-6, times=300) < 120e-6
+    assert quickest(lambda: status.encode(state), 120e-6, times=300) < 120e-6
 
 
 def test_status_and_preview_round_trip() -> None:
     node = NodeStatus(1, "left", "streaming", False, 120.0, 10, 1, {"magic": 2}, 1.5, 1e-4, 2e-4)
     status = EngineStatus(1, 2, 3, True, "TRACKING", "rig", "/rig.json", 118.0, (node,), (Advice("info", "ok"),),
                           {"solve": LatencySummary(1e-4, 2e-4)})
-    assert codec.decode(codec.TOPIC_STATUS, codec.encode(status)) == status
+    assert status.decode(status.TOPIC_STATUS, status.encode(status)) == status
     preview = Preview("left", 5, 640, 480, b"\xff\xd8")
-    assert codec.decode(codec.TOPIC_PREVIEW, codec.encode(preview)) == preview
+    assert status.decode(status.TOPIC_PREVIEW, status.encode(preview)) == preview
 
 
 @pytest.mark.parametrize(("topic", "payload"), [
-    (b"other", b""), (codec.TOPIC_STATE, b""), (codec.TOPIC_STATE, b"\x80"), (codec.TOPIC_STATUS, b"\xc1"),
-    (codec.TOPIC_STATE, codec.encode(make_state())[:-5]),
+    (b"other", b""), (status.TOPIC_STATE, b""), (status.TOPIC_STATE, b"\x80"), (status.TOPIC_STATUS, b"\xc1"),
+    (status.TOPIC_STATE, status.encode(make_state())[:-5]),
 ])
 def test_foreign_bytes_are_refused(topic: bytes, payload: bytes) -> None:
     with pytest.raises(EngineError):
-        codec.decode(topic, payload)
+        status.decode(topic, payload)

@@ -11,7 +11,7 @@ import pytest
 from fake_tracker import FakeTracker
 from patience import eventually, settled
 
-from rhot_app.engine import codec
+from rhot_app.engine import status
 from rhot_app.engine.core import Engine
 from rhot_app.engine.replay_summary import replay_states, summarise
 from rhot_app.engine.status import EngineStatus
@@ -20,8 +20,8 @@ from rhot_app.project import OneEuroSettings, OutputSettings, Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.sources.links import UdpNodes
 from rhot_app.sources.replay import LogReplay, LogValidator
-from rhot_app.sources.udp_nodes import UdpNodes
 from rhot_app.tracking.state import HandState
 from rhot_node.clock import NodeClock
 
@@ -72,7 +72,7 @@ def nodes(rig: Rig) -> Iterator[list[SyntheticNode]]:
 def test_states_carry_the_latency_of_the_one_before(bench: Bench, nodes: list[SyntheticNode]) -> None:
     bench.engine.start()
     bench.run_until(lambda: len(bench.published) > 20)
-    state = codec.decode(codec.TOPIC_STATE, bench.published[-1])
+    state = status.decode(status.TOPIC_STATE, bench.published[-1])
     assert isinstance(state, HandState)
     assert 0.0 < state.latency_s["publish"] < 0.05
     assert 0.0 < state.latency_s["receive_to_state"] < 0.5
@@ -164,7 +164,7 @@ def test_tracking_goes_on_when_the_disk_is_full(tmp_path: Path, bench: Bench, no
 
 def test_a_disk_that_fills_is_told_before_it_is_full(tmp_path: Path, bench: Bench, nodes: list[SyntheticNode],
                                                      monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rhot_app.recording.disk_watch.os.statvfs",
+    monkeypatch.setattr("rhot_app.recording.recorder.os.statvfs",
                         lambda path: SimpleNamespace(f_bavail=9, f_frsize=512))
     bench.engine.start()
     bench.engine.record(tmp_path / "a.log")
@@ -174,7 +174,7 @@ def test_a_disk_that_fills_is_told_before_it_is_full(tmp_path: Path, bench: Benc
 
 
 def _decode_state(payload: bytes) -> HandState:
-    state = codec.decode(codec.TOPIC_STATE, payload)
+    state = status.decode(status.TOPIC_STATE, payload)
     assert isinstance(state, HandState)
     return state
 

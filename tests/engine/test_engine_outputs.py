@@ -23,7 +23,7 @@ from rhot_app.engine.output_process import OutputProcess
 from rhot_app.errors import OutputError
 from rhot_app.project import OutputSettings, save_rig
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
-from rhot_app.sources.udp_nodes import UdpNodes
+from rhot_app.sources.links import UdpNodes
 
 
 def free_port() -> int:

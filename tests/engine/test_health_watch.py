@@ -14,8 +14,8 @@ from rhot_app.engine.advice import calibration_advice
 from rhot_app.engine.observer import HealthWatch
 from rhot_app.engine.status import Advice
 from rhot_app.project import CameraPose, DepthSettings, Rig
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
 RIG = make_rig()

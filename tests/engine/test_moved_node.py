@@ -15,7 +15,7 @@ from rhot_app.engine.core import Engine
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.project import load_rig, save_rig
 from rhot_app.sources import lost_nodes
-from rhot_app.sources.udp_nodes import UdpNodes
+from rhot_app.sources.links import UdpNodes
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from rhot_app.engine.node_health import SENTENCE_MAX, health_advice, most_urgent_first, sees_black
+from rhot_app.engine.node_meter import SENTENCE_MAX, health_advice, most_urgent_first, sees_black
 from rhot_app.engine.status import Advice
 from rhot_node.health.checks import BLACK_PICTURE, check_heat, check_power
 from rhot_node.health.machine import Throttled

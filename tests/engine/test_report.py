@@ -22,7 +22,7 @@ from rhot_app.recording.bookmarks import Bookmark, bookmark_record
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_node.keys import new_key_pair
-from rhot_node.pairing import new_code, show_code
+from rhot_node.network.pairing import new_code, show_code
 
 SECOND = 1_000_000_000
 

@@ -11,9 +11,8 @@ from fake_tracker import FakeTracker
 from patience import PATIENCE_MS, PATIENCE_S, eventually, settled
 
 from rhot_app.engine import node_control
-from rhot_app.engine.client import EngineClient
+from rhot_app.engine.client import EngineClient, open_directory
 from rhot_app.engine.core import Engine
-from rhot_app.engine.directory import open_directory
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.serve import Server, StatePublisher
 from rhot_app.engine.status import EngineStatus, Preview
@@ -22,7 +21,7 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.recording.bookmarks import Bookmark, read_bookmarks
 from rhot_app.recording.video import video_name
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
-from rhot_app.sources.udp_nodes import UdpNodes
+from rhot_app.sources.links import UdpNodes
 from rhot_app.tracking.state import HandState
 from rhot_node.wire.messages import NodeState
 

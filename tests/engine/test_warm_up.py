@@ -5,10 +5,10 @@ import pytest
 from modelled_hand import model_rig
 from synthetic_rig import make_rig
 
-from rhot_app.engine.warm_up import warm_up
+from rhot_app.engine.pipeline import warm_up
 from rhot_app.project import OTHER_HAND, CameraPose
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import Condition
+from rhot_app.tracking.trackers import make_tracker
 
 
 class Spy:

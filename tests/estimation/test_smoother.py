@@ -7,17 +7,16 @@ import pytest
 from linear_motion import ConstantVelocity, kalman_update, place
 
 from rhot_app.engine.replay_summary import replay_states, smoothed_states
-from rhot_app.estimation.filter import IteratedFilter
-from rhot_app.estimation.smoother import ChunkedSmoother, Estimate, smooth
+from rhot_app.estimation.filter import ChunkedSmoother, Estimate, IteratedFilter, smooth
 from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.data_sets import Order, data_set
 from rhot_app.project import with_tracker
 from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.state import Condition
+from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
 PROCESS = ConstantVelocity()

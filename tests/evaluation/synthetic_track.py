@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rhot_app.evaluation.deviations import WornMarkers
+from rhot_app.evaluation.accuracy import WornMarkers
 from rhot_app.evaluation.track import Track
 from rhot_app.simulator.truth.truth import FrameTruth, Truth
 from rhot_app.tracking.state import Knowledge

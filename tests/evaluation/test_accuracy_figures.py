@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 from synthetic_track import LATE_S, WORN, make_track, make_truth
 
-from rhot_app.evaluation.accuracy import accuracy, display_error, pooled, predicted, ratio
-from rhot_app.evaluation.compare import Comparison, Judged, Run
-from rhot_app.evaluation.compare_table import COLUMNS, consistency_table, table
-from rhot_app.evaluation.consistency import squares
-from rhot_app.evaluation.deviations import deviations, worn_by
+from rhot_app.evaluation.accuracy import accuracy, deviations, display_error, pooled, predicted, ratio, squares, worn_by
+from rhot_app.evaluation.compare import COLUMNS, Comparison, Judged, Run, consistency_table, table
 from rhot_app.evaluation.track import Predicted, Track
 from rhot_app.project import load_rig
 from rhot_app.simulator.truth.truth import Truth

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_app.evaluation.compare import TRACKERS, compare
-from rhot_app.evaluation.compare_table import consistency_table, table
+from rhot_app.evaluation.compare import TRACKERS, compare, consistency_table, table
 from rhot_app.evaluation.data_sets import Order
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from synthetic_track import WORN, make_track, make_truth
 
-from rhot_app.evaluation.consistency import (
+from rhot_app.evaluation.accuracy import (
     INSTANT_S,
     Squares,
     at_instants,
     axes_within,
     band,
     consistency,
+    deviations,
     normalised,
     squares,
 )
-from rhot_app.evaluation.deviations import deviations
 
 COVARIANCE = 1e-6 * np.array([[1.0, 0.3, 0.0], [0.3, 2.0, -0.5], [0.0, -0.5, 9.0]])
 TIMES = np.arange(0.0, 3.9, INSTANT_S) + 0.5 * INSTANT_S

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from rhot_app.evaluation import scenarios
-from rhot_app.evaluation.accuracy import accuracy
+from rhot_app.evaluation.accuracy import accuracy, deviations, worn_by
 from rhot_app.evaluation.data_sets import DataSet, Order, data_set
-from rhot_app.evaluation.deviations import deviations, worn_by
 from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from rhot_app.evaluation.run_table import legend, run_table
+from rhot_app.evaluation.compare import legend, run_table
 
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "trackers.py"
 BLIND = {"classic": {"tips_mm": 33.25, "within_3_sd_share": None},

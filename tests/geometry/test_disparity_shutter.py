@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rhot_app.geometry.disparity import depth_error, depth_from_disparity, depth_from_power_law
-from rhot_app.geometry.shutter import row_times_ns
+from rhot_app.calibration.depth.fit import depth_error, depth_from_disparity, depth_from_power_law
+from rhot_app.calibration.observations import row_times_ns
 
 TABLE = Path(__file__).parents[2] / "../shared/reference/rhot_table_10_1.csv"
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhot_app.geometry.silhouette import ball, ellipsoid, point_rays
+from rhot_app.geometry.camera import ball, ellipsoid, point_rays
 from rhot_app.geometry.transforms import exp_so3
 from rhot_app.geometry.triangulate import triangulate
 

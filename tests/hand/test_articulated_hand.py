@@ -7,12 +7,11 @@ import pytest
 from hand_samples import random_pose
 
 from rhot_app.geometry.transforms import quaternion_from_rotation
-from rhot_app.hand.articulated import load_articulated, save_articulated
-from rhot_app.hand.articulated_hand import articulated_hand
+from rhot_app.hand.articulated import articulated_hand, load_articulated, save_articulated
 from rhot_app.hand.articulated_model import build_articulated, forward_state, state_jacobian
 from rhot_app.hand.kinematics import forward, jacobian
+from rhot_app.hand.model import make_variant
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.hand.variants import make_variant
 
 
 def state_of(pose):

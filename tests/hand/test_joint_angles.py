@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot_app.hand.anatomy import load_hand
-from rhot_app.hand.joint_angles import angles_from_joints
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.hand.solvers.fabrik import angles_from_joints
 from rhot_node.files import resource_path
 
 MODELS = {side: build_model(load_hand(resource_path("hands", f"{side}.json"))) for side in ("right", "left")}

@@ -10,12 +10,11 @@ from hand_samples import random_pose, rotation_about
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhot_app.hand.ik_status import Status
+from rhot_app.hand.finger_chain import Status
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.model import neutral_pose
+from rhot_app.hand.model import inter_finger, neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, excess, slice_flexion, swing, unswing
-from rhot_app.hand.solvers.knuckles import shape_knuckles
+from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, excess, shape_knuckles, slice_flexion, swing, unswing
 from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
 from rhot_app.hand.solvers.methods import (
     NEIGHBOURS,
@@ -28,7 +27,6 @@ from rhot_app.hand.solvers.methods import (
     violation,
 )
 from rhot_app.hand.solvers.problem import make_problem
-from rhot_app.hand.variants import inter_finger
 
 BOUNDS = np.radians([[-20.0, 35.0], [-30.0, 80.0]])
 ROUND = (Shape.CONE, Shape.PARABOLA)

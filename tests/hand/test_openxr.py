@@ -10,8 +10,8 @@ from hand_samples import random_pose
 from scipy.spatial.transform import Rotation
 
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.openxr import OPENXR_JOINTS, OUR_JOINTS, joints_from_openxr, openxr_hand, openxr_map
 from rhot_app.hand.skeleton import FINGERS, JOINTS, HandPose
+from rhot_app.outputs.openxr import OPENXR_JOINTS, OUR_JOINTS, joints_from_openxr, openxr_hand, openxr_map
 
 SIDES = ["right_hand", "left_hand"]
 CHAINS = {finger: [k for k, name in enumerate(OPENXR_JOINTS) if name.startswith(finger)] for finger in FINGERS}

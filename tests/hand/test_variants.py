@@ -12,10 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot_app.errors import RigError
-from rhot_app.hand.anatomy import load_hand, save_hand
-from rhot_app.hand.couplings import Coupling
+from rhot_app.hand.anatomy import Coupling, load_hand, save_hand
+from rhot_app.hand.model import inter_finger, limit_set, make_variant
 from rhot_app.hand.skeleton import ANGLES, FINGERS
-from rhot_app.hand.variants import inter_finger, limit_set, make_variant
 from rhot_node.files import resource_path
 
 COUPLED = make_variant("coupled")

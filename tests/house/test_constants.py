@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 APP = Path(__file__).parents[2] / "rhot_app"
-FILES = [APP / "estimation" / f"{name}.py" for name in ("filter", "residual", "smoother")] + [
+FILES = [APP / "estimation" / f"{name}.py" for name in ("filter", "residual")] + [
     APP / "tracking" / f"{name}.py" for name in ("acquisition", "estimator", "estimator_state", "extrapolation",
                                                  "hand_process", "marker_model", "marker_residual")]
 """The estimator, its residuals, its process, its start, and what it publishes."""

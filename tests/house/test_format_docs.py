@@ -9,8 +9,8 @@ import msgspec
 import pytest
 
 from rhot_app import project
-from rhot_app.calibration.lens import intrinsics_file
-from rhot_app.hand import anatomy, articulated, couplings
+from rhot_app.calibration.lens import intrinsics
+from rhot_app.hand import anatomy, articulated
 from rhot_app.objects import alignment_file
 from rhot_app.tracking.state import HandState
 from rhot_node import config, markers
@@ -23,13 +23,13 @@ PAGES: tuple[tuple[str, str, int, tuple[type[msgspec.Struct], ...]], ...] = (
         project.Broadcast, project.FilterSettings, project.OneEuroSettings)),
     ("markers.md", markers.FORMAT, markers.VERSION, (
         markers.MarkerSet, markers.Marker, markers.ChromaModel, markers.RangeModel)),
-    ("calibration-files.md", intrinsics_file.FORMAT, intrinsics_file.VERSION, (
-        intrinsics_file.IntrinsicsFile, intrinsics_file.BoardUsed)),
+    ("calibration-files.md", intrinsics.FORMAT, intrinsics.VERSION, (
+        intrinsics.IntrinsicsFile, intrinsics.BoardUsed)),
     ("alignment.md", alignment_file.FORMAT, alignment_file.VERSION, (
         alignment_file.Alignment, alignment_file.RigidTransform)),
-    ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy, couplings.Coupling)),
+    ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy, anatomy.Coupling)),
     ("hand.md", articulated.FORMAT, articulated.VERSION, (
-        articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, couplings.Coupling,
+        articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, anatomy.Coupling,
         articulated.Point, articulated.Capsule, articulated.Box)),
     ("node.md", config.FORMAT, config.VERSION, (config.NodeSettings, config.CameraSettings, config.ClockSettings)),
 )

@@ -24,10 +24,10 @@ def test_every_import_of_every_file_is_allowed() -> None:
     ("rhot_node/daemon.py", "def run():\n    from rhot_app.project import Rig"),
     ("rhot_node/daemon.py", "import scipy.optimize"),
     ("rhot_node/__main__.py", "def main():\n    from PySide6 import QtCore"),
-    ("rhot_app/geometry/camera.py", "from rhot_app.hand.fabrik import solve_chain"),
+    ("rhot_app/geometry/camera.py", "from rhot_app.hand.solvers.fabrik import solve_chain"),
     ("rhot_app/geometry/camera.py", "from ..hand import fabrik"),
     ("rhot_app/filters/__init__.py", "from ..tracking.state import HandState"),
-    ("rhot_app/hand/fabrik.py", "from rhot_app.tracking.state import HandState"),
+    ("rhot_app/hand/solvers/fabrik.py", "from rhot_app.tracking.state import HandState"),
     ("rhot_app/tracking/pipeline.py", "from rhot_app.sources.clock import ClockModel"),
     ("rhot_app/tracking/pipeline.py", "if TYPE_CHECKING:\n    from rhot_app.engine.status import EngineStatus"),
     ("rhot_app/sources/receiver.py", "import rhot_app.engine.client"),
@@ -46,7 +46,7 @@ def test_a_planted_violation_is_found(file: str, source: str) -> None:
 
 @pytest.mark.parametrize(("file", "source"), [
     ("rhot_node/detect/fast.py", "from rhot_node.wire.messages import MarkerObservation\nimport numpy, cv2"),
-    ("rhot_app/hand/fabrik.py", "from .skeleton import JOINTS\nfrom rhot_app.project import Rig"),
+    ("rhot_app/hand/solvers/fabrik.py", "from .skeleton import JOINTS\nfrom rhot_app.project import Rig"),
     ("rhot_app/ui/main_window.py", "from PySide6 import QtWidgets\nfrom rhot_app.engine.client import Client"),
     ("rhot_app/__main__.py", "def main():\n    from rhot_app.ui.app import run"),
 ])

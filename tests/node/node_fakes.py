@@ -12,7 +12,7 @@ from rhot_node.capture.camera import EndOfRecording, Frame
 from rhot_node.clock import NodeClock
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import CameraError
-from rhot_node.session import Stream
+from rhot_node.network.session import Stream
 from rhot_node.wire.messages import MarkerObservation, Observations
 
 SIZE = (64, 48)

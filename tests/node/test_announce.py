@@ -9,10 +9,9 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from rhot_node import announce
-from rhot_node.announce import Announcer
-from rhot_node.announcement import SERVICE, host_of, instance_of, presence_of, properties_of
-from rhot_node.presence import Presence
+from rhot_node.network import announce
+from rhot_node.network.announce import Announcer
+from rhot_node.network.presence import SERVICE, Presence, host_of, instance_of, presence_of, properties_of
 from rhot_node.wire.messages import TrustState
 
 LEFT = Presence(3, 0xB007, "left", 47800, 47801, 47802, 47803, TrustState.UNPAIRED)

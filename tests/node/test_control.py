@@ -19,16 +19,15 @@ from patience import PATIENCE_MS, eventually
 from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, load_settings, save_settings
-from rhot_node.control import ControlServer
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import LinkError
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.pairing_offer import OfferFile
-from rhot_node.pictures import PictureBox
-from rhot_node.reception import Reception
-from rhot_node.requests import Responder, SettingsStore
-from rhot_node.session import Sessions
+from rhot_node.network.control import ControlServer
+from rhot_node.network.pairing import OfferFile, Reception
+from rhot_node.network.pictures import PictureBox
+from rhot_node.network.requests import Responder, SettingsStore
+from rhot_node.network.session import Sessions
 
 RNG = np.random.default_rng(3)
 
@@ -170,7 +169,7 @@ def test_a_still_is_the_whole_frame_without_loss_or_nearly_so(served: Served, as
 
 
 def test_a_node_without_frames_says_so(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rhot_node.requests.STILL_S", 0.1)
+    monkeypatch.setattr("rhot_node.network.requests.STILL_S", 0.1)
     answer = served.ask(request="still")
     assert not answer["ok"] and "no frame" in answer["error"]
 
@@ -210,7 +209,7 @@ def test_nothing_is_copied_when_nobody_looks() -> None:
 
 def test_previews_keep_their_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [1000.0]
-    monkeypatch.setattr("rhot_node.pictures.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("rhot_node.network.pictures.time.monotonic", lambda: now[0])
     woken: list[float] = []
     box = PictureBox(4.0, lambda: woken.append(now[0]))
     box.wanted = True

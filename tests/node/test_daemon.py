@@ -17,10 +17,10 @@ from rhot_node.config import NodeSettings, save_settings
 from rhot_node.daemon import NodeDaemon
 from rhot_node.errors import CameraError
 from rhot_node.files import resource_path
-from rhot_node.health.check import Check
+from rhot_node.health.checks import Check
 from rhot_node.markers import load_markers
-from rhot_node.pictures import PictureBox
-from rhot_node.requests import SettingsStore
+from rhot_node.network.pictures import PictureBox
+from rhot_node.network.requests import SettingsStore
 from rhot_node.wire.messages import NodeState
 
 MASTER = ("10.0.0.1", 5000)

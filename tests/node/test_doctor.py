@@ -19,10 +19,9 @@ from rhot_node.config import NodeSettings, save_settings
 from rhot_node.doctor_command import check_camera, check_compiled, check_service, check_settings, examine, run
 from rhot_node.errors import CameraError
 from rhot_node.files import resource_path
-from rhot_node.health.check import Check, worst
-from rhot_node.keys import new_key_pair
+from rhot_node.health.checks import Check, worst
+from rhot_node.keys import Master, NodeTrust, keys_path, new_key_pair
 from rhot_node.markers import load_markers
-from rhot_node.trust import Master, NodeTrust, keys_path
 
 SHOW = "systemctl show rhot-node.service --property=LoadState,ActiveState,NRestarts"
 

@@ -13,11 +13,10 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError
 from rhot_node.files import resource_path
-from rhot_node.link import ANSWERS_PER_S, UdpLink
-from rhot_node.link_keys import LinkKeys
 from rhot_node.markers import load_markers
-from rhot_node.presence import Presence
-from rhot_node.session import Sessions, Stream
+from rhot_node.network.link import ANSWERS_PER_S, UdpLink
+from rhot_node.network.presence import Presence
+from rhot_node.network.session import LinkKeys, Sessions, Stream
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (
     ClockReply,

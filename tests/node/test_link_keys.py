@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rhot_node.errors import WireError
-from rhot_node.link_keys import LINKS_MAX, LinkKeys
+from rhot_node.network.session import LINKS_MAX, LinkKeys
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import ClockRequest, Message, Start, StartEntry, Stop
 

@@ -7,8 +7,11 @@ from pathlib import Path
 import pytest
 from machine_fake import machine
 
-from rhot_node.health.check import Check, worst
 from rhot_node.health.checks import (
+    LOOK_S,
+    RECENT_S,
+    Check,
+    HealthMonitor,
     check_clock,
     check_heat,
     check_memory,
@@ -16,9 +19,9 @@ from rhot_node.health.checks import (
     check_network,
     check_power,
     check_speed,
+    worst,
 )
 from rhot_node.health.machine import Machine, Throttled, run_command
-from rhot_node.health.monitor import LOOK_S, RECENT_S, HealthMonitor
 
 FIRMWARE = "sys/devices/platform/soc/soc:firmware/get_throttled"
 FIRMWARE_PI5 = "sys/devices/platform/soc@107c000000/soc@107c000000:firmware/get_throttled"

@@ -14,7 +14,7 @@ from trusted_node import TrustedNode
 
 from rhot_node.errors import TrustError
 from rhot_node.keys import KeyPair, new_key_pair
-from rhot_node.pairing import (
+from rhot_node.network.pairing import (
     ALPHABET,
     CODE_LENGTH,
     Transcript,

@@ -19,10 +19,9 @@ from rhot_node.capture.open import PluginCamera, open_camera
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings, load_settings, parse_settings, save_settings
 from rhot_node.detect.image import YuvImage
-from rhot_node.detector_plugin import DetectorChoice, PluginDetector
 from rhot_node.errors import CameraError, SettingsError
 from rhot_node.files import resource_path
-from rhot_node.plugins import plugin_names
+from rhot_node.plugins import DetectorChoice, PluginDetector, plugin_names
 from rhot_node.warm_up import rehearsal_image
 from rhot_node.wire.codec import decode
 from rhot_node.wire.messages import MarkerFlag, Observations

@@ -9,9 +9,17 @@ from pathlib import Path
 import pytest
 
 from rhot_node.errors import TrustError
-from rhot_node.keys import KeyPair, new_key_pair
-from rhot_node.private_files import read_private, remove_private, write_private
-from rhot_node.trust import MASTERS_MAX, Master, NodeTrust, pair_beforehand
+from rhot_node.keys import (
+    MASTERS_MAX,
+    KeyPair,
+    Master,
+    NodeTrust,
+    new_key_pair,
+    pair_beforehand,
+    read_private,
+    remove_private,
+    write_private,
+)
 
 
 def mode(path: Path) -> int:

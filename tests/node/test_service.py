@@ -15,9 +15,8 @@ from rhot_node.config import NodeSettings, load_settings, save_settings
 from rhot_node.errors import NodeError
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.service.install import Host, Wish, install, uninstall
+from rhot_node.service.install import Host, Service, Wish, install, uninstall, unit_text
 from rhot_node.service.notify import ServiceManager
-from rhot_node.service.unit import Service, unit_text
 
 SERVICE = Service(Path("/opt/rhot/bin/python"), Path("/var/lib/rhot-node/node.json"), "pi")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rhot_node.session import ENDED_MAX, MASTER_SILENCE_S, Sessions
+from rhot_node.network.session import ENDED_MAX, MASTER_SILENCE_S, Sessions
 
 MASTER = ("10.0.0.1", 5000)
 OTHER = ("10.0.0.2", 6000)

@@ -23,11 +23,10 @@ from rhot_node.daemon import NodeDaemon
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import VideoError
 from rhot_node.files import resource_path
-from rhot_node.link_keys import LinkKeys
 from rhot_node.markers import load_markers
-from rhot_node.pictures import PictureBox
-from rhot_node.requests import Responder, SettingsStore
-from rhot_node.session import Sessions
+from rhot_node.network.pictures import PictureBox
+from rhot_node.network.requests import Responder, SettingsStore
+from rhot_node.network.session import LinkKeys, Sessions
 from rhot_node.video import recorder as recorder_module
 from rhot_node.video.avi import read_stamps
 from rhot_node.video.recorder import FREE_MIN, READ_MAX, VideoInfo, VideoRecorder

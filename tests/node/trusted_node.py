@@ -11,16 +11,13 @@ from patience import PATIENCE_S
 
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, save_settings
-from rhot_node.control import ControlServer
 from rhot_node.files import resource_path
-from rhot_node.keys import KeyPair, connect_with, new_key_pair
-from rhot_node.link_keys import LinkKeys
+from rhot_node.keys import KeyPair, Master, NodeTrust, connect_with, new_key_pair
 from rhot_node.markers import load_markers
-from rhot_node.pairing_offer import OfferFile
-from rhot_node.reception import Reception
-from rhot_node.requests import Responder, SettingsStore
-from rhot_node.session import Sessions
-from rhot_node.trust import Master, NodeTrust
+from rhot_node.network.control import ControlServer
+from rhot_node.network.pairing import OfferFile, Reception
+from rhot_node.network.requests import Responder, SettingsStore
+from rhot_node.network.session import LinkKeys, Sessions
 
 ABOUT = {"node_id": 3, "name": "left", "state": "ready"}
 

@@ -20,8 +20,7 @@ from patience import PATIENCE_S, eventually
 from streams import RATE_HZ, Stream, free_port, palm_before_cameras, state_of, unknown
 
 from rhot_app.hand.model import neutral_pose
-from rhot_app.outputs.joints import JointConverter
-from rhot_app.outputs.json_message import json_message
+from rhot_app.outputs.joints import JointConverter, json_message
 from rhot_app.outputs.lsl import LslSink
 from rhot_app.project import OutputSettings, Rig, parse_rig
 

@@ -12,9 +12,9 @@ from streams import palm_before_cameras, state_of, unknown
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import neutral_pose
-from rhot_app.hand.openxr import OPENXR_JOINTS
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
 from rhot_app.outputs.joints import MEDIAPIPE_JOINTS, JointConverter
+from rhot_app.outputs.openxr import OPENXR_JOINTS
 from rhot_app.outputs.vmc import bone_poses, bones_of
 from rhot_app.project import Rig
 from rhot_node.files import resource_path

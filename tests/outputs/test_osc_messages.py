@@ -13,9 +13,9 @@ from pythonosc.osc_message import OscMessage
 from streams import palm_before_cameras, state_of, unknown
 
 from rhot_app.hand.model import neutral_pose
-from rhot_app.hand.openxr import OPENXR_JOINTS
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.outputs.joints import JointConverter
+from rhot_app.outputs.openxr import OPENXR_JOINTS
 from rhot_app.outputs.osc import DATAGRAM_MAX, OscSink, bundles, osc_message
 from rhot_app.outputs.vmc import VmcSink
 from rhot_app.project import OutputSettings, Rig

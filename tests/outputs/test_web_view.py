@@ -20,8 +20,7 @@ from streams import Stream, free_port, unknown
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from rhot_app.outputs.spec import web_settings
-from rhot_app.outputs.status import SECRET_VARIABLE
+from rhot_app.outputs.spec import SECRET_VARIABLE, web_settings
 from rhot_app.project import Rig
 
 needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None and not os.environ.get("CI"),

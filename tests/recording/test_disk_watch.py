@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rhot_app.recording.disk_watch import WINDOW_S, DiskWatch, free_bytes
+from rhot_app.recording.recorder import WINDOW_S, DiskWatch, free_bytes
 
 
 def test_the_rate_is_that_of_the_last_seconds() -> None:

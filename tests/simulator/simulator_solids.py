@@ -12,8 +12,7 @@ from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.painter import Solids
 from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.render.solids_painter import SolidsPainter
-from rhot_app.simulator.scene.camera_controls import Controls
-from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.scene.camera_controls import Controls, Lamp
 from rhot_app.simulator.scene.rigid_target import RigidTarget
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.render import Exposure, FrameRenderer
 from rhot_app.simulator.render.solids_painter import SolidsPainter
-from rhot_app.simulator.scene.lamp import Lamp, flicker_gain, lamp_gains, level_gain
+from rhot_app.simulator.scene.camera_controls import Lamp, flicker_gain, lamp_gains, level_gain
 from rhot_node.detect.image import YuvImage, from_i420
 
 WIDTH, HEIGHT = 96, 64

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rhot_app.simulator.nodes.pace import Pace
+from rhot_app.simulator.nodes.live_cameras import Pace
 
 
 def said(pace: Pace, begin_s: float, seconds: float, rate_hz: float) -> list[dict[str, Any]]:

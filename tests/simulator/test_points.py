@@ -16,8 +16,7 @@ from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
 from rhot_app.simulator.nodes.shot import make_shot
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, MarkerShow
-from rhot_app.simulator.truth.distances import write_distances
-from rhot_app.simulator.truth.points import LOG_NAME, PointNoise, write_points
+from rhot_app.simulator.truth.points import LOG_NAME, PointNoise, write_distances, write_points
 from rhot_app.simulator.truth.truth import load_thing_truth, load_truth
 
 

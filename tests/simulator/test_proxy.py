@@ -9,8 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rhot_app.simulator.nodes.impairment import DelayQueue, Impairment
-from rhot_app.simulator.nodes.proxy import UdpProxy
+from rhot_app.simulator.nodes.proxy import DelayQueue, Impairment, UdpProxy
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import ClockRequest, Start, StartEntry
 

@@ -13,8 +13,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.simulator.scene.motion import FACING, load_motion
-from rhot_app.simulator.scene.recorded import fit_poses
-from rhot_app.simulator.truth.landmarks import Landmarks, read_landmarks
+from rhot_app.simulator.scene.recorded import Landmarks, fit_poses, read_landmarks
 from rhot_node.files import resource_path
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "hand_motion"

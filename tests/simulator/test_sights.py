@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import SimulatorError
-from rhot_app.geometry.silhouette import point_rays
+from rhot_app.geometry.camera import point_rays
 from rhot_app.simulator.nodes.shot import Shot, make_renderer, make_shot
 from rhot_app.simulator.scene.scene import Scene, make_scene, node_settings, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow

@@ -14,12 +14,10 @@ import pytest
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.board.corners import detect
 from rhot_app.errors import CalibrationError, SimulatorError
-from rhot_app.simulator.nodes.frame_socket import FrameSocket
-from rhot_app.simulator.nodes.live_cameras import LiveCameras
-from rhot_app.simulator.nodes.remote import TwinRemote
-from rhot_app.simulator.nodes.twin_requests import CoverRequest, LampRequest, ShowRequest, StateRequest
-from rhot_app.simulator.nodes.twin_server import TwinServer
-from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.nodes.live import TwinServer
+from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras
+from rhot_app.simulator.nodes.remote import CoverRequest, LampRequest, ShowRequest, StateRequest, TwinRemote
+from rhot_app.simulator.scene.camera_controls import Lamp
 from rhot_app.simulator.scene.live_scene import LiveScene
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow

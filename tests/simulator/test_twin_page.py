@@ -9,14 +9,14 @@ import pytest
 
 from rhot_app.simulator import pictures
 from rhot_app.simulator.nodes import shot
+from rhot_app.simulator.scene import camera_controls, motion, scene
 from rhot_app.simulator.scene import camera_controls as controls
-from rhot_app.simulator.scene import lamp, motion_file, scene
 from rhot_app.simulator.scene import scene_description as shows
 
 PAGE = (Path(__file__).parents[2] / "docs" / "twin.md").read_text()
 FORMATS: list[tuple[str, int, tuple[type[msgspec.Struct], ...]]] = [
-    (scene.FORMAT, scene.VERSION, (scene.TwinSettings, scene.Preset, lamp.Lamp, controls.Controls)),
-    (motion_file.FORMAT, motion_file.VERSION, (motion_file.MotionFile, motion_file.Key, motion_file.Sway)),
+    (scene.FORMAT, scene.VERSION, (scene.TwinSettings, scene.Preset, camera_controls.Lamp, controls.Controls)),
+    (motion.FORMAT, motion.VERSION, (motion.MotionFile, motion.Key, motion.Sway)),
     (shot.FORMAT, shot.VERSION, (shot.ShotFile, shows.HandShow, shows.BoardShow, shows.RulerShow, shows.MarkerShow)),
     (pictures.FORMAT, pictures.VERSION, (pictures.PicturesFile, pictures.Picture)),
 ]
@@ -38,5 +38,5 @@ def test_page_names_every_default_as_it_is() -> None:
         assert row.split("|")[2].strip() == value
         actual = getattr(defaults, field)
         assert value.strip("`") == (actual if isinstance(actual, str) else f"{actual:g}")
-    for name, kind in (("lamp", lamp.Lamp), ("controls", controls.Controls)):
+    for name, kind in (("lamp", camera_controls.Lamp), ("controls", controls.Controls)):
         assert getattr(defaults, name) == kind(), "neutral unless somebody asks"

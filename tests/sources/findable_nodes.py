@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
 from rhot_node.files import resource_path
-from rhot_node.link import UdpLink
 from rhot_node.markers import load_markers
-from rhot_node.presence import Presence
-from rhot_node.session import Sessions
+from rhot_node.network.link import UdpLink
+from rhot_node.network.presence import Presence
+from rhot_node.network.session import Sessions
 from rhot_node.wire.messages import NodeState, TrustState
 
 

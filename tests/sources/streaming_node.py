@@ -13,14 +13,13 @@ from trusted_node import TrustedNode
 from rhot_app.project import Broadcast, Rig
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
-from rhot_app.sources.links import new_session
-from rhot_app.sources.udp_nodes import UdpNodes
+from rhot_app.sources.links import UdpNodes, new_session
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
 from rhot_node.keys import KeyPair
-from rhot_node.link import UdpLink
-from rhot_node.link_keys import LinkKeys
+from rhot_node.network.link import UdpLink
+from rhot_node.network.session import LinkKeys
 from rhot_node.wire.messages import MarkerObservation, NodeState, Observations
 
 CLOCK = NodeClock(7 * 3600 * 10**9, 20.0, 0)

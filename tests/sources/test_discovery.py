@@ -14,11 +14,19 @@ import pytest
 from findable_nodes import findable, free_udp_port, presence
 
 from rhot_app.__main__ import main
-from rhot_app.sources import discovery, find_socket
-from rhot_app.sources.browse import Found, ZeroconfBrowser
-from rhot_app.sources.discovery import NO_NETWORK, Search, conflicts, find_nodes, together
-from rhot_app.sources.find_socket import FindSocket, Sighting
-from rhot_node.announce import announce_by_zeroconf
+from rhot_app.sources import discovery
+from rhot_app.sources.discovery import (
+    NO_NETWORK,
+    FindSocket,
+    Found,
+    Search,
+    Sighting,
+    ZeroconfBrowser,
+    conflicts,
+    find_nodes,
+    together,
+)
+from rhot_node.network.announce import announce_by_zeroconf
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import Find, Here, NodeState, TrustState
 
@@ -48,8 +56,8 @@ def a_network(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         found = [ipaddress.IPv4Interface(address) for address in addresses]
         monkeypatch.setattr(discovery, "own_interfaces", lambda: found)
     have("10.0.0.4/24", "127.0.0.1/8")
-    monkeypatch.setattr(find_socket, "own_interfaces", lambda: [ipaddress.IPv4Interface("127.0.0.1/8")])
-    monkeypatch.setattr(find_socket, "_EVERYBODY", "127.255.255.255")
+    monkeypatch.setattr(discovery, "own_interfaces", lambda: [ipaddress.IPv4Interface("127.0.0.1/8")])
+    monkeypatch.setattr(discovery, "_EVERYBODY", "127.255.255.255")
     return have
 
 

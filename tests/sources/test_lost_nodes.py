@@ -14,11 +14,10 @@ from streaming_node import Setup
 
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources import lost_nodes
-from rhot_app.sources.browse import Found
-from rhot_app.sources.find_socket import Sighting
+from rhot_app.sources.discovery import Found, Sighting
+from rhot_app.sources.links import UdpNodes
 from rhot_app.sources.lost_nodes import BROWSE_NS, LOST_NS, PLACES_MAX, TRIED_NS, LostNodes
 from rhot_app.sources.node_link import NodeLink
-from rhot_app.sources.udp_nodes import UdpNodes
 
 SOON_NS = 300_000_000
 

@@ -14,14 +14,12 @@ from streaming_node import Setup
 from rhot_app.errors import SourceError
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
-from rhot_app.sources.links import new_session
+from rhot_app.sources.links import UdpNodes, new_session
 from rhot_app.sources.replay import LogValidator
-from rhot_app.sources.udp_nodes import UdpNodes
 from rhot_node.keys import new_key_pair
-from rhot_node.link_keys import LinkKeys
-from rhot_node.wire.codec import decode, encode, is_tagged
+from rhot_node.network.session import LinkKeys
+from rhot_node.wire.codec import TAG_LENGTH, decode, encode, is_tagged
 from rhot_node.wire.messages import Stop
-from rhot_node.wire.seal import TAG_LENGTH
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.pairing import NodeAddress, ask_who, pair
 from rhot_node.errors import TrustError
 from rhot_node.keys import new_key_pair
-from rhot_node.pairing import new_code, show_code
+from rhot_node.network.pairing import new_code, show_code
 
 PORTS = {"udp_port": 1, "control_port": 2, "preview_port": 3, "pairing_port": 4}
 

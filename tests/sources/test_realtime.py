@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from rhot_app.sources import realtime
+from rhot_app.sources import receiver
 
 
 def in_a_thread(call):
@@ -19,7 +19,7 @@ def in_a_thread(call):
 
 def test_only_the_calling_thread_is_hurried():
     def hurried() -> int:
-        realtime.hurry_this_thread()
+        receiver.hurry_this_thread()
         return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
 
     before = os.sched_getscheduler(0)
@@ -34,7 +34,7 @@ def test_without_permission_nothing_changes(monkeypatch):
         raise PermissionError(1, "Operation not permitted")
 
     def policy_after_hurrying() -> int:
-        realtime.hurry_this_thread()
+        receiver.hurry_this_thread()
         return os.sched_getscheduler(0)
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
@@ -44,9 +44,9 @@ def test_without_permission_nothing_changes(monkeypatch):
 def test_the_interpreter_is_kept_only_while_a_datagram_is_worked_on() -> None:
     before = sys.getswitchinterval()
     try:
-        realtime.claim_interpreter()
+        receiver.claim_interpreter()
         assert sys.getswitchinterval() >= 1e-3
-        realtime.share_interpreter()
-        assert sys.getswitchinterval() <= 2 * realtime.PATIENCE_S
+        receiver.share_interpreter()
+        assert sys.getswitchinterval() <= 2 * receiver.PATIENCE_S
     finally:
         sys.setswitchinterval(before)

@@ -19,7 +19,7 @@ from rhot_app.sources.receiver import (
 )
 from rhot_app.sources.validation import DatagramValidator
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
+from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import MarkerObservation, Observations
 

@@ -11,9 +11,8 @@ from patience import eventually, settled
 
 from rhot_app.project import Rig
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, hand_markers, synthetic_rig
-from rhot_app.sources.links import new_session
+from rhot_app.sources.links import UdpNodes, new_session
 from rhot_app.sources.node_link import SILENT_NS
-from rhot_app.sources.udp_nodes import UdpNodes
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
 from rhot_node.wire.codec import encode

@@ -6,8 +6,8 @@ import numpy as np
 from synthetic_rig import EPOCH_NS, WIDE, Preset, Sight, Trajectory, hand_trajectory, make_rig, observe, run
 
 from rhot_app.project import Rig
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.tracking.trackers import make_tracker
 
 RIG = make_rig()
 GRASP = hand_trajectory(RIG, "grasp", 5.0)

@@ -23,8 +23,8 @@ from synthetic_rig import (
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import FilterSettings
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import LATENCY_STAGES, Knowledge
+from rhot_app.tracking.trackers import make_tracker
 
 
 def test_a_grasping_hand_is_measured_to_a_fraction_of_a_millimetre():

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from synthetic_rig import EPOCH_NS, WIDE, Sight, hand_trajectory, make_rig, observe, run
 
-from rhot_app.geometry.disparity import depth_from_disparity, depth_from_power_law
+from rhot_app.calibration.depth.fit import depth_from_disparity, depth_from_power_law
 from rhot_app.project import CameraPose, DepthSettings
-from rhot_app.tracking.estimate import disparity_law, locate_by_disparity
-from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.rig_arrays import disparity_law, locate_by_disparity
 from rhot_app.tracking.state import Condition, Knowledge
+from rhot_app.tracking.trackers import make_tracker
 
 THEORY = DepthSettings(mode="disparity", baseline_m=0.075, view_angle_deg=62.2)
 LAW = DepthSettings(mode="disparity", baseline_m=0.075, view_angle_deg=62.2, k=45.4332, z=-1.035423)

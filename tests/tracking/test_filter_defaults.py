@@ -6,7 +6,7 @@ from synthetic_rig import FAST, WIDE, Sight, compare, hand_trajectory, make_rig,
 
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.project import FilterSettings
-from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.trackers import make_tracker
 
 PRESETS = {"wide": (WIDE, 0.6), "fast": (FAST, 1.0)}
 

@@ -11,8 +11,8 @@ from synthetic_rig import EPOCH_NS, WIDE, Sight, compare, hand_trajectory, make_
 from rhot_app.hand.model import build_model
 from rhot_app.project import FilterSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene.motion import load_motion
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.rig_arrays import compile_rig
+from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

@@ -8,16 +8,15 @@ import pytest
 from modelled_hand import after_s, deviations, model_rig, moving, seconds, sights, states_of
 from synthetic_rig import LOST, altered, make_rig
 
-from rhot_app.engine import codec
+from rhot_app.engine import status
 from rhot_app.engine.advice import hands_advice
 from rhot_app.errors import RigError
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import OTHER_HAND, Rig, TrackerSettings, parse_rig
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.state import Condition, HandState
-from rhot_app.tracking.two_hands import TwoHands
+from rhot_app.tracking.trackers import TwoHands, make_tracker
 from rhot_node.files import resource_path
 
 RIGHT, LEFT = model_rig("rhot8"), model_rig("rhot8", side="left")
@@ -120,7 +119,7 @@ def test_both_are_predicted_to_one_instant():
 
 
 def test_a_state_of_two_hands_is_published_whole(states):
-    back = codec.decode(codec.TOPIC_STATE, codec.encode(states[-1]))
+    back = status.decode(status.TOPIC_STATE, status.encode(states[-1]))
     assert isinstance(back, HandState) and back.other.other is None
     assert back.other.condition is states[-1].other.condition
     np.testing.assert_array_equal(back.other.joint_positions, states[-1].other.joint_positions)

@@ -26,8 +26,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.outputs.spec import as_run
-from rhot_app.outputs.status import OutputStatus
+from rhot_app.outputs.spec import OutputStatus, as_run
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode, parse_rig
 from rhot_app.rig_history import accept
 from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge

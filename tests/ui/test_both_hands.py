@@ -12,10 +12,10 @@ from fake_engine import FakeEngine
 from PySide6.QtCore import QPoint
 from two_hands_engine import ASIDE, TwoHandsEngine, one_hand_rig, two_hand_rig
 
-from rhot_app.engine import codec
+from rhot_app.engine import status
 from rhot_app.project import TrackerSettings
-from rhot_app.ui.models.hands import hand_names
 from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.models.words import hand_names
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import camera_like_state, to_display
 from rhot_app.ui.scene.hands import hands_of
@@ -73,7 +73,7 @@ def test_each_hand_has_its_own_markers_and_none_has_them_twice():
 
 
 def test_both_hands_are_drawn_where_they_are(scene, state):
-    scene.show_state(codec.decode(codec.TOPIC_STATE, codec.encode(state)))  # as it comes from the engine
+    scene.show_state(status.decode(status.TOPIC_STATE, status.encode(state)))  # as it comes from the engine
     for hand, one in enumerate((state, state.other)):
         joints = to_display(one.joint_positions)
         for part in (SKIN, SKELETON, ELLIPSOIDS):

@@ -14,7 +14,7 @@ from rhot_app.engine.status import Advice
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.panels.advice_bar import SHOWN, chosen_of
-from rhot_app.ui.scene.pick import spots
+from rhot_app.ui.scene.hands import spots
 from rhot_node.files import resource_path
 
 HEADLINE = "Not calibrated: millimetres are not reliable."

@@ -14,7 +14,7 @@ from PySide6.QtCore import Qt
 
 from rhot_app.project import TrackerSettings
 from rhot_app.tracking.state import Condition
-from rhot_app.ui.display_prediction import DisplayPrediction
+from rhot_app.ui.appearance import DisplayPrediction
 
 AHEAD_S = 0.02
 

@@ -13,7 +13,7 @@ from screen_pictures import check, picture_of
 
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.ui.export_dialog import ExportDialog
+from rhot_app.ui.dialogs.export_dialog import ExportDialog
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fake_engine import FakeEngine
 
-from rhot_app.ui.models.jitter import JitterWindow, difference_weights
+from rhot_app.ui.models.meters import JitterWindow, difference_weights
 
 RATE_HZ = 40.0
 

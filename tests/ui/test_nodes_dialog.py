@@ -15,23 +15,20 @@ from PySide6.QtWidgets import QApplication
 from rhot_app.errors import PairingError, SourceError
 from rhot_app.keys import load_master_keys
 from rhot_app.project import load_rig
-from rhot_app.sources.discovery import Search, conflicts, together
-from rhot_app.sources.find_socket import Sighting
+from rhot_app.sources.discovery import Search, Sighting, conflicts, together
 from rhot_app.sources.pairing import Introduction, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig
+from rhot_app.ui.dialogs.nodes_dialog import NodesDialog, PairDialog
 from rhot_app.ui.job import CancelledError
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.nodes_dialog import NodesDialog, PairDialog
 from rhot_node.config import NodeSettings
-from rhot_node.control import ControlServer
 from rhot_node.files import resource_path
+from rhot_node.keys import NodeTrust
 from rhot_node.markers import load_markers
-from rhot_node.pairing import show_code
-from rhot_node.pairing_offer import OfferFile
-from rhot_node.presence import Presence
-from rhot_node.reception import Reception
-from rhot_node.requests import Responder
-from rhot_node.trust import NodeTrust
+from rhot_node.network.control import ControlServer
+from rhot_node.network.pairing import OfferFile, Reception, show_code
+from rhot_node.network.presence import Presence
+from rhot_node.network.requests import Responder
 from rhot_node.wire.messages import NodeState, TrustState
 
 

@@ -21,16 +21,16 @@ from PySide6.QtTest import QTest
 from screen_pictures import check
 
 from rhot_app.engine.client import EngineClient
-from rhot_app.outputs.status import OutputStatus
+from rhot_app.outputs.spec import OutputStatus
 from rhot_app.project import OutputSettings, load_rig, save_rig
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig as streaming_rig
 from rhot_app.ui.backend.contract import Opened
+from rhot_app.ui.dialogs.output_card import qr_code
+from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.guide import page_of
 from rhot_app.ui.models.outputs import SendRates, web_hint
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.output_card import qr_code
-from rhot_app.ui.outputs_dialog import OutputsDialog
 
 OSC = OutputSettings("osc", "127.0.0.1:9000")
 WS = OutputSettings("ws", "127.0.0.1:9001", "openxr", 60.0)

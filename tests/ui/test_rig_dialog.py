@@ -9,7 +9,7 @@ from patience import PATIENCE_MS
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QTableWidget
 
-from rhot_app.ui.dialogs import RigDialog
+from rhot_app.ui.dialogs.dialogs import RigDialog
 
 
 @pytest.mark.parametrize("page", ["cameras", "markers", "hand"])

@@ -11,7 +11,7 @@ from fake_engine import FakeEngine, synthetic_rig
 from rhot_app.project import CameraPose
 from rhot_app.tracking.state import Knowledge
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.scene import floor as stage
+from rhot_app.ui.scene import frames as stage
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice, EllipsoidMesh
 from rhot_app.ui.scene.frames import (
     DISPLAY_FROM_RIG,

@@ -12,15 +12,14 @@ from two_hands_engine import TwoHandsEngine
 
 from rhot_app.engine.status import Advice
 from rhot_app.project import TrackerSettings, load_rig
-from rhot_app.sources.discovery import Search, conflicts, together
-from rhot_app.sources.find_socket import Sighting
+from rhot_app.sources.discovery import Search, Sighting, conflicts, together
 from rhot_app.sources.pairing import Introduction, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer
-from rhot_app.ui.dialogs import RigDialog
+from rhot_app.ui.dialogs.dialogs import RigDialog
+from rhot_app.ui.dialogs.nodes_dialog import NodesDialog, PairDialog
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.nodes_dialog import NodesDialog, PairDialog
 from rhot_node.files import resource_path
-from rhot_node.presence import Presence
+from rhot_node.network.presence import Presence
 from rhot_node.wire.messages import NodeState, TrustState
 
 WRIST = "Right camera saw no wrist marker for 12 s: it is behind the forearm. Turn the hand or add rhot8."

@@ -16,9 +16,9 @@ from PySide6.QtTest import QTest
 from rhot_app.hand.anthropometry import hand_length
 from rhot_app.project import DepthSettings, TrackerSettings, load_rig, save_rig
 from rhot_app.rig_history import versions
-from rhot_app.ui.models.tracker_words import scale_text, size_text
-from rhot_app.ui.tracker_dialog import TrackerDialog
-from rhot_app.ui.wizards.models.rig_rows import rig_rows
+from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
+from rhot_app.ui.models.rows import rig_rows
+from rhot_app.ui.models.words import scale_text, size_text
 
 MODEL = TrackerSettings(kind="estimator")
 FLOATING = TrackerSettings(kind="estimator", float_scale=True)

@@ -8,8 +8,8 @@ import pytest
 
 from rhot_app.errors import SimulatorError
 from rhot_app.ui.backend.session import _key_of, _show_named
-from rhot_app.ui.twin_shows import TITLE
-from rhot_app.ui.wizards.catalogue import wizard_named
+from rhot_app.ui.simulated_rig_menus import TITLE
+from rhot_app.ui.wizards.framework.plan import wizard_named
 
 
 def ticked(bench):

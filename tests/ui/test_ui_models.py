@@ -9,15 +9,13 @@ import pytest
 from fake_engine import FakeEngine
 
 from rhot_app.tracking.state import LATENCY_STAGES, Condition, Knowledge
-from rhot_app.ui.models import glossary, words
-from rhot_app.ui.models.axis_range import peaks_above, round_top, usual_top
+from rhot_app.ui.models import words
 from rhot_app.ui.models.label_layout import Box, place_at_sides, place_labels
-from rhot_app.ui.models.latency import STACKED, LatencyWindow
+from rhot_app.ui.models.meters import STACKED, LatencyWindow, LossMeter, RateRows, unused_frames
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import SCHEMES, contrast, visible_on
-from rhot_app.ui.models.rates import LossMeter, RateRows, unused_frames
 from rhot_app.ui.models.rows import bytes_text, clock_text, marker_rows, node_row
-from rhot_app.ui.models.series import Series, to_csv
+from rhot_app.ui.models.series import Series, peaks_above, round_top, to_csv, usual_top
 from rhot_node.wire.messages import MarkerFlag
 
 SECOND = 1_000_000_000
@@ -132,7 +130,7 @@ def test_every_condition_has_its_own_word_and_shape():
 
 
 def test_every_stage_is_explained():
-    assert all(glossary.tip(stage) for stage in STACKED)
+    assert all(words.tip(stage) for stage in STACKED)
 
 
 @pytest.mark.parametrize(("hidden", "word"),

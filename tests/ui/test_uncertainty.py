@@ -15,11 +15,10 @@ from PySide6.QtWidgets import QApplication, QToolButton, QToolTip
 from test_tracker_dialog import FLOATING
 
 from rhot_app.tracking.state import Knowledge
-from rhot_app.ui.models.spread import sd_number, worst_sd
+from rhot_app.ui.models.rows import sd_number, worst_sd
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import to_display
-from rhot_app.ui.scene.labels import pixels_of
-from rhot_app.ui.scene.legend import ellipsoid_text
+from rhot_app.ui.scene.labels import ellipsoid_text, pixels_of
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,7 @@ from PySide6.QtGui import QDesktopServices
 
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.backend.contract import TwinPace
-from rhot_app.ui.models.notice import Notice
-from rhot_app.ui.models.transient_notices import TransientNotices
+from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.settings import Settings
 
 

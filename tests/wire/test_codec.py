@@ -28,7 +28,7 @@ from wire_samples import (
 )
 
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import asks_who_is_there, decode, decode_sealed, encode
+from rhot_node.wire.codec import Seal, asks_who_is_there, decode, decode_sealed, encode
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockRequest,
@@ -42,7 +42,6 @@ from rhot_node.wire.messages import (
     StartEntry,
     Stop,
 )
-from rhot_node.wire.seal import Seal
 
 OBSERVATIONS = "version_1_observations_some_lost"
 

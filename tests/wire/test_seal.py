@@ -10,8 +10,7 @@ import pytest
 from wire_samples import KEY, TAGGED
 
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import decode, decode_sealed, decode_verified, encode, node_of
-from rhot_node.wire.seal import TAG_LENGTH, Seal
+from rhot_node.wire.codec import TAG_LENGTH, Seal, decode, decode_sealed, decode_verified, encode, node_of
 
 PACKETS = Path(__file__).parents[1] / "packets"
 SEAL = Seal(KEY)

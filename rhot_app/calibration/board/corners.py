@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board, Chessboard
-from rhot_app.calibration.board.charuco_search import find_charuco
-from rhot_app.calibration.board.saddle import FIELDS, fit_saddles
+from rhot_app.calibration.board.saddle import FIELDS, find_charuco, fit_saddles
 
 Array = NDArray[np.float64]
 Gray = NDArray[np.uint8]

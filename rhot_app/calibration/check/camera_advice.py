@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.check.exposure import ExposureReport, Mask, measure_exposure
-from rhot_app.calibration.colour.white_balance import WhiteBalance, balance_on_grey
+from rhot_app.calibration.check.exposure import ExposureReport, Mask, WhiteBalance, balance_on_grey, measure_exposure
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_node.config import CameraSettings

@@ -6,23 +6,193 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rhot_app.calibration.check.camera_checks import (
-    LensFigures,
-    PairGeometry,
-    all_pairs,
-    lens_figures,
-    lens_findings,
-    pair_findings,
-)
 from rhot_app.calibration.lens.camera_calibration import calibration_finding
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.transforms import inverse
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.places import ROLES
 from rhot_app.hand.skeleton import FINGERS
-from rhot_app.project import OTHER_HAND, OneEuroSettings, Rig, estimator_obstacle
+from rhot_app.project import OTHER_HAND, OneEuroSettings, Rig, RigNode, estimator_obstacle
 from rhot_node.files import resource_path
 
+# -- What a rig file says about cameras and lenses, held against what cameras and lenses can be. No picture is ---------
+
+Array = NDArray[np.float64]
+
+WORKING_DISTANCES_M = (0.4, 0.6, 1.0)
+
+_USUAL_VIEW_DEG = (25.0, 120.0)  # horizontal field of view: a tele lens to a wide one
+_POSSIBLE_VIEW_DEG = (8.0, 170.0)
+_USUAL_OFFSET = 0.15  # of the picture's side, principal point from the middle
+_USUAL_ASPECT = 0.05  # fx against fy: pixels are square
+_GRID = 19
+_TOGETHER_M = 0.005
+_NARROW_M, _APART_M = 0.025, 3.0
+_GOOD_OVERLAP, _LEAST_OVERLAP = 0.5, 0.15
+_STEEP_RAD = np.radians(70.0)
+
+
+@dataclass(frozen=True, slots=True)
+class LensFigures:
+    """A lens in words of the shop: horizontal and vertical field of view, and the share of the picture that it can turn
+    into directions."""
+
+    name: str
+    view_rad: tuple[float, float]
+    usable: float
+
+
+@dataclass(frozen=True, slots=True)
+class PairGeometry:
+    """Two cameras: `baseline_m` between their centres, `toe_in_rad` between their axes, and of the picture of each the
+    share that the other sees too, the lesser of the two, at each of `WORKING_DISTANCES_M`."""
+
+    first: str
+    second: str
+    baseline_m: float
+    toe_in_rad: float
+    overlap: tuple[float, ...]
+
+
+def lens_figures(node: RigNode) -> LensFigures:
+    """Fields of view, and how much of the picture has a direction."""
+    lens = node.intrinsics
+    usable = np.isfinite(_model(node).undistort(_grid(node))).all(axis=1)
+    return LensFigures(node.name, (2.0 * float(np.arctan(0.5 * lens.width / lens.fx)),
+                                   2.0 * float(np.arctan(0.5 * lens.height / lens.fy))), float(np.mean(usable)))
+
+
+def pair_geometry(first: RigNode, second: RigNode) -> PairGeometry:
+    """How two cameras stand to each other."""
+    a, b = _model(first), _model(second)
+    cosine = float(np.clip(a.world_from_camera[:3, 2] @ b.world_from_camera[:3, 2], -1.0, 1.0))
+    return PairGeometry(
+        first.name, second.name, float(np.linalg.norm(a.centre - b.centre)), float(np.arccos(cosine)),
+        tuple(min(_seen_too(first, second, z), _seen_too(second, first, z)) for z in WORKING_DISTANCES_M))
+
+
+def lens_findings(node: RigNode, figures: LensFigures) -> list[Finding]:
+    """Whether this can be a lens."""
+    lens, name = node.intrinsics, node.name
+    found = [_view_finding(node, figures)]
+    aspect = abs(lens.fx / lens.fy - 1.0)
+    if aspect > _USUAL_ASPECT:
+        found.append(Finding("aspect", Grade.FAIR if aspect < 0.5 else Grade.POOR,
+                             f"The focal lengths of {name} are {lens.fx:.0f} and {lens.fy:.0f} px, "
+                             f"{100 * aspect:.0f} % apart.", "Pixels are square, unless the picture was stretched.",
+                             _CALIBRATE))
+    offset = max(abs(lens.cx / (lens.width - 1) - 0.5), abs(lens.cy / (lens.height - 1) - 0.5))
+    if offset > _USUAL_OFFSET:
+        found.append(Finding(
+            "principal_point", Grade.POOR if offset > 0.5 else Grade.FAIR,
+            f"The principal point of {name} is at ({lens.cx:.0f}, {lens.cy:.0f}) in a picture of "
+            f"{lens.width}x{lens.height} px.", "It should be near the middle; the intrinsics may be of another picture "
+            "size, or of views that were all alike.", _CALIBRATE))
+    if figures.usable < 1.0:
+        found.append(Finding(
+            "distortion", Grade.POOR if figures.usable < 0.95 else Grade.FAIR,
+            f"The distortion of {name} turns over inside the picture: {100 * (1 - figures.usable):.0f} % of it has no "
+            "direction.", "The coefficients were fitted to views that do not reach the picture's corners.", _CALIBRATE))
+    return [each for each in found if each is not None]
+
+
+def pair_findings(rig: Rig, pairs: list[PairGeometry]) -> list[Finding]:
+    """Whether the cameras stand where cameras can track together."""
+    found = []
+    for pair in pairs:
+        both = f"{pair.first} and {pair.second}"
+        if pair.baseline_m < _TOGETHER_M:
+            found.append(Finding("coincident", Grade.POOR, f"{both} stand at the same place "
+                                 f"({pair.baseline_m * 1e3:.0f} mm apart).", "Depth needs two places.", _STEREO))
+        elif pair.baseline_m < _NARROW_M:
+            found.append(Finding("narrow", Grade.FAIR, f"{both} are only {pair.baseline_m * 1e3:.0f} mm apart.",
+                                 "So near to each other they hardly see depth; or the board's squares were given too "
+                                 "small.", "Measure from lens to lens. If that is right, put them 75 mm apart."))
+        elif pair.baseline_m > _APART_M:
+            found.append(Finding("apart", Grade.POOR, f"{both} are {pair.baseline_m:.0f} m apart.",
+                                 "A pose's translation is in metres, not millimetres.", _STEREO))
+    return [*found, *_overlap_findings(pairs), *_side_findings(rig)]
+
+
+def all_pairs(rig: Rig) -> list[PairGeometry]:
+    """The geometry of all pairs of cameras."""
+    return [pair_geometry(a, b) for a, b in combinations(rig.nodes, 2)]
+
+
+_CALIBRATE = "Calibrate the intrinsics of this camera."
+_STEREO = "Run the stereo calibration."
+
+
+def _view_finding(node: RigNode, figures: LensFigures) -> Finding | None:
+    degrees = float(np.degrees(figures.view_rad[0]))
+    if _USUAL_VIEW_DEG[0] <= degrees <= _USUAL_VIEW_DEG[1]:
+        return None
+    possible = _POSSIBLE_VIEW_DEG[0] <= degrees <= _POSSIBLE_VIEW_DEG[1]
+    return Finding(
+        "field_of_view", Grade.FAIR if possible else Grade.POOR,
+        f"{node.name.capitalize()} sees {degrees:.0f} degrees across (f {node.intrinsics.fx:.0f} px, picture "
+        f"{node.intrinsics.width} px wide).", "The focal length may be of another picture size, or in millimetres.",
+        _CALIBRATE)
+
+
+def _overlap_findings(pairs: list[PairGeometry]) -> list[Finding]:
+    """Each camera needs one other that sees the same hands; two on opposite sides need not see each other's."""
+    found = []
+    for name in {each for pair in pairs for each in (pair.first, pair.second)}:
+        partners = [pair for pair in pairs if name in (pair.first, pair.second)]
+        best = max(partners, key=lambda pair: max(pair.overlap))
+        if max(best.overlap) >= _GOOD_OVERLAP:
+            continue
+        shares = ", ".join(f"{100 * share:.0f} % at {z:g} m"
+                           for share, z in zip(best.overlap, WORKING_DISTANCES_M, strict=True))
+        found.append(Finding(
+            "overlap", Grade.POOR if max(best.overlap) < _LEAST_OVERLAP else Grade.FAIR,
+            f"{best.first} and {best.second} see little together: {shares}.",
+            "They look in different directions, or stand too far apart for this distance.",
+            "Turn them towards each other, so that their pictures share at least half where the hand will be."))
+    unique = {finding.figure: finding for finding in found}
+    return list(unique.values())
+
+
+def _side_findings(rig: Rig) -> list[Finding]:
+    nodes = {node.name.lower(): node for node in rig.nodes}
+    if "left" not in nodes or "right" not in nodes:
+        return []
+    left, right = _model(nodes["left"]), _model(nodes["right"])
+    x, y, z = (inverse(left.world_from_camera) @ right.world_from_camera)[:3, 3]
+    if abs(x) <= max(abs(y), abs(z)) or x > 0.0:
+        return []
+    return [Finding("swapped", Grade.POOR, f"Right stands {-x * 1e3:.0f} mm to the left of left.",
+                    "The cameras are swapped, or were calibrated from mirrored pictures.",
+                    "Run the stereo calibration again, with the pictures of each camera under its own name.")]
+
+
+def _seen_too(first: RigNode, second: RigNode, distance_m: float) -> float:
+    """The share of the first camera's picture that, `distance_m` in front of it, lies in the second one's."""
+    rays = _model(first).undistort(_grid(first))
+    rays = rays[np.isfinite(rays).all(axis=1)]
+    local = np.column_stack([rays, np.ones(len(rays))]) * distance_m
+    world = local @ _model(first).world_from_camera[:3, :3].T + _model(first).centre
+    pixels = _model(second).project(world)
+    inside = ((pixels >= -0.5) & (pixels <= np.array([second.intrinsics.width, second.intrinsics.height]) - 0.5))
+    return float(np.mean(inside.all(axis=1))) if len(rays) else 0.0
+
+
+def _grid(node: RigNode) -> Array:
+    """(N, 2) px over the whole picture, its border included."""
+    u, v = np.meshgrid(np.linspace(0, node.intrinsics.width - 1, _GRID),
+                       np.linspace(0, node.intrinsics.height - 1, _GRID))
+    return np.column_stack([u.ravel(), v.ravel()])
+
+
+def _model(node: RigNode) -> CameraModel:
+    return CameraModel.from_rig(node.intrinsics, node.pose)
+
+
+# -- Everything that can be wrong with a rig file and shows without a picture, for ``rhot check`` and before -----------
 
 @dataclass(frozen=True, slots=True)
 class RigReport:

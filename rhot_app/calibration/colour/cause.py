@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.colour.paint_region import Mask, PaintRegion
-from rhot_node.detect.colour import Colours, colours_of
+from rhot_node.detect.colour import SECTOR_MAGNITUDE_MIN, Colours, colours_of, sector_table
 from rhot_node.detect.fast import SEARCH_STEP, FastDetector
 from rhot_node.detect.find import LARGEST
 from rhot_node.detect.gate import AREA_MIN, ColourGate, Labels
 from rhot_node.detect.illuminant import Illuminant
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.labels import SECTOR_MAGNITUDE_MIN, sector_table
 from rhot_node.detect.search import AREA, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import CANDIDATES_MAX, MarkerFlag, MarkerObservation

@@ -10,15 +10,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.colour.identity import identify
+from rhot_app.calibration.colour.identity import free_paints, identify
 from rhot_app.calibration.colour.illuminant import SAME
 from rhot_app.calibration.colour.model import Obstacles, range_of_samples, solve_models
-from rhot_app.calibration.colour.names import free_paints
-from rhot_app.calibration.colour.rehearsal import Rehearsal, rehearse
 from rhot_app.calibration.colour.samples import PaintSamples, View
 from rhot_app.calibration.colour.separability import Separability, judge_colours
 from rhot_app.calibration.colour.surroundings import SurroundingsReport, surrounding_colours, survey_surroundings
-from rhot_app.calibration.colour.verdict import judge_report
+from rhot_app.calibration.colour.verdict import Rehearsal, judge_report, rehearse
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE

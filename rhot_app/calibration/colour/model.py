@@ -17,8 +17,8 @@ from rhot_app.calibration.colour.illuminant import LAMPS, balanced, relit
 from rhot_app.calibration.colour.samples import PaintSamples
 from rhot_app.calibration.colour.surroundings import SurroundingColours
 from rhot_node.detect.colour import Colours
+from rhot_node.detect.gate import MARKERS_LEAST
 from rhot_node.detect.illuminant import RGB_FROM_YCC
-from rhot_node.detect.illuminant_guess import MARKERS_LEAST
 from rhot_node.markers import ChromaModel, RangeModel
 
 Array = NDArray[np.float64]

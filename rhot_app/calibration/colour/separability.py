@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from rhot_app.calibration.colour.illuminant import LAMPS, Lamp, balanced, chances, relit
 from rhot_app.calibration.colour.model import WINDOW_LEVEL, typical
 from rhot_app.calibration.colour.samples import PaintSamples
-from rhot_node.detect.colour import Colours
+from rhot_node.detect.colour import Colours, directions, sector_table
 from rhot_node.detect.gate import ColourGate
-from rhot_node.detect.labels import directions, sector_table
 from rhot_node.markers import MarkerSet
 
 SKIN, ROOM = "skin", "room"

@@ -102,7 +102,7 @@ def _move(args: argparse.Namespace) -> tuple[BonesReport, _Seats]:
 
 def _enter(args: argparse.Namespace, lengths: dict[str, float]) -> BonesReport:
     """The hand of a ruler."""
-    from rhot_app.calibration.hand.bones_entry import enter_bones
+    from rhot_app.calibration.hand.bones import enter_bones
 
     return enter_bones(_base(args, None, "" if args.hand is not None else "measured with a ruler"), lengths)
 

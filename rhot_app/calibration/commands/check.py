@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _fields(report: RigReport) -> dict[str, Any]:
-    from rhot_app.calibration.check.camera_checks import WORKING_DISTANCES_M
+    from rhot_app.calibration.check.checks import WORKING_DISTANCES_M
 
     return {
         "cameras": [{"name": lens.name, "view_deg": [round(math.degrees(angle), 2) for angle in lens.view_rad],
@@ -47,7 +47,7 @@ def _fields(report: RigReport) -> dict[str, Any]:
 
 
 def _lines(report: RigReport) -> list[str]:
-    from rhot_app.calibration.check.camera_checks import WORKING_DISTANCES_M
+    from rhot_app.calibration.check.checks import WORKING_DISTANCES_M
 
     lines = [f"{lens.name}: sees {math.degrees(lens.view_rad[0]):.1f} x {math.degrees(lens.view_rad[1]):.1f} degrees"
              for lens in report.lenses]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import add_json_argument, show
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.filters.judgement import FilterTargets, MarkerFigures
+    from rhot_app.calibration.filters.meters import FilterTargets, MarkerFigures
     from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport
 
 
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 def _targets(args: argparse.Namespace) -> FilterTargets:
     from dataclasses import replace
 
-    from rhot_app.calibration.filters.judgement import FilterTargets
+    from rhot_app.calibration.filters.meters import FilterTargets
     from rhot_app.errors import CalibrationError
 
     targets = FilterTargets()

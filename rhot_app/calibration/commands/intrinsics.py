@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.board_arguments import add_board_arguments, board_of
-from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
 
 if TYPE_CHECKING:
     from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
@@ -29,8 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; files are written only when the verdict allows it."""
     from rhot_app.calibration.lens.camera_calibration import with_lens
-    from rhot_app.calibration.lens.intrinsics import solve
-    from rhot_app.calibration.lens.intrinsics_file import save_intrinsics
+    from rhot_app.calibration.lens.intrinsics import save_intrinsics, solve
     from rhot_app.calibration.lens.views import matching_files, read_views
     from rhot_app.errors import CalibrationError
     from rhot_app.progress import ProgressLine, within
@@ -60,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
 
 def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
     """The JSON's fields."""
-    from rhot_app.calibration.lens.certainty import WORKING_DISTANCE_M
     from rhot_app.calibration.lens.fit import PARAMETERS
+    from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
 
     lens, errors = report.intrinsics, report.board_errors
     return {
@@ -84,8 +82,8 @@ def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
 
 def lines_of(report: IntrinsicsReport) -> list[str]:
     """The figures for people."""
-    from rhot_app.calibration.lens.certainty import WORKING_DISTANCE_M
     from rhot_app.calibration.lens.fit import PARAMETERS
+    from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
     from rhot_app.calibration.robust_error import what_is_reported
 
     lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]

@@ -3,23 +3,99 @@
 from __future__ import annotations
 
 import argparse
+import math
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.board_arguments import add_board_arguments, board_of
-from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
-from rhot_app.calibration.commands.stereo_arguments import (
-    files_of,
-    known_lengths,
-    named_paths,
-)
+from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
+from rhot_app.calibration.robust_error import what_is_reported
+from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M, PairFigures, StereoReport
+from rhot_app.calibration.stereo.start import WorldFrame
+from rhot_app.errors import CalibrationError
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.lens.start import LensStart
+    from rhot_app.calibration.lens.fit import LensStart
+    from rhot_app.calibration.stereo.calibrate import KnownLengths
     from rhot_app.calibration.stereo.report import StereoReport
-    from rhot_app.calibration.stereo.world_frame import WorldFrame
+    from rhot_app.calibration.stereo.start import WorldFrame
     from rhot_app.progress import Progress
     from rhot_app.project import Rig
+
+
+# -- What the arguments of ``rhot calibrate stereo`` mean; every mistake is a sentence ---------------------------------
+
+def files_of(args: argparse.Namespace) -> dict[str, list[Path]]:
+    """The pictures of each camera, left and right first."""
+    patterns = {name: pattern for name, pattern in (("left", args.left), ("right", args.right)) if pattern}
+    for text in args.camera:
+        name, pattern = _split(text, "--camera", "NAME=PATTERN")
+        if name in patterns:
+            raise CalibrationError(f"--camera {text}: the pictures of {name} are given twice.")
+        patterns[name] = pattern
+    if len(patterns) < 2:
+        raise CalibrationError("Pictures of at least two cameras are needed: --left PATTERN --right PATTERN, or "
+                               "--camera NAME=PATTERN for each.")
+    from rhot_app.calibration.lens.views import matching_files
+
+    found = {name: matching_files(pattern) for name, pattern in patterns.items()}
+    for name, paths in found.items():
+        if not paths:
+            raise CalibrationError(f"{name}: no file matches {patterns[name]!r}. Put the pattern in quotes and see "
+                                   "that the folder is right.")
+    return found
+
+
+def named_paths(texts: list[str], option: str, names: list[str]) -> dict[str, Path]:
+    """NAME=FILE arguments as a table; raises CalibrationError for a name that is no camera."""
+    table = {}
+    for text in texts:
+        name, path = _split(text, option, "NAME=FILE")
+        if name not in names:
+            raise CalibrationError(f"{option} {text}: there are no pictures of {name!r}; the cameras are "
+                                   f"{', '.join(names)}.")
+        table[name] = Path(path)
+    return table
+
+
+def known_lengths(args: argparse.Namespace, names: list[str]) -> KnownLengths:
+    """The baseline by hand and the ruler."""
+    import numpy as np
+
+    from rhot_app.calibration.depth.ruler import RulerReading
+    from rhot_app.calibration.stereo.calibrate import KnownLengths
+
+    for option, value in (("--baseline-mm", args.baseline_mm), ("--ruler-mm", args.ruler_mm)):
+        if value is not None and not 0.0 < value < 1e5:
+            raise CalibrationError(f"{option} {value:g}: a length in millimetres is needed.")
+    baseline = None if args.baseline_mm is None else args.baseline_mm * 1e-3
+    if args.ruler_mm is None and not args.ruler:
+        return KnownLengths(baseline)
+    if args.ruler_mm is None or len(args.ruler) < 2:
+        raise CalibrationError("A ruler needs its length, --ruler-mm, and its ends in the pictures of two cameras: "
+                               "--ruler left=x,y,x,y --ruler right=x,y,x,y.")
+    ends = np.full((len(names), 2, 2), np.nan)
+    for text in args.ruler:
+        name, numbers = _split(text, "--ruler", "NAME=x,y,x,y")
+        try:
+            values = [float(number) for number in numbers.split(",")]
+        except ValueError:
+            values = []
+        if name not in names or len(values) != 4 or not np.all(np.isfinite(values)):
+            raise CalibrationError(f"--ruler {text}: a camera and the ends' positions in its picture are needed, such "
+                                   f"as {names[0]}=120.5,80,410,95.")
+        ends[names.index(name)] = np.reshape(values, (2, 2))
+    return KnownLengths(baseline, RulerReading(args.ruler_mm * 1e-3, ends))
+
+
+def _split(text: str, option: str, form: str) -> tuple[str, str]:
+    name, _, rest = text.partition("=")
+    if not name or not rest:
+        raise CalibrationError(f"{option} {text}: write it as {form}.")
+    return name, rest
+
+
+# -- ``rhot calibrate stereo``: two or more cameras from pictures of a board that they took at the same moments --------
 
 EPILOG = """Patterns stand in quotes. Pictures of one moment have the same number in their names, such as left07.jpg and
 right07.jpg. Two cameras are --left and --right; more, or others, are --camera NAME=PATTERN, named as in the rig.
@@ -60,8 +136,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; a rig is written when it may be used and passes its own checks."""
-    from rhot_app.calibration.commands.stereo_output import fields_of, lines_of
-    from rhot_app.calibration.stereo.rig import calibrated_rig, require_nodes, rig_verdict
+    from rhot_app.calibration.commands.stereo import fields_of, lines_of
+    from rhot_app.calibration.stereo.calibrate import calibrated_rig, require_nodes, rig_verdict
     from rhot_app.progress import ProgressLine
     from rhot_app.rig_history import accept
 
@@ -85,11 +161,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig,
                progress: Progress) -> tuple[StereoReport, WorldFrame | None]:
-    from rhot_app.calibration.lens.search import find_lens
-    from rhot_app.calibration.stereo.calibrate import calibrate
+    from rhot_app.calibration.lens.fit import find_lens
+    from rhot_app.calibration.stereo.calibrate import calibrate, lens_of
     from rhot_app.calibration.stereo.reading import read_shared, read_view
-    from rhot_app.calibration.stereo.rig import lens_of
-    from rhot_app.calibration.stereo.world_frame import place_world
+    from rhot_app.calibration.stereo.start import place_world
 
     board = board_of(args)
     names = list(files)
@@ -110,7 +185,7 @@ def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig
 
 
 def _given_lenses(args: argparse.Namespace, names: list[str]) -> dict[str, LensStart]:
-    from rhot_app.calibration.lens.intrinsics_file import load_intrinsics
+    from rhot_app.calibration.lens.intrinsics import load_intrinsics
 
     given = named_paths(args.intrinsics, "--intrinsics", names)
     for name, path in (("left", args.left_intrinsics), ("right", args.right_intrinsics)):
@@ -129,3 +204,106 @@ def _base_rig(args: argparse.Namespace) -> Rig:
     if args.out is not None and args.out.exists():
         return load_rig(args.out)
     return load_rig(resource_path("rigs", "two_pis.json"))
+
+
+# -- What ``rhot calibrate stereo`` prints: the fields of its JSON object, and lines for people ------------------------
+
+LENS_NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+
+
+def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
+    """The JSON's fields; those of the first pair stand at the top. None where nothing was solved."""
+    rejected = [{"name": each.name, "reason": each.reason, "code": each.code} for each in report.dropped]
+    figures = report.figures
+    if figures is None:
+        names = ("rms_px", "baseline_mm", "rotation_rad", "translation_mm", "square_mm_triangulated", "epipolar_px")
+        return {**dict.fromkeys(names), "cameras": [{"name": name} for name in report.cameras], "pairs": [],
+                "views_used": 0, "views_rejected": rejected}
+    pairs = [_pair(pair) for pair in figures.pairs]
+    squares, (by_rig, by_noise) = figures.squares, figures.error_m
+    return {
+        "rms_px": figures.rms_px, "noise_px": figures.noise_px, **pairs[0],
+        "square_mm_triangulated": squares.mean_m * 1e3, "square_std_mm": squares.std_m * 1e3,
+        "flatness_mm": squares.flatness_m * 1e3,
+        "board_error_mm": None if figures.board_errors is None else {
+            "in_plane": figures.board_errors.in_plane_m * 1e3, "across": figures.board_errors.across_m * 1e3},
+        "expected_error_mm": {"distance_m": WORKING_DISTANCE_M, "by_calibration": _number(by_rig * 1e3),
+                              "marker_noise_px": MARKER_NOISE_PX, "by_marker_noise": _number(by_noise * 1e3)},
+        "std_method": "inverse of the bundle adjustment's normal equations at the corners' own spread, times the "
+        "disagreement of the shots",
+        "disagreement": figures.error_inflation,
+        "cameras": [_camera(report, i) for i in range(len(figures.cameras))], "pairs": pairs,
+        "views_used": len(figures.shots), "views_rejected": rejected,
+        "shots": [{"name": shot.name, "rms_px": [_number(rms) for rms in shot.rms_px]} for shot in figures.shots],
+        "ruler_mm": None if figures.ruler is None else {
+            "said": figures.ruler.said_m * 1e3, "measured": figures.ruler.measured_m * 1e3,
+            "std": figures.ruler.std_m * 1e3},
+        "lengths": figures.lengths,
+        "table": None if frame is None else _table(frame),
+    }
+
+
+def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
+    """The figures for people."""
+    figures = report.figures
+    lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
+    if figures is None:
+        return lines
+    for camera in figures.cameras:
+        fx, fy, cx, cy = camera.lens[:4]
+        sfx, _, scx, scy = camera.lens_std[:4]
+        lines.append(f"{camera.name}: f {fx:.2f}, {fy:.2f} +- {sfx:.2f} px, centre ({cx:.2f} +- {scx:.2f}, "
+                     f"{cy:.2f} +- {scy:.2f}) px, rms {camera.rms_px:.3f} px")
+    for pair in figures.pairs:
+        shift, shift_std = _listed(pair.translation_m * 1e3), _listed(pair.translation_std_m * 1e3)
+        lines.append(f"{pair.first} to {pair.second}: {pair.baseline_m * 1e3:.2f} mm; T ({shift}) +- ({shift_std}) mm, "
+                     f"R ({_listed(pair.rotation_rad, 4)}) rad, epipolar {pair.epipolar_px:.2f} px")
+    lines.append(what_is_reported(figures.error_inflation))
+    squares = figures.squares
+    lines.append(f"squares as the cameras see them: {squares.mean_m * 1e3:.3f} +- {squares.std_m * 1e3:.3f} mm, board "
+                 f"flat to {squares.flatness_m * 1e3:.2f} mm")
+    if figures.board_errors is not None:
+        lines.append(f"the board's corners are {figures.board_errors.in_plane_m * 1e3:.2f} mm off in its plane and "
+                     f"{figures.board_errors.across_m * 1e3:.2f} mm across; allowed for")
+    lines.append(f"a marker {WORKING_DISTANCE_M:g} m away: {figures.error_m[0] * 1e3:.1f} mm uncertain by this "
+                 f"calibration, {figures.error_m[1] * 1e3:.1f} mm by {MARKER_NOISE_PX:g} px of noise")
+    if frame is not None:
+        lines += [f"{each.name}: {each.height_m * 1e3:.0f} mm above the table, looks down by "
+                  f"{math.degrees(each.down_rad):.1f} degrees" for each in frame.stances]
+    return lines
+
+
+def _camera(report: StereoReport, index: int) -> dict[str, Any]:
+    assert report.figures is not None
+    camera = report.figures.cameras[index]
+    values = [float(value) for value in camera.lens]
+    return {"name": camera.name, **dict(zip(LENS_NAMES[:4], values[:4], strict=True)), "distortion": values[4:],
+            "size": list(camera.size), "rms_px": camera.rms_px,
+            "std": dict(zip(LENS_NAMES, [float(std) for std in camera.lens_std], strict=True))}
+
+
+def _pair(pair: PairFigures) -> dict[str, Any]:
+    return {"first": pair.first, "second": pair.second, "baseline_mm": pair.baseline_m * 1e3,
+            "rotation_rad": _list(pair.rotation_rad), "rotation_std_rad": _list(pair.rotation_std_rad),
+            "translation_mm": _list(pair.translation_m * 1e3),
+            "translation_std_mm": _list(pair.translation_std_m * 1e3),
+            "epipolar_px": _number(pair.epipolar_px), "shared": pair.shared}
+
+
+def _table(frame: WorldFrame) -> dict[str, Any]:
+    return {"rms_px": frame.rms_px,
+            "cameras": [{"name": each.name, "height_mm": each.height_m * 1e3, "down_deg": math.degrees(each.down_rad),
+                         "roll_deg": math.degrees(each.roll_rad)} for each in frame.stances]}
+
+
+def _list(values: Iterable[float]) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _listed(values: Iterable[float], digits: int = 2) -> str:
+    return ", ".join(f"{value:.{digits}f}" for value in values)
+
+
+def _number(value: float) -> float | None:
+    """JSON knows no NaN."""
+    return float(value) if math.isfinite(value) else None

@@ -9,15 +9,46 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rhot_app.calibration.depth.table import DepthRow, DepthTable, RejectedRow
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.disparity import depth_error, depth_from_disparity, depth_from_power_law
 from rhot_app.project import DepthSettings, Rig
 
+# -- Depth from disparity alone, as the thesis computes it: no calibration, parallel axes, equal cameras ---------------
+
 Array = NDArray[np.float64]
+
+
+def depth_from_disparity(disparity_px: ArrayLike, baseline_m: float, width_px: float, view_angle_rad: float) -> Array:
+    """Distance in m from the disparity X_L - X_R in px (RHOT eq. 6.12); NaN where it is not positive.
+
+    D = B x0 / (2 tan(phi0 / 2) (X_L - X_R)), with the image width x0 and the horizontal view angle phi0.
+    """
+    return baseline_m * width_px / (2.0 * math.tan(view_angle_rad / 2.0)) / _positive(disparity_px)
+
+
+def depth_from_power_law(disparity_px: ArrayLike, k: float, z: float) -> Array:
+    """Distance D = k |x|^z of a disparity in px (RHOT eq. 7.4), in the unit in which `k` was fitted.
+
+    The thesis found k = 4543.3 (cm) and z = -1.035. NaN where the disparity is not positive.
+    """
+    return np.asarray(k * _positive(disparity_px) ** z)
+
+
+def depth_error(depth_m: ArrayLike, baseline_m: float, angle_error_rad: float) -> Array:
+    """Error in m that a viewing angle's error makes at `depth_m`: D^2 / B tan(dphi) (RHOT eq. 7.3)."""
+    return np.asarray(np.square(np.asarray(depth_m, dtype=np.float64)) / baseline_m * math.tan(angle_error_rad))
+
+
+def _positive(disparity_px: ArrayLike) -> Array:
+    disparity = np.asarray(disparity_px, dtype=np.float64)
+    return np.where(disparity > 0.0, disparity, np.nan)
+
+
+# -- Depth correction without a board (RHOT 7.2.3): the power law D = k |disparity|^z through measured -----------------
+# The cameras need not be calibrated. The law takes up what parallel axes and equal view angles (eq. 6.12) leave out.
 
 LEAST_ROWS = 3
 

@@ -12,23 +12,123 @@ lowest of their cutoffs and the largest of their betas.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import msgspec
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.calibration.filters.judgement import FilterFigures, FilterTargets, MarkerFigures, judge_filters
-from rhot_app.calibration.filters.meters import JITTER_WINDOW_S, jitter, lag, motion_of, velocities
-from rhot_app.calibration.filters.simulation import OFF, Footage, make_footage, simulate
+from rhot_app.calibration.filters.meters import (
+    JITTER_WINDOW_S,
+    FilterFigures,
+    FilterTargets,
+    MarkerFigures,
+    jitter,
+    judge_filters,
+    lag,
+    motion_of,
+    velocities,
+)
 from rhot_app.calibration.observations import InstantTable
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.errors import CalibrationError
+from rhot_app.filters import one_euro
+from rhot_app.geometry.camera import CameraModel, undistort_point
+from rhot_app.geometry.triangulate import triangulate
 from rhot_app.progress import Progress, silent
-from rhot_app.project import FilterSettings, OneEuroSettings, Rig
+from rhot_app.project import CameraPose, FilterSettings, Intrinsics, OneEuroSettings, Rig
+
+# -- A recording sent through candidate filters as the tracker does it: filter pixels, triangulate, filter -------------
 
 Array = NDArray[np.float64]
+
+OFF = (math.inf, 0.0, 1.0)
+"""Parameters of a 1-euro filter that changes nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Footage:
+    """What the filters work on. `times_s` (T,); `pixels` (T, C, M, 2), NaN where not to be used; `intrinsics` (C, 9),
+    `cameras` (C, 3, 4) camera_from_world m, `focal` (C, 2) px."""
+
+    times_s: Array
+    pixels: Array
+    intrinsics: Array
+    cameras: Array
+    focal: Array
+
+    @property
+    def markers(self) -> int:
+        """M."""
+        return self.pixels.shape[2]
+
+
+def make_footage(instants: InstantTable, rig: Rig) -> Footage:
+    """The measured part of a recording; a rig without stereo geometry gets the cameras that eq. 6.12 assumes."""
+    pixels = np.where(instants.measured[:, None, :, None], instants.pixels, np.nan)
+    models = [CameraModel.from_rig(lens, pose) for lens, pose in _lenses(rig)]
+    return Footage(instants.times_s, np.ascontiguousarray(pixels), np.array([model.intrinsics for model in models]),
+                   np.array([model.camera_from_world[:3] for model in models]),
+                   np.array([model.intrinsics[:2] for model in models]))
+
+
+def simulate(footage: Footage, pixel: Array, position: Array) -> tuple[Array, Array]:
+    """Filtered pixels (T, C, M, 2) and positions (T, M, 3) with parameters (M, 3) of both filters."""
+    cameras, markers = footage.pixels.shape[1:3]
+    pixels, positions = np.empty_like(footage.pixels), np.empty((len(footage.times_s), markers, 3))
+    _run(footage.times_s, footage.pixels, footage.intrinsics, footage.cameras, footage.focal,
+         np.tile(np.repeat(pixel, 2, axis=0), (cameras, 1)), np.repeat(position, 3, axis=0), one_euro.RESET_GAP_S,
+         pixels, positions)
+    return pixels, positions
+
+
+def _lenses(rig: Rig) -> list[tuple[Intrinsics, CameraPose]]:
+    if rig.depth.mode == "stereo":
+        return [(node.intrinsics, node.pose) for node in rig.nodes]
+    found = []
+    for k, node in enumerate(rig.nodes):
+        width, height = node.intrinsics.width, node.intrinsics.height
+        focal = 0.5 * width / math.tan(0.5 * math.radians(rig.depth.view_angle_deg))
+        lens = Intrinsics(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1))
+        found.append((lens, CameraPose(translation_m=(k * rig.depth.baseline_m, 0.0, 0.0))))
+    return found
+
+
+@njit(cache=True)
+def _run(times: Array, seen: Array, intrinsics: Array, cameras: Array, focal: Array, pixel_parameters: Array,
+         position_parameters: Array, gap_s: float, pixels: Array, positions: Array) -> None:
+    count, markers = seen.shape[1], seen.shape[2]
+    pixel_state = np.full((2 * count * markers, 3), math.nan)
+    position_state = np.full((3 * markers, 3), math.nan)
+    rays, spread, used = np.empty((count, 2)), np.zeros((count, 2, 2)), np.empty(count, np.bool_)
+    covariance = np.empty((3, 3))
+    for c in range(count):
+        spread[c, 0, 0], spread[c, 1, 1] = 1.0 / focal[c, 0] ** 2, 1.0 / focal[c, 1] ** 2
+    for t in range(len(times)):
+        one_euro.step(times[t], seen[t].reshape(-1), pixel_parameters, pixel_state, gap_s, pixels[t].reshape(-1))
+        for m in range(markers):
+            for c in range(count):
+                x, y, _, _, _, _ = undistort_point(pixels[t, c, m, 0], pixels[t, c, m, 1], intrinsics[c])
+                rays[c, 0], rays[c, 1] = x, y
+                used[c] = math.isfinite(x) and math.isfinite(y)
+            triangulate(rays, spread, cameras, focal, used, positions[t, m], covariance)
+        flat = positions[t].reshape(-1)
+        one_euro.step(times[t], flat, position_parameters, position_state, gap_s, flat)
+
+
+# -- The filters' settings from two recordings, in the thesis's two steps (RHOT 7.3): held still, then moved -----------
+# The rule, for the filter before depth and then for the one after it, marker by marker:
+#
+# 1. held still, beta 0: the highest min cutoff whose jitter is within the target, since a higher one lags less;
+# 2. moved fast: the smallest beta whose lag is within the target, and whose rms error is no more than so much lag makes
+#    of the speed; a smaller one is calmer.
+#
+# The filter before depth may use up half of the lag, the one after it what is left. What holds for all markers is the
+# lowest of their cutoffs and the largest of their betas.
+
 Place = Callable[[Array], tuple[Array, Array]]
 """Puts a candidate's parameters (M, 3) before or after depth: parameters of both filters."""
 

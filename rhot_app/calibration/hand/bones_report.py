@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.hand.rigid_segments import RigidPair
+from rhot_app.calibration.hand.bones_collector import RigidPair
 from rhot_app.calibration.hand.shape import BONE_COUNT, MARKERS, ROOTS, HandUnknowns
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.hand.anatomy import HandAnatomy

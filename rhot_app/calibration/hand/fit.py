@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.hand.bundle import HandAdjustment, HandBundle, Weights
+from rhot_app.calibration.hand.bundle import HandAdjustment, HandBundle, Weights, bend
 from rhot_app.calibration.hand.bundle_model import POSE, Poses, expected
-from rhot_app.calibration.hand.incidental import bend
 from rhot_app.calibration.hand.marker_places import MarkerTracks
 from rhot_app.calibration.hand.shape import HandUnknowns
-from rhot_app.calibration.time.track_noise import SmoothTracks, smooth
+from rhot_app.calibration.time.tracks import SmoothTracks, smooth
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import apply, fit_rigid
 from rhot_app.hand.anatomy import HandAnatomy

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rhot_app.calibration.hand import prior as hand_prior
-from rhot_app.calibration.hand.marker_places import DISTAL, MarkerPlace
-from rhot_app.calibration.hand.prior import Prior
+from rhot_app.calibration.hand import marker_places as hand_prior
+from rhot_app.calibration.hand.marker_places import DISTAL, MarkerPlace, Prior
 from rhot_app.geometry.transforms import skew
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, build_model

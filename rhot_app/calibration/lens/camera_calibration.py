@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.check.health_findings import HealthFinding
+from rhot_app.calibration.check.health import HealthFinding
 from rhot_app.calibration.depth.ruler import lengths_finding
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.project import Intrinsics, Rig

@@ -9,28 +9,124 @@ the stated intervals of k1 and k2 then hold one time in two.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.errors import BoardErrors, find_board_errors
-from rhot_app.calibration.board.poses import pose_view
-from rhot_app.calibration.lens.search import find_lens
-from rhot_app.calibration.lens.start import loose_prior
-from rhot_app.calibration.outliers import MOST_DROPPED, misfit_limit
-from rhot_app.calibration.robust_error import error_inflation
+from rhot_app.calibration.board.poses import BoardErrors, find_board_errors, pose_view
+from rhot_app.calibration.robust_error import MOST_DROPPED, error_inflation, misfit_limit
 from rhot_app.calibration.stereo.bundle import Bundle, adjust
-from rhot_app.calibration.stereo.bundle_layout import LensFreedom
-from rhot_app.calibration.stereo.bundle_model import LENS, BundleState, Observations
+from rhot_app.calibration.stereo.bundle_model import LENS, BundleState, LensFreedom, Observations
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent, within
 
+# -- What is known about a camera's lens before cameras are put together -----------------------------------------------
+
 Array = NDArray[np.float64]
 
+K3 = 8  # its place among the lens parameters
+
+
+@dataclass(frozen=True, slots=True)
+class LensStart:
+    """One camera's lens: `lens` (9,) fx, fy, cx, cy, k1, k2, p1, p2, k3 for pictures of `size` (width, height).
+
+    `std` (9,) the standard deviations, when known. `origin`: "given" by a file or the rig, or found from the same
+    "views" that now put the cameras together.
+    """
+
+    lens: Array
+    size: tuple[int, int]
+    std: Array | None = None
+    origin: Literal["given", "views"] = "given"
+
+    def freedom(self, *, refine: bool) -> LensFreedom:
+        """How the bundle adjustment may change it.
+
+        Found from the same views: all of it, for these corners say it all. Given: not at all, or with `refine` within
+        its standard deviations; a k3 of zero then stays zero, because that lens was described without it.
+        """
+        if self.origin == "views":
+            return LensFreedom.free([True] * len(self.lens), self.lens, loose_prior(self.lens, self.size))
+        if not refine:
+            return LensFreedom.fixed()
+        free = np.ones(len(self.lens), bool)
+        free[K3] = self.lens[K3] != 0.0
+        return LensFreedom.free(list(free), self.lens, None if self.std is None else np.where(free, self.std, np.inf))
+
+    def mirrored(self) -> LensStart:
+        """The lens of the same camera when its pictures are flipped left to right."""
+        flipped = self.lens.copy()
+        flipped[2] = self.size[0] - 1 - flipped[2]
+        flipped[7] = -flipped[7]
+        return replace(self, lens=flipped)
+
+
+def loose_prior(lens: Array, size: tuple[int, int]) -> Array:
+    """Standard deviations (9,) of what lenses are: they keep a fit from running away, and pull at nothing that pictures
+    determine.
+
+    Radial coefficients are limited by what they do in the picture's corner, each power less than the one before.
+    """
+    longest = float(max(size))
+    corner = (size[0] ** 2 + size[1] ** 2) / (4.0 * lens[0] * lens[1])  # squared radius, normalised
+    return np.array([longest, longest, 0.2 * longest, 0.2 * longest, 1.0 / corner, 0.3 / corner**2, 0.05, 0.05,
+                     0.05 / corner**3])
+
+
+# -- A first lens from the same views that will put the cameras together: good enough to start from, refined -----------
+
 FEWEST_VIEWS = 3
+
+
+def find_lens(views: Sequence[BoardView], board: Board, name: str) -> LensStart:
+    """The lens of one camera from its views: Zhang's closed form, then a robust fit of everything.
+
+    Raises CalibrationError naming the camera when the views do not determine a lens.
+    """
+    if len(views) < FEWEST_VIEWS:
+        raise CalibrationError(f"{name}: the board was found in {len(views)} pictures; {FEWEST_VIEWS} are the least to "
+                               "find the lens from, 15 are good. Or give the intrinsics.")
+    size = views[0].size
+    lens = _closed_form(views, board, size)
+    posed = [(view, pose_view(view, board, lens)) for view in views]
+    usable = [(view, found.camera_from_board[0]) for view, found in posed if found is not None]
+    counts = [len(view.ids) for view, _ in usable]
+    seen = Observations(np.zeros(sum(counts), np.intp), np.repeat(np.arange(len(usable)), counts),
+                        np.concatenate([view.object_points(board) for view, _ in usable]),
+                        np.concatenate([view.pixels for view, _ in usable]))
+    start = BundleState(lens[None], np.eye(4)[None], np.array([pose for _, pose in usable]))
+    free = LensFreedom.free([True] * LENS, lens, loose_prior(lens, size))
+    try:
+        found = adjust(start, seen, [free]).state.lenses[0]
+    except CalibrationError as exc:
+        raise CalibrationError(f"{name}: {exc}") from exc
+    return LensStart(found, size, None, "views")
+
+
+def _closed_form(views: Sequence[BoardView], board: Board, size: tuple[int, int]) -> Array:
+    points = [view.object_points(board).astype(np.float32) for view in views]
+    pixels = [view.pixels.astype(np.float32) for view in views]
+    matrix = cv2.initCameraMatrix2D(points, pixels, size, 1.0)
+    focal = float(matrix[0, 0])
+    longest = float(max(size))
+    if not 0.3 * longest < focal < 10.0 * longest:  # views seen face on leave it open
+        focal = longest
+    return np.array([focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+# -- The fit of one camera's lens to its views of a board: without the views that do not fit, and with the -------------
+# errors.
+#
+# All distortion coefficients are estimated; where the views do not determine one, what is known of lenses in general
+# keeps it near zero. Leaving coefficients out when they are insignificant would bias the others: with a true k3 of 0.04
+# the stated intervals of k1 and k2 then hold one time in two.
+
 PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Names of the lens parameters, in their order."""
 

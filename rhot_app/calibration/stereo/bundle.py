@@ -15,8 +15,17 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from rhot_app.calibration.stereo.bundle_layout import BoardFreedom, Layout, LensFreedom
-from rhot_app.calibration.stereo.bundle_model import POINT, Array, BundleState, Observations, linearise, residuals
+from rhot_app.calibration.stereo.bundle_model import (
+    POINT,
+    Array,
+    BoardFreedom,
+    BundleState,
+    Layout,
+    LensFreedom,
+    Observations,
+    linearise,
+    residuals,
+)
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent
 

@@ -10,16 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board
-from rhot_app.calibration.board.errors import BoardErrors
+from rhot_app.calibration.board.poses import BoardErrors
 from rhot_app.calibration.depth.ruler import RulerResult
-from rhot_app.calibration.lens.certainty import WORKING_DISTANCE_M
-from rhot_app.calibration.lens.start import LensStart
-from rhot_app.calibration.outliers import tilt_spread
-from rhot_app.calibration.robust_error import error_inflation
+from rhot_app.calibration.lens.fit import LensStart
+from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
+from rhot_app.calibration.robust_error import error_inflation, tilt_spread
 from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.bundle import Bundle
-from rhot_app.calibration.stereo.bundle_layout import Layout, LensFreedom
-from rhot_app.calibration.stereo.bundle_model import LENS, POSE, BundleState, Observations, linearise, residuals
+from rhot_app.calibration.stereo.bundle_model import (
+    LENS,
+    POSE,
+    BundleState,
+    Layout,
+    LensFreedom,
+    Observations,
+    linearise,
+    residuals,
+)
 from rhot_app.calibration.stereo.points import Squares, epipolar_px, locate, measure_squares
 from rhot_app.calibration.stereo.views import Dropped
 from rhot_app.calibration.verdict import Verdict

@@ -18,9 +18,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.couplings import DIP_PER_PIP
-from rhot_app.hand.finger_chain import miss
-from rhot_app.hand.ik_status import status_of
+from rhot_app.hand.anatomy import DIP_PER_PIP
+from rhot_app.hand.finger_chain import miss, status_of
 from rhot_app.hand.limits import clamp_angle, wrap
 from rhot_app.hand.solvers.problem import assign, clamp, norm
 

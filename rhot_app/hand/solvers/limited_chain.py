@@ -15,8 +15,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from rhot_app.hand.finger_chain import GAIN, PATIENCE, distance
-from rhot_app.hand.ik_status import EXHAUSTED, LIMITED, REACHED, STALLED, UNREACHABLE, Status, within_reach
+from rhot_app.hand.finger_chain import (
+    EXHAUSTED,
+    GAIN,
+    LIMITED,
+    PATIENCE,
+    REACHED,
+    STALLED,
+    UNREACHABLE,
+    Status,
+    distance,
+    within_reach,
+)
 from rhot_app.hand.solvers.chain_newton import finish_arrays, lay_out
 from rhot_app.hand.solvers.joint_shapes import BOX, CONE, HINGE, Shape, clamp_joint, direction_angles, excess
 from rhot_app.hand.solvers.problem import assign

@@ -17,18 +17,27 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.fabrik import solve_chain_arrays
-from rhot_app.hand.finger_chain import chain_points, distance, fabrik_within, miss
-from rhot_app.hand.ik_status import EXHAUSTED, MISSING, REACHED, STALLED, UNREACHABLE, status_of, within_reach
-from rhot_app.hand.joint_angles import plane_angles, thumb_angles
+from rhot_app.hand.finger_chain import (
+    EXHAUSTED,
+    MISSING,
+    REACHED,
+    STALLED,
+    UNREACHABLE,
+    chain_points,
+    distance,
+    fabrik_within,
+    miss,
+    status_of,
+    within_reach,
+)
 from rhot_app.hand.linear import solve_in_box
-from rhot_app.hand.solvers import exact, inverse
+from rhot_app.hand.model import inter_finger
+from rhot_app.hand.solvers import inverse, newton
 from rhot_app.hand.solvers.closed_form import solve_coupled
-from rhot_app.hand.solvers.exact import solve_exactly
+from rhot_app.hand.solvers.fabrik import plane_angles, solve_chain_arrays, thumb_angles
 from rhot_app.hand.solvers.inverse import follow_jacobian
-from rhot_app.hand.solvers.newton import STEP_MAX
+from rhot_app.hand.solvers.newton import STEP_MAX, solve_exactly
 from rhot_app.hand.solvers.problem import Problem, Solution, assign, clamp, linearise, norm
-from rhot_app.hand.variants import inter_finger
 
 Array = NDArray[np.float64]
 
@@ -195,9 +204,9 @@ class Method(IntEnum):
     """Pseudo-inverse by singular values, the small ones left out (eq. 2.20)."""
     DAMPED = inverse.DAMPED
     """Damped least squares (eq. 2.23)."""
-    NEWTON = exact.NEWTON
+    NEWTON = newton.NEWTON
     """Newton with the exact Hessian (eq. 2.24), within limits."""
-    LEVENBERG = exact.LEVENBERG
+    LEVENBERG = newton.LEVENBERG
     """Levenberg-Marquardt, within limits."""
     CLOSED_FORM = 6
     """The planar finger with DIP = 2/3 PIP (eq. 2.4)."""

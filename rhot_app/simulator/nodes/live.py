@@ -13,24 +13,149 @@ import json
 import os
 import signal
 import sys
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
-from rhot_app.errors import RhotError
+import msgspec
+import zmq
+
+from rhot_app.errors import RhotError, SimulatorError
 from rhot_app.project import save_rig
-from rhot_app.simulator.nodes.frame_socket import FrameSocket
-from rhot_app.simulator.nodes.live_cameras import LiveCameras
-from rhot_app.simulator.nodes.nodes import READY_TIMEOUT_S
-from rhot_app.simulator.nodes.pace import Pace
-from rhot_app.simulator.nodes.supervisor import Supervisor, socket_path
-from rhot_app.simulator.nodes.twin_server import TwinServer
+from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras, Pace
+from rhot_app.simulator.nodes.nodes import READY_TIMEOUT_S, NodePorts, TwinNode, settings_path
+from rhot_app.simulator.nodes.remote import SERVER_NAME, Request, decode_request, refusal, server_address
 from rhot_app.simulator.scene.live_scene import LiveScene
-from rhot_app.simulator.scene.scene import Scene, build_rig
-from rhot_app.simulator.scene.scene_arguments import add_show_arguments, show_of
-from rhot_app.simulator.scene.scene_description import Show
+from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
+from rhot_app.simulator.scene.scene_description import Show, add_show_arguments, show_of
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
-from rhot_node.errors import NodeError
+from rhot_node.config import load_settings
+from rhot_node.errors import NodeError, SettingsError
+
+# -- The live twin's control door: a ZeroMQ REP socket in the twin's directory, served by a thread of its own ----------
+
+Perform = Callable[[Request], dict[str, Any]]
+
+_REQUEST_MAX = 1 << 16
+_POLL_MS = 200
+
+
+class TwinServer:
+    """Answers requests with what `perform` returns, in a thread, so that building a show never holds up the cameras."""
+
+    def __init__(self, directory: Path, perform: Perform) -> None:
+        """Open the door; raises SimulatorError when it cannot be opened there."""
+        self._path = directory / SERVER_NAME
+        self._perform = perform
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._socket = self._context.socket(zmq.REP)
+        self._socket.linger = 0
+        self._socket.maxmsgsize = _REQUEST_MAX
+        try:
+            self._path.unlink(missing_ok=True)
+            self._socket.bind(server_address(directory))
+        except (zmq.ZMQError, OSError) as exc:
+            self._context.destroy(0)
+            raise SimulatorError(f"{self._path}: the twin's door cannot be opened there ({exc}).") from exc
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="twin door", daemon=True)
+
+    def start(self) -> None:
+        """Serve from now on."""
+        self._thread.start()
+
+    def step(self, timeout_ms: int) -> bool:
+        """Answer one request; False when none came in time."""
+        if not self._socket.poll(timeout_ms):
+            return False
+        self._socket.send(msgspec.json.encode(self._answer(self._socket.recv())))
+        return True
+
+    def close(self) -> None:
+        """Close and remove the door. May be called twice."""
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._context.destroy(0)
+        with contextlib.suppress(OSError):
+            self._path.unlink()
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            self.step(_POLL_MS)
+
+    def _answer(self, data: bytes) -> dict[str, Any]:
+        try:
+            return {"ok": True, **self._perform(decode_request(data))}
+        except msgspec.DecodeError as exc:
+            return refusal(f"the simulated rig cannot do that: {exc}")
+        except (RhotError, NodeError) as exc:
+            return refusal(str(exc))
+
+
+# -- Keeps the live twin's node daemons alive, on the ports that they had first ----------------------------------------
+
+_RESTART_PAUSE_S = 0.5
+
+
+class Supervisor:
+    """Keeps one daemon per camera alive, on the ports it had first."""
+
+    def __init__(self, scene: Scene, directory: Path) -> None:
+        self._scene, self._directory = scene, directory
+        self._nodes = [self._start(index, None) for index in range(len(scene.names))]
+        self._ports: list[NodePorts] = []
+        self._died_s: dict[int, float] = {}
+
+    def _start(self, index: int, ports: NodePorts | None) -> TwinNode:
+        """A daemon; one that starts again keeps what its settings file says by now, as a real node does."""
+        name = self._scene.names[index]
+        settings = node_settings(self._scene, index, ports=ports)
+        if ports is not None:
+            with contextlib.suppress(SettingsError):
+                kept = load_settings(settings_path(self._directory, name))
+                settings = msgspec.structs.replace(kept, udp_port=ports.udp_port, control_port=ports.control_port,
+                                                   preview_port=ports.preview_port,
+                                                   pairing_port=ports.pairing_port)
+        return TwinNode(self._directory, settings, f"stream:{socket_path(self._directory, name)}")
+
+    def ports(self, deadline_s: float) -> list[NodePorts] | None:
+        """The daemons' ports, once all have said them; None before. Raises SimulatorError when one cannot start."""
+        while len(self._ports) < len(self._nodes):
+            node = self._nodes[len(self._ports)]
+            if not node.ready_waits and node.alive and time.monotonic() < deadline_s:
+                return None
+            self._ports.append(node.wait_ready(deadline_s))
+        return self._ports
+
+    def step(self) -> None:
+        """Start again what has died, a moment later."""
+        for index, node in enumerate(self._nodes):
+            if node.alive:
+                continue
+            died = self._died_s.setdefault(index, time.monotonic())
+            if time.monotonic() - died >= _RESTART_PAUSE_S:
+                node.close()
+                self._nodes[index] = self._start(index, self._ports[index])
+                del self._died_s[index]
+
+    def close(self) -> None:
+        """End every daemon."""
+        for node in self._nodes:
+            node.close()
+
+
+def socket_path(directory: Path, name: str) -> Path:
+    """Where the frames of the camera `name` are offered."""
+    return directory / f"{name}.frames"
+
+
+# -- The live twin: a process that renders both cameras as fast as the machine allows, for two real node ---------------
+# ``python -m rhot_app.simulator.nodes.live --directory DIR --rig OUT.json``. It writes a rig file with the daemons'
+# real ports and prints one JSON line when all is ready, later others about its pace. It shows what its clients ask
+# for (docs/twin.md), starts a daemon again that has died, and ends on SIGTERM with both.
 
 _NICE = 5
 

@@ -2,23 +2,105 @@
 
 from __future__ import annotations
 
+import contextlib
+import select
+import socket
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import msgspec
+from numpy.typing import NDArray
 
-from rhot_app.simulator.nodes.frame_socket import FrameSocket
+from rhot_app.errors import SimulatorError
 from rhot_app.simulator.nodes.shot import renderer_of
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.render import FrameRenderer
 from rhot_app.simulator.scene.camera_controls import controls_of
 from rhot_app.simulator.scene.live_scene import LiveScene, Setting
 from rhot_app.simulator.scene.scene import Scene
-from rhot_node.capture.pace import available_delay_ns, sleep_until
-from rhot_node.capture.stream import StreamHeader
+from rhot_node.capture.camera import available_delay_ns, sleep_until
+from rhot_node.capture.stream import StreamHeader, pack_header, take_settings
 from rhot_node.config import CameraSettings
+from rhot_node.errors import CameraError
+
+# -- The twin's end of a ``stream:`` camera: a Unix socket to which one node at a time may connect ---------------------
+# Frames go out; what the node tells its camera comes in.
+
+_SEND_TIMEOUT_S = 0.25  # a node that takes no bytes for so long is stuck; it may connect again
+_BUFFER_BYTES = 1 << 20
+
+
+class FrameSocket:
+    """Listens at `path`; frames go to whichever node connected last and are lost while there is none."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises SimulatorError when the socket cannot be made."""
+        self._path = path
+        self._peer: socket.socket | None = None
+        self._received = bytearray()
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            path.unlink(missing_ok=True)
+            self._listener.bind(str(path))
+        except OSError as exc:
+            raise SimulatorError(f"{path}: no socket for frames can be made there ({exc}).") from exc
+        self._listener.setblocking(False)
+        self._listener.listen(4)
+
+    def hear(self) -> CameraSettings | None:
+        """Let in a node that waits, and return what a node has told its camera since the last call; None: nothing."""
+        self._accept()
+        told = None
+        if self._peer is not None:
+            try:
+                if select.select([self._peer], [], [], 0.0)[0]:
+                    self._received += self._peer.recv(_BUFFER_BYTES)
+                while (settings := take_settings(self._received)) is not None:
+                    told = settings
+            except (OSError, CameraError):
+                self._drop()
+        return told
+
+    def send(self, header: StreamHeader, frame: NDArray[Any]) -> bool:
+        """Send one packed I420 frame to the node that `hear` has let in; False when there is none to take it."""
+        if self._peer is None:
+            return False
+        try:
+            self._peer.sendall(pack_header(header))
+            self._peer.sendall(frame.data)
+        except OSError:
+            self._drop()
+            return False
+        return True
+
+    def _accept(self) -> None:
+        """A new connection replaces the old one: the node has come back."""
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                peer, _ = self._listener.accept()
+                self._drop()
+                peer.settimeout(_SEND_TIMEOUT_S)
+                peer.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER_BYTES)
+                self._peer = peer
+
+    def _drop(self) -> None:
+        if self._peer is not None:
+            self._peer.close()
+            self._peer = None
+        self._received.clear()
+
+    def close(self) -> None:
+        """Close and remove the socket. May be called twice."""
+        self._drop()
+        self._listener.close()
+        with contextlib.suppress(OSError):
+            self._path.unlink()
+
+
+# -- The live twin's cameras: rendered in turn, handed over when a sensor would have read them out, told by ------------
 
 CORE_SHARE = 0.6
 """Part of one processor core that rendering may take; engine, nodes and window need the rest."""
@@ -106,3 +188,49 @@ class LiveCameras:
         exposure_s = min(1e-6 * told.exposure_us, 1.0 / self._scene.preset.fps)
         shutter = Shutter(exposure_s, renderer.exposure.shutter.row_time_s)
         renderer.expose(replace(renderer.exposure, shutter=shutter, controls=controls_of(told)))
+
+
+# -- Whether the live twin keeps up: it says so when its cameras run slower than their preset, or no longer do ---------
+
+WINDOW_S = 2.0
+"""Rates are means over this long: a single late frame is none of the user's business."""
+
+SHORT = 0.95  # of the preset's rate: below it the rig is slow
+CHANGE = 0.15  # of the rate said last: what is worth saying again
+
+
+class Pace:
+    """Counts frames; `note` returns what to say, seldom."""
+
+    def __init__(self, preset_hz: float) -> None:
+        self._preset_hz = preset_hz
+        self._began_s: float | None = None
+        self._frames = 0
+        self._said_hz = preset_hz
+        self.rate_hz = 0.0
+        """Frames per second, of late; 0 until that is known."""
+
+    def note(self, now_s: float) -> dict[str, Any] | None:
+        """A frame is out at monotonic time `now_s`. Returns an event for programs to read, or None:
+        ``{"event": "slow", "achieved_hz": 21.4, "preset_hz": 40.0, "text": sentence}``, and once the rate is back
+        ``{"event": "in_time", ...}`` with the same fields."""
+        if self._began_s is None:
+            self._began_s = now_s
+            return None
+        self._frames += 1
+        if now_s - self._began_s < WINDOW_S:
+            return None
+        achieved_hz = self._frames / (now_s - self._began_s)
+        self._began_s, self._frames, self.rate_hz = now_s, 0, achieved_hz
+        slow, was_slow = (rate < SHORT * self._preset_hz for rate in (achieved_hz, self._said_hz))
+        if slow == was_slow and (not slow or abs(achieved_hz - self._said_hz) < CHANGE * self._said_hz):
+            return None
+        self._said_hz = achieved_hz
+        return {"event": "slow" if slow else "in_time", "achieved_hz": round(achieved_hz, 1),
+                "preset_hz": self._preset_hz, "text": self._sentence(achieved_hz, slow)}
+
+    def _sentence(self, achieved_hz: float, slow: bool) -> str:
+        if not slow:
+            return f"The simulated cameras run at their {self._preset_hz:g} frames per second again."
+        return (f"The simulated cameras run at {achieved_hz:.0f} instead of {self._preset_hz:g} frames per second: "
+                "rendering takes only what this machine can spare. Rates and latency are not those of a real rig.")

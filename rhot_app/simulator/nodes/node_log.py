@@ -16,7 +16,7 @@ import numpy as np
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.scene.scene import Scene
-from rhot_node.capture.pace import available_delay_ns
+from rhot_node.capture.camera import available_delay_ns
 from rhot_node.clock import NodeClock
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import (

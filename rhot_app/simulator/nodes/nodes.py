@@ -18,7 +18,7 @@ from typing import IO
 from rhot_app.errors import SimulatorError
 from rhot_app.keys import load_master_keys
 from rhot_node.config import NodeSettings, save_settings
-from rhot_node.trust import keys_path, pair_beforehand
+from rhot_node.keys import keys_path, pair_beforehand
 
 READY_TIMEOUT_S = 300.0
 """The first start of all compiles the detector, minutes on a busy machine; later ones take about two seconds."""

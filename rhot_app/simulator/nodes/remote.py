@@ -21,24 +21,94 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 import zmq
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.nodes.twin_requests import (
-    CoverRequest,
-    LampRequest,
-    Request,
-    ShowRequest,
-    StateRequest,
-    server_address,
-)
-from rhot_app.simulator.scene.camera_controls import Controls
-from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.scene.camera_controls import Controls, Lamp
 from rhot_app.simulator.scene.scene_description import Show
 from rhot_node.files import decode_message
+
+# -- What may be asked of a live twin, as JSON, and its answers (docs/twin.md). No sockets -----------------------------
+# Stage, lamp and caps on lenses belong to the room, not to the rig: nothing that is asked here reaches nodes or engine
+# but as pictures.
+
+SERVER_NAME: Final = "twin.ipc"
+
+
+def server_address(directory: Path) -> str:
+    """ZeroMQ endpoint of the twin whose directory this is (the client asks with REQ)."""
+    return f"ipc://{directory / SERVER_NAME}"
+
+
+class _Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="request"):
+    """Root of all requests; the field "request" tells them apart."""
+
+
+class ShowRequest(_Request, frozen=True, tag="show"):
+    """Show something else, from its beginning."""
+
+    what: Show
+
+
+class LampRequest(_Request, frozen=True, tag="lamp"):
+    """Change the lamp; what is null stays."""
+
+    brightness: float | None = None
+    kelvin: float | None = None
+    mains_hz: float | None = None
+    flicker: float | None = None
+
+    def change(self, lamp: Lamp) -> Lamp:
+        """The lamp as asked for; raises msgspec.ValidationError when there can be none like it."""
+        chosen = {name: value for name in ("brightness", "kelvin", "mains_hz", "flicker")
+                  if (value := getattr(self, name)) is not None}
+        return msgspec.convert(msgspec.to_builtins(lamp) | chosen, Lamp)
+
+
+class CoverRequest(_Request, frozen=True, tag="cover"):
+    """Cover these cameras' lenses, by name, and uncover all others."""
+
+    cameras: tuple[str, ...] = ()
+
+
+class StateRequest(_Request, frozen=True, tag="state"):
+    """What is shown, by which lamp, to which cameras, by which settings of the cameras, and how fast."""
+
+
+Request = ShowRequest | LampRequest | CoverRequest | StateRequest
+
+_decoder = msgspec.json.Decoder(Request)
+
+
+def decode_request(data: bytes) -> Request:
+    """Read a request; raises msgspec.DecodeError."""
+    return decode_message(data, _decoder)
+
+
+def refusal(sentence: str) -> dict[str, Any]:
+    """The answer to what cannot be done."""
+    return {"ok": False, "error": sentence}
+
+
+# -- A client of the live twin's door: what its cameras see, asked for from another process ----------------------------
+# For the app's wizards on the simulated rig ("hold up the board") and for tests::
+#
+#     with TwinRemote(directory) as twin:                        # the directory that the live twin was started with
+#         twin.show(BoardShow(size="9x6", square_mm=25.0))       # a board is moved about, with pauses
+#         twin.show(BoardShow(on_table=True))                    # the board lies on the table
+#         twin.show(MarkerShow(marker="index", distance_m=0.4))  # one marker, held at 0.4 m
+#         twin.show(MarkerShow(moving=True))                     # one marker that sweeps fast to and fro
+#         twin.show(RulerShow(length_mm=200.0))                  # a paper ruler
+#         twin.show(HandShow("rest"))                            # a hand again
+#         twin.lamp(brightness=0.8, kelvin=3200.0)               # what is not named stays
+#         twin.cover("left")                                     # a cap on that lens alone; cover() takes all off
+#         twin.state().lamp.kelvin
+#
+# Every call returns when the cameras show the change, and raises SimulatorError with a sentence when they cannot. The
+# cameras' own settings (exposure, gains, ...) are not the twin's business: write them to the nodes, as for a real rig.
 
 ANSWER_S = 180.0
 """A show that was never shown on this machine is compiled first."""

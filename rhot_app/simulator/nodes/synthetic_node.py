@@ -20,10 +20,9 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, FINGERS, HandPose
 from rhot_app.project import Broadcast, CameraCalibration, CameraPose, Intrinsics, Rig, RigNode
-from rhot_node.clock import NodeClock
+from rhot_node.clock import ANCILLARY_SIZE, KernelTime, NodeClock, ask_for_times
 from rhot_node.errors import WireError
 from rhot_node.files import resource_path
-from rhot_node.kernel_time import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.markers import load_markers
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (

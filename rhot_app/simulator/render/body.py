@@ -22,8 +22,7 @@ from rhot_app.errors import RigError
 from rhot_app.hand.dh import ROOT
 from rhot_app.hand.kinematics import forward, forward_arrays
 from rhot_app.hand.model import HandModel, neutral_pose
-from rhot_app.hand.patches import gap_middle, patch_of, segment_axis
-from rhot_app.hand.places import KNUCKLE_ROLES, Place, dorsal, place_of
+from rhot_app.hand.places import KNUCKLE_ROLES, Place, dorsal, gap_middle, patch_of, place_of, segment_axis
 from rhot_app.hand.shape import segments
 from rhot_app.hand.skeleton import FINGERS, JOINTS, TIP_ROLES, WRIST_ROLE
 from rhot_node.markers import Marker, MarkerSet

@@ -10,8 +10,15 @@ from numpy.typing import NDArray
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter
 from rhot_app.simulator.render.painter import Box, Image, Painter, PoseSource
 from rhot_app.simulator.render.sensor import Sensor
-from rhot_app.simulator.scene.camera_controls import Controls, Development, development
-from rhot_app.simulator.scene.lamp import Lamp, flicker_gain, lamp_gains, level_gain
+from rhot_app.simulator.scene.camera_controls import (
+    Controls,
+    Development,
+    Lamp,
+    development,
+    flicker_gain,
+    lamp_gains,
+    level_gain,
+)
 
 Array = NDArray[np.float64]
 

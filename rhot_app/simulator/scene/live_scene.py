@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 
 from rhot_app.errors import SimulatorError
+from rhot_app.simulator.nodes.remote import CoverRequest, LampRequest, Request, ShowRequest
 from rhot_app.simulator.nodes.shot import camera_seed
-from rhot_app.simulator.nodes.twin_requests import CoverRequest, LampRequest, Request, ShowRequest
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter
 from rhot_app.simulator.render.painter import Painter
 from rhot_app.simulator.scene.background import background_image
-from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.scene.camera_controls import Lamp
 from rhot_app.simulator.scene.scene import Scene
 from rhot_app.simulator.scene.scene_description import RulerShow, Show
 from rhot_app.simulator.scene.scene_objects import SceneObject, make_object

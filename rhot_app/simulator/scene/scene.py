@@ -20,8 +20,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode
 from rhot_app.simulator.nodes.nodes import NodePorts
-from rhot_app.simulator.scene.camera_controls import Controls
-from rhot_app.simulator.scene.lamp import Lamp
+from rhot_app.simulator.scene.camera_controls import Controls, Lamp
 from rhot_node.config import CameraSettings, ClockSettings, NodeSettings
 from rhot_node.errors import SettingsError
 from rhot_node.files import read_document, resource_path

@@ -24,7 +24,7 @@ from rhot_app.hand.skeleton import WRIST_ROLE
 from rhot_app.simulator.nodes.shot import Shot, camera_seed
 from rhot_app.simulator.render.body import ACROSS, BOUNDS, CAPSULE, HALF, ON_ONE_SIDE, PALM_GROUP, SIDE, HandBody
 from rhot_app.simulator.render.raycast import PREPARED, hit, prepare
-from rhot_app.simulator.truth.marker_rows import at_own_rows
+from rhot_app.simulator.truth.points import at_own_rows
 from rhot_app.simulator.truth.truth import FrameTruth
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
@@ -142,7 +142,7 @@ class _Eye:
         return np.asarray(places @ pose[:3, :3].T + pose[:3, 3])
 
     def _silhouette(self, places: Array, marker: int) -> Array:
-        """(F, 2) normalised middle of the outline (`rhot_app.geometry.silhouette`)."""
+        """(F, 2) normalised middle of the outline (`rhot_app.geometry.camera`)."""
         x, y, z = self._local(places).T
         shape = self._shapes[marker]
         below = z**2 - shape[..., 2, 2]

@@ -8,8 +8,9 @@ that it goes through the same door.
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -19,18 +20,50 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rhot_app.errors import SimulatorError
-from rhot_app.project import Rig, load_rig
+from rhot_app.project import Rig, load_rig, save_rig
 from rhot_app.recording.raw_log import Record
-from rhot_app.simulator.nodes.camera_workers import Progress
-from rhot_app.simulator.nodes.film import TRUTH_NAME, new_folder
+from rhot_app.simulator.nodes.film import TRUTH_NAME, Progress, new_folder
 from rhot_app.simulator.nodes.node_log import CABLE, NodeSender, write_node_log
-from rhot_app.simulator.nodes.shot import RIG_NAME, Shot, save_shot
+from rhot_app.simulator.nodes.nodes import NodePorts
+from rhot_app.simulator.nodes.shot import RIG_NAME, Shot, make_shot, save_shot
 from rhot_app.simulator.render.sheet import Sheet
-from rhot_app.simulator.truth.marker_rows import at_own_rows
+from rhot_app.simulator.scene.scene import Scene, build_rig
+from rhot_app.simulator.scene.scene_description import FARTHEST_M, NEAREST_M, MarkerShow
 from rhot_app.simulator.truth.truth import FrameTruth, save_truth, true_object
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
+# -- Where a rolling shutter sees a moving marker: at the time at which the row that it is on is exposed ---------------
+
 Array = NDArray[np.float64]
+
+MARGIN_PX = 4.0
+"""A marker nearer to the image's border is cut by it."""
+
+_ROUNDS = 4  # a contraction: markers move far fewer rows per second than the shutter
+
+
+def at_own_rows(way: Callable[[Array], Array], see: Callable[[Array], Array], times_s: Array, row_time_s: float,
+                size: tuple[int, int]) -> tuple[Array, Array]:
+    """A marker's places (F, 3) m and pixels (F, 2) in frames whose row 0 is exposed at `times_s` (F,).
+
+    `way`: places (F, 3) at times (F,); `see`: pixels (F, 2) of places; `size`: width and height, px. Pixels are NaN
+    where the marker is not in the picture.
+    """
+    rows = np.full(len(times_s), 0.5 * size[1])
+    places, pixels = np.empty((len(times_s), 3)), np.empty((len(times_s), 2))
+    for _ in range(_ROUNDS):
+        places = way(times_s + rows * row_time_s)
+        pixels = see(places)
+        rows = np.clip(np.nan_to_num(pixels[:, 1]), 0.0, size[1])
+    inside = ((pixels > MARGIN_PX) & (pixels < np.array(size) - 1.0 - MARGIN_PX)).all(axis=1, keepdims=True)
+    return places, np.where(inside, pixels, np.nan)
+
+
+# -- The twin's ideal detector: what nodes would send if they found every marker, as a raw log, without any ------------
+# Each marker is where it was at its own row's time, projected through the lens, with Gaussian noise; now and then one
+# is lost. Nothing hides anything, and colours do not matter: the way to observe marker sets that no camera could tell
+# apart. The log holds what a real one does - session, clock exchanges of clocks that disagree, datagrams with their
+# delays - so that it goes through the same door.
 
 LOG_NAME: Final = "points.log"
 
@@ -120,3 +153,40 @@ class _Stream:
         depth = (self._camera.camera_from_world @ np.append(self._centres[number, index], 1.0))[2]
         diameter = 2.0 * radius * self._camera.intrinsics[0] / depth
         return MarkerObservation(index, float(x), float(y), float(diameter), variance, 0.0, variance, 1.0, NO_FLAGS)
+
+
+# -- A marker held at known distances, as a table for the depth calibration: mean disparities that ideal ---------------
+
+TABLE_NAME: Final = "table.csv"
+_SECONDS = 1.0  # at each distance
+
+
+def write_distances(scene: Scene, distances_m: Sequence[float], folder: Path, noise: PointNoise) -> None:
+    """Write ``table.csv`` (real_cm, disparity_px: left minus right) and the rig into the new `folder`.
+
+    Raises SimulatorError for a distance that the scene does not reach.
+    """
+    for distance in distances_m:
+        if not NEAREST_M <= distance <= FARTHEST_M:
+            raise SimulatorError(f"a marker can be held at {100 * NEAREST_M:g} to {100 * FARTHEST_M:g} cm, not at "
+                                 f"{100 * distance:g} cm.")
+    rows = [(100.0 * distance, disparity(scene, distance, noise)) for distance in distances_m]
+    with new_folder(folder) as work:
+        save_rig(work / RIG_NAME, build_rig(scene, (NodePorts(0, 0, 0),) * len(scene.names)))
+        with (work / TABLE_NAME).open("w", newline="") as file:
+            table = csv.writer(file)
+            table.writerow(("real_cm", "disparity_px"))
+            table.writerows((f"{distance:g}", f"{pixels:.3f}") for distance, pixels in rows)
+
+
+def disparity(scene: Scene, distance_m: float, noise: PointNoise) -> float:
+    """px, left minus right: the mean over a second of frames of both cameras."""
+    shot = make_shot(scene, MarkerShow(distance_m=distance_m), _SECONDS)
+    rng = np.random.default_rng([scene.seed, round(1e4 * distance_m)])
+    means = []
+    for index in (0, 1):
+        times = 1e-9 * np.array(scene.frame_times_ns(index, _SECONDS))
+        centres = shot.scene_object.source.sample(times)[0][:, :3, 3]  # a ball's centre is its own origin
+        x = scene.camera(index).project(centres)[:, 0]
+        means.append(float(np.mean(x + rng.normal(0.0, noise.sigma_px, len(x)))))
+    return means[0] - means[1]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from rhot_app.engine.codec import Published
+from rhot_app.engine.status import Published
 from rhot_app.project import Rig
 
 Report = Callable[[str, float], None]

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, Preview
 from rhot_app.tracking.state import HandState
-from rhot_app.ui.models.jitter import JitterWindow
-from rhot_app.ui.models.latency import STACKED, LatencyWindow
-from rhot_app.ui.models.rates import LossMeter, RateRows, rate_names
+from rhot_app.ui.models.meters import STACKED, JitterWindow, LatencyWindow, LossMeter, RateRows, rate_names
 from rhot_app.ui.models.series import Series
 
 Array = NDArray[np.float64]

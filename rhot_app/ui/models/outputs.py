@@ -12,8 +12,7 @@ import msgspec
 
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import OutputError
-from rhot_app.outputs.spec import OPENXR_ONLY, WEB_PORT, as_run, host_and_port, parse_output, web_settings
-from rhot_app.outputs.status import OutputStatus
+from rhot_app.outputs.spec import OPENXR_ONLY, WEB_PORT, OutputStatus, as_run, host_and_port, parse_output, web_settings
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.ui.models.words import Look
 from rhot_app.ui.wizards.models.proposal import Command, set_rig

@@ -5,11 +5,18 @@ Shapes are names that `rhot_app.ui.shapes` draws; tones are names of `palette.Sc
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
+from rhot_app.calibration.verdict import Grade
+from rhot_app.errors import RigError
+from rhot_app.hand.anthropometry import hand_length
+from rhot_app.project import Rig, TrackerSettings
 from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_node.files import read_json, resource_path
 from rhot_node.wire.messages import MarkerFlag
 
 
@@ -87,3 +94,204 @@ def marker_look(state: HandState, marker: int) -> Look:
     if union & int(MarkerFlag.AMBIGUOUS):
         return AMBIGUOUS
     return HIDDEN if union & int(MarkerFlag.PARTIAL) else OK
+
+
+# -- What each term on the screen means, in one or two sentences: the tooltips -----------------------------------------
+
+TERMS: dict[str, str] = {
+    "condition": "The state of the whole rig in one word: IDLE, SEARCHING, TRACKING, PARTIAL, LOST or FAULT.",
+    "state rate": "How many hand states per second the engine publishes.",
+    "rig": "The rig file: cameras, lenses, marker set, hand and filters.",
+    "node": "A small computer with a camera. It finds the markers in its picture and sends their places.",
+    "node rate": "Frames per second that arrive from this node.",
+    "lost": "Frames that were not used since the start, shown when they are more than one in a hundred. The hint of "
+            "the card says why.",
+    "dropped": "Datagrams that arrived and were rejected, with the reason.",
+    "clock": "How well the node's clock is known: the true offset lies within this bound of the estimate. "
+             "1 ms at 1 m/s is 1 mm.",
+    "marker": "A coloured spot on the hand: five painted fingertips and a wrist band.",
+    "jitter": "How much a marker trembles: rms over the last second of its raw position, motion removed by third "
+              "differences. It includes depth, which is the noisiest direction. There is no figure below about ten "
+              "states per second.",
+    "latency": "How long each stage took for one state: median (p50) and 99th percentile (p99) of the last two "
+               "seconds. Bands are stacked medians; the lines are the whole way of each state.",
+    "budget": "11.1 ms is one frame at 90 fps, the rate the thesis aims at.",
+    "detect": "From the frame being available on the node to the datagram being sent.",
+    "network": "From the node's send to the receive time of the master's kernel, by the estimated clocks.",
+    "pair": "Waiting until both cameras have seen a time after the state's instant.",
+    "triangulate": "From two pixels to a point in space.",
+    "filter": "The 1-euro filter before and after depth.",
+    "solve": "From points to the hand's joints.",
+    "publish": "From the finished state to the clients.",
+    "rate": "States per second and frames per second of each node; bars show lost datagrams per second.",
+    "fingertip difference": "How far the fingertips of the two runs are apart at the same instant, in mm. p50 and p95 "
+                            "are over the whole recording.",
+    "measured": "Seen by enough cameras at this instant. Drawn solid.",
+    "inferred": "Follows from what is measured through the hand model, or from a half-hidden sight. "
+                "Drawn translucent.",
+    "guessed": "The images do not determine it: the last or the most natural value. Drawn hatched.",
+    "flexion": "Bending towards the palm, in degrees; 0 is a straight finger.",
+    "abduction": "Spreading towards the thumb's side, in degrees.",
+    "CMC": "Carpometacarpal joint: the thumb's base, at the wrist.",
+    "MCP": "Metacarpophalangeal joint: the knuckle.",
+    "PIP": "Proximal interphalangeal joint: the middle joint of a finger.",
+    "DIP": "Distal interphalangeal joint: the last joint of a finger.",
+    "IP": "Interphalangeal joint: the last joint of the thumb.",
+    "covariance": "An ellipsoid of three sigma holds the true place with 97 % probability.",
+    "worst axis": "Standard deviation (one sigma) of the place along the axis in which it is known worst, in mm.",
+    "palm": "How well the palm's place and turn are known: standard deviations along the worst axes.",
+    "hand size": "Estimated size of the hand as a factor on every length of the rig's hand (Calibrate, Tracker).",
+    "epipolar error": "How far the two cameras' rays miss each other, in pixels. Above one pixel, check calibration.",
+}
+
+
+def tip(term: str) -> str:
+    """Tooltip of a term; raises KeyError for a term that has no explanation, so that none is forgotten."""
+    return TERMS[term]
+
+
+# -- The hands of a rig as people call them, and of its states ---------------------------------------------------------
+
+def hand_names(rig: Rig | None) -> tuple[str, ...]:
+    """What the hands that the rig's tracker follows are called, the rig's `hand` first.
+
+    A hand that is alone needs no name: it is called "".
+    """
+    if rig is None or rig.other_hand is None or rig.tracker.kind == "classic":
+        return ("",)
+    sides = rig.hand.side, rig.other_hand.side
+    return sides if sides[0] != sides[1] else (f"first {sides[0]}", f"other {sides[1]}")
+
+
+def each_hand(state: HandState | None) -> list[HandState]:
+    """The states of the hands that `state` tells of, the rig's `hand` first; none without a state."""
+    return [hand for hand in (state, state.other if state is not None else None) if hand is not None]
+
+
+# -- The motions that ship with the simulated hand, with a sentence each -----------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class MotionInfo:
+    """Name as the simulator takes it, and what the hand does."""
+
+    name: str
+    description: str
+
+
+def shipped_motions() -> list[MotionInfo]:
+    """All motions of resources/motions, by name; one that cannot be read is left out."""
+    found = []
+    for path in sorted(resource_path("motions").glob("*.json")):
+        try:
+            document = read_json(path, RigError)
+        except RigError:
+            continue
+        found.append(MotionInfo(path.stem, str(document.get("description", ""))))
+    return found
+
+
+# -- The choice of the tracker in words: what each is good at, what stands in the way, how large the hand --------------
+
+KINDS: Final = {
+    "classic": ("Classic", "The thesis's way: triangulate each marker, smooth it, then bend the fingers one by one. "
+                "Works with every rig. A marker needs two cameras, and joints do not say how well they are known."),
+    "estimator": ("Estimator", "One hand estimated from everything that every camera sees, at the time it was seen. A "
+                  "marker that one camera sees counts, hidden fingers are carried on, and every joint says how well "
+                  "it is known. It predicts, and smooths recordings. Needs calibrated cameras with clocks."),
+}
+VARIANTS: Final = {
+    "full": ("full: every joint by itself", "27 degrees of freedom. The default."),
+    "coupled": ("coupled: last joints follow", "DIP = 2/3 PIP, and the middle finger does not spread. Steadier with "
+                "markers on the tips only; wrong for a fingertip that is pushed back."),
+}
+LIMITS: Final = {
+    "anatomical": ("anatomical: what hands do", "How far each joint goes in living hands. The default."),
+    "thesis": ("thesis: equation 2.1", "The thesis's ranges, for comparing with it; some are too narrow for "
+               "living hands."),
+}
+SIZE_MEANING: Final = ("The hand's size is estimated as it moves, so that a hand file that is some percent too large "
+                       "or too small does no harm. Open and close the hand for half a minute.")
+
+SETTLED_SD = 0.02
+"""A size that is not known to 2 % is no better than a hand chosen by its length."""
+
+
+def settings_text(settings: TrackerSettings) -> str:
+    """One line, e.g. "estimator, full, anatomical limits, size estimated"."""
+    if settings.kind == "classic":
+        return "classic"
+    size = ", size estimated" if settings.float_scale else ""
+    return f"estimator, {settings.variant}, {settings.limits} limits{size}"
+
+
+def size_known(state: HandState | None) -> bool:
+    """Whether the state says how large the hand is."""
+    return state is not None and math.isfinite(state.hand_scale_sd) and state.hand_scale_sd > 0.0
+
+
+def size_settled(state: HandState | None) -> bool:
+    """Whether the size is known well enough to be written into the rig's hand."""
+    return state is not None and size_known(state) and state.hand_scale_sd <= SETTLED_SD
+
+
+def scale_text(state: HandState, *, known: bool = True) -> str:
+    """E.g. "1.03 ± 0.02" with the digits that mean something; not `known` how sure: "1.03"."""
+    if not known:
+        return f"{state.hand_scale:.2f}"
+    digits = 2 if state.hand_scale_sd >= 0.005 else 3
+    return f"{state.hand_scale:.{digits}f} ± {max(state.hand_scale_sd, 10.0**-digits):.{digits}f}"
+
+
+def size_text(state: HandState | None, rig: Rig) -> str:
+    """The estimated size in words; what to do when there is none yet."""
+    if not rig.tracker.float_scale or rig.tracker.kind == "classic":
+        return ""
+    if state is None or not size_known(state):
+        return "No size yet: start, and show the hand."
+    before, after = 1e3 * hand_length(rig.hand), 1e3 * hand_length(rig.hand) * state.hand_scale
+    if not size_settled(state):
+        return f"{scale_text(state)} of the rig's hand: not certain yet. Open and close the hand, and turn it."
+    if abs(state.hand_scale - 1.0) <= state.hand_scale_sd:
+        return f"{scale_text(state)} of the rig's hand: it fits ({before:.0f} mm from wrist to middle fingertip)."
+    return f"{scale_text(state)} of the rig's hand: {after:.0f} mm long instead of {before:.0f} mm."
+
+
+# -- How long a piece of work will still take, in words ----------------------------------------------------------------
+
+_LEAST_DONE = 0.03
+_LEAST_S = 0.5
+
+
+class Remaining:
+    """Fed with the fraction done and the time; tells the remaining time once there is enough to judge by."""
+
+    def __init__(self, began_s: float) -> None:
+        self._began_s = began_s
+        self.fraction = 0.0
+        self._at_s = began_s
+
+    def report(self, fraction: float, now_s: float) -> None:
+        """`fraction` 0..1 is done at `now_s`; work that goes back a little stays where it was."""
+        self.fraction = max(self.fraction, min(fraction, 1.0))
+        self._at_s = now_s
+
+    def text(self, now_s: float) -> str:
+        """Remaining time in words, "" while it cannot be told."""
+        elapsed = self._at_s - self._began_s
+        if self.fraction < _LEAST_DONE or elapsed < _LEAST_S:
+            return ""
+        left = elapsed * (1.0 - self.fraction) / self.fraction - (now_s - self._at_s)
+        if left < 1.0:
+            return "a moment left"
+        if left < 90.0:
+            return f"about {left:.0f} s left"
+        return f"about {left / 60.0:.0f} min left"
+
+
+# -- How a grade looks: a word, a shape and a tone, as every state of the app has them ---------------------------------
+
+GRADES: dict[Grade, Look] = {
+    Grade.GOOD: Look("good", "disc", "good", "May be used as it is."),
+    Grade.FAIR: Look("usable", "half", "caution", "May be used; better is possible."),
+    Grade.POOR: Look("not usable", "cross", "bad", "Must not be used."),
+}

@@ -22,12 +22,9 @@ from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, calibrat
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.project import Rig
 from rhot_app.tracking.state import Condition, HandState, Knowledge
-from rhot_app.ui.models.glossary import tip
-from rhot_app.ui.models.hands import each_hand, hand_names
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, angle_text, palm_text
-from rhot_app.ui.models.tracker_words import scale_text, size_known
-from rhot_app.ui.models.words import KNOWLEDGE, Look, condition_look
+from rhot_app.ui.models.words import KNOWLEDGE, Look, condition_look, each_hand, hand_names, scale_text, size_known, tip
 from rhot_app.ui.shapes import ShapeMark, shape_icon
 
 FINGER_HEADS = (("spread", "abduction"), ("MCP", "MCP"), ("PIP", "PIP"), ("DIP", "DIP"))

@@ -9,10 +9,9 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWi
 from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
-from rhot_app.ui.models.glossary import tip
 from rhot_app.ui.models.palette import Scheme, hex_of
 from rhot_app.ui.models.rows import MarkerRow, marker_rows, short_name
-from rhot_app.ui.models.words import Look
+from rhot_app.ui.models.words import Look, tip
 from rhot_app.ui.panels.empty_state import EmptyState
 from rhot_app.ui.shapes import ShapeMark
 

@@ -6,9 +6,8 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from rhot_app.ui.models.glossary import tip
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.models.words import CONDITIONS, NO_RIG, Look
+from rhot_app.ui.models.words import CONDITIONS, NO_RIG, Look, tip
 from rhot_app.ui.shapes import shape_pixmap
 from rhot_app.ui.theme import app_font
 

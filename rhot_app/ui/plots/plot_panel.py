@@ -2,21 +2,151 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QGuiApplication, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPainter, QPen, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from rhot_app.ui.models.axis_range import round_top, usual_top
-from rhot_app.ui.models.glossary import tip
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.models.series import Series, to_csv
-from rhot_app.ui.plots.legend import Legend
-from rhot_app.ui.plots.overflow import Line, OverflowMarks
+from rhot_app.ui.models.series import Peak, Series, peaks_above, round_top, to_csv, usual_top
+from rhot_app.ui.models.words import tip
+
+# -- Triangles at the upper edge of a plot: here a line leaves the axis, and the tooltip says how far ------------------
 
 Array = NDArray[np.float64]
+
+_SIZE_PX = 11
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line that may leave the axis: its name, colour and values (n,)."""
+
+    name: str
+    colour: str
+    values: Array
+
+
+class OverflowMarks:
+    """The triangles of one plot."""
+
+    def __init__(self, plot: pg.PlotWidget, unit: str) -> None:
+        self._unit = unit
+        self._item = pg.ScatterPlotItem(symbol="t1", size=_SIZE_PX, pxMode=True, hoverable=True, tip=self._words)
+        self._item.setZValue(10)
+        plot.addItem(self._item)
+        self.peaks: list[tuple[str, Peak]] = []
+
+    def show(self, seconds: Array, lines: list[Line], top: float) -> None:
+        """Mark every run of every line above `top`."""
+        found = [(line, peak) for line in lines for peak in peaks_above(seconds, line.values, top)]
+        self.peaks = [(line.name, peak) for line, peak in found]
+        self._item.setData([{"pos": (peak.second, top), "brush": line.colour, "pen": line.colour,
+                             "data": (line.name, peak.value)} for line, peak in found])
+
+    def _words(self, x: float, y: float, data: tuple[str, float]) -> str:
+        return f"{data[0]}: {data[1]:.3g} {self._unit}, above the axis"
+
+
+# -- The column beside a plot: line sample, name and newest value, so that colour is never the only key ----------------
+
+_SAMPLE_PX = 18
+
+
+@dataclass(frozen=True, slots=True)
+class LegendEntry:
+    """One row. `band` draws a filled square instead of a line; `dash` is a pen's style."""
+
+    name: str
+    colour: str
+    dash: Qt.PenStyle = Qt.PenStyle.SolidLine
+    band: bool = False
+
+
+class Legend(QWidget):
+    """Rows of samples, names and values under optional column heads, painted in one go."""
+
+    def __init__(self, scheme: Scheme, heads: tuple[str, ...], widest_value: str,
+                 parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._scheme = scheme
+        self._heads = heads
+        self._widest = widest_value
+        self.entries: list[LegendEntry] = []
+        self.values: list[tuple[str, ...]] = []
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        self.update()
+
+    def set_entries(self, entries: list[LegendEntry]) -> None:
+        """Other rows."""
+        if entries != self.entries:
+            self.entries = entries
+            self.values = [("",) * len(self._heads)] * len(entries)
+            self.updateGeometry()
+            self.update()
+
+    def set_values(self, values: list[tuple[str, ...]]) -> None:
+        """The newest values, one text per head and row."""
+        if values != self.values:
+            self.values = values
+            self.update()
+
+    def _small_font_metrics(self) -> tuple[QFontMetricsF, float]:
+        metrics = QFontMetricsF(self.font())
+        return metrics, metrics.horizontalAdvance(self._widest) + 8
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """Room for the longest name and every value."""
+        metrics, value = self._small_font_metrics()
+        name = max((metrics.horizontalAdvance(entry.name) for entry in self.entries), default=40.0)
+        return QSize(round(_SAMPLE_PX + 6 + name + 4 + value * len(self._heads) + 4), 60)
+
+    def paintEvent(self, event: object) -> None:  # noqa: N802
+        """Heads, then one line per row; rows move closer together when there is little room."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        metrics, value_width = self._small_font_metrics()
+        rows = len(self.entries) + (1 if any(self._heads) else 0)
+        if not self.entries:
+            return
+        step = min(metrics.height() + 2, self.height() / rows)
+        y = 0.0
+        if any(self._heads):
+            painter.setPen(QColor(self._scheme.muted))
+            self._paint_values(painter, self._heads, y, step, value_width)
+            y += step
+        for entry, values in zip(self.entries, self.values, strict=True):
+            self._paint_sample(painter, entry, y + step / 2)
+            painter.setPen(QColor(self._scheme.text))
+            painter.drawText(QRectF(_SAMPLE_PX + 6, y, self.width(), step), Qt.AlignmentFlag.AlignVCenter, entry.name)
+            self._paint_values(painter, values, y, step, value_width)
+            y += step
+        painter.end()
+
+    def _paint_values(self, painter: QPainter, values: tuple[str, ...], y: float, step: float, width: float) -> None:
+        left = self.width() - width * len(values) - 4
+        for k, value in enumerate(values):
+            painter.drawText(QRectF(left + k * width, y, width, step),
+                             Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, value)
+
+    def _paint_sample(self, painter: QPainter, entry: LegendEntry, y: float) -> None:
+        colour = QColor(entry.colour)
+        if entry.band:
+            painter.fillRect(QRectF(3, y - 5, _SAMPLE_PX - 6, 10), colour)
+        else:
+            painter.setPen(QPen(colour, 2.5, entry.dash, Qt.PenCapStyle.FlatCap))
+            painter.drawLine(0, round(y), _SAMPLE_PX, round(y))
+
+
+# -- What every plot has: title, named axes in units, legend, pause, reset, copy as CSV; time runs left to -------------
 
 SPAN_S = 30.0
 _OLD_S = 1.5  # a figure older than this is not the present one any more

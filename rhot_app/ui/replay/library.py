@@ -12,8 +12,8 @@ import msgspec
 import numpy as np
 
 from rhot_app.engine.observer import condition_of
+from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.replay_summary import replay_states
-from rhot_app.engine.warm_up import warm_up
 from rhot_app.errors import RecordingError, RhotError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import with_tracker
@@ -21,7 +21,7 @@ from rhot_app.recording.bookmarks import bookmarks_of
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import videos_of
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.make import make_tracker
+from rhot_app.tracking.trackers import make_tracker
 from rhot_app.ui.recordings import LOG_SUFFIX
 from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, being_recorded, condition_bins
 from rhot_node.errors import NodeError

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, bytes_text
 from rhot_app.ui.replay.library import Entry, Summary
-from rhot_app.ui.replay.player import time_text
+from rhot_app.ui.replay.session import time_text
 from rhot_app.ui.replay.timeline import paint_conditions
 
 NAME, DATE, RIG, LENGTH, SIZE, BAR = range(6)

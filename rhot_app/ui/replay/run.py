@@ -19,20 +19,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.engine.codec import TOPIC_STATE, decode, encode
 from rhot_app.engine.observer import condition_of
+from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.replay_summary import replay_states, smoothed_states
-from rhot_app.engine.warm_up import warm_up
+from rhot_app.engine.status import TOPIC_STATE, decode, encode
 from rhot_app.errors import RecordingError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.make import make_tracker
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
 from rhot_app.tracking.state import Condition, HandState
-from rhot_app.ui.models.jitter import JitterWindow
+from rhot_app.tracking.trackers import make_tracker
+from rhot_app.ui.models.meters import JitterWindow
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]

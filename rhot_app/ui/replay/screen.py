@@ -17,13 +17,9 @@ from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
 from rhot_app.ui.panels.hand_panel import HandPanel
 from rhot_app.ui.panels.markers_panel import MarkersPanel
-from rhot_app.ui.plots.jitter_plot import JitterPlot
-from rhot_app.ui.plots.legend import LegendEntry
-from rhot_app.ui.plots.overflow import Line
-from rhot_app.ui.plots.plot_panel import DASHES, PlotPanel, newest, number
-from rhot_app.ui.replay.comparison import Comparison
-from rhot_app.ui.replay.player import SPEEDS
-from rhot_app.ui.replay.session import Replay
+from rhot_app.ui.plots.live_plots import JitterPlot
+from rhot_app.ui.plots.plot_panel import DASHES, LegendEntry, Line, PlotPanel, newest, number
+from rhot_app.ui.replay.session import SPEEDS, Comparison, Replay
 from rhot_app.ui.replay.timeline import Timeline
 from rhot_app.ui.scene.view import SceneView
 from rhot_app.ui.settings import Settings

@@ -10,9 +10,8 @@ from PySide6.QtGui import QColor, QHelpEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.replay.player import time_text
 from rhot_app.ui.replay.run import LOST, NO_STATE, PARTIAL, TRACKING, Codes
-from rhot_app.ui.replay.session import Replay
+from rhot_app.ui.replay.session import Replay, time_text
 
 MARGIN_PX = 10
 BAR_PX = 18

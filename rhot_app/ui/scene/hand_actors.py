@@ -12,11 +12,9 @@ from rhot_app.hand.skeleton import JOINTS, TIP_ROLES
 from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.ui.models.palette import Scheme, rgb_of
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice, EllipsoidMesh
-from rhot_app.ui.scene.floor import FLOOR_M
-from rhot_app.ui.scene.frames import to_display
-from rhot_app.ui.scene.hand_mesh import HandMesh, PosedMesh, SkeletonMesh
+from rhot_app.ui.scene.frames import FLOOR_M, to_display
+from rhot_app.ui.scene.hand_mesh import HandMesh, PosedMesh, SkeletonMesh, tinted, with_knowledge
 from rhot_app.ui.scene.hands import OneHand
-from rhot_app.ui.scene.known import tinted, with_knowledge
 from rhot_app.ui.scene.mesh_item import MeshItem
 from rhot_app.ui.scene.meshes import Faces, capsule_template, elliptic_band, pose_capsules, repeat_faces
 from rhot_node.markers import FLAT_PATCHES, Marker, MarkerSet

@@ -15,18 +15,15 @@ from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
-from rhot_app.ui.models.hands import each_hand, hand_names
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
-from rhot_app.ui.models.tracker_words import KINDS
-from rhot_app.ui.scene import floor as stage
+from rhot_app.ui.models.words import KINDS, each_hand, hand_names
+from rhot_app.ui.scene import frames as stage
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import Up, camera_like, camera_like_state, frustum_lines, to_display
 from rhot_app.ui.scene.hand_actors import HandActors
-from rhot_app.ui.scene.hands import hands_of
-from rhot_app.ui.scene.labels import LabelPainter, TextStyle, pixels_of
-from rhot_app.ui.scene.legend import Legend, ellipsoid_text
-from rhot_app.ui.scene.pick import nearest, spots
+from rhot_app.ui.scene.hands import hands_of, nearest, spots
+from rhot_app.ui.scene.labels import LabelPainter, Legend, TextStyle, ellipsoid_text, pixels_of
 
 Array = NDArray[np.float64]
 

@@ -17,17 +17,16 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from rhot_app.calibration.hand.bones_entry import BONE_NAMES
+from rhot_app.calibration.hand.bones import BONE_NAMES
 from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.accept_page import AcceptPage
-from rhot_app.ui.wizards.models.accept import AcceptStep
+from rhot_app.ui.wizards.framework.movement_page import Movements
+from rhot_app.ui.wizards.framework.page import AcceptPage, Page
+from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.bones_steps import SECONDS, EntryStep, HandStep, knowledge_of, make_coach, propose
+from rhot_app.ui.wizards.models.proposal import AcceptStep
 from rhot_app.ui.wizards.models.step import StepView
-from rhot_app.ui.wizards.movement_kit import Movements
-from rhot_app.ui.wizards.page import Page
-from rhot_app.ui.wizards.plan import Kit, Plan
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -13,15 +13,12 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScro
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.job import Job
-from rhot_app.ui.wizards.accept_page import AcceptPage
-from rhot_app.ui.wizards.control_row import ControlRow
-from rhot_app.ui.wizards.models.accept import AcceptStep
-from rhot_app.ui.wizards.models.camera_settings import CONTROLS, CameraChoices, Control, Value
-from rhot_app.ui.wizards.models.camera_steps import SettingsStep
-from rhot_app.ui.wizards.models.proposal import NodeChange
+from rhot_app.ui.wizards.framework.control_row import ControlRow
+from rhot_app.ui.wizards.framework.page import AcceptPage, Page
+from rhot_app.ui.wizards.framework.plan import Kit, Plan
+from rhot_app.ui.wizards.models.camera_steps import CONTROLS, CameraChoices, Control, SettingsStep, Value
+from rhot_app.ui.wizards.models.proposal import AcceptStep, NodeChange
 from rhot_app.ui.wizards.models.step import StepView
-from rhot_app.ui.wizards.page import Page
-from rhot_app.ui.wizards.plan import Kit, Plan
 
 
 def make_plan(kit: Kit) -> Plan:

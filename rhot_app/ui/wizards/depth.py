@@ -17,14 +17,12 @@ from PySide6.QtWidgets import (
 
 from rhot_app.calibration.depth.table import DepthRow
 from rhot_app.errors import EngineError
-from rhot_app.ui.wizards.accept_page import AcceptPage
-from rhot_app.ui.wizards.chart_page import ChartPage
-from rhot_app.ui.wizards.models.accept import AcceptStep
+from rhot_app.ui.wizards.framework.feed import StateFeed
+from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page
+from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.depth_steps import DistanceStep, LawStep, propose
+from rhot_app.ui.wizards.models.proposal import AcceptStep
 from rhot_app.ui.wizards.models.step import StepView
-from rhot_app.ui.wizards.page import Page
-from rhot_app.ui.wizards.plan import Kit, Plan
-from rhot_app.ui.wizards.state_feed import StateFeed
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -19,17 +19,22 @@ from PySide6.QtWidgets import (
 
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.accept_page import AcceptPage
-from rhot_app.ui.wizards.chart_page import ChartPage
-from rhot_app.ui.wizards.models.accept import AcceptStep
-from rhot_app.ui.wizards.models.filter_meters import FastCoach, LiveMeters, StillCoach
-from rhot_app.ui.wizards.models.filter_steps import FAST_S, STILL_S, TuneStep, propose
+from rhot_app.ui.wizards.framework.feed import StateFeed
+from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
+from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
+from rhot_app.ui.wizards.framework.plan import Kit, Plan
+from rhot_app.ui.wizards.models.filter_steps import (
+    FAST_S,
+    STILL_S,
+    FastCoach,
+    LiveMeters,
+    StillCoach,
+    TuneStep,
+    propose,
+)
 from rhot_app.ui.wizards.models.movement import MovementStep
+from rhot_app.ui.wizards.models.proposal import AcceptStep
 from rhot_app.ui.wizards.models.step import StepView
-from rhot_app.ui.wizards.movement_kit import Movements
-from rhot_app.ui.wizards.movement_page import MovementPage
-from rhot_app.ui.wizards.plan import Kit, Plan
-from rhot_app.ui.wizards.state_feed import StateFeed
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from rhot_app.ui.wizards.accept_page import AcceptPage
-from rhot_app.ui.wizards.chart_page import ChartPage
-from rhot_app.ui.wizards.models.accept import AcceptStep
-from rhot_app.ui.wizards.models.solve import SolveStep
-from rhot_app.ui.wizards.models.step import Task
+from rhot_app.ui.wizards.framework.movement_page import Movements
+from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
+from rhot_app.ui.wizards.framework.plan import Kit, Plan
+from rhot_app.ui.wizards.models.proposal import AcceptStep
+from rhot_app.ui.wizards.models.step import SolveStep, Task
 from rhot_app.ui.wizards.models.time_steps import SECONDS, WaveCoach, charts_of, propose, solve_log
-from rhot_app.ui.wizards.movement_kit import Movements
-from rhot_app.ui.wizards.plan import Kit, Plan
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot_app.ui.replay.player import Player, time_text
+from rhot_app.ui.replay.session import Player, time_text
 
 
 @pytest.fixture

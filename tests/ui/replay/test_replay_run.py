@@ -14,9 +14,8 @@ from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_hea
 from rhot_app.recording.recorder import Recorder
 from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
 from rhot_app.tracking.state import Condition
-from rhot_app.ui.replay.comparison import Comparison, nearest
 from rhot_app.ui.replay.run import LOST, NO_STATE, PARTIAL, TRACKING, Run, condition_bins, new_run_path, track_log
-from rhot_app.ui.replay.session import Choice, Replay
+from rhot_app.ui.replay.session import Choice, Comparison, Replay, nearest
 
 
 def rig_of(log: Path) -> Rig:

@@ -227,7 +227,7 @@ def test_a_bookmark_that_cannot_be_written_is_said(desk, monkeypatch):
     def refuse(path: Path, mark: Bookmark) -> None:
         raise OSError("the disk is full")
 
-    monkeypatch.setattr("rhot_app.ui.replay.bookmark_writer.append_bookmark", refuse)
+    monkeypatch.setattr("rhot_app.ui.replay.toolbar.append_bookmark", refuse)
     desk.click(desk.window.parts.transport.bookmark_button)
     edit = desk.window.bookmarks.dialog.findChild(QLineEdit)
     QTest.keyClicks(edit, "x")

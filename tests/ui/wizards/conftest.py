@@ -18,7 +18,7 @@ from rhot_app.simulator.nodes.remote import TwinRemote
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.catalogue import WIZARDS
+from rhot_app.ui.wizards.framework.plan import WIZARDS
 from rhot_app.ui.wizards.launcher import Launcher
 
 

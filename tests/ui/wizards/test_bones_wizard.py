@@ -22,11 +22,11 @@ from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.bones import make_plan
+from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_app.ui.wizards.models.bones_steps import SweepCoach, make_coach
 from rhot_app.ui.wizards.models.movement import QuietCoach
 from rhot_app.ui.wizards.models.step import Bar
-from rhot_app.ui.wizards.plan import Kit
-from rhot_app.ui.wizards.window import WizardWindow
 
 SECONDS = 8.0
 SIZE = 1.06

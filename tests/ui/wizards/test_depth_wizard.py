@@ -12,8 +12,8 @@ from wizard_rig import FakeMemory, FakeRigAsker
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards import depth
-from rhot_app.ui.wizards.plan import Kit
-from rhot_app.ui.wizards.window import WizardWindow
+from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
 
 DISTANCES_CM = (25.0, 30.0, 40.0, 50.0, 60.0, 70.0, 85.0, 100.0)
 

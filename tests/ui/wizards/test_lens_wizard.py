@@ -16,11 +16,11 @@ from wizard_rig import FakeMemory, FakeRigAsker
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.project import Intrinsics, load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_app.ui.wizards.lens import LAST, make_plan
 from rhot_app.ui.wizards.models.drawing import Cells, Line
-from rhot_app.ui.wizards.models.lens_result import straightened
-from rhot_app.ui.wizards.plan import Kit
-from rhot_app.ui.wizards.window import WizardWindow
+from rhot_app.ui.wizards.models.lens_steps import straightened
 
 TRUE_F = 530.0
 PLACES = [((0.0, 0.0, 0.0), (0.0, 0.0, 0.417)), ((0.0, 0.0, 0.0), (-0.142, -0.083, 0.417)),

@@ -17,11 +17,11 @@ from rhot_app.calibration.check.checks import check_rig
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.feed import Picture
+from rhot_app.ui.wizards.framework.feed import Picture
+from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_app.ui.wizards.models.known_step import KnownStep
-from rhot_app.ui.wizards.plan import Kit
 from rhot_app.ui.wizards.stereo import make_plan
-from rhot_app.ui.wizards.window import WizardWindow
 
 TRUE_BASELINE_M = 0.075
 PLACES = [((0.0, 0.0, 0.0), (0.037, 0.0, 0.62)), ((0.5, 0.0, 0.0), (0.037, 0.03, 0.6)),

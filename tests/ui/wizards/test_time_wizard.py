@@ -17,8 +17,8 @@ from wizard_rig import FakeMemory
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards import time as time_wizard
-from rhot_app.ui.wizards.plan import Kit
-from rhot_app.ui.wizards.window import WizardWindow
+from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
 
 LATE_S = 0.006
 ROW_NS = 48_000

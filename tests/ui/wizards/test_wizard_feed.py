@@ -16,10 +16,10 @@ from patience import PATIENCE_S, eventually, settled
 from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import CalibrationError
-from rhot_app.ui.wizards.feed import LiveFeed
+from rhot_app.ui.wizards.framework.feed import LiveFeed
+from rhot_app.ui.wizards.framework.solver import Solver, StoppedError
+from rhot_app.ui.wizards.framework.work import PictureWorker
 from rhot_app.ui.wizards.models.step import Step
-from rhot_app.ui.wizards.picture_worker import PictureWorker
-from rhot_app.ui.wizards.solver import Solver, StoppedError
 
 
 @pytest.fixture
@@ -180,5 +180,6 @@ def test_work_runs_in_another_process_that_gives_way(solver):
 
 
 def test_the_solving_process_imports_no_qt():
-    code = "import rhot_app.ui.wizards.solver_process, sys; sys.exit(any('PySide6' in m for m in sys.modules))"
+    module = "rhot_app.ui.wizards.framework.solver_process"
+    code = f"import {module}, sys; sys.exit(any('PySide6' in m for m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

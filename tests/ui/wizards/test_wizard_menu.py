@@ -19,9 +19,10 @@ from rhot_app.engine.status import Advice
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui import actions, main_window
 from rhot_app.ui.backend.contract import Opened
-from rhot_app.ui.wizards import catalogue, launcher
-from rhot_app.ui.wizards.catalogue import Wizard
-from rhot_app.ui.wizards.models.rig_rows import rig_rows
+from rhot_app.ui.models.rows import rig_rows
+from rhot_app.ui.wizards import launcher
+from rhot_app.ui.wizards.framework import plan
+from rhot_app.ui.wizards.framework.plan import Wizard
 
 
 class SampleWizard(Wizard):
@@ -97,7 +98,7 @@ def test_a_wizard_that_cannot_open_says_why(bench):
 
 
 def test_a_stale_calibration_offers_the_wizard_that_mends_it(bench, monkeypatch):
-    monkeypatch.setattr(catalogue, "WIZARDS", SAMPLE)
+    monkeypatch.setattr(plan, "WIZARDS", SAMPLE)
     bench.backend.engine.advice = (Advice("warning", "The cameras' rays miss each other.", "sample"),)
     bench.until(lambda: bench.window.advice.texts == ["The cameras' rays miss each other."])
     button = next(button for _, _, _, button in bench.window.advice._lines if button.isVisible())

@@ -17,9 +17,8 @@ from rhot_app import rig_history
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.guide import page_path
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.catalogue import WIZARDS
-from rhot_app.ui.wizards.plan import Kit
-from rhot_app.ui.wizards.window import WizardWindow
+from rhot_app.ui.wizards.framework.plan import WIZARDS, Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
 
 
 @pytest.fixture

@@ -9,14 +9,22 @@ from typing import Literal
 
 import msgspec
 
-from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard, parse_size
+from rhot_app.calibration.board.boards import (
+    BOARD,
+    CHARUCO,
+    DEFAULT_DICTIONARY,
+    MARKER_SHARE,
+    SQUARE_MM,
+    Board,
+    CharucoBoard,
+    Chessboard,
+    parse_size,
+)
 from rhot_app.calibration.board.corners import BoardView, detect, to_gray
-from rhot_app.calibration.board.missing import why_missing
-from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding
-from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
+from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding, why_missing
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
-from rhot_app.ui.wizards.models.board_drawing import board_marks
+from rhot_app.ui.wizards.models.drawing import board_marks
 from rhot_app.ui.wizards.models.step import Pictures, Step, StepView
 
 DICTIONARIES = (DEFAULT_DICTIONARY, "DICT_4X4_250", "DICT_5X5_100", "DICT_5X5_250", "DICT_6X6_250",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import msgspec
 import numpy as np
 
-from rhot_app.calibration.hand.bones_entry import BONE_NAMES, enter_bones
+from rhot_app.calibration.hand.bones import BONE_NAMES, enter_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
@@ -17,11 +17,10 @@ from rhot_app.hand.skeleton import BONES, FINGERS
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
+from rhot_app.ui.models.rows import rig_rows
 from rhot_app.ui.wizards.models.movement import Coach, MovementStep, QuietCoach
 from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
-from rhot_app.ui.wizards.models.rig_rows import rig_rows
-from rhot_app.ui.wizards.models.solve import SolveStep
-from rhot_app.ui.wizards.models.step import Bar, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import Bar, SolveStep, Step, StepView, Task
 
 if TYPE_CHECKING:
     from rhot_app.calibration.hand.bones_collector import BonesCollector

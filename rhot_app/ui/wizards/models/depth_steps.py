@@ -14,10 +14,9 @@ from rhot_app.calibration.depth.table import DepthRow, DepthTable
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.tracking.state import HandState
-from rhot_app.ui.wizards.models.chart import Chart, ChartedStep, Curve
 from rhot_app.ui.wizards.models.drawing import Callout, Dots, Overlay
 from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
-from rhot_app.ui.wizards.models.step import Bar, Step, StepView
+from rhot_app.ui.wizards.models.step import Bar, Chart, ChartedStep, Curve, Step, StepView
 
 REASON = "depth calibration"
 ENOUGH = 8

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rhot_app.calibration.filters.judgement import FilterTargets
+from rhot_app.calibration.filters.meters import BRISK_M_S, MOVING_M_S, FilterMeter, FilterTargets, MeterReading
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
+from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.palette import hex_of
-from rhot_app.ui.wizards.models.chart import Chart, Curve
+from rhot_app.ui.models.rows import rig_rows
 from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
-from rhot_app.ui.wizards.models.rig_rows import rig_rows
-from rhot_app.ui.wizards.models.solve import SolveStep
-from rhot_app.ui.wizards.models.step import Task
+from rhot_app.ui.wizards.models.step import Bar, Chart, Curve, SolveStep, Task
 
 if TYPE_CHECKING:
     from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport
+
 
 REASON = "filter tuning"
 STILL_S, FAST_S = 10.0, 15.0
@@ -115,3 +116,156 @@ def propose(report: FilterReport | None, rig: Rig, path: Path | None, *, per_mar
 
 def _figure(value: float, decimals: int, unit: str) -> str:
     return f"{value:.{decimals}f} {unit}" if np.isfinite(value) else "–"
+
+
+# -- Jitter and lag of every marker while the hand is held still or moves: for the page, and for the coaches -----------
+
+_READ_S = 0.25
+_MOST = 0.7  # of the time: a hand may take a moment to come to rest, or to get going
+
+
+class LiveMeters:
+    """Takes each state once; `reading` is of the last two seconds, None before there are any."""
+
+    def __init__(self) -> None:
+        self.names: tuple[str, ...] = ()
+        self.reading: MeterReading | None = None
+        self._meter: FilterMeter | None = None
+        self._last = -1
+        self._due_s = 0.0
+
+    def watch(self, states: Sequence[HandState]) -> None:
+        """Take what is new in the states of the last seconds."""
+        for state in states:
+            if self._meter is None or state.marker_ids != self.names:
+                self.names, self._meter = state.marker_ids, FilterMeter(len(state.marker_ids))
+            if state.t_master_ns > self._last:
+                self._last = state.t_master_ns
+                self._meter.add(state.t_master_ns, state.marker_raw_positions, state.marker_positions)
+        now = time.monotonic()
+        if self._meter is not None and states and now >= self._due_s:
+            self._due_s = now + _READ_S
+            self.reading = self._meter.read()
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of the fastest marker; NaN when none is seen."""
+        speeds = self.reading.speed_m_s if self.reading is not None else np.full(1, np.nan)
+        seen = speeds[speeds > 0.0]
+        return float(seen.max()) if len(seen) else float("nan")
+
+    def rows(self) -> tuple[tuple[str, str, str, str], ...]:
+        """Per marker: name, jitter without and with filters in mm, lag in ms; dashes for what cannot be told."""
+        if self.reading is None:
+            return ()
+        one = self.reading
+        return tuple((name, _text(1e3 * raw, 2), _text(1e3 * filtered, 2), _text(1e3 * lag, 1)) for name, raw, filtered,
+                     lag in zip(self.names, one.raw_jitter_m, one.jitter_m, one.lag_s, strict=True))
+
+
+class _Tally:
+    """In which share of the readings something was so."""
+
+    def __init__(self) -> None:
+        self._last: MeterReading | None = None
+        self._all = self._so = 0
+
+    def add(self, reading: MeterReading | None, so: bool) -> None:
+        """Take a reading once."""
+        if reading is not None and reading is not self._last:
+            self._last = reading
+            self._all += 1
+            self._so += so
+
+    @property
+    def share(self) -> float:
+        """0..1, as it was for most of the time: 1 is enough."""
+        return min(self._so / (_MOST * self._all), 1.0) if self._all else 0.0
+
+
+class _Sight:
+    """Which markers both cameras have seen since the recording began."""
+
+    def __init__(self, meters: LiveMeters) -> None:
+        self._meters = meters
+        self._seen = np.zeros(0, bool)
+
+    def look(self) -> None:
+        """Take the newest reading."""
+        reading = self._meters.reading
+        if reading is not None:
+            seen = np.isfinite(reading.raw_jitter_m)
+            self._seen = seen | self._seen if len(self._seen) == len(seen) else seen
+
+    def bar(self) -> Bar:
+        """How many of them."""
+        return Bar("markers", float(self._seen.mean()) if len(self._seen) else 0.0,
+                   "markers that both cameras have seen so far")
+
+    def shortfall(self) -> str:
+        """Those that were not seen."""
+        names = [name for name, seen in zip(self._meters.names, self._seen, strict=False) if not seen]
+        return f"Both cameras have not seen {', '.join(names)}." if names else ""
+
+
+class StillCoach:
+    """Rest the hand."""
+
+    def __init__(self, meters: LiveMeters) -> None:
+        self._meters = meters
+        self._still, self._sight = _Tally(), _Sight(meters)
+
+    def watch(self, states: Sequence[HandState]) -> None:
+        """See what is new."""
+        self._meters.watch(states)
+        self._still.add(self._meters.reading, self._meters.speed_m_s <= MOVING_M_S)
+        self._sight.look()
+
+    def bars(self) -> tuple[Bar, ...]:
+        """How much of the time the hand was at rest, and the markers in sight."""
+        return Bar("still", self._still.share, "of the time at rest that is needed"), self._sight.bar()
+
+    def sentence(self) -> str:
+        """Rest it, or go on so."""
+        speed = self._meters.speed_m_s
+        return "It moves: rest the hand on something." if speed > MOVING_M_S else "Good, hold still."
+
+    def shortfall(self) -> str:
+        """That it moved, or what was not seen."""
+        return self._sight.shortfall() if self._still.share >= 1.0 else "The hand moved: rest it on something."
+
+
+class FastCoach:
+    """Wave the hand briskly."""
+
+    def __init__(self, meters: LiveMeters) -> None:
+        self._meters = meters
+        self._fast, self._sight = _Tally(), _Sight(meters)
+
+    def watch(self, states: Sequence[HandState]) -> None:
+        """See what is new."""
+        self._meters.watch(states)
+        self._fast.add(self._meters.reading, self._share >= 1.0)
+        self._sight.look()
+
+    @property
+    def _share(self) -> float:
+        speed = self._meters.speed_m_s
+        return min(speed / BRISK_M_S, 1.0) if speed == speed else 0.0
+
+    def bars(self) -> tuple[Bar, ...]:
+        """The speed, how much of the time it was enough, and the markers in sight."""
+        return (Bar("speed", self._share, f"of {BRISK_M_S:.1f} m/s, the fastest marker of the last two seconds"),
+                Bar("fast", self._fast.share, "of the time at that speed that is needed"), self._sight.bar())
+
+    def sentence(self) -> str:
+        """Faster, or go on so."""
+        return "Good, go on." if self._share >= 1.0 else "Faster, 20 cm wide."
+
+    def shortfall(self) -> str:
+        """That it was slow, or what was not seen."""
+        return self._sight.shortfall() if self._fast.share >= 1.0 else "The hand was too slow."
+
+
+def _text(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if np.isfinite(value) else "–"

@@ -3,24 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView, detect
-from rhot_app.calibration.lens.start import LensStart
-from rhot_app.calibration.stereo.calibrate import KnownLengths
+from rhot_app.calibration.lens.camera_calibration import lengths_text
+from rhot_app.calibration.lens.fit import LensStart, find_lens
+from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate, calibrated_rig, lens_of, rig_findings
 from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollector
-from rhot_app.calibration.stereo.report import StereoReport
+from rhot_app.calibration.stereo.report import WORKING_DISTANCE_M, PairFigures, StereoFigures, StereoReport
+from rhot_app.calibration.stereo.start import WorldFrame, place_world
 from rhot_app.calibration.stereo.views import SharedViews
-from rhot_app.calibration.stereo.world_frame import WorldFrame, place_world
+from rhot_app.calibration.verdict import judge
 from rhot_app.errors import CalibrationError
-from rhot_app.ui.wizards.models.board_drawing import board_marks
+from rhot_app.progress import Progress
+from rhot_app.project import Rig, RigNode
+from rhot_app.ui.models.rows import place_figures
 from rhot_app.ui.wizards.models.board_form import BoardStep
-from rhot_app.ui.wizards.models.drawing import Dots, Overlay
+from rhot_app.ui.wizards.models.drawing import Dots, Overlay, board_marks
+from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
-from rhot_app.ui.wizards.models.stereo_work import put_together
+
+# -- The stereo solve as the solving process runs it: lenses that nobody has calibrated come from the same -------------
+
+def put_together(views: SharedViews, lenses: Sequence[LensStart | None], *, known: KnownLengths,
+                 progress: Progress) -> StereoReport:
+    """`lenses` one per camera, None to find it from the views. Raises CalibrationError."""
+    found = [lens if lens is not None else find_lens(views.of_camera(camera), views.board, views.cameras[camera])
+             for camera, lens in enumerate(lenses)]
+    return calibrate(views, found, known=known, remembered=lenses, progress=progress)
+
+
+def known_lenses(nodes: Sequence[RigNode]) -> list[LensStart | None]:
+    """The rig's lenses, None for those that only say what is written on the box."""
+    return [None if node.intrinsics.nominal else lens_of(node) for node in nodes]
+
+
+# -- The steps that put cameras together: shared captures, the solve, the world on the table. No mathematics -----------
 
 Views = dict[str, BoardView | None]
 FEWEST = 4  # shots; with fewer the solve refuses
@@ -251,3 +273,52 @@ class TableStep(BoardFinder):
         return StepView(sentence, done=not wrong and self.world is not None, hint=hint, overlays=self.marks(),
                         verdict=self.world.verdict if self.world is not None else None,
                         kept=int(self.world is not None), passable=not wrong)
+
+
+# -- The rig that a stereo calibration proposes, and its figures beside those in force ---------------------------------
+
+REASON = "stereo calibration"
+
+
+def stereo_proposal(rig: Rig, path: Path | None, report: StereoReport, world: WorldFrame | None) -> Proposal | None:
+    """What the last page shows and uses; None while the cameras could not be put together."""
+    figures = report.figures
+    if figures is None:
+        return None
+    after = calibrated_rig(rig, figures, world)
+    found = [*report.verdict.findings, *rig_findings(after, report.cameras)]
+    found += world.verdict.findings if world is not None else ()
+    unique = {finding.figure: finding for finding in found}
+    return Proposal(REASON, judge(report.summary, list(unique.values())), _rows(rig, after, figures),
+                    (RigChange(rig, after, path, REASON),))
+
+
+def _rows(before: Rig, after: Rig, figures: StereoFigures) -> tuple[Row, ...]:
+    rows = [Row(f"{pair.first} to {pair.second}: distance", _distance(before, pair),
+                f"{1e3 * pair.baseline_m:.2f} ± {1e3 * _baseline_std(pair):.2f} mm") for pair in figures.pairs]
+    old = {name: text for node in before.nodes for name, text in place_figures(node).items()}
+    new = {name: text for node in after.nodes for name, text in place_figures(node).items()}
+    rows += [Row(name, old[name], text) for name, text in new.items()]
+    rows.append(Row("corners, rms", "", f"{figures.rms_px:.2f} px"))
+    rows.append(Row("squares, measured", f"{1e3 * figures.board.square_m:.2f} mm by ruler",
+                    f"{1e3 * figures.squares.mean_m:.2f} mm"))
+    rows.append(Row("lengths", lengths_text(before), lengths_text(after)))
+    by_calibration, by_noise = (1e3 * error for error in figures.error_m)
+    rows.append(Row(f"error expected at {WORKING_DISTANCE_M:g} m", "", f"{by_calibration:.2f} mm by the calibration, "
+                    f"{by_noise:.2f} mm by noise"))
+    return tuple(rows)
+
+
+def _distance(rig: Rig, pair: PairFigures) -> str:
+    places = {node.name: np.array(node.pose.translation_m) for node in rig.nodes}
+    return f"{1e3 * np.linalg.norm(places[pair.second] - places[pair.first]):.2f} mm"
+
+
+def _baseline_std(pair: PairFigures) -> float:
+    """Of the length of T, by the standard deviations of its parts."""
+    return float(np.linalg.norm(pair.translation_m * pair.translation_std_m) / pair.baseline_m)
+
+
+def chosen_nodes(rig: Rig) -> tuple[RigNode, ...]:
+    """The cameras that have pictures."""
+    return tuple(node for node in rig.nodes if not node.text_datagrams)

@@ -1,0 +1,272 @@
+"""Which tracker makes a hand of the markers: chosen while it runs, seen at once, taken back with one key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QRadioButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from rhot_app.hand.anthropometry import scaled_hand
+from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle
+from rhot_app.tracking.state import HandState
+from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.job import Job
+from rhot_app.ui.models.words import (
+    KINDS,
+    LIMITS,
+    SIZE_MEANING,
+    VARIANTS,
+    settings_text,
+    size_settled,
+    size_text,
+)
+from rhot_app.ui.wizards.models.proposal import RigChange
+
+LOOK_MS = 150
+_WIDTH_PX = 460
+
+
+class TrackerDialog(QDialog):
+    """Every choice takes effect at once, in the engine and in the rig's file, and `rig_used` gives the new rig.
+
+    `hand` gives the newest state, None while nothing streams. The rig's file keeps what each choice replaced.
+    """
+
+    rig_used = Signal(object)
+
+    def __init__(self, rig: Rig, path: Path | None, connect: Callable[[], Asker], hand: Callable[[], HandState | None],
+                 parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Tracker")
+        self.setProperty("guide", "tracker")
+        self.setFixedWidth(_WIDTH_PX)
+        self._rig, self._path = rig, path
+        self._connect, self._hand = connect, hand
+        self._made: list[RigChange] = []
+        self._job: Job | None = None
+        self.kinds = {kind: QRadioButton(title) for kind, (title, _) in KINDS.items()}
+        self.variant_box, self.variant_words = _choices(VARIANTS), _sentence()
+        self.limits_box, self.limits_words = _choices(LIMITS), _sentence()
+        self.size_check = QCheckBox("Estimate the hand's size")
+        self.size_check.setToolTip(SIZE_MEANING)
+        self.size_label = _sentence()
+        self.size_button = QPushButton("Use this size for the rig's hand")
+        self.size_button.setToolTip("Makes every length of the rig's hand so much larger or smaller. What was there is "
+                                    "kept.")
+        self.size_label.hide()
+        self.size_button.hide()
+        self.obstacle_label, self.sentence = _sentence(muted=False), _sentence(muted=False)
+        self.undo_button, self.close_button = QPushButton("Undo"), QPushButton("Close")
+        self.undo_button.setToolTip("Take the last change back (Ctrl+Z).")
+        self._lay_out()
+        self._connect_parts()
+        self._show_rig()
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self.look)
+        self._timer.start(LOOK_MS)
+
+    # -- putting it together ---------------------------------------------------------------------------------------
+
+    def _lay_out(self) -> None:
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(8)
+        for kind, (_, meaning) in KINDS.items():
+            words = _sentence()
+            words.setText(meaning)
+            words.setContentsMargins(24, 0, 0, 0)
+            layout.addWidget(self.kinds[kind])
+            layout.addWidget(words)
+        self.obstacle_label.setContentsMargins(24, 0, 0, 0)
+        layout.addWidget(self.obstacle_label)
+        self.details = QWidget()
+        form = QGridLayout(self.details)
+        form.setContentsMargins(24, 8, 0, 0)
+        form.setVerticalSpacing(6)
+        form.setColumnStretch(1, 1)
+        for row, (name, part) in enumerate((
+                ("Fingers", self.variant_box), ("", self.variant_words), ("Limits", self.limits_box),
+                ("", self.limits_words), ("Size", self.size_check), ("", self.size_label), ("", self.size_button))):
+            form.addWidget(QLabel(name), row, 0)
+            form.addWidget(part, row, 1)
+        layout.addWidget(self.details)
+        layout.addWidget(self.sentence)
+        layout.addStretch(1)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.undo_button)
+        buttons.addStretch(1)
+        buttons.addWidget(self.close_button)
+        layout.addLayout(buttons)
+
+    def _connect_parts(self) -> None:
+        for kind in self.kinds.values():
+            kind.clicked.connect(self._choose)
+        for box in (self.variant_box, self.limits_box):
+            box.activated.connect(self._choose)
+        self.size_check.clicked.connect(self._choose)
+        self.size_button.clicked.connect(self.use_size)
+        self.undo_button.clicked.connect(self.undo)
+        self.close_button.clicked.connect(self.reject)
+        for button in (self.size_button, self.undo_button, self.close_button):
+            button.setAutoDefault(False)  # Enter in the form is no order
+        QShortcut(QKeySequence(QKeySequence.StandardKey.Undo), self).activated.connect(self.undo)
+
+    # -- what is done ----------------------------------------------------------------------------------------------
+
+    def _kind(self) -> TrackerKind:
+        return next((kind for kind in TRACKER_KINDS if self.kinds[kind].isChecked()), "classic")
+
+    @property
+    def chosen(self) -> TrackerSettings:
+        """What the form says."""
+        return TrackerSettings(
+            kind=self._kind(), variant=self.variant_box.currentData(),
+            limits=self.limits_box.currentData(), float_scale=self.size_check.isChecked())
+
+    def _choose(self) -> None:
+        settings = self.chosen
+        if settings != self._rig.tracker:
+            self._change(msgspec.structs.replace(self._rig, tracker=settings),
+                         f"choosing the tracker {settings_text(settings)}")
+
+    def use_size(self) -> None:
+        """Put the estimated size into the rig's hand."""
+        state = self._hand()
+        if state is not None and size_settled(state):
+            hand = scaled_hand(self._rig.hand, state.hand_scale)
+            self._change(msgspec.structs.replace(self._rig, hand=hand), f"hand {state.hand_scale:.3f} times as large")
+
+    def undo(self) -> None:
+        """Take the last change back."""
+        if self._job is None and self._made:
+            change = self._made[-1]
+            self._start(lambda asker: change.restore(asker.command), lambda: self._undone(change))
+
+    def _change(self, rig: Rig, reason: str) -> None:
+        if self._job is None:
+            change = RigChange(self._rig, rig, self._path, reason)
+            self._start(lambda asker: change.use(asker.command), lambda: self._done(change))
+
+    def _start(self, work: Callable[[Asker], None], done: Callable[[], None]) -> None:
+        def with_engine() -> None:
+            asker = self._connect()
+            try:
+                work(asker)
+            finally:
+                asker.close()
+
+        self.sentence.setText("The engine changes over …")
+        self._fit()
+        self._job = Job(lambda progress: with_engine(), lambda _: done(), self._failed, None, self).start()
+        self._enable()
+
+    def _done(self, change: RigChange) -> None:
+        self._made.append(change)
+        self._take(change.after, "In force." if self._path is not None else
+                   "In force until the engine ends: this rig came from no file. Rig, Save rig keeps it.")
+
+    def _undone(self, change: RigChange) -> None:
+        self._made.remove(change)
+        self._take(change.before, "Taken back.")
+
+    def _take(self, rig: Rig, sentence: str) -> None:
+        self._job, self._rig = None, rig
+        self.sentence.setText(sentence)
+        self._show_rig()
+        self.rig_used.emit(rig)
+
+    def _failed(self, sentence: str) -> None:
+        self._job = None
+        self.sentence.setText(sentence)
+        self._show_rig()
+
+    # -- showing ---------------------------------------------------------------------------------------------------
+
+    def follow(self, rig: Rig, path: Path | None) -> None:
+        """Somebody else has changed the rig: what was changed here cannot be taken back singly any more."""
+        if self._job is None and (rig != self._rig or path != self._path):
+            self._rig, self._path = rig, path
+            self._made.clear()
+            self.sentence.setText("")
+            self._show_rig()
+
+    def _show_rig(self) -> None:
+        """The form as the rig is."""
+        settings = self._rig.tracker
+        self.kinds[settings.kind].setChecked(True)
+        self.variant_box.setCurrentIndex(self.variant_box.findData(settings.variant))
+        self.limits_box.setCurrentIndex(self.limits_box.findData(settings.limits))
+        self.size_check.setChecked(settings.float_scale)
+        self.variant_words.setText(VARIANTS[settings.variant][1])
+        self.limits_words.setText(LIMITS[settings.limits][1])
+        obstacle = estimator_obstacle(self._rig)
+        self.obstacle_label.setText("" if obstacle is None else f"{obstacle.why} {obstacle.remedy}")
+        self.obstacle_label.setVisible(bool(self.obstacle_label.text()))
+        self.details.setVisible(settings.kind != "classic")
+        self._enable()
+        self.look()
+        self._fit()
+
+    def _fit(self) -> None:
+        """As tall as its sentences, which wrap, need it."""
+        inner, layout = self.details.layout(), self.layout()
+        if inner is not None and layout is not None:
+            inner.invalidate()  # what has just been shown or hidden there counts now, not with the next event
+            inner.activate()
+            layout.activate()
+            self.setFixedHeight(layout.totalHeightForWidth(_WIDTH_PX))
+
+    def _enable(self) -> None:
+        resting = self._job is None
+        possible = not self.obstacle_label.text()
+        self.kinds["classic"].setEnabled(resting)
+        self.kinds["estimator"].setEnabled(resting and possible)
+        self.details.setEnabled(resting and possible)
+        self.undo_button.setEnabled(resting and bool(self._made))
+        self.close_button.setEnabled(resting)
+
+    def reject(self) -> None:
+        """Close, but not while the engine changes over: what comes of that is written to the rig file, or told."""
+        if self._job is None:
+            super().reject()
+
+    def look(self) -> None:
+        """The hand's size as it is estimated now."""
+        state = self._hand()
+        text = size_text(state, self._rig)
+        self.size_button.setEnabled(size_settled(state))
+        if text != self.size_label.text():
+            self.size_label.setText(text)
+            self.size_label.setVisible(bool(text))
+            self.size_button.setVisible(bool(text))
+            self._fit()
+
+
+def _choices(words: dict[str, tuple[str, str]]) -> QComboBox:
+    box = QComboBox()
+    for name, (title, meaning) in words.items():
+        box.addItem(title, name)
+        box.setItemData(box.count() - 1, meaning, Qt.ItemDataRole.ToolTipRole)
+    return box
+
+
+def _sentence(*, muted: bool = True) -> QLabel:
+    label = QLabel()
+    label.setWordWrap(True)
+    label.setProperty("muted", muted)
+    return label

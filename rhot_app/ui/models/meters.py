@@ -1,0 +1,202 @@
+"""The figures of the live plots: jitter of each marker, latency by stage, rates and losses."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.engine.status import EngineStatus, NodeStatus
+from rhot_app.tracking.state import LATENCY_STAGES, HandState
+
+Array = NDArray[np.float64]
+
+ORDER = 3
+"""Differences are of third order: they remove any motion that is a parabola over four states."""
+
+
+def difference_weights(times_s: Array) -> Array:
+    """(4,) weights that annul every parabola sampled at `times_s` (4,) s and pass white noise with gain one.
+
+    They are those of the third divided difference, scaled to unit length, so unevenly spaced states are no problem.
+    """
+    gaps = times_s[:, None] - times_s[None, :]
+    np.fill_diagonal(gaps, 1.0)
+    weights = 1.0 / gaps.prod(axis=1)
+    return np.asarray(weights / np.linalg.norm(weights))
+
+
+class JitterWindow:
+    """Fed with every state; tells each marker's jitter over the last `span_s` seconds, m."""
+
+    def __init__(self, span_s: float = 1.0, capacity: int = 512, gap_s: float = 0.12) -> None:
+        self._span_ns = round(span_s * 1e9)
+        self._gap_ns = round(gap_s * 1e9)
+        self._capacity = capacity
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything, e.g. when another rig is opened."""
+        self.marker_ids: tuple[str, ...] = ()
+        self._recent_t: list[int] = []
+        self._recent: list[Array] = []
+        self._times = np.zeros(self._capacity, dtype=np.int64)
+        self._squares = np.zeros((self._capacity, 0))
+        self._count = 0
+
+    def add(self, state: HandState) -> None:
+        """Take one state in."""
+        if state.marker_ids != self.marker_ids:
+            self.clear()
+            self.marker_ids = state.marker_ids
+            self._squares = np.full((self._capacity, len(state.marker_ids)), np.nan)
+        if self._recent_t and not 0 < state.t_master_ns - self._recent_t[-1] <= self._gap_ns:
+            self._recent_t.clear()
+            self._recent.clear()
+        self._recent_t.append(state.t_master_ns)
+        self._recent.append(state.marker_raw_positions)
+        if len(self._recent) <= ORDER:
+            return
+        times = np.array([t - self._recent_t[0] for t in self._recent_t]) * 1e-9
+        difference = np.tensordot(difference_weights(times), np.stack(self._recent), axes=1)
+        slot = self._count % self._capacity
+        self._times[slot] = state.t_master_ns
+        self._squares[slot] = (difference**2).sum(axis=1)
+        self._count += 1
+        del self._recent_t[0], self._recent[0]
+
+    def rms(self, now_ns: int) -> Array:
+        """(M,) three-dimensional rms jitter of each marker, m; NaN with fewer than four values in the window."""
+        n = min(self._count, self._capacity)
+        inside = now_ns - self._times[:n] <= self._span_ns
+        squares = self._squares[:n][inside]
+        known = np.isfinite(squares)
+        count = known.sum(axis=0)
+        total = np.where(known, squares, 0.0).sum(axis=0)
+        return np.where(count >= 4, np.sqrt(total / np.maximum(count, 1)), np.nan)
+
+
+# -- Where the time goes: median and 99th percentile of every stage over the last seconds, and of the whole way --------
+
+STACKED: tuple[str, ...] = LATENCY_STAGES[:-1]
+"""The stages that follow one another; the last entry of `LATENCY_STAGES` overlaps them and is not stacked."""
+
+BUDGET_S = 1.0 / 90.0
+"""One frame at the 90 fps that the thesis names as the camera's limit (RHOT ch. 9): 11.1 ms."""
+
+
+class LatencyWindow:
+    """Fed with every state; keeps the last `capacity` of them and looks at those of the last `span_s` seconds."""
+
+    def __init__(self, span_s: float = 2.0, capacity: int = 1024) -> None:
+        self._span_ns = round(span_s * 1e9)
+        self._times = np.zeros(capacity, dtype=np.int64)
+        self._stages = np.full((capacity, len(STACKED)), np.nan)
+        self._count = 0
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._count = 0
+
+    def add(self, state: HandState) -> None:
+        """Take one state in; stages it does not name are unknown."""
+        slot = self._count % len(self._times)
+        self._times[slot] = state.t_master_ns
+        self._stages[slot] = [state.latency_s.get(stage, np.nan) for stage in STACKED]
+        self._count += 1
+
+    def summary(self, now_ns: int) -> tuple[Array, Array]:
+        """p50 and p99, each (stages + 1,) s: of every stage of `STACKED`, and last of their sum. NaN without states.
+
+        The sum's percentiles are those of the whole way of each state, not sums of percentiles.
+        """
+        n = min(self._count, len(self._times))
+        inside = self._stages[:n][now_ns - self._times[:n] <= self._span_ns]
+        p50 = np.full(len(STACKED) + 1, np.nan)
+        p99 = p50.copy()
+        known = np.isfinite(inside)
+        if not known.any():
+            return p50, p99
+        whole = np.where(known, inside, 0.0).sum(axis=1)
+        for column in range(len(STACKED)):
+            values = inside[known[:, column], column]
+            if len(values):
+                p50[column], p99[column] = np.percentile(values, (50, 99))
+        p50[-1], p99[-1] = np.percentile(whole, (50, 99))
+        return p50, p99
+
+
+# -- Rates and losses of the nodes and of the states, from the engine's status messages --------------------------------
+
+_GAPS_TOO = ("time", "kernel_overflow")
+_AT_START = frozenset({"clock_in_doubt", "no_clock", "not_started", "session"})
+
+SETTLE_NS = 1_200_000_000
+
+
+class LossMeter:
+    """Turns the ever growing counts of lost and dropped datagrams into losses per second."""
+
+    def __init__(self) -> None:
+        self._last: EngineStatus | None = None
+
+    def clear(self) -> None:
+        """Forget the last counts."""
+        self._last = None
+
+    def per_second(self, status: EngineStatus) -> float:
+        """Lost and dropped datagrams of all nodes per second since the last status; NaN when that is not known.
+
+        Counts that fell (a new session, another engine) start anew instead of giving a negative rate.
+        """
+        last, self._last = self._last, status
+        if last is None or last.session != status.session or last.pid != status.pid:
+            return float("nan")
+        elapsed = (status.t_master_ns - last.t_master_ns) * 1e-9
+        lost = count_lost(status) - count_lost(last)
+        return lost / elapsed if elapsed > 0 and lost >= 0 else float("nan")
+
+
+def count_lost(status: EngineStatus) -> int:
+    """Frames that could not be used, all nodes together."""
+    return sum(sum(unused_frames(node).values()) for node in status.nodes)
+
+
+def unused_frames(node: NodeStatus) -> dict[str, int]:
+    """How many frames of a node could not be used, by reason ("lost": never arrived); each is counted once.
+
+    A frame that came too late is a gap in the sequence too. What comes before the clock and the session are agreed is
+    no loss: every start has some.
+    """
+    twice = sum(node.dropped.get(reason, 0) for reason in _GAPS_TOO)
+    found = {reason: count for reason, count in node.dropped.items() if count and reason not in _AT_START}
+    lost = max(node.lost - twice, 0)
+    return {**({"lost": lost} if lost else {}), **found}
+
+
+class RateRows:
+    """Rates of a status as a row; unknown until a run has lasted as long as the engine's own window of one second.
+
+    Before that the engine counts what had piled up while it started as if it had come in that moment.
+    """
+
+    def __init__(self) -> None:
+        self._run: tuple[int, int] | None = None
+        self._began_ns = 0
+
+    def clear(self) -> None:
+        """Forget the run."""
+        self._run = None
+
+    def row(self, status: EngineStatus) -> Array:
+        """Rates (1 + nodes,) Hz; NaN while nothing arrives, so that a silence is a gap and not a line at zero."""
+        run = (status.pid, status.session)
+        if run != self._run:
+            self._run, self._began_ns = run, status.t_master_ns
+        values = [status.state_rate_hz, *(node.rate_hz for node in status.nodes)]
+        settled = status.t_master_ns - self._began_ns >= SETTLE_NS
+        return np.array([value if value > 0 and settled else np.nan for value in values])
+
+
+def rate_names(status: EngineStatus) -> tuple[str, ...]:
+    """Names of the columns of `RateRows.row`."""
+    return ("states", *(node.name for node in status.nodes))

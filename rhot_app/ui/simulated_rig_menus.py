@@ -1,0 +1,159 @@
+"""What the simulated rig does: what its hand shows, and which of its cameras are covered, each chosen from a menu."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import QObject
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QMenu, QWidget
+
+from rhot_app.ui.controller import Controller
+from rhot_app.ui.job import Job
+from rhot_app.ui.models.notice import Notice
+from rhot_app.ui.models.words import shipped_motions
+
+TITLE = "Simulated hand does"
+_FIRST = {"still": "Holds still", "wave": "Waves", "fast": "Moves fast", "sweep": "Moves every joint"}
+"""The motions that calibrations ask for; the others stand in a menu of their own."""
+
+_THINGS = (("board", "Shows a board", "A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses."),
+           ("table", "Lays the board on the table", "The same board, lying on the table."),
+           ("ruler", "Shows a ruler", "A paper ruler with two crosses, 200 mm apart."))
+DISTANCES_CM = (20, 25, 30, 40, 50, 65, 80, 100)
+
+
+class TwinShows(QObject):
+    """The choices, ticked as the simulated rig says; without that rig `menu` gives none. What is refused is told.
+
+    The keys are those of `Backend.show_in_twin`.
+    """
+
+    def __init__(self, controller: Controller, menu: QMenu, tell: Callable[[Notice], None]) -> None:
+        super().__init__(menu)
+        self._controller, self._tell = controller, tell
+        self._job: Job | None = None
+        self._group = QActionGroup(self)
+        self._group.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
+        self.actions: dict[str, QAction] = {}
+        motions = {info.name: info.description for info in shipped_motions()}
+        for name, text in _FIRST.items():
+            self._make(f"hand:{name}", text, motions.get(name, ""))
+        for key, text, meaning in _THINGS:
+            self._make(key, text, meaning)
+        for distance in DISTANCES_CM:
+            self._make(f"marker:{0.01 * distance:g}", f"{distance} cm",
+                       f"One painted ball, {distance} cm from the cameras, before the middle between them.")
+        for name, meaning in motions.items():
+            if name not in _FIRST:
+                self._make(f"hand:{name}", name, meaning)
+        self._fill(menu)
+        menu.aboutToShow.connect(self._look)
+        controller.rig_changed.connect(lambda: menu.menuAction().setVisible(self._simulated))
+        menu.menuAction().setVisible(self._simulated)
+
+    @property
+    def _simulated(self) -> bool:
+        opened = self._controller.opened
+        return opened is not None and opened.simulated
+
+    def menu(self, parent: QWidget) -> QMenu | None:
+        """A menu of the choices for another window; None without the simulated rig."""
+        if not self._simulated:
+            return None
+        menu = QMenu(TITLE, parent)
+        self._fill(menu)
+        menu.aboutToShow.connect(self._look)
+        return menu
+
+    def _make(self, key: str, text: str, meaning: str) -> None:
+        action = QAction(text, self)
+        action.setCheckable(True)
+        action.setData(key)
+        action.setToolTip(meaning)
+        action.triggered.connect(lambda: self._ask(lambda: self._controller.backend.show_in_twin(key)))
+        self._group.addAction(action)
+        self.actions[key] = action
+
+    def _fill(self, menu: QMenu) -> None:
+        one_marker, others = QMenu("Shows one marker at", menu), QMenu("Another motion", menu)
+        for each in (menu, one_marker, others):
+            each.setToolTipsVisible(True)
+        for key, action in self.actions.items():
+            kind, _, name = key.partition(":")
+            where = one_marker if kind == "marker" else others if kind == "hand" and name not in _FIRST else menu
+            where.addAction(action)
+        menu.addMenu(one_marker)
+        menu.addMenu(others)
+
+    def _look(self) -> None:
+        """Another window, or a program, may have changed it."""
+        self._ask(self._controller.backend.shown_in_twin)
+
+    def _ask(self, op: Callable[[], str]) -> None:
+        if self._job is not None:
+            self._job.cancel()
+        self._job = Job(lambda progress: op(), self._show, self._fail, parent=self).start()
+
+    def _show(self, key: Any) -> None:
+        self._job = None
+        for known, action in self.actions.items():
+            action.setChecked(known == key)
+
+    def _fail(self, sentence: str) -> None:
+        self._show("")
+        self._tell(Notice("error", sentence))
+
+
+# -- The menu that covers the simulated cameras' lenses, to see what is left of a hand that one camera sees ------------
+
+class LensCaps(QObject):
+    """An entry per camera of the simulated rig, ticked while the camera is covered; without that rig there is no menu.
+    What the twin refuses is told, and the ticks say what is so."""
+
+    def __init__(self, controller: Controller, menu: QMenu, tell: Callable[[Notice], None]) -> None:
+        super().__init__(menu)
+        self._controller, self._menu, self._tell = controller, menu, tell
+        self._caps: list[QAction] = []
+        self._job: Job | None = None
+        controller.rig_changed.connect(self._follow)
+        menu.aboutToShow.connect(self._look)
+        self._follow()
+
+    def _follow(self) -> None:
+        """Entries for the rig that is open now."""
+        opened = self._controller.opened
+        names = [node.name for node in opened.rig.nodes] if opened is not None and opened.simulated else []
+        self._menu.menuAction().setVisible(bool(names))
+        if names == [cap.data() for cap in self._caps]:
+            return
+        self._menu.clear()
+        self._caps = [self._menu.addAction(name) for name in names]
+        for cap, name in zip(self._caps, names, strict=True):
+            cap.setData(name)
+            cap.setCheckable(True)
+            cap.setToolTip(f"A cap on the lens of the camera {name}: it sees nothing until it is taken off.")
+            cap.triggered.connect(self._cover)
+
+    def _look(self) -> None:
+        """Another window, or a program, may have covered a camera."""
+        self._ask(self._controller.backend.covered_cameras)
+
+    def _cover(self) -> None:
+        wanted = tuple(str(cap.data()) for cap in self._caps if cap.isChecked())
+        self._ask(lambda: self._controller.backend.cover_cameras(wanted))
+
+    def _ask(self, op: Callable[[], tuple[str, ...]]) -> None:
+        if self._job is not None:
+            self._job.cancel()
+        self._job = Job(lambda progress: op(), self._show, self._fail, parent=self).start()
+
+    def _show(self, covered: Any) -> None:
+        self._job = None
+        for cap in self._caps:
+            cap.setChecked(cap.data() in covered)
+
+    def _fail(self, sentence: str) -> None:
+        self._show(())
+        self._tell(Notice("error", sentence))

@@ -1,0 +1,1 @@
+"""What every wizard is made of: window, frame, pages, pictures, movements and long work."""

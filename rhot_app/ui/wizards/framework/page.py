@@ -1,0 +1,320 @@
+"""The widgets of one step: what stands at the right below the sentence, and what takes the pictures' place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QGridLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from rhot_app.calibration.verdict import Finding, Verdict
+from rhot_app.ui.models.palette import Scheme, visible_on
+from rhot_app.ui.models.words import GRADES
+from rhot_app.ui.shapes import ShapeMark
+from rhot_app.ui.theme import app_font
+from rhot_app.ui.wizards.framework.colour_list import swatch
+from rhot_app.ui.wizards.models.proposal import AcceptStep, Row
+from rhot_app.ui.wizards.models.step import Chart, ChartedStep, Curve, Step, StepView
+
+
+class Page(QWidget):
+    """Base of all pages: hands what a person does to its `step` and shows what the step says. Holds no mathematics.
+
+    `changed` tells the window that the person changed something, so that it asks the step anew. `centre` is a widget
+    that takes the middle instead of the live pictures; None leaves the pictures there. `first_field` has the keyboard
+    when the page opens. `pickable` lets the person click and drag in the pictures, see `pick`. `one_large` shows one
+    picture as large as fits and the others small; a click on a small one makes it the large one.
+    """
+
+    changed = Signal()
+
+    def __init__(self, step: Step, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.step = step
+        self.centre: QWidget | None = None
+        self.first_field: QWidget | None = None
+        self.pickable = False
+        self.one_large = False
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(0, 0, 0, 0)
+        self.column.setSpacing(8)
+
+    def entered(self) -> None:
+        """The step is the current one now."""
+
+    def show_view(self, view: StepView) -> None:
+        """What the step says now; the sentence, bars, verdict and overlays are shown by the window."""
+
+    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+        """A person has clicked or dragged in a picture; px of the frame, a click has no size."""
+
+
+# -- The last page of every wizard: figures before and after side by side, and the way back ----------------------------
+
+HEADS = ("", "before", "after")
+
+
+class AcceptPage(Page):
+    """`restore_asked` when the person wants the old state back; the window does it."""
+
+    restore_asked = Signal()
+
+    def __init__(self, step: AcceptStep, scheme: Scheme) -> None:
+        super().__init__(step)
+        self._accept = step
+        self._rows: tuple[Row, ...] | None = None
+        self.table = RowTable(scheme)
+        self.centre = self.table
+        self.restore_button = QPushButton("Restore the old one")
+        self.restore_button.setAutoDefault(False)
+        self.restore_button.setToolTip("Brings back what was there before, in the engine and in the file. The new "
+                                       "calibration is kept among the earlier ones.")
+        self.restore_button.clicked.connect(self.restore_asked)
+        note = QLabel("Nothing was saved so far. What is there now is kept, and can be brought back at any time with "
+                      "Calibrate, Bring back an earlier calibration.")
+        note.setWordWrap(True)
+        note.setProperty("muted", True)
+        self.column.addWidget(note)
+        self.column.addWidget(self.restore_button)
+        self.column.addStretch(1)
+        self._note = note
+
+    def show_view(self, view: StepView) -> None:
+        """The rows of the proposal, and the way back while there is one."""
+        proposal = self._accept.proposal
+        rows = proposal.rows if proposal is not None else ()
+        if rows != self._rows:
+            self._rows = rows
+            self.table.show_rows(rows)
+        self._note.setVisible(self._accept.state == "proposed")
+        self.restore_button.setVisible(self._accept.restorable)
+
+
+class RowTable(QTableWidget):
+    """Rows of before and after; what changes is bold."""
+
+    def __init__(self, scheme: Scheme, heads: tuple[str, str, str] = HEADS) -> None:
+        super().__init__(0, len(heads))
+        self._scheme = scheme
+        self.setHorizontalHeaderLabels(list(heads))
+        self.verticalHeader().setVisible(False)
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setShowGrid(False)
+        self.setWordWrap(True)
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        self.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+
+    def show_rows(self, rows: tuple[Row, ...]) -> None:
+        """Show these instead of the last ones."""
+        self.setRowCount(len(rows))
+        for r, row in enumerate(rows):
+            for c, text in enumerate((row.what, row.before, row.after)):
+                item = QTableWidgetItem(text)
+                item.setFont(app_font(13.0, bold=c == 2 and row.changed))
+                item.setForeground(QColor(self._scheme.muted if c == 0 else self._scheme.text))
+                if row.swatches is not None and c:
+                    item.setIcon(swatch(row.swatches[c - 1], self._scheme))
+                self.setItem(r, c, item)
+
+
+# -- Charts of a result in the middle of a wizard, one below the other -------------------------------------------------
+
+_DOT_PX = 7
+_FAINT_PX = 3
+_WIDTH_PX = 2.0
+_TEXT_PT = 11.0
+_LEGEND_ROWS, _LEGEND_COLUMNS = 5, 4
+_LEGEND_ROOM = 0.35  # of the chart's height, above what a large legend would cover
+_BAND_ALPHA, _OWN_ALPHA = 40, 90
+_FEW_DECADES = 2.5
+
+
+class ChartView(QWidget):
+    """Shows some `Chart`s; a chart that is the same object as before is not drawn again."""
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._scheme = scheme
+        self._column = QVBoxLayout(self)
+        self._column.setContentsMargins(8, 8, 8, 8)
+        self._column.setSpacing(8)
+        self._shown: tuple[Chart, ...] = ()
+        self.plots: list[pg.PlotWidget] = []
+
+    def show_charts(self, charts: tuple[Chart, ...]) -> None:
+        """Show these instead of the last ones."""
+        if len(charts) == len(self._shown) and all(a is b for a, b in zip(charts, self._shown, strict=True)):
+            return
+        self._shown = charts
+        for plot in self.plots:
+            self._column.removeWidget(plot)
+            plot.deleteLater()
+        self.plots = [self._draw(chart) for chart in charts]
+        for plot in self.plots:
+            self._column.addWidget(plot, 1)
+
+    def _draw(self, chart: Chart) -> pg.PlotWidget:
+        scheme = self._scheme
+        plot = pg.PlotWidget(background=scheme.panel)
+        plot.setMenuEnabled(False)
+        plot.setTitle(chart.title, color=scheme.text, size=f"{_TEXT_PT + 1}pt")
+        plot.showGrid(x=True, y=True, alpha=0.15)
+        for side, label in (("bottom", chart.x_label), ("left", chart.y_label)):
+            axis = plot.getAxis(side)
+            axis.setLabel(label, color=scheme.muted)
+            axis.enableAutoSIPrefix(False)
+            axis.setTickFont(app_font(_TEXT_PT))
+            axis.setPen(scheme.border)
+            axis.setTextPen(scheme.muted)
+        plot.setLogMode(x=chart.log_x, y=chart.log_y)
+        columns = _LEGEND_COLUMNS if len(chart.curves) > _LEGEND_ROWS else 1
+        plot.addLegend(offset=(-10, 1), labelTextColor=scheme.text, brush=pg.mkBrush(scheme.panel), colCount=columns)
+        tones = iter((scheme.accent, scheme.caution, scheme.good, scheme.bad, scheme.muted) * 4)
+        for curve in chart.curves:
+            self._add(plot, curve, QColor(visible_on(curve.colour, scheme.panel) if curve.colour else next(tones)))
+        for side, logarithmic in (("bottom", chart.log_x), ("left", chart.log_y)):
+            if logarithmic:
+                plot.getAxis(side).setTicks([_log_ticks(chart, side)])
+        if columns > 1:
+            low, high = _reach(chart)
+            plot.setYRange(low, high + _LEGEND_ROOM * (high - low))
+        return plot
+
+    def _add(self, plot: pg.PlotWidget, curve: Curve, tone: QColor) -> None:
+        if curve.style == "band":
+            self._add_band(plot, curve, tone)
+        elif curve.style in ("dots", "faint dots"):
+            size = _DOT_PX if curve.style == "dots" else _FAINT_PX
+            plot.plot(curve.x, curve.y, pen=None, symbol="o", symbolSize=size, symbolBrush=tone, symbolPen=None,
+                      name=curve.name)
+        else:
+            style = Qt.PenStyle.DashLine if curve.style == "dashes" else Qt.PenStyle.SolidLine
+            plot.plot(curve.x, curve.y, pen=pg.mkPen(tone, width=_WIDTH_PX, style=style), name=curve.name)
+
+    def _add_band(self, plot: pg.PlotWidget, curve: Curve, tone: QColor) -> None:
+        edge = pg.mkPen(tone, width=1.0)
+        low = plot.plot(curve.x, curve.y, pen=edge, name=curve.name or None)
+        high = plot.plot(curve.x, curve.high if curve.high is not None else curve.y, pen=edge)
+        fill = QColor(tone)
+        fill.setAlpha(_OWN_ALPHA if curve.colour else _BAND_ALPHA)
+        plot.addItem(pg.FillBetweenItem(low, high, brush=fill))
+
+
+def _reach(chart: Chart) -> tuple[float, float]:
+    """Lowest and highest y of all curves, in the axis's own units."""
+    values = np.concatenate([np.asarray(part, dtype=np.float64) for curve in chart.curves
+                             for part in (curve.y, curve.high) if part is not None])
+    values = np.log10(values) if chart.log_y else values
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+
+
+def _log_ticks(chart: Chart, side: str) -> list[tuple[float, str]]:
+    """1, 2, 5, 10, ...; powers of ten alone where there are many of them."""
+    values = np.concatenate([curve.x if side == "bottom" else curve.y for curve in chart.curves])
+    low, high = np.log10(values[values > 0.0].min()), np.log10(values[values > 0.0].max())
+    steps = (1.0, 2.0, 5.0) if high - low < _FEW_DECADES else (1.0,)
+    ticks = [step * 10.0**decade for decade in range(int(np.floor(low)), int(np.ceil(high)) + 1) for step in steps]
+    return [(float(np.log10(tick)), f"{tick:g}") for tick in ticks]
+
+
+# -- The page of a result: its charts in the middle --------------------------------------------------------------------
+
+class ChartPage(Page):
+    """Shows the charts of its step."""
+
+    def __init__(self, step: ChartedStep, scheme: Scheme) -> None:
+        super().__init__(step)
+        self._charted = step
+        self.charts = ChartView(scheme)
+        self.centre = self.charts
+        self.column.addStretch(1)
+
+    def show_view(self, view: StepView) -> None:
+        """The newest charts."""
+        self.charts.show_charts(self._charted.charts)
+
+
+# -- A calibration's verdict: the grade as shape, colour and word, the sentence, each finding with cause and -----------
+
+_SENTENCE_PT = 14.0
+
+
+class VerdictView(QScrollArea):
+    """Empty until a verdict is there."""
+
+    def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._scheme = scheme
+        self.verdict: Verdict | None = None
+        self.setWidgetResizable(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+
+    def show_verdict(self, verdict: Verdict | None) -> None:
+        """Another verdict, or none."""
+        if verdict == self.verdict:
+            return
+        self.verdict = verdict
+        body = QWidget()
+        body.setProperty("panel", True)
+        column = QVBoxLayout(body)
+        column.setContentsMargins(0, 0, 8, 0)
+        if verdict is not None:
+            column.addLayout(self._rows(verdict))
+        column.addStretch(1)
+        self.setWidget(body)
+
+    def _rows(self, verdict: Verdict) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(10)
+        grid.setVerticalSpacing(6)
+        grid.setColumnStretch(1, 1)
+        look = GRADES[verdict.grade]
+        self._add_row(grid, look.shape, look.tone, _label(_escaped(verdict.sentence), size=_SENTENCE_PT, bold=True), 24)
+        for finding in verdict.findings:
+            look = GRADES[finding.grade]
+            self._add_row(grid, look.shape, look.tone, _label(_finding_text(finding)), 16)
+        self.setAccessibleName(f"Verdict: {GRADES[verdict.grade].word}. {verdict.sentence}")
+        return grid
+
+    def _add_row(self, grid: QGridLayout, shape: str, tone: str, label: QLabel, size: int) -> None:
+        mark = ShapeMark(size)
+        mark.set_shape(shape, self._scheme.tone(tone))
+        row = grid.rowCount()
+        grid.addWidget(mark, row, 0, Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignHCenter)
+        grid.addWidget(label, row, 1)
+
+
+def _finding_text(finding: Finding) -> str:
+    remedy = f"<b>{_escaped(finding.remedy)}</b>" if finding.remedy else ""
+    return " ".join(part for part in (_escaped(finding.figure), _escaped(finding.cause), remedy) if part)
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;")
+
+
+def _label(text: str, *, size: float | None = None, bold: bool = False) -> QLabel:
+    label = QLabel(text)
+    label.setWordWrap(True)
+    label.setTextFormat(Qt.TextFormat.RichText)
+    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    if size is not None:
+        label.setFont(app_font(size, bold=bold))
+    return label

@@ -1,0 +1,108 @@
+"""What a wizard is made of, and what it is made from."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from rhot_app.project import Rig
+from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.framework.page import Page
+
+# -- What wizards remember between runs, by name: the board, the camera chosen last ------------------------------------
+
+class Memory(Protocol):
+    """`rhot_app.ui.settings.Settings` is one."""
+
+    def remembered(self, name: str) -> str:
+        """What was remembered by this name, "" for nothing."""
+        ...
+
+    def remember(self, name: str, text: str) -> None:
+        """Remember something by this name."""
+        ...
+
+
+# -- What a wizard is made of, and what it is made from ----------------------------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class Kit:
+    """What every wizard is given: the rig in force, its file (None: it came from none), a way to ask the engine, the
+    colours of the screen, and what was entered before. Node settings by node id are as the nodes gave them when the
+    wizard was opened. `listen` makes a client that hears the hand's states, for wizards that calibrate by a moving
+    hand."""
+
+    rig: Rig
+    rig_path: Path | None
+    connect: Callable[[], Asker]
+    scheme: Scheme
+    memory: Memory
+    node_settings: dict[int, dict[str, Any]] = field(default_factory=dict)
+    listen: Callable[[], Listener] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A wizard ready to be shown: its pages in order, the last one an `AcceptPage`. `guide` is its page in the guide,
+    where a section has the wizard's title;
+    `solver` a module that the solving process should import in good time; `put_back` undoes in a worker what the wizard
+    has tried out, when it is closed without being used."""
+
+    title: str
+    pages: tuple[Page, ...]
+    guide: str = "calibration"
+    solver: str = ""
+    put_back: Callable[[], None] | None = None
+
+
+# -- All wizards in the order in which a new rig needs them. Cheap to import: a wizard's own module comes as -----------
+
+@dataclass(frozen=True, slots=True)
+class Wizard:
+    """One wizard. `module` in this package has ``make_plan(kit)``; `reason` begins what it writes into a rig's history,
+    so that the menu can tell when it was used last."""
+
+    module: str
+    title: str
+    meaning: str
+    reason: str
+
+    def load(self) -> None:
+        """Import what it needs; takes a moment the first time, so call it in a worker."""
+        importlib.import_module(f"{__package__}.{self.module}")
+
+    def make_plan(self, kit: Kit) -> Plan:
+        """Its pages for the rig at hand."""
+        plan: Plan = importlib.import_module(f"{__package__}.{self.module}").make_plan(kit)
+        return plan
+
+
+OPEN_WIZARD = "wizard "
+"""A notice's key that opens the wizard whose module it names."""
+
+WIZARDS: tuple[Wizard, ...] = (
+    Wizard("camera", "Set the cameras", "Exposure, gains, white balance: what each camera is told, tried out live.",
+           "camera settings"),
+    Wizard("lens", "Find the lens of a camera", "Focal length, centre and distortion of one camera, from a board that "
+           "is held all over its picture.", "intrinsics of"),
+    Wizard("stereo", "Put the cameras together", "Where the cameras stand to each other and to the table, from a board "
+           "that they see at the same time.", "stereo calibration"),
+    Wizard("colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
+           "colour calibration"),
+    Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),
+    Wizard("depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
+           "depth calibration"),
+    Wizard("bones", "Bones of the hand", "How long the bones are, from a minute of movement or by a ruler.",
+           "bones calibration"),
+    Wizard("filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
+           "filter tuning"),
+)
+
+
+def wizard_named(module: str) -> Wizard | None:
+    """The wizard of that module; None when there is none."""
+    return next((wizard for wizard in WIZARDS if wizard.module == module), None)

@@ -1,0 +1,273 @@
+"""The window of every wizard: steps at the left, pictures in the middle, what to do at the right, progress below."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QLineEdit, QMessageBox, QWidget
+
+from rhot_app.ui.guide import GuideViewer
+from rhot_app.ui.job import Job
+from rhot_app.ui.wizards.framework.feed import LiveFeed, Picture
+from rhot_app.ui.wizards.framework.frame import WizardFrame
+from rhot_app.ui.wizards.framework.page import AcceptPage
+from rhot_app.ui.wizards.framework.plan import Kit, Plan
+from rhot_app.ui.wizards.framework.work import PictureWorker, Work
+from rhot_app.ui.wizards.models.proposal import AcceptStep, State
+from rhot_app.ui.wizards.models.step import Step
+
+TICK_MS = 16
+SHOW_S = 0.1
+_SIZE = (1280, 800)
+
+
+class WizardWindow(QDialog):
+    """Shows one `Plan`. `rig_used` gives the rig that is in force after "Use this calibration" and after a restore;
+    `used` the proposal, and whether it is in force now.
+
+    `tick` is one turn of the timer, so that tests can turn by hand.
+    """
+
+    rig_used = Signal(object)
+    used = Signal(object, bool)
+
+    def __init__(self, plan: Plan, kit: Kit, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.plan = plan
+        self._kit = kit
+        self.setWindowTitle(plan.title)
+        self.setProperty("guide", plan.guide)
+        self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
+        self.resize(*_SIZE)
+        self.feed = LiveFeed({node.name: node.node_id for node in kit.rig.nodes if not node.text_datagrams},
+                             kit.connect)
+        self.looker = PictureWorker(self.feed)
+        self.work = Work(self)
+        self.frame = WizardFrame(plan, self.feed.cameras, self.work, kit.scheme, self)
+        self.current = 0
+        self._dirty = True
+        self._next_show = 0.0
+        self._kept = 0
+        self._frozen: Mapping[str, Picture] = {}
+        self._job: Job | None = None
+        self._guide: GuideViewer | None = None
+        self._ending: Job | None = None
+        self._connect_everything()
+        self._go_to(0)
+        self.feed.start()
+        self.looker.start()
+        if plan.solver:
+            self.work.solver.prepare(plan.solver)
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start(TICK_MS)
+
+    def _connect_everything(self) -> None:
+        frame = self.frame
+        frame.back_button.clicked.connect(self.back)
+        frame.next_button.clicked.connect(self.next)
+        frame.close_button.clicked.connect(self.reject)
+        frame.work_view.again_asked.connect(lambda: self.work.again(self.step))
+        frame.wall.picked.connect(self._pick)
+        self.work.changed.connect(self.refresh)
+        for page in self.plan.pages:
+            page.changed.connect(self._page_changed)
+            if isinstance(page, AcceptPage):
+                page.restore_asked.connect(self.restore)
+        for key, action in (("Alt+Left", self.back), ("F1", self.open_guide), ("Space", self._press_space),
+                            ("Ctrl+Z", self._undo)):
+            QShortcut(QKeySequence(key), self).activated.connect(action)
+
+    # -- steps -----------------------------------------------------------------------------------------------------
+
+    @property
+    def page(self) -> QWidget:
+        """The page shown."""
+        return self.plan.pages[self.current]
+
+    @property
+    def step(self) -> Step:
+        """The step shown."""
+        return self.plan.pages[self.current].step
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being put into force or taken back."""
+        return self._job is not None
+
+    def next(self) -> None:
+        """The next step once this one is done; on the last one: use the calibration, then close."""
+        step = self.step
+        if isinstance(step, AcceptStep):
+            if step.usable:
+                self._apply(step, "used")
+            elif step.state == "used":
+                self.accept()
+        elif step.view().may_go_on and not self.work.running:
+            self._go_to(self.current + 1)
+
+    def back(self) -> None:
+        """The step before; what was captured stays."""
+        if self.current > 0 and not self.busy:
+            self._go_to(self.current - 1)
+
+    def restore(self) -> None:
+        """Bring back what was before."""
+        step = self.step
+        if isinstance(step, AcceptStep) and step.restorable:
+            self._apply(step, "restored")
+
+    def _go_to(self, number: int) -> None:
+        self.work.leave()
+        self.current = number
+        page = self.plan.pages[number]
+        page.step.enter()
+        self.frame.show_page(page, number)
+        page.entered()
+        self.looker.watch(page.step)
+        self.feed.pause(page.centre is not None and not page.step.watches)
+        self._kept = page.step.view().kept
+        self.refresh()
+
+    def _apply(self, step: AcceptStep, outcome: State) -> None:
+        if self._job is not None:
+            return
+        before = step.state
+        step.begin()
+        self._job = Job(lambda progress: self._carry_out(step, outcome), lambda _: self._applied(step, outcome),
+                        lambda sentence: self._not_applied(step, before, sentence), None, self).start()
+        self.refresh()
+
+    def _carry_out(self, step: AcceptStep, outcome: State) -> None:
+        asker = self._kit.connect()
+        try:
+            (step.apply if outcome == "used" else step.take_back)(asker.command)
+        finally:
+            asker.close()
+
+    def _applied(self, step: AcceptStep, outcome: State) -> None:
+        self._job = None
+        step.finish(outcome)
+        assert step.proposal is not None
+        rig = step.proposal.rig if outcome == "used" else step.proposal.rig_before
+        if rig is not None:
+            self.rig_used.emit(rig)
+        self.used.emit(step.proposal, outcome == "used")
+        self.refresh()
+
+    def _not_applied(self, step: AcceptStep, before: State, sentence: str) -> None:
+        self._job = None
+        step.finish(before, sentence)
+        self.refresh()
+
+    # -- every tick ------------------------------------------------------------------------------------------------
+
+    def tick(self) -> None:
+        """Newest pictures; what was seen in them; what the step says to it."""
+        self.frame.wall.refresh(self.feed, self._frozen)
+        seen = self.looker.found(self.step)
+        if seen is not None:
+            self.step.take(seen)
+            self._dirty = True
+        now = time.monotonic()
+        if self._dirty or now >= self._next_show:
+            self._next_show = now + SHOW_S
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Ask the step and show it; begin its long work if it has some."""
+        self._dirty = False
+        self.work.offer(self.step)
+        views = [page.step.view() for page in self.plan.pages]
+        view = views[self.current]
+        self._frozen = view.pictures
+        self.plan.pages[self.current].show_view(view)
+        self.frame.show_view(view, self.step, self.current, [each.done for each in views])
+        if view.kept > self._kept:
+            self.frame.wall.flash()
+        self._kept = view.kept
+
+    def _page_changed(self) -> None:
+        self.work.halted = False
+        self.refresh()
+
+    def _pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+        self.plan.pages[self.current].pick(camera, x, y, width, height)
+        self.refresh()
+
+    # -- keys ------------------------------------------------------------------------------------------------------
+
+    def _press_space(self) -> None:
+        """Capture, unless the key means something where the focus is."""
+        focus = QApplication.focusWidget()
+        if isinstance(focus, QAbstractButton):
+            focus.click()
+        elif isinstance(focus, QComboBox):
+            focus.showPopup()
+        elif self.step.captures and self.step.capture():
+            self.refresh()
+
+    def _undo(self) -> None:
+        focus = QApplication.focusWidget()
+        if isinstance(focus, QLineEdit):
+            focus.undo()
+        elif self.step.undo():
+            self._page_changed()
+
+    def open_guide(self) -> None:
+        """This wizard's section of the guide, beside it."""
+        if self._guide is None:
+            self._guide = GuideViewer(self)
+        self._guide.open_page(self.plan.guide, self.plan.title)
+
+    # -- the end ---------------------------------------------------------------------------------------------------
+
+    @property
+    def would_lose(self) -> bool:
+        """Whether closing now throws away what the person has done."""
+        used = any(isinstance(page.step, AcceptStep) and page.step.state == "used" for page in self.plan.pages)
+        return not used and any(page.step.keeps for page in self.plan.pages)
+
+    def reject(self) -> None:
+        """Escape and Close: ask only when something would be lost."""
+        if not self.busy and (not self.would_lose or self._may_lose()):
+            self.end()
+            super().reject()
+
+    def accept(self) -> None:
+        """Close after use."""
+        self.end()
+        super().accept()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """The window's own close button is Escape; when the app itself ends, nothing is asked."""
+        event.ignore()
+        self.reject()
+
+    def _may_lose(self) -> bool:
+        answer = QMessageBox.question(
+            self, self.plan.title, "Close without using this calibration? What was captured here is lost; the "
+            "calibration in force stays as it is.",
+            QMessageBox.StandardButton.Discard | QMessageBox.StandardButton.Cancel, QMessageBox.StandardButton.Cancel)
+        return answer == QMessageBox.StandardButton.Discard
+
+    def end(self) -> Job:
+        """End threads and processes, in a worker, because a question to a node may be under way; the worker's job."""
+        if self._ending is not None:
+            return self._ending
+        self._timer.stop()
+        self.work.close()
+        put_back, feed, looker = self.plan.put_back, self.feed, self.looker
+
+        def stop() -> None:
+            looker.stop()
+            feed.stop()
+            if put_back is not None:
+                put_back()
+
+        self._ending = Job(lambda progress: stop(), lambda _: None, lambda sentence: None).start()
+        return self._ending
