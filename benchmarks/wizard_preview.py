@@ -22,9 +22,9 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.board.shared_views import SharedViews, Shot
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import calibrate
-from rhot_app.calibration.stereo.views import SharedViews, Shot
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import RhotError

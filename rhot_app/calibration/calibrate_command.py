@@ -17,7 +17,10 @@ KINDS: dict[str, str] = {
     "alignment": "where another tracker's world is in the rig, from two streams of one motion",
     "depth": "distance from disparity, without a board, from a table of measured distances",
 }
-"""Name of each calibration, as of its module in `commands`, and what it is for."""
+"""Name of each calibration, and what it is for."""
+
+_ELSEWHERE = {"alignment": "rhot_app.objects.alignment_command"}
+"""Modules of calibrations that do not stand in `commands` under their name."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,4 +41,4 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _module(kind: str) -> ModuleType:
-    return importlib.import_module(f"rhot_app.calibration.commands.{kind}")
+    return importlib.import_module(_ELSEWHERE.get(kind, f"rhot_app.calibration.commands.{kind}"))

@@ -1,6 +1,6 @@
 """What the cameras saw over some seconds, as plain arrays: the input of every calibration from a moving hand.
 
-Fed frame by frame (`ObservationCollector`), by a live source or from a log (`rhot_app.recording.observation_table`).
+Fed frame by frame (`ObservationCollector`), by a live source or from a log (`recorded_observations`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ def row_times_ns(t_row0_ns: int, row_time_ns: int, rows: NDArray[np.float64]) ->
 
 
 # -- What the cameras saw over some seconds, as plain arrays: the input of every calibration from a moving hand --------
-# Fed frame by frame (`ObservationCollector`), by a live source or from a log (`rhot_app.recording.observation_table`).
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]

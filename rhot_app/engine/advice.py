@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhot_app.calibration.lens.camera_calibration import NOT_CALIBRATED, calibration_finding
+from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibration_finding
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus
 from rhot_app.project import Rig

@@ -132,7 +132,6 @@ def lock_holder(directory: EngineDirectory) -> int | None:
 
 
 # -- The engine as its clients see it: states, status and previews to poll, commands to give ---------------------------
-# For the app, for commands and for tests; imports neither Qt nor the tracker.
 
 VANISHED_S = 1.0
 """An engine publishes its status ten times a second; after this long without one it is gone."""

@@ -9,12 +9,12 @@ from types import TracebackType
 
 import numpy as np
 
+from rhot_app.calibration.recorded_observations import why_none
 from rhot_app.engine.replay_summary import replay_states, smoothed_states
 from rhot_app.errors import ExportError, RecordingError, take_losses
 from rhot_app.export.states import HandStates, in_blocks
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
-from rhot_app.recording.observation_table import why_none
 from rhot_app.recording.raw_log import LogReader, Record
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker

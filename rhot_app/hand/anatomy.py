@@ -58,7 +58,6 @@ def coupling_complaints(couplings: Sequence[Coupling], angles: Collection[str]) 
 
 
 # -- The anatomy of one hand: bone lengths, radii, joint limits, marker places. File format ``rhot-hand`` --------------
-# Millimetres and degrees in the file, because people measure and edit them; metres and radians in every array.
 
 FORMAT: Final = "rhot-hand"
 VERSION: Final = 1

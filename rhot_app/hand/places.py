@@ -123,10 +123,6 @@ def gap_middle(marker: Marker, mirror: float) -> float:
 
 
 # -- Where on the hand a marker sits, by its role: the place rides on one row of the hand's kinematic table ------------
-# Roles: the five ``<finger>_tip`` (the last segment, painted as the marker's `patch` says), ``wrist`` (a band),
-# ``palm_<finger>`` (a painted knuckle, which moves with the palm), ``<finger>_<bone>`` for the inner bones (a ball
-# glued to the back of the finger, half-way), and ``hand_1`` to ``hand_3`` (balls on the back of the hand: below index
-# and little knuckle, and near the wrist).
 
 KNUCKLE_ROLES = tuple(f"palm_{finger}" for finger in FINGERS)
 INNER_ROLES = tuple(f"{finger}_{bone}" for finger, bones in zip(FINGERS, BONES, strict=True) for bone in bones[:2])

@@ -161,7 +161,6 @@ class ZeroconfBrowser:
 
 
 # -- Which nodes are there: asked by broadcast and by zeroconf at once, put together, with what cannot be --------------
-# Nothing here is proved. A node that is found is shown to somebody who pairs with it, or its address is tried.
 
 SECONDS = 2.5
 """Zeroconf may take more than a second; a broadcast is answered within milliseconds."""

@@ -49,7 +49,6 @@ RECORDED = Authentication(decode_verified, lambda data: True)
 
 
 # -- The door of one node: every datagram, live or from a log, is verified here and counted, or becomes ----------------
-# No sockets and no threads. Nothing in a datagram raises past `DatagramValidator.admit`.
 
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""

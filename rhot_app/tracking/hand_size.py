@@ -185,11 +185,6 @@ def _strain(posture: Posture, angles: Array, matrix: Array, right: Array) -> flo
 
 
 # -- How large the hand is: learnt slowly, from many of its shapes, beside the filter ----------------------------------
-# One frame hardly shows a hand's size, and a filter that takes every frame for new evidence soon believes to know it.
-# So shapes of the hand are kept that differ from each other, each as all its markers were located at one instant; for
-# each of them the evidence for a grid of sizes is worked out once, one size per datagram; and all shapes together are
-# the evidence for the one size that they share. They are of one person, whose habits are not the natural pose's and
-# who often repeats a movement, so they count for less than as many independent ones.
 
 GRID = 0.0125 * np.arange(-24, 25)
 """(49,) logarithms of the scales that are weighed."""

@@ -123,9 +123,6 @@ def newest_instant(frames: Times, book: Times, newest: Times, live: Mask) -> tup
 
 
 # -- Brings cameras that are not synchronised to one instant: decides when a state is due, and for which time ----------
-# The state's time is the newest instant that every live camera brackets: the earliest of the times at which the
-# cameras' newest frames saw their markers, each marker at its own row's time. All tracks are interpolated to it;
-# nothing is paired by arrival.
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint16]

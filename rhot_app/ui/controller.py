@@ -74,7 +74,6 @@ class EngineLink(QObject):
 
 
 # -- What the window does: opens rigs, gives commands, watches over the engine. Holds no widgets -----------------------
-# Everything that waits runs as a `Job`; `step()` is called by the window's timer and never waits.
 
 SAMPLE_S = 0.1
 RESTART_TRIES = 3

@@ -108,13 +108,6 @@ def sag_of(radius, look):
 
 
 # -- The quick lane: markers in plain view, followed from frame to frame in one call of compiled code ------------------
-# A marker's window is predicted at constant velocity. The projection of its chroma, whose levels come from the last
-# frame as the camera shows it (so that no light has to be mended), gives a soft centroid; about that the outline of
-# the last frame is fitted anew (`contour`). Whatever is not as plain as it was - area, level, outline, misfit, the
-# frame's border, a rival in the window - sends the marker back to the careful measurement (`measure`), which also
-# brings it here (`rhot_node.detect.followed`).
-#
-# All coordinates are chroma pixels.
 
 AREA_LEAST = 22.0  # px^2: a smaller marker has too little inside
 NOISE_MOST = 0.12  # of the contrast

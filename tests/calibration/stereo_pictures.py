@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Chessboard
 from rhot_app.calibration.board.corners import BoardView, detect
+from rhot_app.calibration.board.shared_views import SharedViews, Shot
 from rhot_app.calibration.lens.fit import LensStart
-from rhot_app.calibration.stereo.views import SharedViews, Shot
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "stereo_chessboard"
 NUMBERS = range(1, 15)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board, Chessboard
 from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.board.shared_views import SharedViews, Shot
 from rhot_app.calibration.lens.fit import LensStart
-from rhot_app.calibration.stereo.views import SharedViews, Shot
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from stereo_twin import SIZE, Twin, stereo_twin
 
-from rhot_app.calibration.stereo.bundle import adjust
-from rhot_app.calibration.stereo.bundle_model import (
+from rhot_app.calibration.bundle.adjustment import adjust
+from rhot_app.calibration.bundle.model import (
     BundleState,
     Layout,
     LensFreedom,

@@ -9,8 +9,8 @@ from intrinsics_twin import BOARD, twin_views
 from stereo_twin import stereo_twin
 
 from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.bundle.robust_error import in_words, what_is_reported
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
-from rhot_app.calibration.robust_error import in_words, what_is_reported
 from rhot_app.calibration.stereo.calibrate import calibrate
 
 SHEET = BOARD.object_points()[:, :2] / BOARD.object_points().max()

@@ -17,11 +17,11 @@ from rhot_app.__main__ import main
 from rhot_app.calibration.filters.meters import FilterMeter, FilterTargets, jitter, lag, motion_of
 from rhot_app.calibration.filters.tuning import OFF, make_footage, simulate, tune_filters
 from rhot_app.calibration.observations import InstantTable
+from rhot_app.calibration.recorded_observations import read_instants
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.project import FilterSettings, OneEuroSettings, load_rig, save_rig
-from rhot_app.recording.observation_table import read_instants
 from rhot_app.tracking.trackers import make_tracker
 
 RIG = make_rig()

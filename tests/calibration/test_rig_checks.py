@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from rhot_app.__main__ import main
+from rhot_app.calibration.check.camera_calibration import calibration_error
+from rhot_app.calibration.check.camera_calibration import with_lens as with_lens_of
 from rhot_app.calibration.check.checks import check_rig
-from rhot_app.calibration.lens.camera_calibration import calibration_error
-from rhot_app.calibration.lens.camera_calibration import with_lens as with_lens_of
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import (
     CameraCalibration,

@@ -8,8 +8,8 @@ import numpy as np
 from stereo_twin import BOARD, Twin, stereo_twin
 
 from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.board.shared_views import SharedViews, Shot
 from rhot_app.calibration.stereo.collector import StereoCollector, guide
-from rhot_app.calibration.stereo.views import SharedViews, Shot
 
 NAMES = ("left", "right")
 

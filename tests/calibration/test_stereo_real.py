@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from stereo_pictures import BOARD, needs_pictures, rough, shared, views_of
 
-from rhot_app.calibration.depth.ruler import RulerReading
+from rhot_app.calibration.bundle.model import BundleState
 from rhot_app.calibration.lens.fit import LensStart
-from rhot_app.calibration.stereo.bundle_model import BundleState
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate
 from rhot_app.calibration.stereo.report import StereoFigures, StereoReport
+from rhot_app.calibration.stereo.ruler import RulerReading
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 

@@ -10,13 +10,13 @@ from patience import quickest
 from stereo_twin import BOARD, LENSES, RIGHT_FROM_LEFT, SIZE, Twin, stereo_twin, with_boards
 
 from rhot_app.calibration.board.boards import CharucoBoard, Chessboard
-from rhot_app.calibration.depth.ruler import RulerReading, read_ruler
+from rhot_app.calibration.board.shared_views import SharedViews, Shot
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.calibrate import calibrate, solve
 from rhot_app.calibration.stereo.points import locate
 from rhot_app.calibration.stereo.report import StereoFigures, StereoReport
-from rhot_app.calibration.stereo.views import SharedViews, Shot
+from rhot_app.calibration.stereo.ruler import RulerReading, read_ruler
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid

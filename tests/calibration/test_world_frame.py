@@ -10,7 +10,7 @@ from stereo_twin import BOARD, LENSES, Twin
 
 from rhot_app.calibration.board.boards import Chessboard
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.stereo.bundle_model import BundleState
+from rhot_app.calibration.bundle.model import BundleState
 from rhot_app.calibration.stereo.start import place_world
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError

@@ -8,8 +8,8 @@ import pytest
 from log_writing import write_log
 from synthetic_rig import EPOCH_NS, LOST, WIDE, Sight, hand_trajectory, make_rig, observe
 
+from rhot_app.calibration.recorded_observations import read_instants, read_observations
 from rhot_app.errors import RecordingError
-from rhot_app.recording.observation_table import read_instants, read_observations
 from rhot_app.recording.raw_log import encode_header
 
 RIG = make_rig()

@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from rhot_app.calibration.recorded_observations import read_observations
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.recording.observation_table import read_observations
 from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
 from rhot_app.simulator.nodes.shot import make_shot
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults

@@ -9,7 +9,7 @@ from fake_engine import FakeEngine, synthetic_rig
 from PySide6.QtWidgets import QPushButton
 from test_tracker_dialog import FLOATING
 
-from rhot_app.calibration.lens.camera_calibration import calibration_error
+from rhot_app.calibration.check.camera_calibration import calibration_error
 from rhot_app.engine.status import Advice
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig
 from rhot_app.ui.models.notice import Notice

@@ -34,9 +34,6 @@ MARKER_SHARE: Final = 0.75
 
 
 # -- Calibration boards: the plain chessboard and the ChArUco board, as their printed geometry -------------------------
-# The board's frame has its origin at the first inner corner, x along a row of corners, y along a column, z into the
-# paper; seen from the printed side x is right and y down, so z points away from the viewer. Inner corners are numbered
-# row by row: ``id = row * cols + col``.
 
 Array = NDArray[np.float64]
 

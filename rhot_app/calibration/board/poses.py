@@ -16,8 +16,8 @@ from scipy import stats
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.stereo.bundle import Bundle, adjust
-from rhot_app.calibration.stereo.bundle_model import POINT, BoardFreedom, LensFreedom, Observations
+from rhot_app.calibration.bundle.adjustment import Bundle, adjust
+from rhot_app.calibration.bundle.model import POINT, BoardFreedom, LensFreedom, Observations
 from rhot_app.geometry.camera import undistort_points
 from rhot_app.geometry.transforms import apply, exp_so3, rigid
 from rhot_app.progress import Progress, silent

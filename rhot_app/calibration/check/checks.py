@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.lens.camera_calibration import calibration_finding
+from rhot_app.calibration.check.camera_calibration import calibration_finding
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import inverse

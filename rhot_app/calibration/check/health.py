@@ -158,8 +158,6 @@ def _doubled(figures: HealthFigures) -> list[HealthFinding]:
 
 
 # -- Watches a running rig for calibrations that have gone stale, and says which one mends what it sees ----------------
-# Fed some times a second with what the tracker publishes anyway; judges the last twenty seconds. Every finding is gone
-# once what it saw is: nothing is latched.
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

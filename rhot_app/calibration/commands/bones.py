@@ -118,8 +118,8 @@ def _tracks(args: argparse.Namespace) -> tuple[MarkerTracks, _Seats, HandAnatomy
         points = read_qualisys(args.tsv)
         tracks = tracks_of(points.times_s, points.positions, points.names, roles)
         return tracks, _seats(tracks, points.names, roles), None
+    from rhot_app.calibration.recorded_observations import read_instants
     from rhot_app.project import load_rig
-    from rhot_app.recording.observation_table import read_instants
 
     rig, instants = read_instants(args.log, None if args.rig is None else load_rig(args.rig))
     markers = rig.markers.markers

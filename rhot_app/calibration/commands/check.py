@@ -21,8 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check and report; exit code 2 when the rig cannot be tracked with."""
+    from rhot_app.calibration.check.camera_calibration import calibration_text
     from rhot_app.calibration.check.checks import check_rig
-    from rhot_app.calibration.lens.camera_calibration import calibration_text
     from rhot_app.project import load_rig
 
     rig = load_rig(args.rig)

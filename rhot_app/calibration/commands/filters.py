@@ -31,9 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Tune and report; the rig is written only with ``--out``."""
     from rhot_app.calibration.filters.tuning import tune_filters
+    from rhot_app.calibration.recorded_observations import read_instants
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
-    from rhot_app.recording.observation_table import read_instants
     from rhot_app.rig_history import accept
 
     targets, rig = _targets(args), load_rig(args.rig)

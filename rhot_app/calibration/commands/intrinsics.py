@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; files are written only when the verdict allows it."""
-    from rhot_app.calibration.lens.camera_calibration import with_lens
+    from rhot_app.calibration.check.camera_calibration import with_lens
     from rhot_app.calibration.lens.intrinsics import save_intrinsics, solve
     from rhot_app.calibration.lens.views import matching_files, read_views
     from rhot_app.errors import CalibrationError
@@ -82,9 +82,9 @@ def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
 
 def lines_of(report: IntrinsicsReport) -> list[str]:
     """The figures for people."""
+    from rhot_app.calibration.bundle.robust_error import what_is_reported
     from rhot_app.calibration.lens.fit import PARAMETERS
     from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
-    from rhot_app.calibration.robust_error import what_is_reported
 
     lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
     lines += [f"{name:<4}{value:12.4f} +- {std:.4f}" + (" px" if place < 4 else "")

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rhot_app.calibration.bundle.robust_error import what_is_reported
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
-from rhot_app.calibration.robust_error import what_is_reported
 from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M, PairFigures, StereoReport
 from rhot_app.calibration.stereo.start import WorldFrame
 from rhot_app.errors import CalibrationError
@@ -62,8 +62,8 @@ def known_lengths(args: argparse.Namespace, names: list[str]) -> KnownLengths:
     """The baseline by hand and the ruler."""
     import numpy as np
 
-    from rhot_app.calibration.depth.ruler import RulerReading
     from rhot_app.calibration.stereo.calibrate import KnownLengths
+    from rhot_app.calibration.stereo.ruler import RulerReading
 
     for option, value in (("--baseline-mm", args.baseline_mm), ("--ruler-mm", args.ruler_mm)):
         if value is not None and not 0.0 < value < 1e5:

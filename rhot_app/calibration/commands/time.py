@@ -24,10 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Solve and report; the rig is written only with ``--out``."""
+    from rhot_app.calibration.recorded_observations import read_observations
     from rhot_app.calibration.time.offset import calibrate_times
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
-    from rhot_app.recording.observation_table import read_observations
     from rhot_app.rig_history import accept
 
     rig, table = read_observations(args.log, load_rig(args.rig))

@@ -48,7 +48,6 @@ def _positive(disparity_px: ArrayLike) -> Array:
 
 
 # -- Depth correction without a board (RHOT 7.2.3): the power law D = k |disparity|^z through measured -----------------
-# The cameras need not be calibrated. The law takes up what parallel axes and equal view angles (eq. 6.12) leave out.
 
 LEAST_ROWS = 3
 

@@ -120,14 +120,6 @@ def _run(times: Array, seen: Array, intrinsics: Array, cameras: Array, focal: Ar
 
 
 # -- The filters' settings from two recordings, in the thesis's two steps (RHOT 7.3): held still, then moved -----------
-# The rule, for the filter before depth and then for the one after it, marker by marker:
-#
-# 1. held still, beta 0: the highest min cutoff whose jitter is within the target, since a higher one lags less;
-# 2. moved fast: the smallest beta whose lag is within the target, and whose rms error is no more than so much lag makes
-#    of the speed; a smaller one is calmer.
-#
-# The filter before depth may use up half of the lag, the one after it what is left. What holds for all markers is the
-# lowest of their cutoffs and the largest of their betas.
 
 Place = Callable[[Array], tuple[Array, Array]]
 """Puts a candidate's parameters (M, 3) before or after depth: parameters of both filters."""

@@ -68,12 +68,6 @@ def _roots(covariances: Array) -> Array:
 
 
 # -- One robust adjustment of a hand's shape and of its pose at every instant to where its markers were seen -----------
-# Levenberg-Marquardt; the poses are eliminated instant by instant (Schur complement, Triggs et al. 2000), so the matrix
-# to solve has only the shape's unknowns. Huber's loss on each marker's distance by reweighting.
-#
-# Neighbouring instants err alike: skin slides over bones in the same way whenever a finger bends, and nobody's joints
-# go together exactly as the natural pose says. So all instants together count only as much as `independent` ones, and
-# what the natural pose says of them as `pose_prior_weight` ones.
 
 HUBER = 3.0
 """Markers farther off than this many standard deviations count less."""

@@ -74,10 +74,6 @@ class Prior:
 
 
 # -- Where on the hand a marker sits: on which segment, by its name or by what the user says ---------------------------
-# A segment is the palm, or one of a finger's three bones. Known words: ``index_proximal``, ``index_medial``,
-# ``index_distal`` (``index_tip`` is the same bone; the thumb's are metacarpal, proximal and distal), ``index_middle``
-# for a marker on one of the two inner bones, whichever fits; anything that begins with ``hand_``, ``palm_`` or
-# ``back_of_hand`` for the palm; and ``wrist`` for a band round the wrist.
 
 PALM = -1
 DISTAL = 2

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import BoardErrors, find_board_errors, pose_view
-from rhot_app.calibration.robust_error import MOST_DROPPED, error_inflation, misfit_limit
-from rhot_app.calibration.stereo.bundle import Bundle, adjust
-from rhot_app.calibration.stereo.bundle_model import LENS, BundleState, LensFreedom, Observations
+from rhot_app.calibration.bundle.adjustment import Bundle, adjust
+from rhot_app.calibration.bundle.model import LENS, BundleState, LensFreedom, Observations
+from rhot_app.calibration.bundle.robust_error import MOST_DROPPED, error_inflation, misfit_limit
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent, within
 
@@ -121,11 +121,6 @@ def _closed_form(views: Sequence[BoardView], board: Board, size: tuple[int, int]
 
 
 # -- The fit of one camera's lens to its views of a board: without the views that do not fit, and with the -------------
-# errors.
-#
-# All distortion coefficients are estimated; where the views do not determine one, what is known of lenses in general
-# keeps it near zero. Leaving coefficients out when they are insignificant would bias the others: with a true k3 of 0.04
-# the stated intervals of k1 and k2 then hold one time in two.
 
 PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Names of the lens parameters, in their order."""

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board.boards import Board, CharucoBoard
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import BoardErrors
+from rhot_app.calibration.board.shared_views import Dropped
+from rhot_app.calibration.bundle.robust_error import tilt_spread
 from rhot_app.calibration.lens.coverage import Coverage, cover
 from rhot_app.calibration.lens.fit import PARAMETERS, LensFit, LensStart, fit_lens
 from rhot_app.calibration.lens.intrinsics_checks import ExpectedErrors, Figures, blind_share, check, expected_errors
-from rhot_app.calibration.robust_error import tilt_spread
-from rhot_app.calibration.stereo.views import Dropped
 from rhot_app.calibration.verdict import Finding, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent, within

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.poses import BoardErrors
+from rhot_app.calibration.bundle.robust_error import in_words
 from rhot_app.calibration.lens.coverage import Coverage
-from rhot_app.calibration.robust_error import in_words
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.geometry.camera import undistort_points
 

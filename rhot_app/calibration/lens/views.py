@@ -13,8 +13,8 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import Board, Chessboard
 from rhot_app.calibration.board.corners import BoardView, Gray, detect
+from rhot_app.calibration.board.shared_views import Dropped
 from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding, why_missing
-from rhot_app.calibration.stereo.views import Dropped
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import BoardErrors, PosedView, find_board_errors
+from rhot_app.calibration.board.shared_views import Dropped, SharedViews
+from rhot_app.calibration.bundle.adjustment import Bundle, adjust
+from rhot_app.calibration.bundle.model import BundleState, LensFreedom, Observations
+from rhot_app.calibration.bundle.robust_error import MOST_DROPPED, misfit_limit, tilt_spread
 from rhot_app.calibration.lens.fit import LensStart
-from rhot_app.calibration.robust_error import MOST_DROPPED, misfit_limit, tilt_spread
-from rhot_app.calibration.stereo.bundle import Bundle, adjust
-from rhot_app.calibration.stereo.bundle_model import BundleState, LensFreedom, Observations
 from rhot_app.calibration.stereo.start import PlacedShot
-from rhot_app.calibration.stereo.views import Dropped, SharedViews
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, within
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rhot_app.calibration.robust_error import in_words
+from rhot_app.calibration.board.shared_views import Dropped
+from rhot_app.calibration.bundle.robust_error import in_words
 from rhot_app.calibration.stereo.adjust import ALIKE_RAD
 from rhot_app.calibration.stereo.points import LensEvidence
 from rhot_app.calibration.stereo.report import WORKING_DISTANCE_M, StereoFigures
-from rhot_app.calibration.stereo.views import Dropped
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.geometry.transforms import inverse
 

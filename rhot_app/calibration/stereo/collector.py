@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.stereo.views import SharedViews, Shot
+from rhot_app.calibration.board.shared_views import SharedViews, Shot
 
 Array = NDArray[np.float64]
 

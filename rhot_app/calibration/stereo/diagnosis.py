@@ -17,9 +17,9 @@ from scipy.spatial.distance import cdist
 from rhot_app.calibration.board.boards import Board, Chessboard
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import PosedView, pose_view
+from rhot_app.calibration.board.shared_views import Dropped
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.start import Link, link, miss
-from rhot_app.calibration.stereo.views import Dropped
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.geometry.transforms import inverse
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import pose_view
+from rhot_app.calibration.bundle.adjustment import adjust
+from rhot_app.calibration.bundle.model import BundleState
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.adjust import StereoSolution
-from rhot_app.calibration.stereo.bundle import adjust
-from rhot_app.calibration.stereo.bundle_model import BundleState
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.geometry.camera import undistort_points
 from rhot_app.geometry.triangulate import triangulate

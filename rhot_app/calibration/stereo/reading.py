@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.board.shared_views import Dropped, SharedViews, Shot
 from rhot_app.calibration.lens.views import (
     Read,
     drop_other_sizes,
@@ -18,7 +19,6 @@ from rhot_app.calibration.lens.views import (
     read_picture,
     size_of,
 )
-from rhot_app.calibration.stereo.views import Dropped, SharedViews, Shot
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent

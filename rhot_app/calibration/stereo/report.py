@@ -11,13 +11,9 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.poses import BoardErrors
-from rhot_app.calibration.depth.ruler import RulerResult
-from rhot_app.calibration.lens.fit import LensStart
-from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
-from rhot_app.calibration.robust_error import error_inflation, tilt_spread
-from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
-from rhot_app.calibration.stereo.bundle import Bundle
-from rhot_app.calibration.stereo.bundle_model import (
+from rhot_app.calibration.board.shared_views import Dropped
+from rhot_app.calibration.bundle.adjustment import Bundle
+from rhot_app.calibration.bundle.model import (
     LENS,
     POSE,
     BundleState,
@@ -27,8 +23,12 @@ from rhot_app.calibration.stereo.bundle_model import (
     linearise,
     residuals,
 )
+from rhot_app.calibration.bundle.robust_error import error_inflation, tilt_spread
+from rhot_app.calibration.lens.fit import LensStart
+from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
+from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.points import Squares, epipolar_px, locate, measure_squares
-from rhot_app.calibration.stereo.views import Dropped
+from rhot_app.calibration.stereo.ruler import RulerResult
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.geometry.transforms import exp_so3, inverse, log_so3
 

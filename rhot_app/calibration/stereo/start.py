@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import PosedView, pose_view
-from rhot_app.calibration.stereo.bundle_model import BundleState, Observations, linearise
+from rhot_app.calibration.bundle.model import BundleState, Observations, linearise
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import apply, exp_so3, inverse, log_so3, rigid

@@ -106,8 +106,6 @@ def _run(shot: Shot, index: int, work: Callable[[Shot, int, Report], Any], pipe:
 
 
 # -- Film a shot to disk: both cameras' frames as raw YUV recordings, one process per camera, and the truth ------------
-# Beside them lie a rig file and each node's settings with ports of their own, so that the shot can be played to real
-# daemons on one machine (docs/twin.md).
 
 TRUTH_NAME = "truth.npz"
 

@@ -153,9 +153,6 @@ def socket_path(directory: Path, name: str) -> Path:
 
 
 # -- The live twin: a process that renders both cameras as fast as the machine allows, for two real node ---------------
-# ``python -m rhot_app.simulator.nodes.live --directory DIR --rig OUT.json``. It writes a rig file with the daemons'
-# real ports and prints one JSON line when all is ready, later others about its pace. It shows what its clients ask
-# for (docs/twin.md), starts a daemon again that has died, and ends on SIGTERM with both.
 
 _NICE = 5
 

@@ -82,8 +82,6 @@ class DelayQueue:
 
 
 # -- A bad network between one node and the master: a UDP proxy that loses, delays, reorders and doubles ---------------
-# The rig names the proxy's `command_port` as the node's port. Start messages pass with the node's data port replaced by
-# the proxy's own, so that the node's observations come through here too; the node sees the proxy as its master.
 
 Address = tuple[str, int]
 

@@ -94,21 +94,6 @@ def refusal(sentence: str) -> dict[str, Any]:
 
 
 # -- A client of the live twin's door: what its cameras see, asked for from another process ----------------------------
-# For the app's wizards on the simulated rig ("hold up the board") and for tests::
-#
-#     with TwinRemote(directory) as twin:                        # the directory that the live twin was started with
-#         twin.show(BoardShow(size="9x6", square_mm=25.0))       # a board is moved about, with pauses
-#         twin.show(BoardShow(on_table=True))                    # the board lies on the table
-#         twin.show(MarkerShow(marker="index", distance_m=0.4))  # one marker, held at 0.4 m
-#         twin.show(MarkerShow(moving=True))                     # one marker that sweeps fast to and fro
-#         twin.show(RulerShow(length_mm=200.0))                  # a paper ruler
-#         twin.show(HandShow("rest"))                            # a hand again
-#         twin.lamp(brightness=0.8, kelvin=3200.0)               # what is not named stays
-#         twin.cover("left")                                     # a cap on that lens alone; cover() takes all off
-#         twin.state().lamp.kelvin
-#
-# Every call returns when the cameras show the change, and raises SimulatorError with a sentence when they cannot. The
-# cameras' own settings (exposure, gains, ...) are not the twin's business: write them to the nodes, as for a real rig.
 
 ANSWER_S = 180.0
 """A show that was never shown on this machine is compiled first."""

@@ -82,7 +82,6 @@ def _planck_xyz(kelvin: float) -> Array:
 
 
 # -- What a simulated camera is told, and what that does to a picture: gains, white balance, contrast ------------------
-# The units are libcamera's, so that a setting found on the twin means the same on a Raspberry Pi.
 
 Image = NDArray[np.float32]
 

@@ -108,8 +108,6 @@ def _leap(text: str) -> Landmarks:
 
 
 # -- Real human motion for the twin: the hand model fitted frame by frame to a recording's landmarks -------------------
-# The recorded person's hand is not our model's; what is wanted is how it moves. The fit need not be exact, the twin's
-# truth is the fitted hand.
 
 LANDMARK_SD_M = 3e-3
 RIGID_SD_M = 2e-3

@@ -60,10 +60,6 @@ def at_own_rows(way: Callable[[Array], Array], see: Callable[[Array], Array], ti
 
 
 # -- The twin's ideal detector: what nodes would send if they found every marker, as a raw log, without any ------------
-# Each marker is where it was at its own row's time, projected through the lens, with Gaussian noise; now and then one
-# is lost. Nothing hides anything, and colours do not matter: the way to observe marker sets that no camera could tell
-# apart. The log holds what a real one does - session, clock exchanges of clocks that disagree, datagrams with their
-# delays - so that it goes through the same door.
 
 LOG_NAME: Final = "points.log"
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, CalibrationError, calibration_text
+from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, CalibrationError, calibration_text
 from rhot_app.engine.status import NodeStatus
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode

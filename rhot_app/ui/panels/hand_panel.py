@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, calibration_error
+from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.project import Rig
 from rhot_app.tracking.state import Condition, HandState, Knowledge

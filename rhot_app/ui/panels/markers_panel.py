@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, calibration_error
+from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.palette import Scheme, hex_of

@@ -106,8 +106,6 @@ def tick_labels(*, on_table: bool = False) -> list[Label]:
 
 
 # -- From the rig frame to the screen's world (z up) -------------------------------------------------------------------
-# Meshes take the rig frame as the left camera's: x right, y down, z away. A rig whose world lies on a table (`up` is z)
-# is brought into such axes at the scene's door, with the table on the floor grid.
 
 DISPLAY_FROM_RIG: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Rotation: right stays right, away from the camera becomes +y, up becomes +z."""

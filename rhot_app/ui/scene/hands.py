@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.lens.camera_calibration import CalibrationError
+from rhot_app.calibration.check.camera_calibration import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND, Rig

@@ -12,7 +12,7 @@ from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtGui import QHelpEvent, QKeyEvent, QMatrix4x4, QPainter, QResizeEvent, QVector3D
 from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 
-from rhot_app.calibration.lens.camera_calibration import KNOWN_EXACTLY, calibration_error
+from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.palette import Scheme

@@ -180,7 +180,7 @@ def make_coach(rig: Rig) -> Coach:
 def solve_log(log: Path, rig: Rig, base: HandAnatomy, *, progress: Progress) -> BonesReport:
     """What ``rhot calibrate bones`` does with a log."""
     from rhot_app.calibration.hand.bones import solve_bones
-    from rhot_app.recording.observation_table import read_instants
+    from rhot_app.calibration.recorded_observations import read_instants
 
     progress("reading the recording", 0.0)
     _, instants = read_instants(log, rig)

@@ -32,7 +32,7 @@ _UNITS: dict[FilterStage, str] = {"pixel": "px/s", "position": "m/s"}
 def solve_logs(still: Path, fast: Path, rig: Rig, targets: FilterTargets, *, progress: Progress) -> FilterReport:
     """What ``rhot calibrate filters`` does with two logs."""
     from rhot_app.calibration.filters.tuning import tune_filters
-    from rhot_app.recording.observation_table import read_instants
+    from rhot_app.calibration.recorded_observations import read_instants
 
     progress("reading the recordings", 0.0)
     resting, moving = (read_instants(log, rig)[1] for log in (still, fast))

@@ -11,7 +11,7 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView, detect
-from rhot_app.calibration.lens.camera_calibration import with_lens
+from rhot_app.calibration.check.camera_calibration import with_lens
 from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
 from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M

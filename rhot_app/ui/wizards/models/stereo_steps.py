@@ -10,13 +10,13 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView, detect
-from rhot_app.calibration.lens.camera_calibration import lengths_text
+from rhot_app.calibration.board.shared_views import SharedViews
+from rhot_app.calibration.check.camera_calibration import lengths_text
 from rhot_app.calibration.lens.fit import LensStart, find_lens
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate, calibrated_rig, lens_of, rig_findings
 from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollector
 from rhot_app.calibration.stereo.report import WORKING_DISTANCE_M, PairFigures, StereoFigures, StereoReport
 from rhot_app.calibration.stereo.start import WorldFrame, place_world
-from rhot_app.calibration.stereo.views import SharedViews
 from rhot_app.calibration.verdict import judge
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress

@@ -28,8 +28,8 @@ _REACH_PX = 250.0
 
 def solve_log(log: Path, rig: Rig, *, progress: Progress) -> TimeReport:
     """What ``rhot calibrate time`` does with a log."""
+    from rhot_app.calibration.recorded_observations import read_observations
     from rhot_app.calibration.time.offset import calibrate_times
-    from rhot_app.recording.observation_table import read_observations
 
     progress("reading the recording", 0.0)
     _, table = read_observations(log, rig)

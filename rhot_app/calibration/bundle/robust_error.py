@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.stereo.bundle import LEAST_NOISE_PX, Bundle
-from rhot_app.calibration.stereo.bundle_model import Observations, linearise
+from rhot_app.calibration.bundle.adjustment import LEAST_NOISE_PX, Bundle
+from rhot_app.calibration.bundle.model import Observations, linearise
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.check.health import HealthFinding
-from rhot_app.calibration.depth.ruler import lengths_finding
+from rhot_app.calibration.stereo.ruler import lengths_finding
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.project import Intrinsics, Rig
 

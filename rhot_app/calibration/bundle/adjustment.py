@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from rhot_app.calibration.stereo.bundle_model import (
+from rhot_app.calibration.bundle.model import (
     POINT,
     Array,
     BoardFreedom,

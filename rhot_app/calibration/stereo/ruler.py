@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.stereo.bundle_model import BundleState
+from rhot_app.calibration.bundle.model import BundleState
 from rhot_app.calibration.stereo.points import locate
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.errors import CalibrationError

@@ -12,6 +12,7 @@ from rhot_app.calibration.commands.output import add_json_argument, require_fold
 if TYPE_CHECKING:
     from rhot_app.objects.alignment_report import AlignmentReport
 
+
 POSE_COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
 POINT_COLUMNS = ("t", "x", "y", "z")
 

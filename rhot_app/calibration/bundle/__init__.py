@@ -1,0 +1,1 @@
+"""Robust bundle adjustment: the one solver of lens, board and stereo calibrations."""
