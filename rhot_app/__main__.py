@@ -27,11 +27,11 @@ class Subcommand:
 APP = "rhot_app.ui.app"
 SUBCOMMANDS = {
     "demo": Subcommand("rhot_app.ui.demo_command", "open the app on the simulated rig"),
-    "engine": Subcommand("rhot_app.engine.serve", "track without a screen and serve the states"),
+    "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
-    "video": Subcommand("rhot_app.recording.video", "fetch the videos that nodes recorded beside a log"),
+    "video": Subcommand("rhot_app.recording.video_command", "fetch the videos that nodes recorded beside a log"),
     "recover": Subcommand("rhot_app.recording.raw_log", "write a damaged log's sound records to a clean one"),
-    "export": Subcommand("rhot_app.export.export", "write a raw log's hand as a file for other programs"),
+    "export": Subcommand("rhot_app.export.export_command", "write a raw log's hand as a file for other programs"),
     "batch": Subcommand("rhot_app.export.batch_command", "track or export many raw logs"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
@@ -42,7 +42,7 @@ SUBCOMMANDS = {
     "nodes": Subcommand("rhot_app.sources.nodes_command", "look for nodes on the network"),
     "pair": Subcommand("rhot_app.sources.pair_command", "pair with a node by the code that it shows"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),
-    "report": Subcommand("rhot_app.engine.report", "collect what somebody needs who looks for a fault"),
+    "report": Subcommand("rhot_app.engine.report_command", "collect what somebody needs who looks for a fault"),
     "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "play a simulated run and compare with its truth"),
 }
 

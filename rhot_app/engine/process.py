@@ -18,7 +18,8 @@ from pathlib import Path
 
 import msgspec
 
-from rhot_app.engine.client import EngineClient, EngineDirectory, lock_holder, open_directory
+from rhot_app.engine.client import EngineClient
+from rhot_app.engine.directory import EngineDirectory, lock_holder, open_directory
 from rhot_app.errors import EngineError
 from rhot_node.files import decode_message, read_input, write_document
 

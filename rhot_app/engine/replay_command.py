@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.engine.serve import add_serving_arguments, asked_outputs, print_addresses
+from rhot_app.engine.command import add_serving_arguments, asked_outputs, print_addresses
 from rhot_app.errors import RecordingError
 from rhot_node.compiled import announce_compilation
 

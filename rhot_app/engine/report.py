@@ -6,7 +6,6 @@ like a key or a pairing code is taken out of all text.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import hashlib
 import io
@@ -24,7 +23,8 @@ from typing import Any, Final
 
 import msgspec
 
-from rhot_app.engine.client import EngineClient, EngineDirectory, default_directory
+from rhot_app.engine.client import EngineClient
+from rhot_app.engine.directory import EngineDirectory, default_directory
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
@@ -171,46 +171,3 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "not installed"
-
-
-# -- ``rhot report``: what somebody needs who looks for a fault, in one zip file, without keys -------------------------
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot report``."""
-    parser.add_argument("log", type=Path, nargs="?", metavar="LOG",
-                        help="a raw log that shows the fault, for its last minute (default: what is being recorded)")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE.zip", help="zip file to write")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="the rig file (default: the running engine's, or the log's)")
-    parser.add_argument("--directory", type=Path, metavar="DIR",
-                        help=f"directory of the engine (default {default_directory()})")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Collect and write; raises EngineError, RecordingError, RigError."""
-    from rhot_app.engine.report import Report
-    from rhot_app.errors import EngineError
-    from rhot_app.project import load_rig
-    from rhot_node.files import require_replaceable, write_atomically
-
-    try:
-        require_replaceable(args.out)
-        report = Report()
-        report.add_versions()
-        recorded = report.add_engine(args.directory)
-        if args.rig is not None:
-            report.add_rig(load_rig(args.rig))
-        log = args.log or recorded
-        if log is not None:
-            report.add_log(log)
-        write_atomically(args.out, report.to_zip())
-    except OSError as exc:
-        raise EngineError(f"{args.out}: cannot be written ({exc.strerror}); choose another --out.") from exc
-    _tell(args.out, report)
-    return 0
-
-
-def _tell(path: Path, report: Report) -> None:
-    for note in report.notes:
-        print(f"not in it: {note}")
-    print(f"{path}: {', '.join(report.names)}. It holds no keys, codes or pictures; look into it before you send it.")

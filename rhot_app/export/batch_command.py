@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.export.export import READ_WITH_LOSSES, add_export_arguments, options_of
+from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
 
 if TYPE_CHECKING:
     from rhot_app.export.batch import Job, Outcome

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import importlib
 import os
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rhot_app.errors import ExportError
 from rhot_app.export.plan import ExportOptions, Plan, Units, Writer, in_frame
@@ -21,9 +18,6 @@ from rhot_app.export.states import HandStates
 from rhot_app.progress import Progress, silent, within
 from rhot_app.project import Rig
 from rhot_app.tracking.smoothing import NOT_SMOOTHED
-
-if TYPE_CHECKING:
-    from rhot_app.export.plan import ExportOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,68 +192,3 @@ def _whole_file(out: Path, ready: Callable[[], None]) -> Iterator[Path]:
     finally:
         if path is not None:
             path.unlink(missing_ok=True)
-
-
-# -- ``rhot export``: a raw log through the tracker into a file that other programs read -------------------------------
-
-READ_WITH_LOSSES = 3
-"""Exit code: the file is there, but not all of the log could be read."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot export``."""
-    parser.add_argument("path", type=Path, metavar="LOG", help="a raw log written by rhot engine --log or the app")
-    parser.add_argument("--out", type=Path, metavar="FILE",
-                        help="file to write (default: named as the log, beside it)")
-    add_export_arguments(parser, "default: by the ending of --out")
-    parser.add_argument("--again", action="store_true", help="write over a file that exists")
-
-
-def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -> None:
-    """What ``rhot export`` and ``rhot batch`` have in common; `without_format` says what holds without --format."""
-    parser.add_argument("--format", default=None, metavar="F",
-                        help=f"csv, trc, c3d, bvh, gltf, npz, parquet or mcap ({without_format})")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="track with this rig instead of the one the log was recorded with")
-    parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,
-                        help="track with this tracker instead of the one that the rig asks for")
-    parser.add_argument("--rate", type=float, default=None, metavar="HZ",
-                        help="states at equal intervals (default: each at its own time; trc, c3d and bvh: the cameras' "
-                             "rate)")
-    parser.add_argument("--frame", choices=("rig", "wrist"), default="rig",
-                        help="positions in the rig frame, or relative to the wrist along the palm's axes (default rig)")
-    parser.add_argument("--units", choices=("mm", "m"), default=None,
-                        help="unit of length (default: what the format's readers expect)")
-    parser.add_argument("--hand", choices=("hand", "other_hand"), default="hand",
-                        help="which of a rig's two hands a bvh file gets (default hand)")
-    parser.add_argument("--smooth", action="store_true",
-                        help="let every state use what came after it as well (estimator)")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Export, and say what came of it."""
-    from rhot_app.export.export import FORMATS, export_log, format_of
-    from rhot_app.progress import ProgressLine
-    from rhot_node.compiled import announce_compilation
-
-    name = format_of(args.format, args.out)
-    out = args.out or args.path.with_suffix(FORMATS[name].endings[0])
-    announce_compilation()
-    line = ProgressLine(f"exporting {args.path.name}")
-    done = export_log(args.path, out, format_name=name, rig=args.rig, options=options_of(args), again=args.again,
-                      progress=line.report)
-    line.finish()
-    for note in done.notes:
-        print(f"note: {note}.", file=sys.stderr)
-    for loss in done.losses:
-        print(f"{args.path}: {loss.removesuffix('.')}; what could be read was exported.", file=sys.stderr)
-    print(f"{done.path}: {done.states} states")
-    return READ_WITH_LOSSES if done.losses else 0
-
-
-def options_of(args: argparse.Namespace) -> ExportOptions:
-    """The options that the arguments say."""
-    from rhot_app.export.plan import ExportOptions
-
-    return ExportOptions(tracker=args.tracker, rate_hz=args.rate, frame=args.frame, units=args.units, hand=args.hand,
-                         smooth=args.smooth)

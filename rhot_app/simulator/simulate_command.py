@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.simulator.scene.scene_description import add_show_arguments, show_of
+from rhot_app.simulator.scene.scene_arguments import add_show_arguments, show_of
 
 if TYPE_CHECKING:
     from rhot_app.simulator.nodes.film import Progress

@@ -9,7 +9,7 @@ import signal
 import sys
 from pathlib import Path
 
-from rhot_app.engine.client import default_directory
+from rhot_app.engine.directory import default_directory
 from rhot_app.errors import EngineError
 from rhot_app.project import load_rig
 from rhot_app.ui.backend.contract import TwinChoice

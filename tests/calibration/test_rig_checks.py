@@ -198,13 +198,13 @@ def test_text_datagrams_need_a_port_that_their_sender_knows(rig: Rig) -> None:
 def test_the_command_says_it_and_ends_with_code_2(rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "rig.json"
     save_rig(path, rig)
-    assert main(["check", str(path), "--json"]) == 0
+    assert main(["check", "--rig", str(path), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["grade"] == "good"
     assert told["pairs"][0]["baseline_mm"] == 75.0
     assert told["calibration"] == "with a board, ± 0.50 mm at 0.6 m; lengths checked by a ruler"
     save_rig(path, with_right_at(rig, -0.075, 0.0, 0.0))
-    assert main(["check", str(path)]) == 2
+    assert main(["check", "--rig", str(path)]) == 2
     assert "calibrated from mirrored pictures" in capsys.readouterr().out
 
 
@@ -215,7 +215,7 @@ def test_a_rig_with_what_only_pythons_json_takes_for_a_number_is_refused(rig: Ri
     document = json.loads(path.read_text())
     document["nodes"][0]["intrinsics"]["fx"] = float("nan")
     path.write_text(json.dumps(document))
-    assert main(["check", str(path)]) == 2
+    assert main(["check", "--rig", str(path)]) == 2
     assert f"{path}: not valid JSON" in capsys.readouterr().err
 
 
@@ -249,7 +249,7 @@ def test_check_and_engine_refuse_what_cannot_be_with_one_sentence(
 def test_the_engine_refuses_what_check_refuses(rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "rig.json"
     save_rig(path, with_right_at(rig, -0.075, 0.0, 0.0))
-    assert main(["check", str(path)]) == 2
+    assert main(["check", "--rig", str(path)]) == 2
     capsys.readouterr()
     assert main(["engine", "--rig", str(path), "--directory", str(tmp_path / "e")]) == 2
     said = capsys.readouterr().err

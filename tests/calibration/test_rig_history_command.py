@@ -25,16 +25,16 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_versions_are_listed_newest_first(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["history", str(path), "--json"]) == 0
+    assert main(["history", "--rig", str(path), "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["versions"]
     assert [each["number"] for each in listed] == [1, 2]
     assert [each["replaced_by"] for each in listed] == ["bone lengths", "stereo calibration"]
-    assert main(["history", str(path)]) == 0
+    assert main(["history", "--rig", str(path)]) == 0
     assert "2 earlier versions" in capsys.readouterr().out
 
 
 def test_a_version_is_brought_back_and_the_present_one_kept(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["history", str(path), "--restore", "2"]) == 0
+    assert main(["history", "--rig", str(path), "--restore", "2"]) == 0
     assert "before the stereo calibration" in capsys.readouterr().out
     assert load_rig(path).name == "one"
     assert load_rig(rig_history.versions(path)[0].path).name == "three"
@@ -43,7 +43,7 @@ def test_a_version_is_brought_back_and_the_present_one_kept(path: Path, capsys: 
 @pytest.mark.parametrize("number", ["0", "3", "-1"])
 def test_a_number_that_is_not_listed_changes_nothing(path: Path, number: str,
                                                      capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["history", str(path), "--restore", number]) == 2
+    assert main(["history", "--rig", str(path), "--restore", number]) == 2
     assert "has no version" in capsys.readouterr().err
     assert load_rig(path).name == "three"
 
@@ -55,5 +55,5 @@ def test_a_missing_rig_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 def test_a_rig_that_was_lost_is_brought_back(path: Path) -> None:
     path.unlink()
-    assert main(["history", str(path), "--restore", "1"]) == 0
+    assert main(["history", "--rig", str(path), "--restore", "1"]) == 0
     assert load_rig(path).name == "two"

@@ -18,7 +18,8 @@ import pytest
 from bench import START_S, TEST_S, Bench, ends, kill_hard, states_of, wait_until
 from patience import PATIENCE_S, eventually
 
-from rhot_app.engine.client import EngineClient, EngineDirectory
+from rhot_app.engine.client import EngineClient
+from rhot_app.engine.directory import EngineDirectory
 from rhot_app.engine.process import StartedProcess, start_ticks, started_processes
 from rhot_app.tracking.state import Condition
 

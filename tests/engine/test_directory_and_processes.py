@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from rhot_app.engine import process as processes
-from rhot_app.engine.client import EngineLock, default_directory, lock_holder, open_directory
+from rhot_app.engine.directory import EngineLock, default_directory, lock_holder, open_directory
 from rhot_app.errors import EngineError
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from rhot_app.engine.client import EngineLock, open_directory
+from rhot_app.engine.directory import EngineLock, open_directory
 lock = EngineLock(open_directory(Path(sys.argv[1])))
 print("held", flush=True)
 time.sleep(60)

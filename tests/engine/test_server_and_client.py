@@ -11,8 +11,9 @@ from fake_tracker import FakeTracker
 from patience import PATIENCE_MS, PATIENCE_S, eventually, settled
 
 from rhot_app.engine import node_control
-from rhot_app.engine.client import EngineClient, open_directory
+from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
+from rhot_app.engine.directory import open_directory
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.serve import Server, StatePublisher
 from rhot_app.engine.status import EngineStatus, Preview

@@ -9,7 +9,7 @@ import numpy as np
 
 from rhot_app.hand.articulated import load_articulated
 from rhot_app.hand.articulated_model import build_articulated
-from rhot_app.hand.hand_command import BACKGROUND, SIZE_PX, draw
+from rhot_app.hand.picture import BACKGROUND, SIZE_PX, draw
 from rhot_node.files import resource_path
 
 HAND = load_articulated(resource_path("hands", "digiteyes.json"))

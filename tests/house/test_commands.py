@@ -40,8 +40,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                                   "--legacy-pattern", "--square-pixels", "--out", "--rig", "--node", "--json"),
     "rhot target": ("chessboard", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
                     "--paper", "--out"),
-    "rhot check": ("RIG", "--json"),
-    "rhot history": ("RIG", "--restore", "--json"),
+    "rhot check": ("--rig", "--json"),
+    "rhot history": ("--rig", "--restore", "--json"),
     "rhot calibrate stereo": (
         "--left", "--right", "--camera", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
         "--left-intrinsics", "--right-intrinsics", "--intrinsics", "--refine-intrinsics", "--baseline-mm", "--ruler-mm",
@@ -102,3 +102,14 @@ def test_documented_commands_exist(file: str, line: str) -> None:
     text = help_of(command)
     for option in re.findall(r"(?<!\S)--?[a-z][a-z-]*", line):
         assert option in text, f"{file}: {line!r} names {option}, which {command} --help does not"
+
+
+def test_help_loads_no_numerical_library() -> None:
+    """Help is at once, and `announce_compilation` comes before numba."""
+    code = ("import importlib, sys\n"
+            "from rhot_app.__main__ import SUBCOMMANDS\n"
+            "for each in SUBCOMMANDS.values():\n"
+            "    importlib.import_module(each.module)\n"
+            "sys.exit(', '.join({'cv2', 'numba', 'scipy'} & set(sys.modules)))")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, f"loaded by command modules: {done.stderr}"

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, tell
+from rhot_app.calibration.commands.output import add_json_argument, add_rig_argument, rig_of, tell
 
 if TYPE_CHECKING:
     from rhot_app.calibration.check.checks import RigReport
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot check``."""
-    parser.add_argument("rig", type=Path, metavar="RIG", help="the rig file")
+    add_rig_argument(parser)
     add_json_argument(parser)
 
 
@@ -25,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.calibration.check.checks import check_rig
     from rhot_app.project import load_rig
 
-    rig = load_rig(args.rig)
+    rig = load_rig(rig_of(args))
     report, calibration = check_rig(rig), calibration_text(rig)
     tell({**_fields(report), "calibration": calibration}, [*_lines(report), f"cameras calibrated: {calibration}"],
          report.verdict, as_json=args.json)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import add_json_argument
+from rhot_app.calibration.commands.output import add_json_argument, add_rig_argument, rig_of
 
 if TYPE_CHECKING:
     from rhot_app.rig_history import Version
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot history``."""
-    parser.add_argument("rig", type=Path, metavar="RIG", help="the rig file")
+    add_rig_argument(parser)
     parser.add_argument("--restore", type=int, metavar="N",
                         help="bring version N of the list back; what is there now becomes a version itself")
     add_json_argument(parser)
@@ -26,20 +25,21 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app import rig_history
     from rhot_app.errors import RigError
 
-    versions = rig_history.versions(args.rig)
-    if not versions and not args.rig.exists():
-        raise RigError(f"{args.rig}: no such file, and no earlier version of it.")
+    rig = rig_of(args)
+    versions = rig_history.versions(rig)
+    if not versions and not rig.exists():
+        raise RigError(f"{rig}: no such file, and no earlier version of it.")
     if args.restore is None:
         _show(args, versions)
         return 0
     if not 1 <= args.restore <= len(versions):
-        raise RigError(f"{args.rig} has no version {args.restore}: {_count(versions)}.")
+        raise RigError(f"{rig} has no version {args.restore}: {_count(versions)}.")
     chosen = versions[args.restore - 1]
-    rig_history.restore(args.rig, chosen)
+    rig_history.restore(rig, chosen)
     if args.json:
-        print(json.dumps({"restored": _entry(args.restore, chosen), "written": str(args.rig)}))
+        print(json.dumps({"restored": _entry(args.restore, chosen), "written": str(rig)}))
     else:
-        print(f"{args.rig} is again as it was before the {chosen.replaced_by} of {_when(chosen)}.")
+        print(f"{rig} is again as it was before the {chosen.replaced_by} of {_when(chosen)}.")
     return 0
 
 
@@ -47,7 +47,7 @@ def _show(args: argparse.Namespace, versions: list[Version]) -> None:
     if args.json:
         print(json.dumps({"versions": [_entry(number, version) for number, version in enumerate(versions, 1)]}))
         return
-    print(f"{args.rig}: {_count(versions)}.")
+    print(f"{rig_of(args)}: {_count(versions)}.")
     for number, version in enumerate(versions, 1):
         print(f"  {number}  until {_when(version)}, before: {version.replaced_by}")
 

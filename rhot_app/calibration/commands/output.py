@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.board.boards import BOARD, CHARUCO, SQUARE_MM
+from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, SQUARE_MM
 from rhot_app.calibration.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -18,6 +18,18 @@ if TYPE_CHECKING:
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
     """``--json``, the same everywhere."""
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+
+
+def add_rig_argument(parser: argparse.ArgumentParser) -> None:
+    """``--rig FILE``; scripts from before it may give the file alone."""
+    given = parser.add_mutually_exclusive_group(required=True)
+    given.add_argument("--rig", type=Path, metavar="FILE", help="the rig file")
+    given.add_argument("file", type=Path, nargs="?", help=argparse.SUPPRESS)
+
+
+def rig_of(args: argparse.Namespace) -> Path:
+    """The rig file of `add_rig_argument`."""
+    return Path(args.rig or args.file)
 
 
 def require_folder(out: Path | None) -> None:

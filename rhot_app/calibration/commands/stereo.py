@@ -8,16 +8,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.bundle.robust_error import what_is_reported
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
-from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M, PairFigures, StereoReport
-from rhot_app.calibration.stereo.start import WorldFrame
 from rhot_app.errors import CalibrationError
 
 if TYPE_CHECKING:
     from rhot_app.calibration.lens.fit import LensStart
     from rhot_app.calibration.stereo.calibrate import KnownLengths
-    from rhot_app.calibration.stereo.report import StereoReport
+    from rhot_app.calibration.stereo.report import PairFigures, StereoReport
     from rhot_app.calibration.stereo.start import WorldFrame
     from rhot_app.progress import Progress
     from rhot_app.project import Rig
@@ -213,6 +210,8 @@ LENS_NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 
 def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
     """The JSON's fields; those of the first pair stand at the top. None where nothing was solved."""
+    from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
+
     rejected = [{"name": each.name, "reason": each.reason, "code": each.code} for each in report.dropped]
     figures = report.figures
     if figures is None:
@@ -245,6 +244,9 @@ def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
 
 def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
     """The figures for people."""
+    from rhot_app.calibration.bundle.robust_error import what_is_reported
+    from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
+
     figures = report.figures
     lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
     if figures is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rhot_app.calibration.board.boards import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
+from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
 from rhot_app.calibration.commands.output import require_folder
 
 

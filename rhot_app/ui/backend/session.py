@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from rhot_app.engine.client import EngineClient, EngineDirectory, open_directory
+from rhot_app.engine.client import EngineClient
+from rhot_app.engine.directory import EngineDirectory, open_directory
 from rhot_app.engine.process import (
     end_started,
     ensure_engine,

@@ -10,7 +10,7 @@ from PySide6.QtCore import QLocale, QRegularExpression, QUrl
 from PySide6.QtGui import QDesktopServices, QRegularExpressionValidator
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton, QSpinBox, QWidget
 
-from rhot_app.calibration.board.boards import SQUARE_MM
+from rhot_app.calibration.board.standard_board import SQUARE_MM
 from rhot_app.calibration.board.target import write_target
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.framework.page import Page

@@ -9,19 +9,10 @@ from typing import Literal
 
 import msgspec
 
-from rhot_app.calibration.board.boards import (
-    BOARD,
-    CHARUCO,
-    DEFAULT_DICTIONARY,
-    MARKER_SHARE,
-    SQUARE_MM,
-    Board,
-    CharucoBoard,
-    Chessboard,
-    parse_size,
-)
+from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard, parse_size
 from rhot_app.calibration.board.corners import BoardView, detect, to_gray
 from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding, why_missing
+from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.models.drawing import board_marks

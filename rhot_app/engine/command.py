@@ -1,0 +1,115 @@
+"""``rhot engine``: the engine as a process of its own, with or without a screen nearby.
+
+What tracks is imported when it runs, so that ``--help`` is there at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+import logging
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rhot_app.engine.directory import default_directory
+from rhot_app.outputs.spec import HELP, WEB_PORT, parse_output, web_settings
+
+if TYPE_CHECKING:
+    from rhot_app.engine.serve import Serving
+    from rhot_app.project import OutputSettings, Rig
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot engine``."""
+    parser.add_argument("--rig", type=Path, required=True, metavar="FILE", help="the rig file (rhot-rig, JSON)")
+    parser.add_argument("--record", "--log", type=Path, dest="log", metavar="FILE",
+                        help="write the raw log of all datagrams to this new file")
+    parser.add_argument("--video", action="store_true",
+                        help="have every node record its frames, too, as long as --record writes; `rhot video "
+                             "collect` fetches them")
+    parser.add_argument("--unchecked", action="store_true",
+                        help="serve also a rig that `rhot check` refuses, to calibrate it")
+    parser.add_argument("--start", action="store_true", help="tell the nodes to stream at once")
+    add_serving_arguments(parser)
+    parser.add_argument("--json", action="store_true",
+                        help="print one JSON object on standard output when ready: pid, directory, rig")
+
+
+def _require_acceptable(rig: Rig, path: Path) -> None:
+    """Raises RigError when `rhot check` refuses the rig."""
+    from rhot_app.calibration.check.checks import check_rig
+    from rhot_app.calibration.verdict import Grade
+    from rhot_app.errors import RigError
+
+    verdict = check_rig(rig).verdict
+    if not verdict.acceptable:
+        wrong = " ".join(finding.sentence for finding in verdict.findings if finding.grade is Grade.POOR)
+        raise RigError(f"{path}: cannot be tracked with. {wrong} `rhot check` says more; --unchecked starts all the "
+                       "same, to calibrate the rig.")
+
+
+def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of every command that serves states to clients."""
+    parser.add_argument("--directory", type=Path, metavar="DIR",
+                        help=f"private directory of the engine's sockets (default {default_directory()})")
+    parser.add_argument("--output", action="append", default=[], dest="outputs", metavar="SPEC",
+                        help="send every state to other programs, see below; may be given more than once")
+    parser.add_argument("--web", nargs="?", const="", metavar="[HOST:]PORT",
+                        help=f"show the hand in browsers, on this computer's port {WEB_PORT} unless told otherwise; "
+                             "the address with its secret is printed")
+    parser.add_argument("--verbose", action="store_true", help="log what happens on standard error")
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = HELP
+
+
+def asked_outputs(args: argparse.Namespace) -> tuple[OutputSettings, ...]:
+    """The outputs of the command line. Raises OutputError."""
+    return (*map(parse_output, args.outputs), *(() if args.web is None else (web_settings(args.web),)))
+
+
+def print_addresses(serve: Serving) -> None:
+    """Say on standard error where clients of the outputs connect."""
+    for output in serve.engine.status().outputs:
+        if output.url:
+            what = "the web view" if output.kind == "web" else f"output {output.spec}"
+            print(f"rhot: {what} is at {output.url}", file=sys.stderr, flush=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the engine until SIGTERM, SIGINT or the command ``quit``."""
+    from rhot_app.engine.advice import calibration_advice
+    from rhot_app.engine.serve import serving
+    from rhot_app.errors import EngineError
+    from rhot_app.keys import load_master_keys
+    from rhot_app.project import load_rig
+    from rhot_app.sources.links import UdpNodes
+
+    if args.video and args.log is None:
+        raise EngineError("--video needs --log FILE: the videos belong to a recording.")
+    logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
+    rig = load_rig(args.rig)
+    if not args.unchecked:
+        _require_acceptable(rig, args.rig)
+    own = load_master_keys().own
+    source = functools.partial(UdpNodes, own=own)
+    with serving(rig, args.rig.absolute(), source, args.directory, own, asked_outputs(args)) as serve:
+        if args.log is not None:
+            serve.engine.record(args.log.absolute(), video=args.video)
+        if args.start:
+            serve.engine.start()
+        if args.json:
+            urls = {output.spec: output.url for output in serve.engine.status().outputs if output.url}
+            print(json.dumps({"pid": os.getpid(), "directory": str(serve.directory.path), "rig": rig.name}
+                             | ({"outputs": urls} if urls else {})), flush=True)
+        else:
+            told = "nodes are told to stream" if args.start else "nodes stream once a client says start"
+            print(f"rhot: the engine of {rig.name} serves clients in {serve.directory.path}; {told}. Ctrl+C ends it.",
+                  file=sys.stderr, flush=True)
+        for advice in calibration_advice(rig):
+            print(f"rhot: {advice.text}", file=sys.stderr, flush=True)
+            print_addresses(serve)
+        serve.server.run()
+    return 0
