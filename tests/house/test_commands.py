@@ -110,6 +110,6 @@ def test_help_loads_no_numerical_library() -> None:
             "from rhot_app.__main__ import SUBCOMMANDS\n"
             "for each in SUBCOMMANDS.values():\n"
             "    importlib.import_module(each.module)\n"
-            "sys.exit(', '.join({'cv2', 'numba', 'scipy'} & set(sys.modules)))")
+            "sys.exit(', '.join({'cv2', 'numba', 'scipy'} & set(sys.modules)) or None)")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
     assert done.returncode == 0, f"loaded by command modules: {done.stderr}"
