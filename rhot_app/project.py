@@ -134,16 +134,22 @@ TrackerKind = Literal["classic", "estimator", "model"]
 TRACKER_KINDS: tuple[TrackerKind, ...] = ("classic", "estimator")
 
 
+IkMethod = Literal["fabrik", "transpose", "pseudo_inverse", "svd", "dls", "newton", "lm", "closed_form"]
+"""What bends the classic tracker's fingers (RHOT chapter 2.2). `fabrik` is the tracker's own: FABRIK, then a descent
+towards the pose prior that allows for the noise of the target. The others meet the target exactly."""
+
+
 class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which tracker makes a hand of the markers, and what it may assume.
 
-    `kind`: `classic` is the thesis's (pair, triangulate, 1-euro, palm fit, FABRIK); `estimator` estimates one hand
-    from every image position. The other fields are the estimator's.
+    `kind`: `classic` is the thesis's (pair, triangulate, 1-euro, palm fit, inverse kinematics by `ik`); `estimator`
+    estimates one hand from every image position. The other fields are the estimator's.
     `variant`: `full` (27 degrees of freedom) or `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT
     2.2 to 2.4). `float_scale`: estimate the hand's size as it moves.
     """
 
     kind: TrackerKind = "classic"
+    ik: IkMethod = "fabrik"
     variant: Literal["full", "coupled"] = "full"
     limits: Literal["anatomical", "thesis"] = "anatomical"
     float_scale: bool = False

@@ -20,13 +20,16 @@ SUMMARIES = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of both commands."""
     installed = SETTINGS if SETTINGS.exists() else None
-    parser.add_argument("--settings", type=Path, required=installed is None, default=installed, metavar="FILE",
+    parser.add_argument("--settings", type=Path, default=installed, metavar="FILE",
                         help="settings of this node (JSON, see docs/node.md); keys lie beside it. Default: those of "
                              f"the installed service, {SETTINGS}")
 
 
 def run(name: str, args: argparse.Namespace) -> int:
     """Run the command `name`; raises SettingsError, TrustError."""
+    if args.settings is None:
+        raise TrustError(f"No node is installed as a service here ({SETTINGS} is missing). Name the settings file that "
+                         f"the node is started with: rhot-node {name} --settings FILE.")
     settings = load_settings(args.settings)
     if name == "pair":
         if settings.trust == "open":

@@ -17,7 +17,9 @@ from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
 from rhot_app.hand.places import with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, JOINT_SLICES, JOINTS, HandPose
-from rhot_app.project import Rig
+from rhot_app.hand.solvers.methods import Method, solve
+from rhot_app.hand.solvers.problem import make_problem
+from rhot_app.project import IkMethod, Rig
 from rhot_app.tracking import locate, trust
 from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.locate import Sheet
@@ -40,7 +42,7 @@ class ClassicTracker:
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
         self._pairing = Pairing(cameras, markers)
         self._association = MarkerAssociation(self._rig)
-        self._hand = HandSolver(with_markers(build_model(rig.hand), rig.markers))
+        self._hand = HandSolver(with_markers(build_model(rig.hand), rig.markers), rig.tracker.ik)
         pixel, position = filter_settings(rig)
         self._filtering = rig.filters.enabled
         self._pixel_filter = OneEuroFilter.from_settings([s for _ in range(cameras) for s in pixel for _ in range(2)])
@@ -204,6 +206,7 @@ Codes = NDArray[np.uint8]
 _INFERRED, _GUESSED = int(Knowledge.INFERRED), int(Knowledge.GUESSED)
 _JOINTS_OF = np.array([(joints.start, joints.stop) for joints in JOINT_SLICES])
 _ANGLES_OF = np.array([(angles.start, angles.stop) for angles in ANGLE_SLICES])
+_FINGER_OF_ANGLE = np.repeat(np.arange(5), np.diff(_ANGLES_OF).ravel())
 
 TARGET_SD_M = 1e-3
 """What a located marker is worth at working distance: a nearly stretched finger is not bent to meet noise."""
@@ -233,13 +236,19 @@ def no_hand(tips: Array) -> SolvedHand:
                       np.full(len(ANGLES), Knowledge.UNKNOWN, np.uint8), np.full((4, 4), np.nan), Knowledge.UNKNOWN)
 
 
+METHODS: dict[IkMethod, Method | None] = {
+    "fabrik": None, "transpose": Method.TRANSPOSE, "pseudo_inverse": Method.PSEUDO_INVERSE, "svd": Method.SVD,
+    "dls": Method.DAMPED, "newton": Method.NEWTON, "lm": Method.LEVENBERG, "closed_form": Method.CLOSED_FORM}
+"""By `ik` of the rig's tracker settings; None: the solver of `rhot_app.hand.finger_ik`."""
+
+
 class HandSolver:
     """Keeps the last pose: the next one starts from it, and what the markers leave open stays as it was.
 
     The model's marker centres are those of the fingertips' paint (`rhot_app.hand.places.with_markers`)."""
 
-    def __init__(self, model: HandModel) -> None:
-        self._model = model
+    def __init__(self, model: HandModel, ik: IkMethod = "fabrik") -> None:
+        self._model, self._method = model, METHODS[ik]
         self.pose: HandPose | None = None
         self._palm: HandPose | None = None  # the last palm fit, whose own angles start the next one
         self._solved_s = 0.0
@@ -280,6 +289,11 @@ class HandSolver:
                         model.base_rotation, model.chain, model.chain_bend, wrist, tips, wrist_knowledge, tip_knowledge,
                         dt_s, self.pose is not None, placed, palm_world, palm_angles, world, angles, points, joints,
                         known)
+        if solved and self._method is not None:
+            located = np.isfinite(tips[:, 0])
+            bent = solve(self._method, make_problem(model, HandPose(world, last.angles), tips)).angles
+            angles[located[_FINGER_OF_ANGLE]] = bent[located[_FINGER_OF_ANGLE]]
+            forward_arrays(model.dh, world, angles, np.empty((model.dh.parent.shape[0], 3, 4)), points)
         if solved:
             self._palm, self.pose, self._solved_s = HandPose(palm_world, palm_angles), HandPose(world, angles), t_s
         return SolvedHand(points[:len(JOINTS)], joints, points[len(JOINTS):], angles, known, world, Knowledge.GUESSED)

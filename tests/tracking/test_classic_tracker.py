@@ -22,7 +22,7 @@ from synthetic_rig import (
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import JOINT_SLICES
-from rhot_app.project import FilterSettings
+from rhot_app.project import FilterSettings, TrackerSettings
 from rhot_app.tracking.state import LATENCY_STAGES, Knowledge
 from rhot_app.tracking.trackers import make_tracker
 
@@ -42,6 +42,13 @@ def test_a_hand_at_two_metres_per_second_is_met_although_the_cameras_are_not_syn
     wide = make_rig(filters=FilterSettings(enabled=False))
     trajectory = hand_trajectory(wide, "fast", 4.0)
     assert compare(wide, states_of(Sight(noise_px=0.0), wide, WIDE, trajectory), trajectory).marker_mm < 0.6
+
+
+@pytest.mark.parametrize("ik", ["transpose", "pseudo_inverse", "svd", "dls", "newton", "lm", "closed_form"])
+def test_every_inverse_kinematics_solver_bends_the_fingers(ik):
+    rig = msgspec.structs.replace(RIG, tracker=TrackerSettings(ik=ik))
+    errors = compare(rig, states_of(rig=rig), GRASP)
+    assert errors.fingertip_mm < 0.6 and errors.marker_mm < 0.5
 
 
 def test_lost_and_late_frames_cost_little():

@@ -117,6 +117,18 @@ def test_fingers_and_limits_are_chosen_from_lists(opened):
     assert dialog.limits_box.currentData() == "anatomical"
 
 
+def test_the_classic_trackers_solver_is_chosen_from_a_list(opened):
+    desk = opened(with_tracker(TrackerSettings()))
+    dialog = desk.dialog
+    assert dialog.solver.isVisible() and not dialog.details.isVisible()
+    QTest.keyClick(dialog.ik_box, Qt.Key.Key_Down)
+    desk.until(lambda: load_rig(desk.path).tracker.ik == "transpose" and dialog.solver.isEnabled())
+    assert "2.13" in dialog.ik_words.text()
+    QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
+    desk.settled("Taken back.")
+    assert load_rig(desk.path).tracker == TrackerSettings()
+
+
 def test_a_size_that_takes_two_lines_is_not_cut_off(opened):
     desk = opened(with_tracker(FLOATING))
     label, desk.engine.running = desk.dialog.size_label, False

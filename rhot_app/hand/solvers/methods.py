@@ -292,7 +292,7 @@ def solve_arrays(method: int, angles: Array, lengths: Array, limits: Array, targ
             chain_points(own, bones, joints[finger], np.empty((3, high - low)))
 
 
-# -- fABRIK for fingers ------------------------------------------------------------------------------------------------
+# -- FABRIK for fingers ------------------------------------------------------------------------------------------------
 
 @njit(cache=True)
 def solve_free(angles: Array, lengths: Array, target: Array, tolerance: float, max_iterations: int,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -27,6 +27,7 @@ from rhot_app.tracking.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.job import Job
 from rhot_app.ui.models.words import (
+    IK_METHODS,
     KINDS,
     LIMITS,
     SIZE_MEANING,
@@ -60,6 +61,7 @@ class TrackerDialog(QDialog):
         self._made: list[RigChange] = []
         self._job: Job | None = None
         self.kinds = {kind: QRadioButton(title) for kind, (title, _) in KINDS.items()}
+        self.ik_box, self.ik_words = _choices(IK_METHODS), _sentence()
         self.variant_box, self.variant_words = _choices(VARIANTS), _sentence()
         self.limits_box, self.limits_words = _choices(LIMITS), _sentence()
         self.size_check = QCheckBox("Estimate the hand's size")
@@ -94,16 +96,11 @@ class TrackerDialog(QDialog):
             layout.addWidget(words)
         self.obstacle_label.setContentsMargins(24, 0, 0, 0)
         layout.addWidget(self.obstacle_label)
-        self.details = QWidget()
-        form = QGridLayout(self.details)
-        form.setContentsMargins(24, 8, 0, 0)
-        form.setVerticalSpacing(6)
-        form.setColumnStretch(1, 1)
-        for row, (name, part) in enumerate((
-                ("Fingers", self.variant_box), ("", self.variant_words), ("Limits", self.limits_box),
-                ("", self.limits_words), ("Size", self.size_check), ("", self.size_label), ("", self.size_button))):
-            form.addWidget(QLabel(name), row, 0)
-            form.addWidget(part, row, 1)
+        self.solver = _form((("Fingers bent by", self.ik_box), ("", self.ik_words)))
+        self.details = _form((
+            ("Fingers", self.variant_box), ("", self.variant_words), ("Limits", self.limits_box),
+            ("", self.limits_words), ("Size", self.size_check), ("", self.size_label), ("", self.size_button)))
+        layout.addWidget(self.solver)
         layout.addWidget(self.details)
         layout.addWidget(self.sentence)
         layout.addStretch(1)
@@ -116,7 +113,7 @@ class TrackerDialog(QDialog):
     def _connect_parts(self) -> None:
         for kind in self.kinds.values():
             kind.clicked.connect(self._choose)
-        for box in (self.variant_box, self.limits_box):
+        for box in (self.ik_box, self.variant_box, self.limits_box):
             box.activated.connect(self._choose)
         self.size_check.clicked.connect(self._choose)
         self.size_button.clicked.connect(self.use_size)
@@ -135,7 +132,7 @@ class TrackerDialog(QDialog):
     def chosen(self) -> TrackerSettings:
         """What the form says."""
         return TrackerSettings(
-            kind=self._kind(), variant=self.variant_box.currentData(),
+            kind=self._kind(), ik=self.ik_box.currentData(), variant=self.variant_box.currentData(),
             limits=self.limits_box.currentData(), float_scale=self.size_check.isChecked())
 
     def _choose(self) -> None:
@@ -209,6 +206,8 @@ class TrackerDialog(QDialog):
         """The form as the rig is."""
         settings = self._rig.tracker
         self.kinds[settings.kind].setChecked(True)
+        self.ik_box.setCurrentIndex(self.ik_box.findData(settings.ik))
+        self.ik_words.setText(IK_METHODS[settings.ik][1])
         self.variant_box.setCurrentIndex(self.variant_box.findData(settings.variant))
         self.limits_box.setCurrentIndex(self.limits_box.findData(settings.limits))
         self.size_check.setChecked(settings.float_scale)
@@ -217,6 +216,7 @@ class TrackerDialog(QDialog):
         obstacle = estimator_obstacle(self._rig)
         self.obstacle_label.setText("" if obstacle is None else f"{obstacle.why} {obstacle.remedy}")
         self.obstacle_label.setVisible(bool(self.obstacle_label.text()))
+        self.solver.setVisible(settings.kind == "classic")
         self.details.setVisible(settings.kind != "classic")
         self._enable()
         self.look()
@@ -224,10 +224,13 @@ class TrackerDialog(QDialog):
 
     def _fit(self) -> None:
         """As tall as its sentences, which wrap, need it."""
-        inner, layout = self.details.layout(), self.layout()
-        if inner is not None and layout is not None:
-            inner.invalidate()  # what has just been shown or hidden there counts now, not with the next event
-            inner.activate()
+        layout = self.layout()
+        if layout is not None:
+            for part in (self.solver, self.details):
+                inner = part.layout()
+                if inner is not None:
+                    inner.invalidate()  # what has just been shown or hidden there counts now, not with the next event
+                    inner.activate()
             layout.activate()
             self.setFixedHeight(layout.totalHeightForWidth(_WIDTH_PX))
 
@@ -237,6 +240,7 @@ class TrackerDialog(QDialog):
         self.kinds["classic"].setEnabled(resting)
         self.kinds["estimator"].setEnabled(resting and possible)
         self.details.setEnabled(resting and possible)
+        self.solver.setEnabled(resting)
         self.undo_button.setEnabled(resting and bool(self._made))
         self.close_button.setEnabled(resting)
 
@@ -255,6 +259,18 @@ class TrackerDialog(QDialog):
             self.size_label.setVisible(bool(text))
             self.size_button.setVisible(bool(text))
             self._fit()
+
+
+def _form(rows: Sequence[tuple[str, QWidget]]) -> QWidget:
+    widget = QWidget()
+    form = QGridLayout(widget)
+    form.setContentsMargins(24, 8, 0, 0)
+    form.setVerticalSpacing(6)
+    form.setColumnStretch(1, 1)
+    for row, (name, part) in enumerate(rows):
+        form.addWidget(QLabel(name), row, 0)
+        form.addWidget(part, row, 1)
+    return widget
 
 
 def _choices(words: dict[str, tuple[str, str]]) -> QComboBox:

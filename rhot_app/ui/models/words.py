@@ -199,6 +199,16 @@ KINDS: Final = {
                   "marker that one camera sees counts, hidden fingers are carried on, and every joint says how well "
                   "it is known. It predicts, and smooths recordings. Needs calibrated cameras with clocks."),
 }
+IK_METHODS: Final = {
+    "fabrik": ("FABRIK, allowing for noise", "FABRIK, then a descent to the natural pose. The default."),
+    "transpose": ("Jacobian transpose", "Equation 2.13. Slow where a finger is nearly straight."),
+    "pseudo_inverse": ("pseudo-inverse", "Equation 2.16. Jumps near a straight finger."),
+    "svd": ("singular values", "Equation 2.20: the pseudo-inverse without its small singular values."),
+    "dls": ("damped least squares", "Equation 2.23."),
+    "newton": ("Newton", "Equation 2.24, with the exact second derivatives."),
+    "lm": ("Levenberg-Marquardt", "Damped Gauss-Newton steps within the limits."),
+    "closed_form": ("closed form", "Equation 2.4: the last two joints bend together, DIP = 2/3 PIP."),
+}
 VARIANTS: Final = {
     "full": ("full: every joint by itself", "27 degrees of freedom. The default."),
     "coupled": ("coupled: last joints follow", "DIP = 2/3 PIP, and the middle finger does not spread. Steadier with "
@@ -219,7 +229,7 @@ SETTLED_SD = 0.02
 def settings_text(settings: TrackerSettings) -> str:
     """One line, e.g. "estimator, full, anatomical limits, size estimated"."""
     if settings.kind == "classic":
-        return "classic"
+        return "classic" if settings.ik == "fabrik" else f"classic, {IK_METHODS[settings.ik][0]}"
     size = ", size estimated" if settings.float_scale else ""
     return f"estimator, {settings.variant}, {settings.limits} limits{size}"
 
