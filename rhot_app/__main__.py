@@ -37,6 +37,7 @@ SUBCOMMANDS = {
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
     "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),
     "check": Subcommand("rhot_app.calibration.commands.check", "check a rig file for what cannot be"),
+    "certify": Subcommand("rhot_app.certificate.certify_command", "measure a rig as the thesis does, with intervals"),
     "hand": Subcommand("rhot_app.hand.hand_command", "look at a hand file, or make one of a given length"),
     "object": Subcommand("rhot_app.objects.object_command", "check an object file, or find the object in still images"),
     "nodes": Subcommand("rhot_app.sources.nodes_command", "look for nodes on the network"),

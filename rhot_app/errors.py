@@ -58,3 +58,7 @@ class ExportError(RhotError):
 
 class OutputError(RhotError):
     """A live stream to another program cannot be what was asked, opened, or written to."""
+
+
+class CertificateError(RhotError):
+    """A certificate cannot be made or read: a recording, a statement about it, or the disk is in the way."""

@@ -29,9 +29,12 @@ from rhot_app.export.plan import ExportOptions, require
 from rhot_app.export.recording import TrackedLog
 from rhot_app.tracking.state import Knowledge
 from rhot_node.errors import NodeError
-from rhot_node.files import write_atomically
+from rhot_node.files import write_atomically, write_document
 
 MANIFEST: Final = "batch.json"
+
+CERTIFICATE: Final = "certificate"
+"""The `format` of a job whose log is a folder of recordings (``protocol.json``), and whose file is a certificate."""
 
 Status = Literal["done", "losses", "failed", "interrupted"]
 
@@ -68,7 +71,7 @@ Ends = Generator[Outcome, None, None]
 def jobs_of(logs: Sequence[Path], folder: Path, format_name: str | None, rig: Path | None,
             options: ExportOptions) -> list[Job]:
     """The jobs of some logs, each named after its log. Raises ExportError when two would have the same name."""
-    ending = ".json" if format_name is None else FORMATS[format_name].endings[0]
+    ending = ".json" if format_name in (None, CERTIFICATE) else FORMATS[str(format_name)].endings[0]
     named: dict[str, Path] = {}
     for log in logs:
         other = named.setdefault(log.stem, log.absolute())
@@ -90,6 +93,8 @@ def run_job(job: Job) -> Outcome:
     try:
         if job.format is None:
             states, losses = _summarise(job)
+        elif job.format == CERTIFICATE:
+            states, losses = _certify(job)
         else:
             done = export_log(job.log, job.out, format_name=job.format, rig=job.rig, options=job.options, again=True)
             states, losses = done.states, done.losses
@@ -116,6 +121,22 @@ def _summarise(job: Job) -> tuple[int, tuple[str, ...]]:
             "losses": tracked.losses, **sums.figures(tracked.rig.markers.ids)}
         write_atomically(job.out, json.dumps(figures, indent=1).encode() + b"\n")
         return tracked.count, tuple(tracked.losses)
+
+
+def _certify(job: Job) -> tuple[int, tuple[str, ...]]:
+    """Write the certificate of a folder of recordings: JSON, and HTML and PDF beside it. Without a rig it is that of
+    the first log. Returns how many lines were judged."""
+    from rhot_app.certificate.certify import certify, rig_of
+    from rhot_app.certificate.recordings import read_protocol
+    from rhot_app.certificate.report import to_html, to_pdf
+    from rhot_app.project import load_rig
+
+    protocol = read_protocol(job.log)
+    made = certify(job.log, protocol, rig_of(job.log, protocol) if job.rig is None else load_rig(job.rig))
+    write_atomically(job.out.with_suffix(".html"), to_html(made).encode())
+    write_atomically(job.out.with_suffix(".pdf"), to_pdf(made))
+    write_document(job.out, made)
+    return len(made.lines) - made.count("not measured"), ()
 
 
 class _Sums:
@@ -196,11 +217,13 @@ class Manifest:
     def order(self, job: Job) -> dict[str, Any] | None:
         """What decides about a job's result; None when its log is not to be had."""
         try:
-            log, rig = job.log.stat(), b"" if job.rig is None else job.rig.read_bytes()
+            files = sorted(job.log.iterdir()) if job.log.is_dir() else [job.log]
+            logs, rig = [file.stat() for file in files], b"" if job.rig is None else job.rig.read_bytes()
         except OSError:
             return None
         how = json.dumps([version("rhot"), job.format, asdict(job.options)], sort_keys=True).encode() + rig
-        return {"log": str(job.log), "size": log.st_size, "mtime_ns": log.st_mtime_ns,
+        return {"log": str(job.log), "size": sum(log.st_size for log in logs),
+                "mtime_ns": max((log.st_mtime_ns for log in logs), default=0),
                 "order": hashlib.sha256(how).hexdigest()}
 
     def unchanged(self, job: Job) -> Outcome | None:

@@ -16,9 +16,10 @@ FAILED = 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot batch``."""
-    parser.add_argument("paths", type=Path, nargs="+", metavar="LOG", help="raw logs")
-    parser.add_argument("--do", choices=("track", "export"), required=True,
-                        help="track: a JSON summary of each log; export: a file of --format")
+    parser.add_argument("paths", type=Path, nargs="+", metavar="LOG", help="raw logs; with --do certify folders")
+    parser.add_argument("--do", choices=("track", "export", "certify"), required=True,
+                        help="track: a JSON summary of each log; export: a file of --format; certify: a certificate of "
+                             "each folder of recordings that rhot certify or the app made")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR",
                         help="folder of the results, named after their logs; batch.json in it lists what is done")
     parser.add_argument("--workers", type=int, default=None, metavar="N", help="processes (default: one per processor)")
@@ -32,15 +33,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Do all, print a table; 2 when a log failed, 3 when one was read with losses."""
     from rhot_app.errors import ExportError
-    from rhot_app.export.batch import jobs_of, run_batch
+    from rhot_app.export.batch import CERTIFICATE, jobs_of, run_batch
     from rhot_app.export.export import check_options, format_of
     from rhot_app.progress import ProgressLine
 
-    if args.do == "track" and args.format is not None:
+    if args.do != "export" and args.format is not None:
         raise ExportError("--format belongs to --do export; leave --format out, or give --do export.")
-    name = None if args.do == "track" else format_of(args.format, None)
+    named = {"track": None, "certify": CERTIFICATE}
+    name = named[args.do] if args.do in named else format_of(args.format, None)
     options = options_of(args)
-    check_options(name, options)
+    check_options(None if name == CERTIFICATE else name, options)
     workers = _processors() if args.workers is None else args.workers
     if workers < 1:
         raise ExportError(f"--workers is 1 or more, not {workers}.")

@@ -42,6 +42,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                     "--paper", "--out"),
     "rhot check": ("--rig", "--json"),
     "rhot history": ("--rig", "--restore", "--json"),
+    "rhot certify": ("--rig", "--recordings", "--step", "--facing", "--marker", "--rod-mm", "--rod-markers",
+                     "--simulated", "--sketched", "--seed", "--keep", "--out", "--compare", "--json"),
     "rhot calibrate stereo": (
         "--left", "--right", "--camera", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
         "--left-intrinsics", "--right-intrinsics", "--intrinsics", "--refine-intrinsics", "--baseline-mm", "--ruler-mm",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -164,15 +164,31 @@ def _ruler_numbers(foot: float) -> Iterator[Text]:
 _MM_PER_POINT = 25.4 / 72.0
 _FONT = "Helvetica"
 
+Ink = tuple[float, float, float]
+"""Red, green and blue, 0..1."""
+
+_BOLD, _BLACK_STROKE = ' font-weight="bold"', ' stroke="black"'
+BLACK: Ink = (0.0, 0.0, 0.0)
+
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A black rectangle; its upper left corner and its size, mm, y down."""
+    """A filled rectangle; its upper left corner and its size, mm, y down."""
 
     x: float
     y: float
     width: float
     height: float
+    ink: Ink = BLACK
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """A line through `points` (x, y), mm, `width` mm thick."""
+
+    points: tuple[tuple[float, float], ...]
+    width: float
+    ink: Ink = BLACK
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,17 +199,21 @@ class Text:
     y: float
     height: float
     text: str
+    bold: bool = False
+    ink: Ink = BLACK
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """One page of `width` x `height` mm; everything that is not a box or text is white."""
+    """One page of `width` x `height` mm; everything that is not a box, a stroke or text is white. Strokes lie on the
+    boxes, text on both."""
 
     width: float
     height: float
     boxes: tuple[Box, ...]
     texts: tuple[Text, ...]
     title: str
+    strokes: tuple[Stroke, ...] = ()
 
     def to_svg(self) -> bytes:
         """The page as SVG; one user unit is one millimetre."""
@@ -204,45 +224,86 @@ class Drawing:
             f'<rect width="{_number(self.width)}" height="{_number(self.height)}" fill="white"/>',
             '<g fill="black" shape-rendering="crispEdges">',
             *(f'<rect x="{_number(box.x)}" y="{_number(box.y)}" width="{_number(box.width)}" '
-              f'height="{_number(box.height)}"/>' for box in self.boxes),
+              f'height="{_number(box.height)}"{_svg_ink("fill", box.ink)}/>' for box in self.boxes),
             "</g>",
+            *(f'<polyline fill="none"{_svg_ink("stroke", stroke.ink) or _BLACK_STROKE} '
+              f'stroke-width="{_number(stroke.width)}" '
+              f'points="{_svg_points(stroke)}"/>'
+              for stroke in self.strokes),
             *(f'<text x="{_number(text.x)}" y="{_number(text.y)}" font-family="{_FONT}, Arial, sans-serif" '
-              f'font-size="{_number(text.height)}">{_escaped(text.text)}</text>' for text in self.texts),
+              f'font-size="{_number(text.height)}"{_BOLD if text.bold else ""}'
+              f'{_svg_ink("fill", text.ink)}>{_escaped(text.text)}</text>' for text in self.texts),
             "</svg>", ""]
         return "\n".join(lines).encode()
 
     def to_pdf(self) -> bytes:
         """The page as PDF 1.4."""
-        box = f"[0 0 {_points(self.width)} {_points(self.height)}]"
-        content = self._pdf_content()
-        objects = [
-            b"<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
-            b"<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
-            (f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents 4 0 R "
-             "/Resources << /Font << /F 5 0 R >> >> >>").encode(),
-            b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content),
-            f"<< /Type /Font /Subtype /Type1 /BaseFont /{_FONT} /Encoding /WinAnsiEncoding >>".encode(),
-            b"<< /Title (" + _pdf_text(self.title) + b") >>",
-        ]
-        data, offsets = bytearray(b"%PDF-1.4\n"), []
-        for number, body in enumerate(objects, start=1):
-            offsets.append(len(data))
-            data += b"%d 0 obj\n%s\nendobj\n" % (number, body)
-        start = len(data)
-        data += b"xref\n0 %d\n0000000000 65535 f \n" % (len(objects) + 1)
-        data += b"".join(b"%010d 00000 n \n" % offset for offset in offsets)
-        data += b"trailer\n<< /Size %d /Root 1 0 R /Info 6 0 R >>\nstartxref\n%d\n%%%%EOF\n" % (len(objects) + 1, start)
-        return bytes(data)
+        return pdf_of((self,), self.title)
 
-    def _pdf_content(self) -> bytes:
+    def pdf_content(self) -> bytes:
         """The page's marks; PDF counts in points from the lower left corner."""
-        lines = [f"{_points(box.x)} {_points(self.height - box.y - box.height)} {_points(box.width)} "
-                 f"{_points(box.height)} re".encode() for box in self.boxes]
+        lines, ink = [], BLACK
+        for box in self.boxes:
+            if box.ink != ink:
+                lines += [b"f", _pdf_ink(box.ink, b"rg")]
+                ink = box.ink
+            lines.append(f"{_points(box.x)} {_points(self.height - box.y - box.height)} {_points(box.width)} "
+                         f"{_points(box.height)} re".encode())
         lines.append(b"f")
-        lines += [b"BT /F %s Tf %s %s Td (%s) Tj ET" % (
-            _points(text.height).encode(), _points(text.x).encode(), _points(self.height - text.y).encode(),
-            _pdf_text(text.text)) for text in self.texts]
+        for stroke in self.strokes:
+            ends = [f"{_points(x)} {_points(self.height - y)} {'l' if k else 'm'}".encode()
+                    for k, (x, y) in enumerate(stroke.points)]
+            lines += [_pdf_ink(stroke.ink, b"RG"), f"{_points(stroke.width)} w".encode(), *ends, b"S"]
+        for text in self.texts:
+            if text.ink != ink:
+                lines.append(_pdf_ink(text.ink, b"rg"))
+                ink = text.ink
+            lines.append(b"BT /%s %s Tf %s %s Td (%s) Tj ET" % (
+                b"B" if text.bold else b"F", _points(text.height).encode(), _points(text.x).encode(),
+                _points(self.height - text.y).encode(), _pdf_text(text.text)))
         return b"\n".join(lines)
+
+
+def pdf_of(pages: Sequence[Drawing], title: str) -> bytes:
+    """Pages as one PDF 1.4, in true scale."""
+    first = 6  # object of the first page; each page is followed by its content
+    kids = " ".join(f"{first + 2 * k} 0 R" for k in range(len(pages)))
+    objects = [
+        b"<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
+        f"<< /Type /Pages /Kids [{kids}] /Count {len(pages)} >>".encode(),
+        f"<< /Type /Font /Subtype /Type1 /BaseFont /{_FONT} /Encoding /WinAnsiEncoding >>".encode(),
+        f"<< /Type /Font /Subtype /Type1 /BaseFont /{_FONT}-Bold /Encoding /WinAnsiEncoding >>".encode(),
+        b"<< /Title (" + _pdf_text(title) + b") >>",
+    ]
+    for k, page in enumerate(pages):
+        content = page.pdf_content()
+        objects += [
+            (f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {_points(page.width)} {_points(page.height)}] "
+             f"/Contents {first + 2 * k + 1} 0 R /Resources << /Font << /F 3 0 R /B 4 0 R >> >> >>").encode(),
+            b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content)]
+    data, offsets = bytearray(b"%PDF-1.4\n"), []
+    for number, body in enumerate(objects, start=1):
+        offsets.append(len(data))
+        data += b"%d 0 obj\n%s\nendobj\n" % (number, body)
+    start = len(data)
+    data += b"xref\n0 %d\n0000000000 65535 f \n" % (len(objects) + 1)
+    data += b"".join(b"%010d 00000 n \n" % offset for offset in offsets)
+    data += b"trailer\n<< /Size %d /Root 1 0 R /Info 5 0 R >>\nstartxref\n%d\n%%%%EOF\n" % (len(objects) + 1, start)
+    return bytes(data)
+
+
+def _svg_points(stroke: Stroke) -> str:
+    return " ".join(f"{_number(x)},{_number(y)}" for x, y in stroke.points)
+
+
+def _svg_ink(attribute: str, ink: Ink) -> str:
+    """Nothing for black, which is the group's own."""
+    hexadecimal = "".join(f"{round(255 * part):02x}" for part in ink)
+    return "" if ink == BLACK else f' {attribute}="#{hexadecimal}"'
+
+
+def _pdf_ink(ink: Ink, operator: bytes) -> bytes:
+    return " ".join(_number(part) for part in ink).encode() + b" " + operator
 
 
 def _points(millimetres: float) -> str:

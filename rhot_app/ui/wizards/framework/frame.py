@@ -146,7 +146,7 @@ class WizardFrame:
 
     def _show_next(self, view: StepView, step: Step, working: bool) -> None:
         if isinstance(step, AcceptStep):
-            self.next_button.setText("Close" if step.state == "used" else "Use this calibration")
+            self.next_button.setText("Close" if step.state == "used" else step.use_label)
             self.next_button.setEnabled(step.usable or step.state == "used")
             self.close_button.setVisible(step.state != "used")
         else:

@@ -85,6 +85,7 @@ class MovementPage(Page):
 # -- What every wizard with recorded movements needs: the states, a folder for the logs, and an end that ---------------
 
 PageT = TypeVar("PageT", bound=MovementPage)
+StepT = TypeVar("StepT", bound=MovementStep)
 
 
 class Movements:
@@ -95,7 +96,7 @@ class Movements:
             raise EngineError("this window cannot hear the hand; open the wizard from the main window.")
         self.states = StateFeed(kit.listen)
         self._connect = kit.connect
-        self._folder = Path(tempfile.mkdtemp(prefix="rhot-wizard-"))
+        self.folder = Path(tempfile.mkdtemp(prefix="rhot-wizard-"))
         self._steps: list[MovementStep] = []
 
     def page(self, title: str, sentence: str, seconds: float, coach: Callable[[], Coach]) -> MovementPage:
@@ -105,9 +106,13 @@ class Movements:
     def page_of(self, make: Callable[[MovementStep, Callable[[], Asker], StateFeed], PageT], title: str, sentence: str,
                 seconds: float, coach: Callable[[], Coach]) -> PageT:
         """The same on a page that shows more."""
-        step = MovementStep(title, sentence, seconds, self._folder, coach, self.states.recent)
-        self._steps.append(step)
+        step = self.add(MovementStep(title, sentence, seconds, self.folder, coach, self.states.recent))
         return make(step, self._connect, self.states)
+
+    def add(self, step: StepT) -> StepT:
+        """A step made elsewhere, which `end` shall end as well; it writes into `folder`."""
+        self._steps.append(step)
+        return step
 
     def end(self) -> None:
         """End a recording that still runs, and throw the logs away. In a worker."""
@@ -118,4 +123,4 @@ class Movements:
                 asker.command("record_stop")
             finally:
                 asker.close()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        shutil.rmtree(self.folder, ignore_errors=True)

@@ -100,6 +100,8 @@ WIZARDS: tuple[Wizard, ...] = (
            "bones calibration"),
     Wizard("filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
            "filter tuning"),
+    Wizard("certificate", "Certificate", "How good this rig is, measured as the thesis did, with 95 % intervals: five "
+           "minutes.", "certificate"),
 )
 
 

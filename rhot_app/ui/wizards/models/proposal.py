@@ -161,6 +161,7 @@ class AcceptStep(Step):
     `begin` and `finish`."""
 
     title = "Before and after"
+    use_label = "Use this calibration"
 
     def __init__(self, propose: Callable[[], Proposal | None], missing: str = "There is no result yet.") -> None:
         """`missing` is shown while `propose` gives None."""

@@ -1,0 +1,159 @@
+"""``rhot certify``: measure a rig as chapter 7 of the thesis does, and write its certificate."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import tempfile
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rhot_app.certificate.document import Certificate
+    from rhot_app.certificate.recordings import ProtocolFile
+    from rhot_app.progress import ProgressLine
+    from rhot_app.project import Rig
+
+DIFFERS = 1
+"""Exit code of a certificate with a line that differs: the work is done, and its result is no."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot certify``."""
+    parser.add_argument("--rig", type=Path, default=None, metavar="FILE", help="the rig file that is certified")
+    parser.add_argument("--recordings", type=Path, default=None, metavar="DIR",
+                        help="recordings made before, with protocol.json; without it, and without --step and "
+                             "--simulated, the running engine records now, step by step in this terminal")
+    parser.add_argument("--step", action="append", default=[], metavar="NAME=FILE",
+                        help="a raw log as one step: static=FILE, ruler:MM=FILE (repeatable), rod=FILE, plumb=FILE")
+    parser.add_argument("--facing", choices=("palm", "back"), default=None,
+                        help="which side of the hand faced the cameras in the static step (default: no hand)")
+    parser.add_argument("--marker", default=None, metavar="ID", help="the marker that was held along the ruler")
+    parser.add_argument("--rod-mm", type=float, default=None, metavar="MM", help="the rod, from marker to marker")
+    parser.add_argument("--rod-markers", default=None, metavar="A,B", help="the rod's markers, the upper one first")
+    parser.add_argument("--simulated", action="store_true",
+                        help="the whole protocol on the simulated rig, unattended; --rig is then optional")
+    parser.add_argument("--sketched", action="store_true", help="the simulated rig without pictures, much faster")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the simulated rig (default 1)")
+    parser.add_argument("--keep", type=Path, default=None, metavar="DIR", help="new folder that keeps the recordings")
+    parser.add_argument("--out", type=Path, default=None, metavar="DIR",
+                        help="new folder for certificate.html, .pdf and .json (default: certificate-DATE-TIME)")
+    parser.add_argument("--compare", type=Path, nargs=2, default=None, metavar=("OLD", "NEW"),
+                        help="two certificates (their folders or JSON files): what changed beyond the intervals")
+    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Collect, solve, judge, report; returns 1 when a line differs."""
+    from rhot_app.errors import CertificateError
+    from rhot_app.progress import ProgressLine, within
+
+    if args.compare is not None:
+        return _compare(args)
+    out = args.out or Path(f"certificate-{datetime.now():%Y%m%d-%H%M%S}")
+    _check(args, out)
+    line = ProgressLine("certificate", sys.stderr)
+    with contextlib.ExitStack() as stack:
+        folder = args.recordings or _folder(args, stack)
+        rig, protocol = _recorded(args, folder, line)
+        from rhot_app.certificate.certify import certify
+        from rhot_app.certificate.report import write_report
+
+        try:
+            certificate = certify(folder, protocol, rig, within(line.report, 0.5 if args.simulated else 0.0, 1.0))
+        except OSError as exc:
+            raise CertificateError(f"{folder}: cannot be read ({exc.strerror}).") from exc
+        guided = not (args.recordings or args.step or args.simulated)  # what a person has recorded is kept
+        write_report(out, certificate, recordings=(folder, protocol) if guided else None)
+    line.finish()
+    _tell(certificate, out, as_json=args.json)
+    return DIFFERS if certificate.count("differs") else 0
+
+
+def _check(args: argparse.Namespace, out: Path) -> None:
+    """Before the work, not after."""
+    from rhot_app.errors import CertificateError
+
+    if args.rig is None and not args.simulated:
+        raise CertificateError("--rig FILE says which rig is certified; or give --simulated.")
+    if sum((args.recordings is not None, bool(args.step), args.simulated)) > 1:
+        raise CertificateError("--recordings, --step and --simulated exclude each other.")
+    if args.sketched and not args.simulated:
+        raise CertificateError("--sketched is of the simulated rig: give --simulated too.")
+    if args.seed < 0:
+        raise CertificateError(f"--seed is 0 or more, not {args.seed}.")
+    for folder in (out, args.keep):
+        if folder is not None and folder.exists():
+            raise CertificateError(f"{folder} exists already; choose another folder or remove it.")
+        if folder is not None and not folder.absolute().parent.is_dir():
+            raise CertificateError(f"{folder.absolute().parent} is not a folder; create it first.")
+    if not (args.recordings or args.step or args.simulated or sys.stdin.isatty()):
+        raise CertificateError("there is no terminal to ask in: give --recordings DIR, --step NAME=FILE or "
+                               "--simulated.")
+
+
+def _folder(args: argparse.Namespace, stack: contextlib.ExitStack) -> Path:
+    """Where recordings are made: kept or thrown away."""
+    if args.keep is None:
+        return Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rhot-certify-")))
+    args.keep.mkdir()
+    return Path(args.keep.absolute())
+
+
+def _recorded(args: argparse.Namespace, folder: Path, line: ProgressLine) -> tuple[Rig, ProtocolFile]:
+    """The rig, and what there is of it; recordings are made where none are given."""
+    from rhot_app.certificate.collect import collect, protocol_of_steps
+    from rhot_app.certificate.recordings import read_protocol
+    from rhot_app.progress import within
+    from rhot_app.project import load_rig
+
+    rig = None if args.rig is None else load_rig(args.rig)
+    if args.simulated:
+        from rhot_app.certificate.simulated import record_protocol, simulated_rig
+        from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+
+        scene = make_scene(twin_defaults(), args.seed)
+        protocol = record_protocol(scene, folder, sketched=args.sketched, progress=within(line.report, 0.0, 0.5))
+        return rig or simulated_rig(scene), protocol
+    assert rig is not None
+    if args.step:
+        return rig, protocol_of_steps(args.step, facing=args.facing, marker=args.marker, rod_mm=args.rod_mm,
+                                      rod_markers=args.rod_markers)
+    if args.recordings is not None:
+        return rig, read_protocol(args.recordings)
+    from rhot_app.engine.client import EngineClient
+
+    with EngineClient(states=False, events=False) as engine:
+        return rig, collect(folder, rig, engine, input)
+
+
+def _tell(certificate: Certificate, out: Path, *, as_json: bool) -> None:
+    if as_json:
+        import msgspec
+
+        print(msgspec.json.encode({"out": str(out.absolute()), "summary": certificate.summary,
+                                   "certificate": certificate}).decode())
+        return
+    print(certificate.summary)
+    for line in certificate.lines:
+        print(f"  [{line.verdict}] {line.title}: "
+              f"{' '.join(text for text in (line.sentence, line.cause, line.remedy) if text)}")
+    print(f"Written: {out / 'certificate.html'}, certificate.pdf, certificate.json")
+
+
+def _compare(args: argparse.Namespace) -> int:
+    from rhot_app.certificate.document import compare, read_certificate
+
+    found, notes = compare(*(read_certificate(path) for path in args.compare))
+    changed = [one for one in found if one.changed]
+    if args.json:
+        import json
+
+        print(json.dumps({"compared": len(found), "changed": [one.sentence for one in changed], "notes": notes}))
+        return 0
+    print(f"{len(changed)} of {len(found)} figures changed beyond their intervals.")
+    for sentence in [*(one.sentence for one in changed), *notes]:
+        print(f"  {sentence}")
+    return 0

@@ -1,0 +1,258 @@
+"""The protocol on the simulated rig, unattended: recordings as an operator would make them, and their statements.
+
+The operator is simulated too: a ruler is read to half a millimetre, a rod measured likewise. With pictures, the nodes'
+own detector finds the markers; without (`sketched`) an ideal one does, a hundred times faster.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.certificate.latency import flash_edges
+from rhot_app.certificate.recordings import (
+    READING_SD_M,
+    FlashStep,
+    PlumbStep,
+    ProtocolFile,
+    RodStep,
+    RulerStep,
+    StaticStep,
+    write_protocol,
+)
+from rhot_app.evaluation.fault_injection import changed, lost
+from rhot_app.progress import Progress, silent
+from rhot_app.project import Rig
+from rhot_app.recording.raw_log import LogReader, Record
+from rhot_app.simulator.nodes.film import Report, for_each_camera
+from rhot_app.simulator.nodes.node_log import CABLE, T0_MASTER_NS, NodeSender, write_node_log
+from rhot_app.simulator.nodes.nodes import NodePorts
+from rhot_app.simulator.nodes.shot import Shot, make_renderer, make_shot
+from rhot_app.simulator.render.body import PALM_GROUP, POINT_M, SKIN
+from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, RigidTarget
+from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
+from rhot_app.simulator.scene.scene_description import MarkerShow
+from rhot_app.simulator.scene.scene_objects import MarkerPath, SceneObject
+from rhot_app.simulator.truth.points import LOG_NAME, PointNoise, write_points
+from rhot_node.__main__ import make_detector
+from rhot_node.detect.image import from_i420
+from rhot_node.wire.messages import MarkerObservation
+
+Array = NDArray[np.float64]
+
+_LONGEST_ROD_M = 0.3
+_SWING = np.array([0.25, 0.15, 0.17])  # of the scene's half height right, down, and of its distance away
+
+DISTANCES_M = (0.20, 0.25, 0.30, 0.35, 0.40, 0.45, 0.50, 0.55, 0.60, 0.65, 0.70, 0.75, 0.80, 0.85, 0.90, 0.95, 1.00)
+"""Those of table 10.1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lengths:
+    """How long each step is recorded, s, and how late the simulated screen is."""
+
+    static_s: float = 10.0
+    distance_s: float = 1.5
+    rod_s: float = 20.0
+    flash_s: float = 20.0
+    plumb_s: float = 3.0
+    screen_s: float = 0.012
+    distances_m: tuple[float, ...] = DISTANCES_M
+
+
+def simulated_rig(scene: Scene) -> Rig:
+    """The rig that a perfect calibration of the scene would give."""
+    return build_rig(scene, (NodePorts(0, 0, 0),) * len(scene.names))
+
+
+def record_protocol(scene: Scene, folder: Path, *, sketched: bool, lengths: Lengths | None = None,
+                    progress: Progress = silent) -> ProtocolFile:
+    """Make every recording of the protocol and ``protocol.json`` in `folder`, which exists. Raises SimulatorError."""
+    lengths = lengths or Lengths()
+    rng = np.random.default_rng([scene.seed, 0xCE47])
+    ids = scene.markers.ids
+    first, second = ids[0], ids[1]
+    todo = 4 + len(lengths.distances_m)
+    step = iter(range(todo))
+
+    def film(name: str, shot: Shot) -> str:
+        number = next(step)
+        progress(f"recording {name} on the simulated rig", number / todo)
+        _record(shot, folder / f"{name}.rhotlog", None, sketched=sketched)
+        return f"{name}.rhotlog"
+
+    static = StaticStep(film("static", make_shot(scene, "still", lengths.static_s)), facing=scene.settings.facing)
+    ruler = []
+    for k, distance in enumerate(lengths.distances_m):
+        shot = make_shot(_reseeded(scene, k), MarkerShow(marker=first, distance_m=distance), lengths.distance_s)
+        stated_mm = round(1e3 * (distance + rng.normal(0.0, READING_SD_M)), 1)
+        ruler.append(RulerStep(film(f"ruler_{1e3 * distance:04.0f}mm", shot), stated_mm, first))
+    rod = RodStep(film("rod", _rod_shot(scene, lengths.rod_s, still=False)),
+                  round(1e3 * (rod_length(scene) + rng.normal(0.0, READING_SD_M)), 1), (first, second))
+    edges = tuple((T0_MASTER_NS + round(1e9 * t), on) for t, on in flash_edges(lengths.flash_s, scene.seed))
+    progress("recording flash on the simulated rig", next(step) / todo)
+    record_flash(scene, folder / "flash.rhotlog", edges, lengths.screen_s, sketched=sketched)
+    flash = FlashStep("flash.rhotlog", first, edges)
+    plumb = PlumbStep(film("plumb", _rod_shot(scene, lengths.plumb_s, still=True)), first, second)
+    protocol = ProtocolFile(static, tuple(ruler), rod, flash, plumb, simulated=True)
+    write_protocol(folder, protocol)
+    return protocol
+
+
+def record_flash(scene: Scene, path: Path, edges: tuple[tuple[int, bool], ...], screen_s: float, *,
+                 sketched: bool) -> None:
+    """Record the patch of a screen that is told `edges` (master time, ns) and is `screen_s` late, until a second after
+    the last of them, in the colour of the set's first marker."""
+    screen = _Screen(tuple((1e-9 * (t_ns - T0_MASTER_NS) + screen_s, on) for t_ns, on in edges))
+    shot = make_shot(scene, MarkerShow(marker=scene.markers.ids[0]), screen.edges[-1][0] + 1.0)
+    _record(shot, path, screen, sketched=sketched)
+
+
+def _reseeded(scene: Scene, number: int) -> Scene:
+    """The same rig, with noise of its own at each distance."""
+    return replace(scene, seed=scene.seed + 10_000 * (number + 1))
+
+
+# -- things to show ----------------------------------------------------------------------------------------------------
+
+def half_height(scene: Scene) -> float:
+    """m: from the middle of the picture to its border, at the nearest that the rod comes."""
+    preset, nearest = scene.preset, (1.0 - float(_SWING[2])) * scene.settings.distance_m
+    return nearest * math.tan(0.5 * math.radians(preset.horizontal_fov_deg)) * preset.height / preset.width
+
+
+def rod_length(scene: Scene) -> float:
+    """m: as long as both ends stay in both pictures."""
+    return min(_LONGEST_ROD_M, 1.3 * half_height(scene))
+
+
+def _rod_shot(scene: Scene, seconds: float, *, still: bool) -> Shot:
+    """A rod whose ends wear the first two markers of the set."""
+    half = np.array([0.5 * rod_length(scene), 0.0, 0.0])
+    reach = _SWING * (half_height(scene), half_height(scene), scene.settings.distance_m)
+    motion = RodMotion(scene.centre, reach, scene.seed, still)
+    centres = np.full((len(scene.markers.markers), 3), np.nan)
+    centres[0], centres[1] = -half, half
+    inner = half * (1.0 - (BALL_RADIUS_M + 0.003) / half[0])
+    point = np.array([0.0, POINT_M, 0.0])
+    rod = RigidTarget(
+        group=np.array([0, 1, PALM_GROUP], dtype=np.int64), marker=np.array([0, 1, SKIN], dtype=np.int64),
+        size=np.array([[BALL_RADIUS_M, 0.0, 0.0], [BALL_RADIUS_M, 0.0, 0.0], [0.003, 0.0, 0.0]]),
+        rgb=np.array([scene.markers.markers[0].display_rgb, scene.markers.markers[1].display_rgb, STICK_RGB],
+                     dtype=np.float64),
+        ends=np.array([[-half, -half + point], [half, half + point], [-inner, inner]]), centres=centres)
+    return Shot(scene, MarkerShow(), SceneObject("rod", rod, motion), seconds)
+
+
+@dataclass(frozen=True)
+class RodMotion:
+    """A `PoseSource`: a rod that is moved slowly by up to `reach` (3,) m about `centre` (3,) m and turned every way; or
+    one that hangs `still` from a string, its first end above."""
+
+    centre: Array
+    reach: Array
+    seed: int
+    still: bool
+
+    def sample(self, times_s: Array) -> tuple[Array, Array]:
+        """world_from_rod (T, 4, 4) at scene times (T,) s; no angles."""
+        times_s = np.asarray(times_s, dtype=np.float64)
+        out = np.tile(np.eye(4), (len(times_s), 1, 1))
+        if self.still:
+            out[:, :3, :3] = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+            out[:, :3, 3] = self.centre
+            return out, np.zeros((len(times_s), 0))
+        phases = np.random.default_rng([self.seed, 0x20D]).uniform(0.0, 2.0 * np.pi, 5)
+        swing = [np.sin(2.0 * np.pi * hertz * times_s + phase)
+                 for hertz, phase in zip((0.11, 0.083, 0.061, 0.047, 0.071), phases, strict=True)]
+        out[:, :3, 3] = self.centre + self.reach * np.stack(swing[:3], axis=1)
+        roll, pitch = np.pi * swing[3], 1.0 * swing[4]
+        along = np.stack([np.cos(pitch) * np.cos(roll), np.cos(pitch) * np.sin(roll), np.sin(pitch)], axis=1)
+        across = np.stack([-np.sin(roll), np.cos(roll), np.zeros_like(roll)], axis=1)
+        out[:, :3, 0], out[:, :3, 1], out[:, :3, 2] = along, across, np.cross(along, across)
+        return out, np.zeros((len(times_s), 0))
+
+
+@dataclass(frozen=True)
+class _Screen:
+    """When the light of a patch changes, scene time s, and to what; dark before."""
+
+    edges: tuple[tuple[float, bool], ...]
+
+    def lit(self, t_s: float) -> bool:
+        """Whether it shines at scene time `t_s`."""
+        before = np.searchsorted([t for t, _ in self.edges], t_s, side="right")
+        return bool(before) and self.edges[int(before) - 1][1]
+
+
+@dataclass(frozen=True)
+class _Flashing:
+    """A `PoseSource` of a patch that is out of sight while its screen is dark, whole frames at a time."""
+
+    patch: MarkerPath
+    screen: _Screen
+
+    def sample(self, times_s: Array) -> tuple[Array, Array]:
+        """As `MarkerPath.sample`; the times are those of one frame, whose middle row sees the patch."""
+        poses, angles = self.patch.sample(times_s)
+        if not self.screen.lit(float(np.mean(times_s))):
+            poses[:, 0, 3] += 50.0
+        return poses, angles
+
+
+# -- from a shot to a log ----------------------------------------------------------------------------------------------
+
+def _record(shot: Shot, path: Path, screen: _Screen | None, *, sketched: bool) -> None:
+    rig = simulated_rig(shot.scene)
+    about = {"simulated": shot.scene_object.name}
+    if not sketched:
+        streams = for_each_camera(shot, functools.partial(_watch, rig, screen), None)
+        write_node_log(path, rig, about, [record for records in streams for record in records])
+        return
+    work = path.with_suffix(".points")
+    write_points(shot, work, PointNoise(loss=0.0))
+    reader = LogReader(work / LOG_NAME)
+    records = list(reader)
+    reader.close()
+    for one in (*work.iterdir(), work):
+        one.rmdir() if one.is_dir() else one.unlink()
+    if screen is not None:
+        records = changed(records, functools.partial(_as_lit, shot, screen))
+    write_node_log(path, rig, about, [record for record in records if record.node_id != 0])
+
+
+def _as_lit(shot: Shot, screen: _Screen, arrival_s: float, node_id: int,
+            seen: list[MarkerObservation]) -> list[MarkerObservation]:
+    """What a node sees of a patch: nothing while it is dark. The frame is the last one that was ready by then."""
+    scene, index = shot.scene, node_id - 1
+    times_s = 1e-9 * np.array(scene.frame_times_ns(index, shot.seconds))
+    ready_s = arrival_s - 1e-9 * (0.5 * scene.exposure_ns + scene.row_time_ns * scene.preset.height)
+    frame_s = times_s[max(int(np.searchsorted(times_s, ready_s, side="right")) - 1, 0)]
+    return [marker if screen.lit(frame_s + 1e-9 * scene.row_time_ns * marker.y) else lost(marker.index)
+            for marker in seen]
+
+
+def _watch(rig: Rig, screen: _Screen | None, shot: Shot, index: int, report: Report) -> list[Record]:
+    """One camera's pictures, what the node's detector finds in them, and what the node says of it."""
+    scene = shot.scene
+    detector, renderer = make_detector(node_settings(scene, index)), make_renderer(shot, index)
+    source = shot.scene_object.source
+    if screen is not None:
+        assert isinstance(source, MarkerPath)
+        source = _Flashing(source, screen)
+    sender = NodeSender(scene, rig, index, np.random.default_rng([scene.seed, index, 0xCE48]), CABLE)
+    times_ns = scene.frame_times_ns(index, shot.seconds)
+    records = list(sender.exchanges(1e-9 * times_ns[-1]))
+    for number, t_ns in enumerate(times_ns):
+        frame, _ = renderer.render(source, 1e-9 * t_ns, number)
+        seen = detector.detect(from_i420(frame, scene.preset.width, scene.preset.height))
+        record = sender.datagram(number, t_ns, seen)
+        if record is not None:
+            records.append(record)
+        report(number)
+    return records

@@ -1,0 +1,253 @@
+"""The certificate's wizard: five minutes that repeat chapter 7 of the RHOT thesis on the rig at hand."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from platformdirs import user_documents_path
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QLabel, QWidget
+
+from rhot_app.certificate.latency import flash_edges
+from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.framework.feed import StateFeed
+from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
+from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
+from rhot_app.ui.wizards.framework.plan import Kit, Plan
+from rhot_app.ui.wizards.models.certificate_steps import (
+    CertificateStep,
+    KeepStep,
+    RulerDistances,
+    Statements,
+    charts_of,
+    propose,
+    task_of,
+    verdict_of,
+)
+from rhot_app.ui.wizards.models.movement import QuietCoach
+from rhot_app.ui.wizards.models.step import SolveStep, StepView
+
+_FLASH_STEP_MS = 4  # a quarter of a 60 Hz screen's frame
+_SEED = 7
+
+_SIDES = (("Palm to the cameras", "palm"), ("Back to the cameras", "back"), ("A board, no hand", None))
+
+
+def make_plan(kit: Kit) -> Plan:
+    """Still, ruler, rod, flash, plumb line; then the lines, and where they are kept."""
+    movements = Movements(kit)
+    ids = kit.rig.markers.ids
+    said = Statements(kit.rig, rod_markers=(ids[0], ids[1 % len(ids)]), flash_marker=ids[0])
+
+    folder, recent = movements.folder, movements.states.recent
+
+    def still() -> QuietCoach:
+        return QuietCoach("Hold still.")
+
+    def moving() -> QuietCoach:
+        return QuietCoach("Go on.")
+
+    made = {"static": movements.add(CertificateStep("static", folder, still, recent)),
+            "ruler": movements.add(RulerDistances(folder, still, recent, ids[0])),
+            "rod": movements.add(CertificateStep("rod", folder, moving, recent)),
+            "flash": movements.add(CertificateStep("flash", folder, moving, recent)),
+            "plumb": movements.add(CertificateStep("plumb", folder, still, recent))}
+    pages = (StillPage(made["static"], kit.connect, movements.states, said),
+             RulerPage(made["ruler"], kit.connect, movements.states, ids),
+             RodPage(made["rod"], kit.connect, movements.states, said),
+             FlashPage(made["flash"], kit.connect, movements.states, said),
+             MovementPage(made["plumb"], kit.connect, movements.states))
+    solve = SolveStep(lambda: task_of(said, made), verdict_of, charts_of)
+    keep = KeepStep(lambda: propose(solve.report, lambda: _place(kit.rig.name)), "Record a step first.")
+    return Plan("Certificate", (*pages, ChartPage(solve, kit.scheme), KeepPage(keep, kit.scheme)),
+                solver="rhot_app.certificate.certify", put_back=movements.end)
+
+
+def _place(rig: str) -> Path:
+    """A new folder in the user's documents."""
+    name = "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in rig)
+    return user_documents_path() / "RHOT" / "certificates" / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+
+
+class StillPage(MovementPage):
+    """Which side of a hand it is."""
+
+    def __init__(self, step: CertificateStep, connect: Callable[[], Asker], states: StateFeed,
+                 said: Statements) -> None:
+        super().__init__(step, connect, states)
+        self.facing = QComboBox()
+        for text, side in _SIDES:
+            self.facing.addItem(text, side)
+        self.facing.setToolTip("A mirrored rig tracks smoothly and is wrong; this tells.")
+        self.facing.currentIndexChanged.connect(lambda: setattr(said, "facing", self.facing.currentData()))
+        form = QFormLayout()
+        form.addRow("Hand", self.facing)
+        self.column.insertLayout(0, form)
+
+
+class RulerPage(MovementPage):
+    """The distance by the ruler, and the rows so far."""
+
+    def __init__(self, step: CertificateStep, connect: Callable[[], Asker], states: StateFeed,
+                 ids: tuple[str, ...]) -> None:
+        super().__init__(step, connect, states)
+        assert isinstance(step, RulerDistances)
+        self.distances = step
+        self.marker = _marker_box(ids, 0, "The marker that is held along the ruler.",
+                                  lambda name: setattr(step, "marker", name))
+        self.distance = _length_box(step.distance_mm, "From the line between both lenses straight ahead, by a ruler.",
+                                    lambda value: setattr(step, "distance_mm", value))
+        self.rows = QLabel()
+        self.rows.setWordWrap(True)
+        form = QFormLayout()
+        form.addRow("Marker", self.marker)
+        form.addRow("Distance", self.distance)
+        self.column.insertLayout(0, form)
+        self.column.insertWidget(self.column.count() - 1, self.rows)
+        self.first_field = self.distance
+
+    def show_view(self, view: StepView) -> None:
+        """What was taken."""
+        super().show_view(view)
+        if self.movement.phase == "recorded":
+            self.button.setText("Record")
+        self.rows.setText(", ".join(f"{row.distance_mm:g}" for row in self.distances.rows) + " mm"
+                          if self.distances.rows else "No distance yet.")
+
+
+class RodPage(MovementPage):
+    """The rod's length and its markers."""
+
+    def __init__(self, step: CertificateStep, connect: Callable[[], Asker], states: StateFeed,
+                 said: Statements) -> None:
+        super().__init__(step, connect, states)
+        ids = said.rig.markers.ids
+        self.length = _length_box(said.rod_mm, "From the centre of one marker to the centre of the other, by a ruler.",
+                                  lambda value: setattr(said, "rod_mm", value))
+        self.upper_end, self.lower_end = (
+            _marker_box(ids, k, "The end that is above when the rod hangs." if k == 0 else "The other end.",
+                        lambda _: self._name(said)) for k in (0, 1))
+        form = QFormLayout()
+        form.addRow("Length", self.length)
+        form.addRow("Upper marker", self.upper_end)
+        form.addRow("Lower marker", self.lower_end)
+        self.column.insertLayout(0, form)
+
+    def _name(self, said: Statements) -> None:
+        said.rod_markers = (self.upper_end.currentText(), self.lower_end.currentText())
+
+
+class FlashPage(MovementPage):
+    """A patch in a marker's colour in the middle of the window; it flashes while it is recorded."""
+
+    def __init__(self, step: CertificateStep, connect: Callable[[], Asker], states: StateFeed, said: Statements,
+                 clock: Callable[[], int] = time.monotonic_ns) -> None:
+        super().__init__(step, connect, states)
+        self.clock = clock
+        self._said = said
+        self.patch = Patch()
+        self.centre = self.patch
+        self._began_ns = 0
+        self._code: list[tuple[float, bool]] = []
+        ids = said.rig.markers.ids
+        self.marker = _marker_box(ids, 0, "The colour of the patch: one that nothing else in the pictures has.",
+                                  self._choose)
+        form = QFormLayout()
+        form.addRow("Colour of", self.marker)
+        self.column.insertLayout(0, form)
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self.turn)
+        self._choose(ids[0])
+
+    def _choose(self, name: str) -> None:
+        marker = self._said.rig.markers.markers[self._said.rig.markers.ids.index(name)]
+        self._said.flash_marker = name
+        self.patch.colour = QColor(*marker.display_rgb)
+        self.patch.update()
+
+    def show_view(self, view: StepView) -> None:
+        """The code begins and ends with the recording."""
+        super().show_view(view)
+        recording = self.movement.phase == "recording"
+        if recording and not self._timer.isActive():
+            self._code = flash_edges(self.movement.seconds, _SEED)
+            self._began_ns, self._said.edges = self.clock(), ()
+            self.patch.show_lit(lit=False)
+            self._timer.start(_FLASH_STEP_MS)
+        elif not recording and self._timer.isActive():
+            self._timer.stop()
+            self.patch.show_lit(lit=True)
+
+    def turn(self) -> None:
+        """Show the next edge of the code when its time has come, and note when the screen was told."""
+        done = len(self._said.edges)
+        if done < len(self._code) and 1e-9 * (self.clock() - self._began_ns) >= self._code[done][0]:
+            lit = self._code[done][1]
+            self.patch.show_lit(lit=lit)
+            self._said.edges = (*self._said.edges, (self.clock(), lit))
+
+
+class Patch(QWidget):
+    """A disc of one colour on black; dark when it is not lit."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.colour = QColor("white")
+        self.lit = True
+        self.setMinimumSize(240, 240)
+        self.setAccessibleName("flashing patch")
+
+    def show_lit(self, *, lit: bool) -> None:
+        """Draw it at once, not with the next events."""
+        self.lit = lit
+        self.repaint()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
+        """The disc."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor("black"))
+        if self.lit:
+            side = round(0.5 * min(self.width(), self.height()))
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setBrush(self.colour)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.drawEllipse(self.rect().center(), side // 2, side // 2)
+        painter.end()
+
+
+class KeepPage(AcceptPage):
+    """The lines in a table, and the way to delete what was written."""
+
+    def __init__(self, step: KeepStep, scheme: Scheme) -> None:
+        super().__init__(step, scheme)
+        self.table.setHorizontalHeaderLabels(["", "verdict", "measured"])
+        self.restore_button.setText("Delete it again")
+        self.restore_button.setToolTip("Removes the folder that was written.")
+        self._note.setText("Nothing was written so far. A certificate is a folder with a page, a PDF, the raw numbers "
+                           "and the recordings; the rig stays as it is.")
+
+
+def _marker_box(ids: tuple[str, ...], chosen: int, meaning: str, choose: Callable[[str], None]) -> QComboBox:
+    box = QComboBox()
+    box.addItems(list(ids))
+    box.setCurrentIndex(min(chosen, len(ids) - 1))
+    box.setToolTip(meaning)
+    box.currentTextChanged.connect(choose)
+    return box
+
+
+def _length_box(value: float, meaning: str, enter: Callable[[float], None]) -> QDoubleSpinBox:
+    box = QDoubleSpinBox()
+    box.setRange(10.0, 5000.0)
+    box.setDecimals(1)
+    box.setSuffix(" mm")
+    box.setValue(value)
+    box.setToolTip(meaning)
+    box.valueChanged.connect(enter)
+    return box

@@ -1,0 +1,172 @@
+"""The certificate of the simulated rig agrees with what is true of it, and says what is wrong with a wrong rig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from scipy import stats
+from simulated_protocol import SHORT, Recorded, recorded, with_baseline, with_focal_length
+
+from rhot_app.certificate.certify import certify
+from rhot_app.certificate.document import Certificate
+from rhot_app.certificate.latency import flash_edges
+from rhot_app.certificate.recordings import FlashStep, ProtocolFile, StaticStep, read_recording
+from rhot_app.certificate.static import judge_static
+from rhot_app.evaluation.fault_injection import changed
+from rhot_app.recording.raw_log import LogReader
+from rhot_app.simulator.nodes.node_log import write_node_log
+
+pytestmark = pytest.mark.timeout(600)  # eight rigs are recorded and certified before the first test
+
+SEEDS = range(1, 9)
+NETWORK_MS = 0.120 + 0.060 * np.log(2.0)
+"""The median way of a datagram on the simulated cable."""
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Recorded, Certificate]]:
+    folder = tmp_path_factory.mktemp("protocols")
+    made = [recorded(folder / str(seed), seed) for seed in SEEDS]
+    return [(one, certify(one.folder, one.protocol, one.rig)) for one in made]
+
+
+def true_delay_ms(one: Recorded) -> float:
+    """From the screen's order to the arrival at the master: its own delay, then from exposure to arrival."""
+    assert one.protocol.flash is not None
+    recording = read_recording(one.folder / one.protocol.flash.log, one.rig)
+    marker = recording.marker(one.protocol.flash.marker)
+    lit = np.isfinite(recording.pixels[:, marker, 0])
+    ages = [np.mean((recording.arrivals_ns - recording.exposed_ns[:, marker])[lit & (recording.cameras == camera)])
+            for camera in range(recording.camera_count)]
+    return 1e3 * SHORT.screen_s + 1e-6 * float(np.mean(ages))
+
+
+def truths(one: Recorded, certificate: Certificate) -> Iterator[tuple[str, bool]]:
+    """(what, whether its interval holds the truth) of a run."""
+    wanted = [("depth", "scale error", 0.0), ("depth", "zero", 0.0), ("depth", "exponent z of eq. 7.4", -1.0),
+              ("rod", "length error", 0.0), ("rod", "length error across the view", 0.0),
+              ("rod", "length error along the view", 0.0), ("upright", "to the right", 0.0), ("upright", "away", 0.0),
+              ("latency", "screen to the picture's timestamp", 1e3 * SHORT.screen_s),
+              ("latency", "screen to master", true_delay_ms(one)), ("timing", "network, p50", NETWORK_MS)]
+    for code, name, truth in wanted:
+        found = certificate.line(code).figure(name)
+        assert found is not None, f"{code} has no {name}"
+        said = f"{code}: {name} {found.value} ({found.low} to {found.high}), true {truth:.4g}"
+        yield said, found.interval.holds(truth)
+
+
+def test_intervals_hold_what_is_true_of_the_twin(runs: list[tuple[Recorded, Certificate]]) -> None:
+    found = [each for one, certificate in runs for each in truths(one, certificate)]
+    missed = [what for what, held in found if not held]
+    assert len(missed) <= stats.binom.ppf(0.999, len(found), 0.05), f"of {len(found)}:\n" + "\n".join(missed)
+
+
+def test_a_perfect_rig_agrees_in_nearly_every_line(runs: list[tuple[Recorded, Certificate]]) -> None:
+    lines = [line for _, certificate in runs for line in certificate.lines]
+    assert all(line.verdict != "not measured" for line in lines)
+    differing = [f"{line.title}: {line.sentence}" for line in lines if line.verdict == "differs"]
+    assert len(differing) <= stats.binom.ppf(0.999, 2 * len(runs), 0.05), "\n".join(differing)
+
+
+@pytest.mark.parametrize("factor", [0.99, 1.01])
+def test_a_wrong_baseline_is_named(runs: list[tuple[Recorded, Certificate]], factor: float) -> None:
+    said = []
+    for one, _ in runs[:4]:
+        certificate = certify(one.folder, ProtocolFile(ruler=one.protocol.ruler, rod=one.protocol.rod),
+                              with_baseline(one.rig, factor))
+        for code in ("depth", "rod"):
+            line = certificate.line(code)
+            said.append(line.verdict == "differs" and "baseline" in line.cause
+                        and ("too long" if factor > 1.0 else "too short") in line.cause)
+            error = line.figure("scale error" if code == "depth" else "length error")
+            assert error is not None and error.interval.widened(0.1).holds(100.0 * (factor - 1.0))
+    assert sum(said) >= len(said) - 1, said
+
+
+def test_a_wrong_focal_length_is_told_from_a_wrong_baseline(runs: list[tuple[Recorded, Certificate]]) -> None:
+    one, _ = runs[0]
+    line = certify(one.folder, ProtocolFile(rod=one.protocol.rod), with_focal_length(one.rig, 1.03)).line("rod")
+    assert line.verdict == "differs" and "focal length" in line.cause
+
+
+def test_a_mirrored_rig_is_found_out(runs: list[tuple[Recorded, Certificate]]) -> None:
+    """The hand that was shown was the other one than stated: so looks a rig whose pictures are mirrored."""
+    one, certificate = runs[0]
+    assert certificate.line("handedness").verdict == "agrees"
+    other = msgspec.structs.replace(one.rig, hand=msgspec.structs.replace(one.rig.hand, side="left"))
+    line = certify(one.folder, ProtocolFile(static=one.protocol.static), other).line("handedness")
+    assert line.verdict == "differs" and "mirror" in line.sentence
+
+
+def test_pictures_that_are_mirrored_are_found_out(runs: list[tuple[Recorded, Certificate]], tmp_path: Path) -> None:
+    """Both cameras mirror, and a calibration with such pictures exchanged them: residuals are as small as before."""
+    one, _ = runs[0]
+    assert one.protocol.static is not None
+    reader = LogReader(one.folder / one.protocol.static.log)
+    width = one.rig.nodes[0].intrinsics.width
+    flipped = changed(list(reader), lambda _t, _node, seen: [mark._replace(x=width - 1 - mark.x) for mark in seen])
+    reader.close()
+    left, right = one.rig.nodes
+    nodes = (msgspec.structs.replace(left, pose=right.pose), msgspec.structs.replace(right, pose=left.pose))
+    mirrored = msgspec.structs.replace(one.rig, nodes=nodes)
+    write_node_log(tmp_path / "static.rhotlog", mirrored, {}, [record for record in flipped if record.node_id])
+    certificate = certify(tmp_path, ProtocolFile(static=StaticStep("static.rhotlog", "palm")), mirrored)
+    assert certificate.line("static").verdict == "agrees"
+    assert certificate.line("handedness").verdict == "differs"
+
+
+def test_a_tilted_rig_is_found_out(runs: list[tuple[Recorded, Certificate]]) -> None:
+    one, _ = runs[0]
+    line = certify(one.folder, ProtocolFile(plumb=one.protocol.plumb),
+                   msgspec.structs.replace(one.rig, up="z")).line("upright")
+    assert line.verdict == "differs" and line.figures[0].interval.widened(0.1).holds(90.0)
+
+
+def test_steps_that_are_missing_are_not_measured(runs: list[tuple[Recorded, Certificate]]) -> None:
+    one, _ = runs[0]
+    certificate = certify(one.folder, ProtocolFile(), one.rig)
+    assert {line.verdict for line in certificate.lines} == {"not measured"}
+    assert all(line.remedy and line.sentence for line in certificate.lines)
+    assert "7 not measured" in certificate.summary
+
+
+def test_a_code_that_was_not_shown_measures_nothing(runs: list[tuple[Recorded, Certificate]]) -> None:
+    one, _ = runs[0]
+    flash = one.protocol.flash
+    assert flash is not None
+    other = tuple((flash.edges[0][0] + round(1e9 * t), lit) for t, lit in flash_edges(10.0, 999))
+    line = certify(one.folder, ProtocolFile(flash=FlashStep(flash.log, flash.marker, other)), one.rig).line("latency")
+    assert line.verdict == "not measured" and "code" in line.sentence
+
+
+def test_timestamps_that_are_late_together_are_found_out(runs: list[tuple[Recorded, Certificate]]) -> None:
+    """All nodes say the same wrong time: nothing between them disagrees, and the screen does."""
+    one, _ = runs[0]
+    late = msgspec.structs.replace(one.rig, nodes=tuple(
+        msgspec.structs.replace(node, time_offset_s=-0.03) for node in one.rig.nodes))
+    line = certify(one.folder, ProtocolFile(flash=one.protocol.flash), late).line("latency")
+    assert line.verdict == "differs" and "before the light" in line.cause
+    whole, before = line.figure("screen to master"), runs[0][1].line("latency").figure("screen to master")
+    assert whole is not None and before is not None and whole.value == pytest.approx(before.value, abs=0.5)
+
+
+def test_jitter_beyond_the_thesis_differs(runs: list[tuple[Recorded, Certificate]]) -> None:
+    one, _ = runs[0]
+    assert one.protocol.static is not None
+    recording = read_recording(one.folder / one.protocol.static.log, one.rig)
+    noisy = recording.pixels + np.random.default_rng(1).normal(0.0, 7.0, recording.pixels.shape)
+    assert judge_static(recording, one.rig).verdict == "agrees"
+    line = judge_static(replace(recording, pixels=noisy), one.rig)
+    assert line.verdict == "differs" and line.figures[0].interval.widened(0.2).holds(7.0)
+
+
+def test_edges_are_irregular_and_a_seed_gives_them_again() -> None:
+    edges = flash_edges(20.0, 3)
+    assert edges == flash_edges(20.0, 3) != flash_edges(20.0, 4)
+    assert len(edges) > 40 and [lit for _, lit in edges[:2]] == [True, False]
+    assert np.ptp(np.diff([t for t, _ in edges])) > 0.2
