@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import ExportError
 from rhot_app.export.bones import PARENTS, TIPS, TURNING, Skeleton, skeleton_of
-from rhot_app.export.plan import Plan, file_from_frame, frame_up, quaternions, require
+from rhot_app.export.plan import Plan, file_from_frame, frame_up, require
 from rhot_app.export.states import HandStates
+from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model
@@ -91,7 +92,7 @@ class _Hand:
             palm = np.tile(np.eye(4), (len(palm), 1, 1))
         turned = np.concatenate([palm[:, None, :3, :3], self._skeleton.rotations(states.angles[known])], axis=1)
         turned = turn @ turned @ turn.T
-        found = quaternions(turned.reshape(-1, 3, 3))[:, [1, 2, 3, 0]].reshape(len(palm), -1, 4)
+        found = quaternion_from_rotation(turned.reshape(-1, 3, 3))[:, [1, 2, 3, 0]].reshape(len(palm), -1, 4)
         seconds = 1e-9 * (states.t_master_ns[known] - self._plan.first_ns)
         self._keys.append((seconds.astype(np.float32), (palm[:, :3, 3] @ turn.T).astype(np.float32),
                            found.astype(np.float32), states.hand_scale[known].astype(np.float32)))

@@ -11,8 +11,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.export.plan import Plan, quaternions, require
+from rhot_app.export.plan import Plan, require
 from rhot_app.export.states import CONDITIONS, HandStates
+from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import OTHER_HAND
 
@@ -120,7 +121,7 @@ class McapWriter:
     def add(self, states: HandStates) -> None:
         """Write the messages of these states."""
         hands = [("", states)] if states.other is None else [("", states), (OTHER_HAND, states.other)]
-        turns = [quaternions(hand.world_from_palm[:, :3, :3]).tolist() for _, hand in hands]
+        turns = [quaternion_from_rotation(hand.world_from_palm[:, :3, :3]).tolist() for _, hand in hands]
         tables = [_rows(states, with_markers=True)] + [_rows(hand) for _, hand in hands[1:]]
         for number, t_ns in enumerate(states.t_master_ns.tolist()):
             rows = [{name: column[number] for name, column in table.items()} for table in tables]

@@ -67,18 +67,6 @@ def _relative(world_from_palm: Array, positions: Array) -> Array:
     return np.asarray((positions - origin) @ rotation)
 
 
-def quaternions(rotations: Array) -> Array:
-    """(N, 4) unit quaternions wxyz, w >= 0, of rotations (N, 3, 3); NaN where a rotation is."""
-    from scipy.spatial.transform import Rotation
-
-    out = np.full((len(rotations), 4), np.nan)
-    known = np.isfinite(rotations).all(axis=(1, 2))
-    if known.any():
-        found = Rotation.from_matrix(rotations[known]).as_quat()[:, [3, 0, 1, 2]]
-        out[known] = np.where(found[:, :1] < 0.0, -found, found)
-    return out
-
-
 # -- What is asked of an export, and what every writer of a format gets and does ---------------------------------------
 
 Units = Literal["mm", "m"]

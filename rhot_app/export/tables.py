@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.export.plan import Plan, quaternions, require
+from rhot_app.export.plan import Plan, require
 from rhot_app.export.states import ARRAYS, HandStates
+from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
 
@@ -62,7 +63,7 @@ def _hand(prefix: str, states: HandStates, scale: float, unit: str) -> Iterator[
         yield f"{prefix}angle_{angle}_sd_deg", np.degrees(states.angle_sd[:, index])
         yield f"{prefix}angle_{angle}_knowledge", states.angle_knowledge[:, index]
     yield from _point(f"{prefix}palm", states.world_from_palm[:, :3, 3], scale, unit)
-    for index, part in enumerate(quaternions(states.world_from_palm[:, :3, :3]).T):
+    for index, part in enumerate(quaternion_from_rotation(states.world_from_palm[:, :3, :3]).T):
         yield f"{prefix}palm_q{'wxyz'[index]}", part
     for i, j in combinations_with_replacement(range(6), 2):
         factor, of = ((scale * scale, f"{unit}2"), (scale, f"{unit}_rad"), (1.0, "rad2"))[(i > 2) + (j > 2)]

@@ -29,22 +29,16 @@ def rotation_from_quaternion(quaternion_wxyz: ArrayLike) -> Array:
 
 
 def quaternion_from_rotation(rotation: Array) -> Array:
-    """Unit quaternion (4,) wxyz of a rotation (3, 3), with w >= 0.
+    """Unit quaternions (..., 4) wxyz, w >= 0, of rotations (..., 3, 3); NaN where a rotation is."""
+    from scipy.spatial.transform import Rotation
 
-    Divides by the largest of the four components (Shepperd 1978), so it is exact for every angle up to pi.
-    """
-    r = rotation
-    squares = np.array([1.0 + r[0, 0] + r[1, 1] + r[2, 2], 1.0 + r[0, 0] - r[1, 1] - r[2, 2],
-                        1.0 - r[0, 0] + r[1, 1] - r[2, 2], 1.0 - r[0, 0] - r[1, 1] + r[2, 2]])
-    products = np.array([
-        [squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-        [r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-        [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]],
-        [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]],
-    ])
-    quaternion = products[int(np.argmax(squares))]
-    quaternion = quaternion / np.linalg.norm(quaternion)
-    return -quaternion if quaternion[0] < 0.0 else quaternion
+    matrices = np.asarray(rotation, dtype=np.float64)
+    flat = matrices.reshape(-1, 3, 3)
+    out, known = np.full((len(flat), 4), np.nan), np.isfinite(flat).all(axis=(1, 2))
+    if known.any():
+        found = Rotation.from_matrix(flat[known]).as_quat()[:, [3, 0, 1, 2]]
+        out[known] = np.where(found[:, :1] < 0.0, -found, found)
+    return out.reshape(*matrices.shape[:-2], 4)
 
 
 def skew(vector: ArrayLike) -> Array:

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.outputs.joints import HandSample, Sample
 from rhot_app.outputs.openxr import OPENXR_JOINTS
 from rhot_app.outputs.osc import UdpSink, bundles, osc_message
@@ -71,7 +72,7 @@ def bone_poses(hand: HandSample, bones: Bones) -> tuple[Array, Array]:
         if parent >= 0:
             local[row] = world[parent].T @ world[row]
             offsets[row] = world[parent].T @ (places[row] - places[parent])
-    return offsets, _quaternions(local)
+    return offsets, np.roll(quaternion_from_rotation(local), -1, axis=-1)
 
 
 class VmcSink(UdpSink):
@@ -109,19 +110,3 @@ def _matrices(xyzw: Array) -> Array:
             [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
     return np.moveaxis(np.array(rows), 2, 0)
-
-
-def _quaternions(r: Array) -> Array:
-    """Unit quaternions xyzw (N, 4), w >= 0, of rotations (N, 3, 3); by the largest of the four (Shepperd 1978)."""
-    xx, yy, zz = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
-    products = np.empty((len(r), 4, 4))
-    for k, square in enumerate((1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz)):
-        products[:, k, k] = square
-    for i, j, value in ((0, 1, r[:, 1, 0] + r[:, 0, 1]), (0, 2, r[:, 0, 2] + r[:, 2, 0]),
-                        (1, 2, r[:, 2, 1] + r[:, 1, 2]), (0, 3, r[:, 2, 1] - r[:, 1, 2]),
-                        (1, 3, r[:, 0, 2] - r[:, 2, 0]), (2, 3, r[:, 1, 0] - r[:, 0, 1])):
-        products[:, i, j] = products[:, j, i] = value
-    best = np.argmax(np.einsum("nkk->nk", products), axis=1)
-    found = products[np.arange(len(r)), best]
-    found /= np.linalg.norm(found, axis=1, keepdims=True)
-    return np.where(found[:, 3:] < 0.0, -found, found)
