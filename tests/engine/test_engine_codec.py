@@ -55,9 +55,9 @@ def test_state_encodes_fast() -> None:
 
 def test_status_and_preview_round_trip() -> None:
     node = NodeStatus(1, "left", "streaming", False, 120.0, 10, 1, {"magic": 2}, 1.5, 1e-4, 2e-4)
-    status = EngineStatus(1, 2, 3, True, "TRACKING", "rig", "/rig.json", 118.0, (node,), (Advice("info", "ok"),),
-                          {"solve": LatencySummary(1e-4, 2e-4)})
-    assert status.decode(status.TOPIC_STATUS, status.encode(status)) == status
+    sent = EngineStatus(1, 2, 3, True, "TRACKING", "rig", "/rig.json", 118.0, (node,), (Advice("info", "ok"),),
+                        {"solve": LatencySummary(1e-4, 2e-4)})
+    assert status.decode(status.TOPIC_STATUS, status.encode(sent)) == sent
     preview = Preview("left", 5, 640, 480, b"\xff\xd8")
     assert status.decode(status.TOPIC_PREVIEW, status.encode(preview)) == preview
 

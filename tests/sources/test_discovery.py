@@ -56,8 +56,7 @@ def a_network(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         found = [ipaddress.IPv4Interface(address) for address in addresses]
         monkeypatch.setattr(discovery, "own_interfaces", lambda: found)
     have("10.0.0.4/24", "127.0.0.1/8")
-    monkeypatch.setattr(discovery, "own_interfaces", lambda: [ipaddress.IPv4Interface("127.0.0.1/8")])
-    monkeypatch.setattr(discovery, "_EVERYBODY", "127.255.255.255")
+    monkeypatch.setattr(discovery.FindSocket, "_broadcasts", lambda self: ["127.255.255.255"])
     return have
 
 

@@ -73,11 +73,11 @@ class Wizard:
 
     def load(self) -> None:
         """Import what it needs; takes a moment the first time, so call it in a worker."""
-        importlib.import_module(f"{__package__}.{self.module}")
+        importlib.import_module(f"rhot_app.ui.wizards.{self.module}")
 
     def make_plan(self, kit: Kit) -> Plan:
         """Its pages for the rig at hand."""
-        plan: Plan = importlib.import_module(f"{__package__}.{self.module}").make_plan(kit)
+        plan: Plan = importlib.import_module(f"rhot_app.ui.wizards.{self.module}").make_plan(kit)
         return plan
 
 
