@@ -74,7 +74,7 @@ def main() -> int:
             for code, what, truth in (*TRUTHS, ("latency", "screen to master", delay_ms(folder, protocol, rig))):
                 found = made.line(code).figure(what)
                 if found is not None and found.value is not None:
-                    held.setdefault(f"{code}: {what}", []).append(found.interval.holds(truth))
+                    held.setdefault(f"{code}: {what}", []).append(bool(found.interval.holds(truth)))
                     widths.setdefault(f"{code}: {what}", []).append(found.interval.half_width)
             for line in made.lines:
                 verdicts.setdefault(line.code, []).append(line.verdict)

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from rhot_app.certificate.document import Certificate, Line, not_measured
 from rhot_app.certificate.latency import LATENCY, TIMING, judge_latency, judge_timing
@@ -52,14 +53,17 @@ def certify(folder: Path, protocol: ProtocolFile, rig: Rig, progress: Progress =
     static = None if protocol.static is None else read(protocol.static.log, 0.0, 0.15)
     lines.append(_missing("static", TITLE, "static") if static is None else judge_static(static, rig))
     lines.append(_depth(protocol, rig, read))
-    lines.append(_timing(folder, protocol, rig, within(progress, 0.45, 0.5)))
+    latencies = {step.log: read_latencies(folder / step.log, rig)
+                 for step in (protocol.static, protocol.rod, protocol.flash, protocol.plumb)
+                 if step is not None and (folder / step.log).is_file()}
+    lines.append(judge_timing(np.concatenate([one.seconds for one in latencies.values()])) if latencies else
+                 _missing("timing", TIMING, "static"))
     rod = protocol.rod
     lines.append(_missing("rod", ROD, "rod") if rod is None else
                  judge_rod(read(rod.log, 0.5, 0.7), rod.markers, 1e-3 * rod.length_mm, rig))
     flash = protocol.flash
     lines.append(_missing("latency", LATENCY, "flash") if flash is None else
-                 judge_latency(read(flash.log, 0.7, 0.85), flash.marker, flash.edges,
-                               read_latencies(folder / flash.log, rig)))
+                 judge_latency(read(flash.log, 0.7, 0.85), flash.marker, flash.edges, latencies[flash.log]))
     plumb = protocol.plumb
     lines.append(_missing("upright", UPRIGHT, "plumb") if plumb is None else
                  judge_upright(read(plumb.log, 0.85, 1.0), plumb.upper, plumb.lower, rig))
@@ -95,12 +99,3 @@ def _depth(protocol: ProtocolFile, rig: Rig, read: Callable[[str, float, float],
     count = len(protocol.ruler)
     return judge_depth([read_distance(read(one.log, 0.15 + 0.3 * k / count, 0.15 + 0.3 * (k + 1) / count), one.marker,
                                       1e-3 * one.distance_mm, rig) for k, one in enumerate(protocol.ruler)], rig)
-
-
-def _timing(folder: Path, protocol: ProtocolFile, rig: Rig, progress: Progress) -> Line:
-    """Of the still hand; else of the longest other movement."""
-    step = protocol.static or protocol.rod or protocol.flash or protocol.plumb
-    if step is None:
-        return _missing("timing", TIMING, "static")
-    progress(f"tracking {step.log}", 0.0)
-    return judge_timing(read_latencies(folder / step.log, rig).by_stage)

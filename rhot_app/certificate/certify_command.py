@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import shutil
 import sys
 import tempfile
 from datetime import datetime
@@ -27,7 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="recordings made before, with protocol.json; without it, and without --step and "
                              "--simulated, the running engine records now, step by step in this terminal")
     parser.add_argument("--step", action="append", default=[], metavar="NAME=FILE",
-                        help="a raw log as one step: static=FILE, ruler:MM=FILE (repeatable), rod=FILE, plumb=FILE")
+                        help="a raw log as one step, in the place of that of --recordings: static=FILE, ruler:MM=FILE "
+                             "(repeatable), rod=FILE, plumb=FILE")
     parser.add_argument("--facing", choices=("palm", "back"), default=None,
                         help="which side of the hand faced the cameras in the static step (default: no hand)")
     parser.add_argument("--marker", default=None, metavar="ID", help="the marker that was held along the ruler")
@@ -56,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     _check(args, out)
     line = ProgressLine("certificate", sys.stderr)
     with contextlib.ExitStack() as stack:
-        folder = args.recordings or _folder(args, stack)
+        folder = args.recordings or _folder(args, out, stack)
         rig, protocol = _recorded(args, folder, line)
         from rhot_app.certificate.certify import certify
         from rhot_app.certificate.report import write_report
@@ -65,8 +67,7 @@ def run(args: argparse.Namespace) -> int:
             certificate = certify(folder, protocol, rig, within(line.report, 0.5 if args.simulated else 0.0, 1.0))
         except OSError as exc:
             raise CertificateError(f"{folder}: cannot be read ({exc.strerror}).") from exc
-        guided = not (args.recordings or args.step or args.simulated)  # what a person has recorded is kept
-        write_report(out, certificate, recordings=(folder, protocol) if guided else None)
+        write_report(out, certificate, recordings=(folder, protocol) if _guided(args) else None)
     line.finish()
     _tell(certificate, out, as_json=args.json)
     return DIFFERS if certificate.count("differs") else 0
@@ -78,13 +79,13 @@ def _check(args: argparse.Namespace, out: Path) -> None:
 
     if args.rig is None and not args.simulated:
         raise CertificateError("--rig FILE says which rig is certified; or give --simulated.")
-    if sum((args.recordings is not None, bool(args.step), args.simulated)) > 1:
-        raise CertificateError("--recordings, --step and --simulated exclude each other.")
+    if args.simulated and (args.recordings is not None or args.step):
+        raise CertificateError("--simulated makes its own recordings: leave out --recordings and --step, or it.")
     if args.sketched and not args.simulated:
         raise CertificateError("--sketched is of the simulated rig: give --simulated too.")
     if args.seed < 0:
         raise CertificateError(f"--seed is 0 or more, not {args.seed}.")
-    for folder in (out, args.keep):
+    for folder in (out, args.keep, Path(f"{out}-recordings") if _guided(args) else None):
         if folder is not None and folder.exists():
             raise CertificateError(f"{folder} exists already; choose another folder or remove it.")
         if folder is not None and not folder.absolute().parent.is_dir():
@@ -94,17 +95,35 @@ def _check(args: argparse.Namespace, out: Path) -> None:
                                "--simulated.")
 
 
-def _folder(args: argparse.Namespace, stack: contextlib.ExitStack) -> Path:
-    """Where recordings are made: kept or thrown away."""
-    if args.keep is None:
+def _guided(args: argparse.Namespace) -> bool:
+    """Whether a person records now."""
+    return not (args.recordings or args.step or args.simulated)
+
+
+def _folder(args: argparse.Namespace, out: Path, stack: contextlib.ExitStack) -> Path:
+    """Where recordings are made: kept, or thrown away at the end. What a person has recorded is thrown away only when
+    it stands in the certificate as well."""
+    if args.keep is None and not _guided(args):
         return Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rhot-certify-")))
-    args.keep.mkdir()
-    return Path(args.keep.absolute())
+    folder = Path((args.keep or Path(f"{out}-recordings")).absolute())
+    folder.mkdir()
+    if args.keep is None:
+        stack.push(lambda kind, error, trace: _leave(folder, kind is None))
+    return folder
+
+
+def _leave(folder: Path, done: bool) -> bool:
+    """Remove the recordings, or say where they are."""
+    if done:
+        shutil.rmtree(folder)
+    else:
+        print(f"What was recorded is in {folder}; --recordings goes on with it.", file=sys.stderr)
+    return False
 
 
 def _recorded(args: argparse.Namespace, folder: Path, line: ProgressLine) -> tuple[Rig, ProtocolFile]:
     """The rig, and what there is of it; recordings are made where none are given."""
-    from rhot_app.certificate.collect import collect, protocol_of_steps
+    from rhot_app.certificate.collect import collect, merged, protocol_of_steps
     from rhot_app.certificate.recordings import read_protocol
     from rhot_app.progress import within
     from rhot_app.project import load_rig
@@ -118,11 +137,10 @@ def _recorded(args: argparse.Namespace, folder: Path, line: ProgressLine) -> tup
         protocol = record_protocol(scene, folder, sketched=args.sketched, progress=within(line.report, 0.0, 0.5))
         return rig or simulated_rig(scene), protocol
     assert rig is not None
-    if args.step:
-        return rig, protocol_of_steps(args.step, facing=args.facing, marker=args.marker, rod_mm=args.rod_mm,
-                                      rod_markers=args.rod_markers)
-    if args.recordings is not None:
-        return rig, read_protocol(args.recordings)
+    if args.step or args.recordings is not None:
+        given = protocol_of_steps(args.step, facing=args.facing, marker=args.marker, rod_mm=args.rod_mm,
+                                  rod_markers=args.rod_markers)
+        return rig, given if args.recordings is None else merged(read_protocol(args.recordings), given)
     from rhot_app.engine.client import EngineClient
 
     with EngineClient(states=False, events=False) as engine:

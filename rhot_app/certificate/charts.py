@@ -25,7 +25,7 @@ _LEFT, _RIGHT, _TOP, _FOOT = 16.0, 4.0, 13.0, 12.0
 
 
 def chart_of(line: Line) -> Drawing | None:
-    """The chart of a line; None for one without, and for one that was not measured."""
+    """The chart of a line; None for one that has nothing to show."""
     make = _CHARTS.get(line.code)
     return None if make is None or not line.curves else make(line)
 

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
+import msgspec
+
 from rhot_app.certificate.certify import STEPS
 from rhot_app.certificate.recordings import (
     PlumbStep,
@@ -135,6 +137,12 @@ def protocol_of_steps(steps: list[str], *, facing: str | None, marker: str | Non
         else:
             fields["plumb"] = PlumbStep(log, pair[0], pair[1])
     return ProtocolFile(ruler=tuple(ruler), **fields)
+
+
+def merged(protocol: ProtocolFile, given: ProtocolFile) -> ProtocolFile:
+    """The protocol with the steps that are `given` in the place of its own."""
+    steps = {name: step for name in ("static", "ruler", "rod", "plumb") if (step := getattr(given, name))}
+    return msgspec.structs.replace(protocol, **steps)
 
 
 def _length(text: str, otherwise: str) -> float:

@@ -72,9 +72,11 @@ class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return next((one for one in self.figures if one.name == name), None)
 
 
-def not_measured(code: str, title: str, why: str, remedy: str) -> Line:
-    """A line whose step is missing, or showed nothing."""
-    return Line(code, title, "not measured", f"Not measured: {why}", remedy=remedy)
+def not_measured(code: str, title: str, why: str, remedy: str, figures: tuple[Figure, ...] = (),
+                 curves: dict[str, list[float | None]] | None = None) -> Line:
+    """A line whose step is missing, showed nothing, or too little to agree with anything: then with what it showed."""
+    return Line(code, title, "not measured", f"Not measured: {why}", remedy=remedy, figures=figures,
+                curves=curves or {})
 
 
 class Certificate(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

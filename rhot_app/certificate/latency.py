@@ -54,6 +54,9 @@ def judge_timing(latencies: Array) -> Line:
         return Line("timing", TIMING, "differs", f"{measured} {beside}", f"Most of it is spent in \"{slow}\".",
                     _REMEDIES.get(slow, "That is this computer's own time, now: close other programs and make the "
                                   "certificate again."), tuple(figures), curves)
+    if late.high > limit:
+        return not_measured("timing", TIMING, f"too few states, or a busy computer. {measured} {beside}",
+                            "Record longer, and close other programs.", tuple(figures), curves)
     return Line("timing", TIMING, "agrees", f"{measured} {beside}", figures=tuple(figures), curves=curves)
 
 

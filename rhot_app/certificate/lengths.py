@@ -31,6 +31,10 @@ Array = NDArray[np.float64]
 
 DEPTH, ROD = "Depth against a ruler", "Rod of known length"
 LEAST_DISTANCES = 4
+
+SHOWS_PERCENT = 1.0
+"""A wrong length of this much must show: an interval that is wider to either side agrees with anything."""
+
 _MEASURE = "Hold a marker still at eight distances or more, from 20 to 100 cm, and type each distance."
 _SWEEP = "Move the rod slowly through the whole volume for 20 s, turning it every way, both markers in sight."
 
@@ -85,6 +89,9 @@ def judge_depth(readings: Sequence[DistanceReading], rig: Rig) -> Line:
         "one_pixel_m": geometry.error_m(ruler).tolist()}
     measured = (f"Over {len(good)} distances from {100 * ruler.min():.0f} to {100 * ruler.max():.0f} cm the rig's "
                 f"scale is off by {in_words(scale, '%')}; about that line they scatter by {number(left.value)} mm rms.")
+    if scale.holds(0.0) and scale.half_width > SHOWS_PERCENT:
+        return not_measured("depth", DEPTH, f"an error of {SHOWS_PERCENT:g} % would not show. {measured}", _MEASURE,
+                            tuple(figures), curves)
     if scale.holds(0.0):
         return Line("depth", DEPTH, "agrees", f"{measured} 0 lies inside. {_offset(zero)}", figures=tuple(figures),
                     curves=curves)
@@ -204,6 +211,9 @@ def judge_rod(recording: Recording, markers: tuple[str, str], length_m: float, r
                 f"{in_words(error, '%')}; its length scatters by {number(jitter.value)} mm.")
     asked = [one for one in (error, across, away) if math.isfinite(one.value)]
     if all(one.together(len(asked)).holds(0.0) for one in asked):
+        if error.half_width > SHOWS_PERCENT:
+            return not_measured("rod", ROD, f"an error of {SHOWS_PERCENT:g} % would not show. {measured}",
+                                f"Take a longer rod. {_SWEEP}", tuple(figures), curves)
         how = (", along the view and across it." if len(asked) > 1 else
                ". The rod was hardly turned, so a wrong focal length would not show.")
         return Line("rod", ROD, "agrees", f"{measured} 0 lies inside{how}", figures=tuple(figures), curves=curves)

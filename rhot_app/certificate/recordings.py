@@ -233,18 +233,18 @@ def _locate(one: Paired, rig: RigArrays, positions: Array) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Latencies:
-    """N states of a log. `by_stage` (N, stages) s of `LATENCY_STAGES`, NaN for one that a replay does not have:
+    """N states of a log. `seconds` (N, stages) of `LATENCY_STAGES`, NaN for one that a replay does not have:
     detection and network are as recorded, the others this computer's, now. `waits` (N,) s: from the instant that the
     state describes to the arrival of the datagram that completed it."""
 
-    by_stage: Array
+    seconds: Array
     waits: Array
 
     @property
     def compute_s(self) -> float:
         """The tracker's own median time, s."""
         own = [LATENCY_STAGES.index(name) for name in ("pair", "triangulate", "filter", "solve")]
-        return float(np.nansum(np.nanmedian(self.by_stage[:, own], axis=0)))
+        return float(np.nansum(np.nanmedian(self.seconds[:, own], axis=0)))
 
 
 def read_latencies(path: Path, rig: Rig) -> Latencies:

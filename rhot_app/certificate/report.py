@@ -49,7 +49,7 @@ def write_report(out: Path, certificate: Certificate, *,
 
 def _about(certificate: Certificate) -> list[str]:
     lines = [f"Made {certificate.created} by {certificate.program}. Rig file: SHA-256 {certificate.rig_sha256[:16]}.",
-             "Every interval holds the true value in 95 of 100 certificates."]
+             "Every interval holds the true value in about 95 of 100 certificates."]
     if certificate.simulated:
         lines.append("This is the simulated rig: it shows that the measurement works, and says nothing of a real rig.")
     return lines

@@ -222,17 +222,17 @@ def _record(shot: Shot, path: Path, screen: _Screen | None, *, sketched: bool) -
     for one in (*work.iterdir(), work):
         one.rmdir() if one.is_dir() else one.unlink()
     if screen is not None:
-        records = changed(records, functools.partial(_as_lit, shot, screen))
+        times_s = [1e-9 * np.array(shot.scene.frame_times_ns(index, shot.seconds)) for index in range(len(rig.nodes))]
+        records = changed(records, functools.partial(_as_lit, shot.scene, times_s, screen))
     write_node_log(path, rig, about, [record for record in records if record.node_id != 0])
 
 
-def _as_lit(shot: Shot, screen: _Screen, arrival_s: float, node_id: int,
+def _as_lit(scene: Scene, times_s: list[Array], screen: _Screen, arrival_s: float, node_id: int,
             seen: list[MarkerObservation]) -> list[MarkerObservation]:
     """What a node sees of a patch: nothing while it is dark. The frame is the last one that was ready by then."""
-    scene, index = shot.scene, node_id - 1
-    times_s = 1e-9 * np.array(scene.frame_times_ns(index, shot.seconds))
     ready_s = arrival_s - 1e-9 * (0.5 * scene.exposure_ns + scene.row_time_ns * scene.preset.height)
-    frame_s = times_s[max(int(np.searchsorted(times_s, ready_s, side="right")) - 1, 0)]
+    mine_s = times_s[node_id - 1]
+    frame_s = float(mine_s[max(int(np.searchsorted(mine_s, ready_s, side="right")) - 1, 0)])
     return [marker if screen.lit(frame_s + 1e-9 * scene.row_time_ns * marker.y) else lost(marker.index)
             for marker in seen]
 

@@ -106,6 +106,9 @@ def judge_upright(recording: Recording, upper: str, lower: str, rig: Rig) -> Lin
     if tilt > 0.5 * math.pi:
         return Line("upright", UPRIGHT, "differs", measured, f"The rig is upside down, or {upper} and {lower} were "
                     "exchanged.", "Check which marker is above.", figures)
+    if math.radians(degrees.low) <= LEVEL_RAD < math.radians(degrees.half_width):
+        return not_measured("upright", UPRIGHT, f"a tilt of {math.degrees(LEVEL_RAD):g} deg would not show. {measured}",
+                            f"Take a longer rod. {_PLUMB}", figures)
     if math.radians(degrees.low) > LEVEL_RAD:
         return Line("upright", UPRIGHT, "differs", measured, "The cameras look up or down, or are rolled, and the rig "
                     "file says nothing of it.", "Calibrate with a picture of the board on the table "

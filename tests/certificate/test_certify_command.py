@@ -12,7 +12,7 @@ from simulated_protocol import Recorded, recorded, with_baseline
 
 from rhot_app.__main__ import main
 from rhot_app.certificate.charts import chart_of
-from rhot_app.certificate.collect import collect
+from rhot_app.certificate.collect import collect, merged
 from rhot_app.certificate.document import compare, read_certificate
 from rhot_app.certificate.recordings import ProtocolFile, read_protocol
 from rhot_app.certificate.report import text_width, wrapped
@@ -71,6 +71,8 @@ def test_logs_by_themselves_are_steps(made: Recorded, rig: Path, tmp_path: Path,
     assert code == (1 if "differs" in lines.values() else 0)
     assert lines["static"] == lines["latency"] == lines["handedness"] == "not measured"
     assert lines["upright"] == "agrees" and "not measured" not in (lines["rod"], lines["depth"])
+    other = merged(protocol, ProtocolFile(rod=msgspec.structs.replace(protocol.rod, log="/tmp/other.rhotlog")))
+    assert other.rod != protocol.rod and (other.static, other.ruler) == (protocol.static, protocol.ruler)
 
 
 def test_a_batch_certifies_folders_and_none_twice_for_nothing(made: Recorded, tmp_path: Path,
@@ -95,7 +97,7 @@ def test_a_batch_certifies_folders_and_none_twice_for_nothing(made: Recorded, tm
     (["--rig", "RIG", "--recordings", "EMPTY"], "protocol.json: no such file"),
     (["--rig", "RIG", "--recordings", "MISSING"], "there is no such recording"),
     (["--rig", "RIG", "--recordings", "BROKEN"], "gone.rhotlog"),
-    (["--rig", "RIG", "--recordings", "EMPTY", "--simulated"], "exclude each other"),
+    (["--rig", "RIG", "--recordings", "EMPTY", "--simulated"], "makes its own recordings"),
     (["--rig", "RIG", "--sketched", "--recordings", "EMPTY"], "give --simulated too"),
     (["--rig", "RIG", "--step", "walk=x.log"], "names are static, ruler:MM, rod and plumb"),
     (["--rig", "RIG", "--step", "ruler:far=x.log", "--marker", "index"], "write ruler:MM=FILE"),
