@@ -35,6 +35,7 @@ SUBCOMMANDS = {
     "batch": Subcommand("rhot_app.export.batch_command", "track or export many raw logs"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
+    "refine": Subcommand("rhot_app.calibration.commands.refine", "refine the cameras' poses from a recorded hand"),
     "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),
     "check": Subcommand("rhot_app.calibration.commands.check", "check a rig file for what cannot be"),
     "certify": Subcommand("rhot_app.certificate.certify_command", "measure a rig as the thesis does, with intervals"),

@@ -163,12 +163,13 @@ class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     """How the lenses and poses of a rig were found, and how far they may be trusted.
 
     `method`: `board`, by the stereo calibration; `outdated`, likewise, but a lens was found anew since; `exact`, known
-    without error, as in a simulation. `lengths`: which
-    second known length confirmed the size of the board's squares; without one every length may be wrong by one factor.
+    without error, as in a simulation; `refined`, one of these, and refined from a moving hand since. `lengths`:
+    which second known length confirmed the size of the board's squares; without one every length may be wrong by one
+    factor.
     `error_m`: standard deviation of a place `distance_m` from the cameras by the calibration alone; none when unknown.
     """
 
-    method: Literal["board", "outdated", "exact"]
+    method: Literal["board", "outdated", "exact", "refined"]
     lengths: Literal["skipped", "baseline", "ruler"] = "skipped"
     error_m: Annotated[float, Meta(ge=0, le=100)] | None = None
     distance_m: Annotated[float, Meta(gt=0, le=100)] = 0.6

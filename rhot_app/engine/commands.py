@@ -53,6 +53,7 @@ class Commands:
             "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
             "record": self._record, "record_stop": self._record_stop, "bookmark": self._bookmark, "rig": self._rig,
             "set_rig": self._set_rig, "save_rig": self._save_rig, "preview": self._set_preview,
+            "refined": self._refined,
             "quit": self._end,
         }
 
@@ -125,6 +126,9 @@ class Commands:
 
     def _save_rig(self, arguments: Arguments) -> Answer:
         return {"path": str(self._engine.save_rig(_path(arguments)))}
+
+    def _refined(self, arguments: Arguments) -> Answer:
+        return self._engine.refined()
 
     def _set_preview(self, arguments: Arguments) -> Answer:
         on = arguments.get("on")

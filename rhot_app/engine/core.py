@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -200,6 +201,11 @@ class Engine:
             status = self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
                                            self._node_message, extra, self._node_black)
             return status if outputs is None else replace(status, outputs=outputs.status())
+
+    def refined(self) -> dict[str, Any]:
+        """What a moving hand says of the cameras (`RigWatch.refined`)."""
+        with self._lock:
+            return self._observer.rig_watch.refined(self.rig)
 
     def close(self) -> None:
         """Stop the nodes, finish the log, close all ports. May be called twice."""

@@ -30,6 +30,9 @@ from rhot_node.wire.codec import encode as encode_datagram
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import MarkerObservation, Observations
 
+RECENT = 256
+"""Frames kept for whoever looks a few times a second: half a second of four cameras at 120 Hz."""
+
 PublishState = Callable[[bytes], None]
 AfterState = Callable[[], None]
 
@@ -54,6 +57,7 @@ class Pipeline:
         self.latency = LatencyMeter()
         self.last_state: HandState | None = None
         self.frame_count = 0
+        self.recent: deque[CameraObservations] = deque(maxlen=RECENT)
         self.failure = ""
         self._work = work
         self._publish = publish
@@ -122,6 +126,7 @@ class Pipeline:
                     state = solved
         for frame in frames:  # once the state is out: nobody waits for this
             work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = now_ns
+        self.recent.extend(frames)
         return state
 
     def _send(self, state: HandState, live: bool) -> None:

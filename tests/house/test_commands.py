@@ -18,6 +18,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot demo": ("--motion", "--seed"),
     "rhot engine": ("--rig", "--record", "--video", "--output", "--web"),
     "rhot replay": ("LOG", "--rig", "--keep", "--smooth"),
+    "rhot refine": ("LOG", "--rig", "--out", "--use", "--no-scale", "--json"),
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),
     "rhot recover": ("LOG", "--out", "--rig"),

@@ -55,10 +55,11 @@ def calibration_text(rig: Rig) -> str:
     record = rig.calibration
     if record is None:
         return "not recorded"
-    if record.method != "board":
+    if record.method in ("exact", "outdated"):
         return "exact, as simulated" if record.method == "exact" else "with a board, before a lens was found anew"
     error = "" if record.error_m is None else f", ± {1e3 * record.error_m:.2f} mm at {record.distance_m:g} m"
-    return f"with a board{error}; lengths {lengths_text(rig)}"
+    how = "refined from a moving hand" if record.method == "refined" else "with a board"
+    return f"{how}{error}; lengths {lengths_text(rig)}"
 
 
 def lengths_text(rig: Rig) -> str:

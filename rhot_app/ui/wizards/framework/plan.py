@@ -91,6 +91,8 @@ WIZARDS: tuple[Wizard, ...] = (
            "is held all over its picture.", "intrinsics of"),
     Wizard("stereo", "Put the cameras together", "Where the cameras stand to each other and to the table, from a board "
            "that they see at the same time.", "stereo calibration"),
+    Wizard("refined", "Use refined calibration", "How the cameras stand now, from the hand that moves while it is "
+           "tracked.", "refined calibration"),
     Wizard("colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
            "colour calibration"),
     Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),

@@ -1,0 +1,91 @@
+"""The refined calibration in the window: shown before and after, used only when asked, kept with the way back."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from fake_engine import synthetic_rig
+from knocked_rig import moved
+from wizard_hands import Hands
+from wizard_rig import FakeMemory, FakeRigAsker
+
+from rhot_app.calibration.verdict import Finding, Grade, judge
+from rhot_app.engine.status import Advice
+from rhot_app.project import load_rig, save_rig
+from rhot_app.rig_history import versions
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.status_words import _advice_notice
+from rhot_app.ui.wizards import refined
+from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
+from rhot_app.ui.wizards.models.refined_steps import propose
+
+
+class RefiningAsker(FakeRigAsker):
+    """An engine that answers `refined` as it is told."""
+
+    answer: dict
+
+    def command(self, name, timeout_s=5.0, **arguments):
+        return self.answer if name == "refined" else super().command(name, timeout_s=timeout_s, **arguments)
+
+
+def answer_of(rig, *, grade=Grade.GOOD, stale=True):
+    pose = moved(rig.nodes[1].pose, np.radians([0.3, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    after = msgspec.structs.replace(rig, nodes=(rig.nodes[0], msgspec.structs.replace(rig.nodes[1], pose=pose)))
+    verdict = judge("rays miss each other by 0.02 px instead of 1.40.", [Finding("moved", grade, "It has turned.")])
+    return {"known": True, "stale": stale, "usable": stale and verdict.acceptable, **verdict.to_json(),
+            "rows": [["rays miss each other by", "1.40 px", "0.02 px"]], "document": msgspec.to_builtins(after)}
+
+
+@pytest.fixture
+def hands(themed, tmp_path):
+    rig, path = synthetic_rig(), tmp_path / "desk.json"
+    save_rig(path, rig)
+    asker = RefiningAsker(rig)
+    asker.answer = {"known": False}
+    kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), {})
+    hands = Hands(WizardWindow(refined.make_plan(kit), kit))
+    hands.path, hands.asker, hands.rig = path, asker, rig
+    yield hands
+    hands.window.end().wait(5.0)
+    hands.window.deleteLater()
+
+
+def test_it_is_used_only_when_asked_and_can_be_taken_back(hands):
+    assert not hands.window.frame.next_button.isEnabled()
+    hands.asker.answer = answer_of(hands.rig)
+    hands.until(lambda: hands.window.frame.next_button.isEnabled())
+    hands.next()
+    assert load_rig(hands.path) == hands.rig, "nothing was changed yet"
+    hands.click(hands.window.frame.next_button)
+    hands.until(lambda: hands.window.step.state == "used")
+    assert load_rig(hands.path).nodes[1].pose != hands.rig.nodes[1].pose
+    assert [one.replaced_by for one in versions(hands.path)] == ["refined calibration"]
+    hands.click(hands.window.page.restore_button)
+    hands.until(lambda: hands.window.step.state == "restored")
+    assert load_rig(hands.path) == hands.rig
+
+
+@pytest.mark.parametrize(("stale", "grade"), [(False, Grade.GOOD), (True, Grade.POOR)])
+def test_what_holds_or_is_not_determined_leads_nowhere(hands, stale, grade):
+    hands.asker.answer = answer_of(hands.rig, stale=stale, grade=grade)
+    hands.until(lambda: "One moment" not in hands.sentence)
+    hands.until(lambda: ("holds" if not stale else "Go on") in hands.sentence)
+    assert not hands.window.frame.next_button.isEnabled()
+
+
+def test_only_poses_are_proposed():
+    rig = synthetic_rig()
+    edited = msgspec.structs.replace(rig, name="edited since")
+    proposal = propose(answer_of(rig), edited, None)
+    assert proposal is not None and proposal.rig is not None
+    assert proposal.rig.name == "edited since" and proposal.rows[0].after == "0.02 px"
+    assert propose({"known": False}, rig, None) is None
+    assert propose(answer_of(rig, stale=False), rig, None) is None
+
+
+def test_the_engines_sentence_has_the_button():
+    notice = _advice_notice(Advice("warning", "The right camera has turned.", "refined"))
+    assert notice.action == "Use refined calibration …" and notice.key == f"{OPEN_WIZARD}refined"
