@@ -41,6 +41,7 @@ SUBCOMMANDS = {
     "certify": Subcommand("rhot_app.certificate.certify_command", "measure a rig as the thesis does, with intervals"),
     "hand": Subcommand("rhot_app.hand.hand_command", "look at a hand file, or make one of a given length"),
     "object": Subcommand("rhot_app.objects.object_command", "check an object file, or find the object in still images"),
+    "poses": Subcommand("rhot_app.sources.poses.poses_command", "listen to another tracker's poses and record them"),
     "nodes": Subcommand("rhot_app.sources.nodes_command", "look for nodes on the network"),
     "pair": Subcommand("rhot_app.sources.pair_command", "pair with a node by the code that it shows"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),

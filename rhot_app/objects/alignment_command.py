@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +13,7 @@ from rhot_app.calibration.commands.output import add_json_argument, require_fold
 
 if TYPE_CHECKING:
     from rhot_app.objects.alignment_report import AlignmentReport
+    from rhot_app.objects.motion_stream import MotionStream
 
 
 POSE_COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
@@ -26,6 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--search", type=float, default=1.0, metavar="S",
                         help="search the time offset within this, either way (default: 1 s)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the alignment")
+    parser.add_argument("--check", type=Path, metavar="FILE",
+                        help="solve nothing: say whether the streams still agree with this alignment, or it is stale")
     add_json_argument(parser)
 
 
@@ -40,7 +45,11 @@ def run(args: argparse.Namespace) -> int:
     require_folder(args.out)
     if not 0.0 < args.search <= 60.0:
         raise CalibrationError(f"--search {args.search:g}: give a time from 0 to 60 s.")
+    if args.check is not None and args.out is not None:
+        raise CalibrationError("--check writes nothing; leave --out away, or leave --check away to align anew.")
     foreign, rig = read_stream(args.foreign, POSE_COLUMNS), read_stream(args.rig_points, POINT_COLUMNS)
+    if args.check is not None:
+        return _check(args.check, foreign, rig, as_json=args.json)
     line = ProgressLine("alignment")
     report = calibrate_alignment(foreign, rig, args.search, line.report)
     line.finish()
@@ -49,6 +58,27 @@ def run(args: argparse.Namespace) -> int:
         save_alignment(args.out, to_alignment(report))
         written = str(args.out)
     return show(_fields(report), _lines(report), report.verdict, as_json=args.json, written=written)
+
+
+def _check(path: Path, foreign: MotionStream, rig: MotionStream, *, as_json: bool) -> int:
+    """Print whether the alignment is stale; 2 when it is. Raises CalibrationError without a file or overlap."""
+    from rhot_app.errors import CalibrationError
+    from rhot_app.objects.alignment_file import load_alignment
+    from rhot_app.objects.drift import DriftMonitor
+
+    test = DriftMonitor.test_streams(load_alignment(path), foreign, rig)
+    if test is None:
+        raise CalibrationError(f"{path}: the streams have too little in common by this alignment's time offset to test "
+                               "it. Record both at once for 20 s, with times of one clock.")
+    holds = f"The alignment holds: within 10 s it is off by {1e3 * test.distance_m:.1f} mm, which chance explains."
+    if as_json:
+        print(json.dumps({"stale": test.stale, "distance_mm": 1e3 * test.distance_m, "offset_ms": 1e3 * test.offset_s,
+                          "statistic": test.statistic, "limit": test.limit, "sentence": test.sentence or holds}))
+    elif not test.stale:
+        print(holds)
+    if test.stale:
+        print(f"rhot: {test.sentence}", file=sys.stderr)
+    return 2 if test.stale else 0
 
 
 def _fields(report: AlignmentReport) -> dict[str, Any]:

@@ -93,6 +93,11 @@ def to_alignment(report: AlignmentReport) -> Alignment:
                      datetime.now(UTC).isoformat(timespec="seconds"))
 
 
+def alignment_path(rig_path: Path) -> Path:
+    """Where the alignment of a rig lies: ``desk.alignment.json`` beside ``desk.json`` or ``desk.rig.json``."""
+    return rig_path.with_name(f"{rig_path.name.removesuffix('.json').removesuffix('.rig')}.alignment.json")
+
+
 def load_alignment(path: Path) -> Alignment:
     """Read and validate a file; raises CalibrationError naming file and field."""
     return read_document(path, Alignment, format_name=FORMAT, version=VERSION, error=CalibrationError)

@@ -102,11 +102,15 @@ def judge_alignment(fit: Fit, search: OffsetSearch) -> AlignmentReport:
 
 def coverage_of(fit: Fit) -> Coverage:
     """The motion that the inliers show."""
-    device, places = fit.device[fit.inlier], fit.places[fit.inlier]
+    return coverage_of_motion(fit.device[fit.inlier], fit.places[fit.inlier], fit.velocity[fit.inlier])
+
+
+def coverage_of_motion(device: Array, places: Array, velocity: Array) -> Coverage:
+    """The motion of rotations (N, 3, 3) of the device, and of places (M, 3) m and velocities (M, 3) m/s of the body."""
     mean = device.mean(axis=0)
     turn = np.sqrt(np.maximum(np.linalg.eigvalsh(np.eye(3) - mean.T @ mean), 0.0))
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(places.T)), 0.0))[::-1]
-    speed = float(np.sqrt(np.mean(np.sum(fit.velocity[fit.inlier] ** 2, axis=1))))
+    speed = float(np.sqrt(np.mean(np.sum(velocity**2, axis=1))))
     return Coverage(turn, spread, speed)
 
 

@@ -11,9 +11,11 @@ from scipy.ndimage import median_filter
 from scipy.stats import chi2
 
 from rhot_app.estimation.residual import student
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment import LASTING_M, LASTING_S
 from rhot_app.objects.alignment_file import Alignment
-from rhot_app.objects.alignment_model import skews
+from rhot_app.objects.alignment_model import GAP_S, skews
+from rhot_app.objects.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
 
@@ -89,6 +91,24 @@ class DriftMonitor:
         clock_m = float(np.sqrt(np.mean(np.sum((drift[:, :, 6] * step[6]) ** 2, axis=1))))
         sentence = _sentence(distance_m, float(step[6]), clock_m, duration_s) if stale else ""
         return Drift(stale, statistic, limit, distance_m, float(step[6]), sentence)
+
+    @classmethod
+    def test_streams(cls, alignment: Alignment, foreign: MotionStream, rig: MotionStream) -> Drift | None:
+        """Test two recorded streams of one motion, window by window: the first test that is stale, else the last one.
+        None where they have no window in common."""
+        monitor, found = cls(alignment), None
+        foreign, rig = foreign.without_outliers(), rig.without_outliers()
+        asked = rig.times_s - alignment.time_offset_s
+        usable = foreign.covers(asked, GAP_S)
+        places, _, turns, _ = foreign.at(asked[usable])
+        due_s = -np.inf
+        for rig_s, position, place, turn in zip(rig.times_s[usable], rig.positions[usable], places, turns, strict=True):
+            monitor.add(float(rig_s), position, rigid(turn, place))
+            if rig_s >= due_s and (test := monitor.test()) is not None:
+                found, due_s = test, rig_s + 0.5 * WINDOW_S
+                if test.stale:
+                    return test
+        return monitor.test() or found
 
     def _innovations(self) -> tuple[Array, Array]:
         """Observed less predicted positions (N, 3) m, and the prediction's Jacobian (N, 3, 10)."""

@@ -15,7 +15,8 @@ from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.words import shipped_motions
 
 TITLE = "Simulated hand does"
-_FIRST = {"still": "Holds still", "wave": "Waves", "fast": "Moves fast", "sweep": "Moves every joint"}
+_FIRST = {"still": "Holds still", "wave": "Waves", "fast": "Moves fast", "sweep": "Moves every joint",
+          "roam": "Moves and turns"}
 """The motions that calibrations ask for; the others stand in a menu of their own."""
 
 _THINGS = (("board", "Shows a board", "A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses."),

@@ -19,6 +19,7 @@ MAY_SLEEP = {
     "simulator/test_proxy.py": "a node's own pace",
     "e2e/test_demo_window.py": "between two looks at a hand that moves",
     "e2e/test_virtual_screen.py": "between two presses of Ctrl-C",
+    "ui/wizards/moved_tracker.py": "a tracker's own pace",
     "ui/wizards/slow_work.py": "work that takes long", "ui/wizards/wizard_rig.py": "a node that takes long",
     "ui/wizards/test_wizard_feed.py": "a look that takes long, and work in full swing",
 }

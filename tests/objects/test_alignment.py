@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from functools import cache
@@ -256,7 +257,8 @@ def write_csv(path, stream):
 
 def command(*arguments):
     return subprocess.run([sys.executable, "-m", "rhot_app", "calibrate", "alignment", *map(str, arguments)],
-                          capture_output=True, text=True, check=False)
+                          capture_output=True, text=True, check=False,
+                          env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])})
 
 
 def test_the_command_writes_the_file(tmp_path):
@@ -269,6 +271,14 @@ def test_the_command_writes_the_file(tmp_path):
     said = json.loads(done.stdout)
     assert said["grade"] == "good" and abs(said["time_offset_ms"] - 37.0) < 1.0
     np.testing.assert_allclose(load_alignment(out).rig_from_foreign.matrix, scene.rig_from_foreign, atol=1e-3)
+    done = command("--foreign", foreign, "--rig-points", rig, "--check", out)
+    assert done.returncode == 0 and "The alignment holds" in done.stdout, done.stderr
+    moved = tmp_path / "moved.csv"
+    write_csv(moved, MotionStream(scene.rig.times_s, scene.rig.positions + np.array([0.0, 5e-3, 0.0])))
+    done = command("--foreign", foreign, "--rig-points", moved, "--check", out)
+    assert done.returncode == 2 and "stale" in done.stderr and "was moved" in done.stderr
+    done = command("--foreign", foreign, "--rig-points", moved, "--check", out, "--json")
+    assert done.returncode == 2 and json.loads(done.stdout)["distance_mm"] == pytest.approx(5.0, abs=0.5)
     rows = foreign.read_text().splitlines()
     foreign.write_text("\n".join([*rows[:10], "1,2,oops", *rows[10:]]))
     done = command("--foreign", foreign, "--rig-points", rig)

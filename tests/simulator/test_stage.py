@@ -16,7 +16,14 @@ from rhot_app.calibration.board.corners import detect
 from rhot_app.errors import CalibrationError, SimulatorError
 from rhot_app.simulator.nodes.live import TwinServer
 from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras
-from rhot_app.simulator.nodes.remote import CoverRequest, LampRequest, ShowRequest, StateRequest, TwinRemote
+from rhot_app.simulator.nodes.remote import (
+    CoverRequest,
+    LampRequest,
+    ShowRequest,
+    StateRequest,
+    TrackerRequest,
+    TwinRemote,
+)
 from rhot_app.simulator.scene.camera_controls import Lamp
 from rhot_app.simulator.scene.live_scene import LiveScene
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
@@ -179,3 +186,20 @@ def test_no_twin_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("rhot_app.simulator.nodes.remote.STATE_S", 0.05)
     with TwinRemote(tmp_path) as twin, pytest.raises(SimulatorError, match="gave no answer"):
         twin.state()
+
+
+def test_the_foreign_tracker_is_where_the_hand_is_and_goes_on(rig: Rig) -> None:
+    def rows(since_ns: int = 0) -> list[tuple[int, list[float]]]:
+        return rig.stage.perform(TrackerRequest(since_ns))["poses"]
+
+    first = rows()
+    newest_ns = first[-1][0]
+    assert 100 <= len(first) <= 121 and len({t_ns for t_ns, _ in first}) == len(first)
+    rig.frame()
+    later = rows(newest_ns)
+    assert later and all(t_ns > newest_ns for t_ns, _ in later)
+    places = np.array([numbers[:3] for _, numbers in first])
+    assert np.linalg.norm(places - places.mean(axis=0), axis=1).max() < 2e-3, "the hand is still"
+    rig.ask(ShowRequest(HandShow("roam")))
+    place = np.array([numbers[:3] for _, numbers in rows()]).mean(axis=0)
+    assert np.linalg.norm(place - places.mean(axis=0)) > 5e-3

@@ -65,8 +65,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _frames(log: Path, rig: Rig) -> list[CameraObservations]:
     """Every admitted frame. Raises RecordingError when there is none."""
-    from rhot_app.errors import RecordingError
     from rhot_app.calibration.recorded_observations import why_none
+    from rhot_app.errors import RecordingError
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogValidator
 

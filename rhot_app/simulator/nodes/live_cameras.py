@@ -121,6 +121,7 @@ class LiveCameras:
             # compiles on the first start; no node waits for it yet
             renderer.render(self._setting.scene_object.source, 0.0, 0)
         self._began_ns = self._tick_ns = time.monotonic_ns()
+        stage.playing = self._setting.scene_object, self._began_ns
         self._number = 0
         self._cost_s = 0.0
 
@@ -181,6 +182,7 @@ class LiveCameras:
                 renderer.expose(exposure)
         if setting.scene_object is not self._setting.scene_object:
             self._began_ns = self._tick_ns
+            self._stage.playing = setting.scene_object, self._began_ns
         self._setting = setting
 
     def _obey(self, renderer: FrameRenderer, told: CameraSettings) -> None:

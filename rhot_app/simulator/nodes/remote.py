@@ -78,7 +78,13 @@ class StateRequest(_Request, frozen=True, tag="state"):
     """What is shown, by which lamp, to which cameras, by which settings of the cameras, and how fast."""
 
 
-Request = ShowRequest | LampRequest | CoverRequest | StateRequest
+class TrackerRequest(_Request, frozen=True, tag="tracker"):
+    """The poses that a foreign tracker on the hand reports after this monotonic time, of the last second."""
+
+    since_ns: int = 0
+
+
+Request = ShowRequest | LampRequest | CoverRequest | StateRequest | TrackerRequest
 
 _decoder = msgspec.json.Decoder(Request)
 
@@ -122,6 +128,12 @@ class TwinState(msgspec.Struct, frozen=True):
     preset_hz: float = 0.0
 
 
+class TrackerPoses(msgspec.Struct, frozen=True):
+    """Monotonic time, ns, with position, m, and quaternion wxyz in the foreign tracker's own world."""
+
+    poses: tuple[tuple[int, tuple[float, float, float, float, float, float, float]], ...]
+
+
 class TwinRemote:
     """A connection to one live twin; it may start before or after. One thread only. A context manager."""
 
@@ -147,6 +159,10 @@ class TwinRemote:
         """What is shown now."""
         return self._ask(StateRequest(), STATE_S)
 
+    def tracker(self, since_ns: int) -> TrackerPoses:
+        """What a foreign tracker on the hand reports after `since_ns`."""
+        return msgspec.convert(self._answer(TrackerRequest(since_ns), STATE_S), TrackerPoses)
+
     def close(self) -> None:
         """Disconnect. May be called twice."""
         self._context.destroy(0)
@@ -159,6 +175,9 @@ class TwinRemote:
         self.close()
 
     def _ask(self, request: Request, timeout_s: float) -> TwinState:
+        return msgspec.convert(self._answer(request, timeout_s), TwinState)
+
+    def _answer(self, request: Request, timeout_s: float) -> dict[str, Any]:
         socket = self._context.socket(zmq.REQ)
         socket.linger = 0
         try:
@@ -172,4 +191,4 @@ class TwinRemote:
             socket.close()
         if not answer.pop("ok", False):
             raise SimulatorError(str(answer.get("error", "the simulated rig refused without a reason.")))
-        return msgspec.convert(answer, TwinState)
+        return answer

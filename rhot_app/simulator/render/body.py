@@ -102,6 +102,14 @@ class HandBody:
         """(T, M, 3) m, the markers' centres for poses (T, 4, 4) and (T, 21)."""
         return self.joints_and_markers(world_from_palm, angles)[1]
 
+    def marker_poses(self, world_from_palm: Array, angles: Array, marker: int) -> Array:
+        """(T, 4, 4) m: the segment that carries a marker, its origin at the marker's centre, for poses (T, 4, 4) and
+        (T, 21)."""
+        out = np.tile(np.eye(4), (len(angles), 1, 1))
+        out[:, :3] = self._forward(world_from_palm, angles)[0][:, self.places[marker].row]
+        out[:, :3, 3] = self.marker_positions(world_from_palm, angles)[:, marker]
+        return out
+
     def place(self, world_from_palm: Array, angles: Array) -> Array:
         """(T, N, 12) parameters of the solids in the world for poses (T, 4, 4) and (T, 21)."""
         frames = self._forward(world_from_palm, angles)[0][:, self.row]

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import threading
+import time
 from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.nodes.remote import CoverRequest, LampRequest, Request, ShowRequest
+from rhot_app.simulator.nodes.remote import CoverRequest, LampRequest, Request, ShowRequest, TrackerRequest
 from rhot_app.simulator.nodes.shot import camera_seed
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter
 from rhot_app.simulator.render.painter import Painter
 from rhot_app.simulator.scene.background import background_image
 from rhot_app.simulator.scene.camera_controls import Lamp
+from rhot_app.simulator.scene.foreign_tracker import RATE_HZ, ForeignTracker
 from rhot_app.simulator.scene.scene import Scene
 from rhot_app.simulator.scene.scene_description import RulerShow, Show
 from rhot_app.simulator.scene.scene_objects import SceneObject, make_object
 
 TAKE_UP_S = 5.0
 """A change is taken up with the next frame; a twin that needs longer is stuck."""
+
+
+TRACKER_KEPT_NS = 1_000_000_000
+"""ns: the foreign tracker's poses that may still be asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +54,9 @@ class LiveScene:
         self._changed = threading.Condition()
         self._setting = self._build(show, scene.settings.lamp)
         self._taken = self._setting
+        self.playing: tuple[SceneObject, int] | None = None
+        """What moves before the cameras, and the monotonic time of its scene time 0, ns; the cameras set it."""
+        self._tracker = ForeignTracker(scene.seed)
         self.report: dict[str, Any] = {}
         """What the cameras say about themselves, for `StateRequest`."""
 
@@ -67,6 +77,8 @@ class LiveScene:
     def perform(self, request: Request) -> dict[str, Any]:
         """Do what is asked and wait until the cameras show it. Raises SimulatorError, RigError, CalibrationError."""
         now = self._setting
+        if isinstance(request, TrackerRequest):
+            return {"poses": self._tracker_rows(request.since_ns)}
         if isinstance(request, ShowRequest):
             self._put(replace(self._build(request.what, now.lamp), covered=now.covered))
         elif isinstance(request, LampRequest):
@@ -79,6 +91,18 @@ class LiveScene:
         setting = self._setting
         return {"name": setting.scene_object.name, "show": setting.show, "lamp": setting.lamp,
                 "covered": sorted(setting.covered), **self.report}
+
+    def _tracker_rows(self, since_ns: int) -> list[tuple[int, list[float]]]:
+        """(monotonic time, ns; position and quaternion) after `since_ns`, of the last second."""
+        if self.playing is None:
+            return []
+        (scene_object, began_ns), step_ns, now_ns = self.playing, round(1e9 / RATE_HZ), time.monotonic_ns()
+        first = max(since_ns, now_ns - TRACKER_KEPT_NS) // step_ns + 1
+        times_ns = step_ns * np.arange(first, now_ns // step_ns + 1)
+        ids = self._scene.markers.ids
+        marker = ids.index("index") if "index" in ids else 0
+        rows = self._tracker.rows(scene_object, marker, 1e-9 * (times_ns - began_ns).astype(np.float64))
+        return list(zip(times_ns.tolist(), rows.tolist(), strict=True))
 
     def _cover(self, cameras: tuple[str, ...]) -> None:
         strangers = [name for name in cameras if name not in self._scene.names]

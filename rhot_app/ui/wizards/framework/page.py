@@ -64,6 +64,8 @@ class Page(QWidget):
 # -- The last page of every wizard: figures before and after side by side, and the way back ----------------------------
 
 HEADS = ("", "before", "after")
+KEPT = ("What is there now is kept, and can be brought back at any time with Calibrate, Bring back an earlier "
+        "calibration.")
 
 
 class AcceptPage(Page):
@@ -71,7 +73,8 @@ class AcceptPage(Page):
 
     restore_asked = Signal()
 
-    def __init__(self, step: AcceptStep, scheme: Scheme) -> None:
+    def __init__(self, step: AcceptStep, scheme: Scheme, kept: str = KEPT) -> None:
+        """`kept` says what becomes of the old one."""
         super().__init__(step)
         self._accept = step
         self._rows: tuple[Row, ...] | None = None
@@ -82,8 +85,7 @@ class AcceptPage(Page):
         self.restore_button.setToolTip("Brings back what was there before, in the engine and in the file. The new "
                                        "calibration is kept among the earlier ones.")
         self.restore_button.clicked.connect(self.restore_asked)
-        note = QLabel("Nothing was saved so far. What is there now is kept, and can be brought back at any time with "
-                      "Calibrate, Bring back an earlier calibration.")
+        note = QLabel(f"Nothing was saved so far. {kept}")
         note.setWordWrap(True)
         note.setProperty("muted", True)
         self.column.addWidget(note)

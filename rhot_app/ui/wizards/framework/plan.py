@@ -102,6 +102,8 @@ WIZARDS: tuple[Wizard, ...] = (
            "bones calibration"),
     Wizard("filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
            "filter tuning"),
+    Wizard("alignment", "Another tracker", "Where a Vive tracker's world is in the rig, from a movement of both.",
+           "alignment with another tracker"),
     Wizard("certificate", "Certificate", "How good this rig is, measured as the thesis did, with 95 % intervals: five "
            "minutes.", "certificate"),
 )

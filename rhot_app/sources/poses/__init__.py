@@ -1,0 +1,1 @@
+"""Poses that other trackers measure: SteamVR, libsurvive, programs that print lines, and files."""
