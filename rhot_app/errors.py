@@ -13,6 +13,10 @@ class ObjectError(RhotError):
     """An object file or a pose stream is unreadable or says something that cannot be, or no image shows the object."""
 
 
+class TrackingError(RhotError):
+    """A tracker was asked for what it cannot know yet, or its input is none of its rig's."""
+
+
 class SourceError(RhotError):
     """A port is taken or a node cannot be reached."""
 

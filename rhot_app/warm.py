@@ -29,7 +29,7 @@ from rhot_app.outputs.joints import JointConverter
 from rhot_app.project import Rig, TrackerSettings, load_rig
 from rhot_app.simulator.nodes.shot import make_renderer, make_shot
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.simulator.scene.scene_description import BoardShow, HandShow
+from rhot_app.simulator.scene.scene_description import BareHandShow, BoardShow, HandShow
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.compiled import mark_complete
 from rhot_node.detect.fast import FastDetector
@@ -61,7 +61,7 @@ def warm_estimator(rig: Rig) -> None:
 def warm_twin(_rig: Rig) -> None:
     """Compile what the digital twin draws with."""
     scene = make_scene(twin_defaults(), seed=1)
-    for show in (HandShow("rest"), BoardShow(on_table=True)):
+    for show in (HandShow("rest"), BareHandShow("rest"), BoardShow(on_table=True)):
         shot = make_shot(scene, show, seconds=1.0)
         make_renderer(shot, 0).render(shot.scene_object.source, t_row0_s=0.0, number=0)
 

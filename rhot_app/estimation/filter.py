@@ -65,10 +65,10 @@ class IteratedFilter:
         return self.process.predict(knot.state, knot.covariance, max(t_s - knot.t_s, 0.0))
 
     def add(self, t_s: float, residuals: Sequence[Residual],
-            prediction: tuple[Array, Array] | None = None) -> Knot:
+            prediction: tuple[Array, Array] | None = None, initial: Array | None = None) -> Knot:
         """Take in `residuals` of the instant `t_s` and return its knot.
 
-        `prediction`: what `predict(t_s)` returned, to save doing it again. An observation from before the oldest knot
+        `prediction`: what `predict(t_s)` returned, to save doing it again. `initial`: see `update`. An observation from before the oldest knot
         enters that one.
         """
         place = bisect_right(self.knots, t_s, key=lambda knot: knot.t_s)
@@ -79,7 +79,7 @@ class IteratedFilter:
             place = 1
         else:
             prior = self.predict(t_s) if prediction is None else prediction
-            self.knots.insert(place, update(self.process, t_s, prior, residuals))
+            self.knots.insert(place, update(self.process, t_s, prior, residuals, initial))
             place += 1
         added = self.knots[place - 1]
         for later in range(place, len(self.knots)):
@@ -90,13 +90,17 @@ class IteratedFilter:
         return added
 
 
-def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: Sequence[Residual]) -> Knot:
-    """The posterior of a `prior` (state, covariance) and residuals.
+def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: Sequence[Residual],
+           initial: Array | None = None) -> Knot:
+    """The posterior of a `prior` (state, covariance) and residuals. The first step begins at the state `initial`, or at
+    the prior's.
 
     `away` is the present state less the prior's, in the tangent space of the present state.
     """
     state, covariance = prior
     away, weights, distance, before = np.zeros(process.size), np.empty(0), 0.0, np.inf
+    if initial is not None:
+        state, away = initial, process.difference(initial, prior[0])
     cross, root, last = np.empty((process.size, 0)), np.empty((0, 0)), (state, away)
     for iteration in range(ITERATIONS):
         error, jacobian, variances, cost, weights = stack(

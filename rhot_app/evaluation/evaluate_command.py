@@ -46,12 +46,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="print the last tracker's ratios to the figures kept in FILE (benchmarks/baselines)")
     group.add_argument("--logs", type=Path, metavar="DIR", default=None,
                        help="where logs are kept and found again (default ~/.cache/rhot/takes)")
+    bare = parser.add_argument_group("a tracker without markers on a bare hand, without real time (docs/twin.md)")
+    bare.add_argument("--bare-hand", action="store_true",
+                      help="matched and mismatched hands, lost cameras, random starts; takes --seeds (default 10), "
+                           "--seconds (default 3), --seed, --logs and --json")
+    bare.add_argument("--cases", metavar="TEXT", default=None, help="only the cases whose names begin with TEXT")
 
 
 def run(args: argparse.Namespace) -> int:
     """Render (or take) the frames, play them, compare, print."""
+    if args.bare_hand:
+        return _bare_hand(args)
     if args.compare:
         return _compare(args)
+    if args.cases is not None:
+        from rhot_app.errors import SimulatorError
+
+        raise SimulatorError("--cases is of --bare-hand, which is not there; add it, or leave --cases out.")
     stray = next((name for name in _OF_COMPARE if getattr(args, name) is not None), None)
     if stray is not None:
         from rhot_app.errors import SimulatorError
@@ -80,6 +91,37 @@ def _evaluate(args: argparse.Namespace) -> int:
         print(json.dumps(figures))
     else:
         print(table([(figures["motion"], figures)]), details(figures), sep="\n\n")
+    return 0
+
+
+def _bare_hand(args: argparse.Namespace) -> int:
+    from rhot_app.errors import SimulatorError
+    from rhot_app.evaluation.bare_hand import CASES, LOSS_S, SETTLE_S, Case, evaluate_bare_hand
+    from rhot_app.evaluation.bare_hand_table import bare_hand_fields, bare_hand_table
+    from rhot_app.evaluation.contour_tracker import ContourTracker
+    from rhot_app.evaluation.data_sets import data_sets_folder
+    from rhot_app.progress import ProgressLine
+    from rhot_app.project import Rig
+
+    def tracker(rig: Rig, case: Case) -> ContourTracker:
+        return ContourTracker(rig, known_size=case.known_size, finds=case.start == "nothing")
+
+    cases = [case for case in CASES if args.cases is None or case.name.startswith(args.cases)]
+    seeds, seconds = 10 if args.seeds is None else args.seeds, 3.0 if args.seconds is None else args.seconds
+    for good, rule in ((not args.compare, "--bare-hand and --compare exclude each other"),
+                       (cases, f"--cases: none of {', '.join(case.name for case in CASES)} begins with {args.cases!r}"),
+                       (seeds >= 1, "--seeds is 1 or more"),
+                       (LOSS_S[1] + SETTLE_S <= seconds <= SECONDS_MAX,
+                        f"--seconds is from {LOSS_S[1] + SETTLE_S:g} to {SECONDS_MAX:.0f} with --bare-hand")):
+        if not good:
+            raise SimulatorError(f"{rule}.")
+    announce_compilation()
+    line = ProgressLine("")
+    found = list(evaluate_bare_hand(tracker, range(args.seed, args.seed + seeds), seconds,
+                                    args.logs or data_sets_folder(), cases, line.report))
+    line.report("evaluating", 1.0)
+    line.finish()
+    print(json.dumps(bare_hand_fields(found, seconds)) if args.json else bare_hand_table(found))
     return 0
 
 

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.simulator.bare_hand.painter import BareHand
 from rhot_app.simulator.nodes.film import TRUTH_NAME, Progress, new_folder
 from rhot_app.simulator.nodes.shot import Shot, make_renderer, save_shot
 from rhot_app.simulator.render.painter import Solids
@@ -117,7 +118,7 @@ def _ruler(shot: Shot, index: int, t_s: float) -> tuple[float, float, float, flo
 
 def _samples(shot: Shot, index: int, t_s: float, visible: Array) -> dict[str, tuple[int, int, int, int]]:
     """A box on the paint of every marker that is seen whole."""
-    if isinstance(shot.scene_object.thing, Sheet):
+    if isinstance(shot.scene_object.thing, Sheet | BareHand):
         return {}
     solids: Solids = shot.scene_object.thing
     camera = shot.scene.camera(index)

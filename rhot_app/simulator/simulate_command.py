@@ -35,8 +35,9 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
                         help="camera preset: wide (62.2 degrees, 40 fps) or fast (26.5 degrees, 120 fps)")
     parser.add_argument("--distance", type=float, default=None, metavar="M",
                         help="distance of the hand from the cameras in metres (default 0.6)")
-    parser.add_argument("--background", default=None, choices=("cloth", "clutter"),
-                        help="what stands behind the hand (default cloth)")
+    parser.add_argument("--background", default=None, choices=("cloth", "clutter", "skin"),
+                        help="what stands behind the hand: cloth (default), clutter, or skin, clutter with things of "
+                        "skin's colours")
     parser.add_argument("--markers", "--marker-set", default=None, metavar="SET",
                         help="which markers the hand wears: rhot6 (default), rhot8, rich, nails6, or a marker file "
                              "(.json)")

@@ -62,7 +62,7 @@ _GROUPS = np.array([0] * 3 + [1] * 3 + [2] * 21)
 class HandProcess:
     """Implements `estimation.residual.Process`; M markers.
 
-    `dh` has a point for each marker; `limits` (21, 2) rad. `mean` (21,) rad and `covariance` (21, 21) of the natural
+    `dh` has a point for each marker; of a hand without points the whole pose is remembered. `limits` (21, 2) rad. `mean` (21,) rad and `covariance` (21, 21) of the natural
     pose. `spread` (2,): standard deviations of the palm's translation, m, and rotation, rad, over one correlation time.
     `slowest` (3,) and `fastest` 1/s: limits of the rates of translation, rotation and angles. `bias` (M, 3, 3) m^2:
     covariances of the paint biases, and `bias_s` their correlation time.
@@ -73,6 +73,7 @@ class HandProcess:
         self.dh, self._limits, self.mean = dh, limits, mean
         self._angles, self._information = covariance, np.linalg.inv(covariance)
         self._spread, self._slowest, self._fastest, self._bias_s = spread, slowest, fastest, bias_s
+        self._marked = len(dh.point_row) > 0
         self.size = MOTION + 3 * len(bias)
         self.stationary = np.zeros((self.size, self.size))
         for order, scale in enumerate((1.0, fastest**2 / 3.0, fastest**4 / 3.0)):  # value, velocity, acceleration
@@ -125,8 +126,9 @@ class HandProcess:
         """See `Process`. Long times are taken in steps in which the rates change little."""
         state, covariance = state.copy(), covariance.copy()
         if dt_s > 0.0:
-            kept, drawn = _redraw(state, self.dh, self._limits, self.mean, self._information)
-            _draw(covariance, kept, drawn, self.rates(state)[2])
+            if self._marked:
+                kept, drawn = _redraw(state, self.dh, self._limits, self.mean, self._information)
+                _draw(covariance, kept, drawn, self.rates(state)[2])
             _predict(state, covariance, dt_s, self.mean, self._angles, self._information, self._spread,
                      self._slowest, self._fastest, self._bias, self._bias_s)
         return state, covariance
@@ -135,7 +137,8 @@ class HandProcess:
         """See `Process`."""
         out, after = np.eye(self.size), state.copy()
         if dt_s > 0.0:
-            _map_rows(_redraw(after, self.dh, self._limits, self.mean, self._information)[0], out)
+            if self._marked:
+                _map_rows(_redraw(after, self.dh, self._limits, self.mean, self._information)[0], out)
             _transition(after, out, dt_s, self.mean, self._information, self._spread, self._slowest, self._fastest,
                         self._bias_s)
         return out
@@ -143,7 +146,8 @@ class HandProcess:
     def remembered(self, state: Array) -> Array:
         """See `Process`: what moves markers."""
         out = np.eye(self.size)
-        _map_rows(_redraw(state.copy(), self.dh, self._limits, self.mean, self._information)[0], out)
+        if self._marked:
+            _map_rows(_redraw(state.copy(), self.dh, self._limits, self.mean, self._information)[0], out)
         return out
 
     def advance(self, state: Array, dt_s: float) -> Array:

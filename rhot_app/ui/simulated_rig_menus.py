@@ -19,7 +19,8 @@ _FIRST = {"still": "Holds still", "wave": "Waves", "fast": "Moves fast", "sweep"
           "roam": "Moves and turns"}
 """The motions that calibrations ask for; the others stand in a menu of their own."""
 
-_THINGS = (("board", "Shows a board", "A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses."),
+_THINGS = (("bare:grasp", "Takes its markers off", "A bare hand that opens and closes."),
+           ("board", "Shows a board", "A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses."),
            ("table", "Lays the board on the table", "The same board, lying on the table."),
            ("ruler", "Shows a ruler", "A paper ruler with two crosses, 200 mm apart."))
 DISTANCES_CM = (20, 25, 30, 40, 50, 65, 80, 100)

@@ -17,7 +17,8 @@ PAGE = (Path(__file__).parents[2] / "docs" / "twin.md").read_text()
 FORMATS: list[tuple[str, int, tuple[type[msgspec.Struct], ...]]] = [
     (scene.FORMAT, scene.VERSION, (scene.TwinSettings, scene.Preset, camera_controls.Lamp, controls.Controls)),
     (motion.FORMAT, motion.VERSION, (motion.MotionFile, motion.Key, motion.Sway)),
-    (shot.FORMAT, shot.VERSION, (shot.ShotFile, shows.HandShow, shows.BoardShow, shows.RulerShow, shows.MarkerShow)),
+    (shot.FORMAT, shot.VERSION, (shot.ShotFile, shows.HandShow, shows.BareHandShow, shows.BoardShow, shows.RulerShow,
+                                 shows.MarkerShow)),
     (pictures.FORMAT, pictures.VERSION, (pictures.PicturesFile, pictures.Picture)),
 ]
 

@@ -1,4 +1,6 @@
-"""What stands behind the hand: a dark cloth, or a cluttered desk. Drawn on a plane, so that both cameras see one room.
+"""What stands behind the hand: a dark cloth, or a cluttered desk, perhaps with things of skin's colour on it.
+
+All is drawn on a plane, so that both cameras see one room.
 
 A background is a function of the plane's coordinates, m; edges are as soft as one pixel, so that nothing aliases.
 """
@@ -14,9 +16,9 @@ from rhot_app.simulator.render.rays import ray_table
 
 Array = NDArray[np.float64]
 
-BACKGROUNDS = ("cloth", "clutter")
+BACKGROUNDS = ("cloth", "clutter", "skin")
 BEHIND_HAND_M = 0.55
-_OBJECTS = 26
+_OBJECTS, _SKIN_OBJECTS = 26, 14
 
 
 def background_image(name: str, camera: CameraModel, hand_distance_m: float, seed: int) -> NDArray[np.float32]:
@@ -35,6 +37,8 @@ def background_image(name: str, camera: CameraModel, hand_distance_m: float, see
     pixel_m = plane_m / camera.intrinsics[0]
     rng = np.random.default_rng([seed, 0xBAC])
     image = _cloth(x, y, rng) if name == "cloth" else _clutter(x, y, pixel_m, rng)
+    if name == "skin":
+        _lay_skin(image, x, y, pixel_m, rng)
     return np.clip(image, 4.0, 240.0).astype(np.float32)
 
 
@@ -76,6 +80,21 @@ def _clutter(x: Array, y: Array, pixel_m: float, rng: np.random.Generator) -> Ar
             lines = np.maximum(abs(np.mod(v, 0.014) - 0.007) - 0.0018, distance + 0.012)
             _lay(image, lines, pixel_m, 0.55 * colour[:, None, None] * shine)
     return image
+
+
+def _lay_skin(image: Array, x: Array, y: Array, pixel_m: float, rng: np.random.Generator) -> None:
+    """Rods and discs of skin's colours on the desk, as thick as fingers, arms and faces."""
+    for _ in range(_SKIN_OBJECTS):
+        start, turn, length = rng.uniform((-0.6, -0.45), (0.65, 0.45)), rng.uniform(0.0, np.pi), rng.uniform(0.0, 0.35)
+        radius = rng.choice([0.009, 0.012, 0.035, 0.08])
+        u = (x - start[0]) * np.cos(turn) + (y - start[1]) * np.sin(turn)
+        v = (y - start[1]) * np.cos(turn) - (x - start[0]) * np.sin(turn)
+        distance = np.hypot(u - np.clip(u, 0.0, length), v) - radius
+        red = rng.uniform(90.0, 225.0)
+        colour = red * np.array([1.0, rng.uniform(0.66, 0.84), rng.uniform(0.48, 0.70)])
+        shade = 0.72 + 0.28 * np.sqrt(np.clip(-distance / radius, 0.0, 1.0))
+        _lay(image, distance - 0.004, 0.008, 0.75 * image)
+        _lay(image, distance, pixel_m, colour[:, None, None] * shade)
 
 
 def _wood(x: Array, y: Array, rng: np.random.Generator) -> Array:

@@ -32,7 +32,7 @@ VERSION: Final = 1
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
 Level = Annotated[int, Meta(ge=0, le=255)]
-Background = Literal["cloth", "clutter"]
+Background = Literal["cloth", "clutter", "skin"]
 
 
 class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -16,6 +16,10 @@ def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     room = parser.add_argument_group("instead of a hand")
     room.add_argument("--show", default="hand", choices=("hand", "board", "ruler", "marker"),
                       help="what stands before the cameras (default hand)")
+    room.add_argument("--bare", action="store_true", help="the hand wears no markers: skin, nails and a forearm")
+    room.add_argument("--tone", type=float, default=None, metavar="T",
+                      help="skin tone of a bare hand, 1 (light) to 10 on the Monk scale (default: drawn from the seed)")
+    room.add_argument("--sleeve", action="store_true", help="the arm of a bare hand wears a sleeve")
     room.add_argument("--board", default=None, metavar="COLSxROWS",
                       help=f"inner corners of a chessboard (default {BOARD}), squares of a ChArUco board (default "
                       f"{CHARUCO})")
@@ -43,7 +47,9 @@ def show_of(args: argparse.Namespace) -> Show:
     from rhot_app.simulator.scene.scene_description import Show
 
     fields: dict[str, object] = {"show": args.show}
-    if args.show == "hand":
+    if args.show == "hand" and args.bare:
+        fields |= {"show": "bare_hand", "motion": args.motion, "tone": args.tone, "sleeve": args.sleeve}
+    elif args.show == "hand":
         fields["motion"] = args.motion
     elif args.show == "board":
         fields |= {"pattern": "charuco" if args.charuco else "chessboard", "square_mm": args.square_mm,

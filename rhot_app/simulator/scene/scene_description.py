@@ -27,6 +27,15 @@ class HandShow(_Show, frozen=True, tag="hand"):
     motion: str = "grasp"
 
 
+class BareHandShow(_Show, frozen=True, tag="bare_hand"):
+    """A hand that wears no marker. `motion` as of a `HandShow`; `tone` of its skin, 1 to 10 on the Monk scale, null:
+    drawn from the seed; `sleeve`: its arm wears one."""
+
+    motion: str = "grasp"
+    tone: Annotated[float, Meta(ge=1, le=10)] | None = None
+    sleeve: bool = False
+
+
 class BoardShow(_Show, frozen=True, tag="board"):
     """A calibration board, moved about with pauses, or lying on the table.
 
@@ -69,4 +78,4 @@ class MarkerShow(_Show, frozen=True, tag="marker"):
     moving: bool = False
 
 
-Show = HandShow | BoardShow | RulerShow | MarkerShow
+Show = HandShow | BareHandShow | BoardShow | RulerShow | MarkerShow

@@ -12,16 +12,25 @@ from scipy.spatial.transform import Rotation
 
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.model import build_model
+from rhot_app.hand.model import HandModel, build_model
+from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter
+from rhot_app.simulator.bare_hand.sequence import BareHandOptions, drawn_hand
 from rhot_app.simulator.render.body import HandBody, Look, build_body
 from rhot_app.simulator.render.painter import Image, Painter, PoseSource
 from rhot_app.simulator.render.sheet import Sheet, board_sheet, ruler_sheet
 from rhot_app.simulator.render.sheet_painter import SheetPainter
 from rhot_app.simulator.render.solids_painter import SolidsPainter
-from rhot_app.simulator.scene.motion import BACK_FACING, load_motion
+from rhot_app.simulator.scene.motion import BACK_FACING, Motion, load_motion
 from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, BoardPoses, RigidTarget, ball_on_stick
 from rhot_app.simulator.scene.scene import Scene
-from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow, RulerShow, Show
+from rhot_app.simulator.scene.scene_description import (
+    BareHandShow,
+    BoardShow,
+    HandShow,
+    MarkerShow,
+    RulerShow,
+    Show,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +38,15 @@ class SceneObject:
     """Something that moves before the cameras of a scene: `thing` as `source` moves it."""
 
     name: str
-    thing: HandBody | RigidTarget | Sheet
+    thing: HandBody | BareHand | RigidTarget | Sheet
     source: PoseSource
 
     def painter(self, camera: CameraModel, background: Image, shading: float, seed: int) -> Painter:
         """The painter of this act for one camera."""
         if isinstance(self.thing, Sheet):
             return SheetPainter(self.thing, camera, background, shading, seed)
+        if isinstance(self.thing, BareHand):
+            return BareHandPainter(self.thing, camera, background)
         return SolidsPainter(self.thing, camera, background, shading, seed)
 
 
@@ -46,12 +57,14 @@ def make_object(show: Show, scene: Scene, hidden: frozenset[str] = frozenset()) 
     """
     match show:
         case HandShow():
-            model = build_model(scene.hand)
-            motion, settings = load_motion(show.motion, model, scene.centre, scene.seed), scene.settings
-            if settings.facing == "back":
-                motion = replace(motion, facing=BACK_FACING)
+            model, motion, settings = *_moved_hand(show.motion, scene), scene.settings
             look = Look(settings.worn_paint, settings.uneven_paint, settings.glove_rgb, scene.seed)
             return SceneObject(motion.name, build_body(model, scene.markers, hidden, look), motion)
+        case BareHandShow():
+            model, motion = _moved_hand(show.motion, scene)
+            options = BareHandOptions(tone=show.tone, sleeve=show.sleeve)
+            hand = drawn_hand(model, motion, options, scene.seed, len(scene.markers.ids))
+            return SceneObject(f"{motion.name}, bare hand", hand, motion)
         case BoardShow():
             return _board_act(show, scene)
         case RulerShow():
@@ -60,6 +73,13 @@ def make_object(show: Show, scene: Scene, hidden: frozenset[str] = frozenset()) 
             return SceneObject(f"ruler of {show.length_mm:g} mm", sheet, held)
         case MarkerShow():
             return _marker_act(show, scene)
+
+
+def _moved_hand(motion: str, scene: Scene) -> tuple[HandModel, Motion]:
+    """The scene's hand and a motion of it that shows the wanted side."""
+    model = build_model(scene.hand)
+    moved = load_motion(motion, model, scene.centre, scene.seed)
+    return model, replace(moved, facing=BACK_FACING) if scene.settings.facing == "back" else moved
 
 
 def _board_act(show: BoardShow, scene: Scene) -> SceneObject:

@@ -22,6 +22,7 @@ from scipy.interpolate import CubicSpline
 from rhot_app.errors import SimulatorError
 from rhot_app.project import Rig, load_rig, save_rig
 from rhot_app.recording.raw_log import Record
+from rhot_app.simulator.bare_hand.painter import BareHand
 from rhot_app.simulator.nodes.film import TRUTH_NAME, Progress, new_folder
 from rhot_app.simulator.nodes.node_log import CABLE, NodeSender, write_node_log
 from rhot_app.simulator.nodes.nodes import NodePorts
@@ -80,7 +81,7 @@ def write_points(shot: Shot, folder: Path, noise: PointNoise, progress: Progress
 
     Raises SimulatorError, also when what is shown wears no markers.
     """
-    if isinstance(shot.scene_object.thing, Sheet):
+    if isinstance(shot.scene_object.thing, Sheet | BareHand):
         raise SimulatorError(f"a {shot.scene_object.name} wears no markers; show a hand or a marker.")
     with new_folder(folder) as work:
         save_shot(shot, work)
@@ -126,7 +127,7 @@ class _Stream:
 
     def _observe(self, shot: Shot) -> tuple[Array, Array]:
         """(F, M, 3) m and (F, M, 2) px at the time of each marker's own row; NaN where it is not in the picture."""
-        assert not isinstance(shot.scene_object.thing, Sheet)
+        assert not isinstance(shot.scene_object.thing, Sheet | BareHand)
         grid = np.arange(0.0, shot.seconds + 0.1, 1.0 / _GRID_HZ)
         ways = shot.scene_object.thing.marker_positions(*shot.scene_object.source.sample(grid))
         times, row_time_s = 1e-9 * self._times_ns, 1e-9 * self._scene.row_time_ns

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import SimulatorError
+from rhot_app.simulator.bare_hand.painter import BareHand
 from rhot_app.simulator.render.body import HandBody
 from rhot_app.simulator.scene.rigid_target import RigidTarget
 from rhot_app.simulator.scene.scene_objects import SceneObject
@@ -101,7 +102,7 @@ def true_object(scene_object: SceneObject, seconds: float, cameras: tuple[FrameT
     """Sample what was rendered, from scene time 0 to `seconds`."""
     times = np.arange(0.0, seconds + 1.0 / SAMPLE_HZ, 1.0 / SAMPLE_HZ)
     transforms, angles = scene_object.source.sample(times)
-    if isinstance(scene_object.thing, HandBody):
+    if isinstance(scene_object.thing, HandBody | BareHand):
         joints, worn = scene_object.thing.joints_and_markers(transforms, angles)
         return Truth(times, worn, joints, angles, transforms, cameras)
     markers = np.zeros((len(times), 0, 3))

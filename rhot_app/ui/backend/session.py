@@ -203,13 +203,21 @@ class Session:
 
 def _show_named(what: str) -> Show:
     """The show of a key; raises SimulatorError for a key that is none."""
-    from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow, RulerShow
+    from rhot_app.simulator.scene.scene_description import (
+        BareHandShow,
+        BoardShow,
+        HandShow,
+        MarkerShow,
+        RulerShow,
+    )
 
     kind, _, detail = what.partition(":")
     with contextlib.suppress(ValueError):
         match kind:
             case "hand":
                 return HandShow(detail)
+            case "bare":
+                return BareHandShow(detail)
             case "board":
                 return BoardShow()
             case "table":
@@ -223,10 +231,18 @@ def _show_named(what: str) -> Show:
 
 def _key_of(show: Show) -> str:
     """The key of a show; "" for one that has none."""
-    from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow, RulerShow
+    from rhot_app.simulator.scene.scene_description import (
+        BareHandShow,
+        BoardShow,
+        HandShow,
+        MarkerShow,
+        RulerShow,
+    )
 
     if isinstance(show, HandShow):
         return f"hand:{show.motion}"
+    if isinstance(show, BareHandShow):
+        return f"bare:{show.motion}" if show == BareHandShow(show.motion) else ""
     if isinstance(show, MarkerShow):
         return f"marker:{show.distance_m:g}" if show == MarkerShow(distance_m=show.distance_m) else ""
     return {BoardShow(): "board", BoardShow(on_table=True): "table", RulerShow(): "ruler"}.get(show, "")

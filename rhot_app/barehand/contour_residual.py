@@ -1,0 +1,240 @@
+"""The residual of one camera's edges: contour points of the hand against the edges that were found near them.
+
+On a slice, the hand's edge is one of the edges found, or none of them was found as an edge (Isard and Blake 1998). Clutter
+is a Poisson process along the slice. An edge counts by the probability that it is the hand's, at the present state.
+So a slice without edges, or with edges of other things only, changes nothing.
+
+What the surface model has wrong is the same along a phalanx: its radius is a nuisance, integrated out for each capsule in
+each camera. Two opposite edges then determine the axis, as in feature mode, and one edge alone is less certain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, contour_points, follow
+from rhot_app.barehand.surface import PALM, SHAPE, Surface
+from rhot_app.estimation.residual import UNIT, Rows
+from rhot_app.tracking.hand_process import ANGLES, BIAS, LIMIT_SD_RAD, MOTION, POSE
+from rhot_node.detect.edges import Edges
+
+Array = NDArray[np.float64]
+
+SHAPE_SD_M = 0.7e-3
+"""m: standard deviation of skin about the model's surface within a phalanx: creases, joints and nails."""
+
+RADIUS_SD = 0.08
+"""Standard deviation of a phalanx's radius, as a part of it, in hands of one size (Buryanov and Kotiuk 2010)."""
+
+MISSED = np.array([0.1, 0.4])
+"""Probability that a silhouette, or an edge within the hand, is no edge of the image."""
+
+GROUPS = PALM + 1
+"""Fingers and palm."""
+
+DEGREES = 4.0
+"""Of freedom, of Student's distribution of edges about the contour (Lange, Little and Taylor 1989)."""
+
+UNSURE = 0.02
+"""Probability that a foreground probability of 0 or 1 is wrong."""
+
+_STUDENT_4 = 0.375  # density at 0 of Student's t of 4 degrees of freedom
+_LEAST_CLUTTER = 1e-3  # edges per px
+_RIDGE = 1e-3  # 1/m^2 and 1/rad^2, as good as nothing
+
+
+class ContourFrame:
+    """Implements `estimation.residual.Residual`: one camera's slices, the edges on them, and where the contour is.
+
+    `slices` (K, 5) as `find_edges` takes them; `expected_sd` (K,) px: of the contour along each slice. `seen`
+    (GROUPS, 2): of each finger and the palm, the slices whose contour was found, and all, when last linearised.
+    """
+
+    def __init__(self, surface: Surface, points: ContourPoints, pose: Array, intrinsics: Array, slices: Array,
+                 expected_sd: Array, late_s: Array, size_column: int) -> None:
+        self.surface, self.points, self.pose, self.intrinsics = surface, points, pose, intrinsics
+        self.slices, self.expected_sd, self.late_s, self.size_column = slices, expected_sd, late_s, size_column
+        self.pixel, self.normal = slices[:, :2].copy(), slices[:, 2:4].copy()
+        self.edges: Edges | None = None
+        self.clutter = np.empty((0, 0))
+        self.seen = np.zeros((GROUPS, 2))
+
+    def observe(self, edges: Edges) -> None:
+        """Take the edges of the slices. The density of edges that are at least as strong is that of the clutter."""
+        self.edges = edges
+        length = float(np.sum(2.0 * self.slices[:, 4] + 1.0))
+        valid = np.arange(edges.offset.shape[1]) < edges.count[:, None]
+        strength = np.abs(edges.strength)
+        stronger = len(strength[valid]) - np.searchsorted(np.sort(strength[valid]), strength)
+        self.clutter = np.maximum(stronger / max(length, 1.0), _LEAST_CLUTTER)
+
+    def predict(self, state: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """The contour on each slice: `offset` (K,) px from its centre, its derivative (K, COLUMNS), whether it exists."""
+        count = len(self.slices)
+        offset, rows, widths = np.zeros(count), np.zeros((count, COLUMNS)), np.zeros(count)
+        good = np.zeros(count, np.bool_)
+        p = self.points
+        follow(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule, p.kind,
+               p.along, self.pixel, self.normal, offset, rows, widths, good)
+        return offset, rows, good
+
+    def _size(self, state: Array) -> Array:
+        first = BIAS - MOTION + self.size_column
+        return np.ascontiguousarray(state[first:first + SHAPE])
+
+    def weights(self, state: Array) -> tuple[Array, Array]:
+        """(K, MOST) probabilities that each edge is the hand's, and (K,) px from the contour to their mean."""
+        assert self.edges is not None
+        offset, _, good = self.predict(state)
+        found = np.zeros(self.edges.offset.shape)
+        error = np.full(len(offset), np.nan)
+        for s in range(len(offset)):
+            if good[s]:
+                scale = self.points.scale[s]
+                _, weight, mean, _ = _mix(self.edges.count[s], self.edges.offset[s], self.edges.sd[s],
+                                          self.edges.inside[s], self.edges.outside[s], self.points.behind[s],
+                                          offset[s], (SHAPE_SD_M * scale) ** 2, self.expected_sd[s] ** 2,
+                                          self.clutter[s], found[s])
+                if weight > 0.0:
+                    error[s] = mean
+        return found, error
+
+    def linearise(self, state: Array) -> Rows:
+        """COLUMNS rows that say what all slices say together, and one that holds the rest of their cost."""
+        assert self.edges is not None, "the edges of the slices have not been observed"
+        p, e = self.points, self.edges
+        information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
+        self.seen = np.zeros((GROUPS, 2))
+        cost = _gather(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule,
+                       p.kind, p.along, p.behind, p.scale, self.pixel, self.normal, e.count, e.offset, e.sd, e.inside,
+                       e.outside, self.expected_sd, self.clutter, information, pull, self.seen)
+        return compressed(information, pull, cost, len(state) - BIAS + MOTION, self.size_column)
+
+
+def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int) -> Rows:
+    """Rows of whitened errors with this information (COLUMNS, COLUMNS), gradient (COLUMNS,) and cost in all."""
+    root = np.linalg.cholesky(information + _RIDGE * np.eye(COLUMNS))
+    error, jacobian = np.zeros(COLUMNS + 1), np.zeros((COLUMNS + 1, size))
+    error[:-1] = np.linalg.solve(root, pull)
+    error[-1] = np.sqrt(max(cost - float(error @ error), 0.0))
+    jacobian[:-1, :POSE], jacobian[:-1, size_column:size_column + SHAPE] = root.T[:, :POSE], root.T[:, POSE:]
+    return Rows(error, jacobian, UNIT)
+
+
+class JointLimits:
+    """Implements `Residual`: angles beyond their limits (21, 2) rad are drawn to them."""
+
+    def __init__(self, limits: Array) -> None:
+        self.limits = limits
+
+    def linearise(self, state: Array) -> Rows:
+        """One row for each angle beyond its limits."""
+        angles = state[ANGLES:ANGLES + 21]
+        excess = np.minimum(self.limits[:, 1] - angles, 0.0) + np.maximum(self.limits[:, 0] - angles, 0.0)
+        beyond = np.flatnonzero(excess)
+        jacobian = np.zeros((len(beyond), len(state) - BIAS + MOTION))
+        jacobian[np.arange(len(beyond)), 6 + beyond] = 1.0 / LIMIT_SD_RAD
+        return Rows(excess[beyond] / LIMIT_SD_RAD, jacobian, UNIT)
+
+
+def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, intrinsics: Array,
+              image_size: tuple[int, int], size_column: int, row_s: float, reach: float, longest_px: float,
+              step_m: float) -> ContourFrame:
+    """The slices that a camera should search when the hand is expected in `state` with `covariance` (n, n): `reach`
+    standard deviations to both sides, at most `longest_px`."""
+    first = BIAS - MOTION + size_column
+    points = contour_points(surface, state, np.ascontiguousarray(state[first:first + SHAPE]), pose, intrinsics,
+                            image_size, step_m)
+    count = len(points.along)
+    late = row_s * (points.pixel[:, 1] - points.pixel[:, 1].mean()) if count and row_s else np.zeros(count)
+    slices = np.column_stack([points.pixel, points.normal, np.ones(count)])
+    frame = ContourFrame(surface, points, pose, intrinsics, slices, np.zeros(count), late, size_column)
+    _, rows, _ = frame.predict(state)
+    own = np.r_[0:POSE, size_column:size_column + SHAPE]
+    variance = np.sum((rows @ covariance[np.ix_(own, own)]) * rows, axis=1)
+    frame.expected_sd = np.sqrt(np.maximum(variance, 0.0))
+    spread = np.sqrt(variance + (2.0 * SHAPE_SD_M * points.scale) ** 2)
+    slices[:, 4] = np.clip(reach * spread + 1.0, 3.0, longest_px)
+    return frame
+
+
+@njit(cache=True)
+def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance, spread_variance, clutter, found):
+    """Fill `found` with the probability that each edge is the hand's. Returns -2 log likelihood over its least, the
+    weight 1/px^2, the weighted mean error px, and the probability that any is."""
+    missed = MISSED[behind]
+    total, peak = missed, missed
+    for k in range(count):
+        variance = sds[k] * sds[k] + shape_variance + spread_variance
+        error = offsets[k] - expected
+        ours = UNSURE + (1.0 - 2.0 * UNSURE) * inside[k]
+        theirs = UNSURE + (1.0 - 2.0 * UNSURE) * outside[k]
+        odds = 4.0 * ours * (theirs if behind == INNER else 1.0 - theirs)
+        top = (1.0 - missed) * odds * _STUDENT_4 / (np.sqrt(variance) * clutter[k])
+        found[k] = top * (1.0 + error * error / (DEGREES * variance)) ** (-0.5 * (DEGREES + 1.0))
+        total += found[k]
+        peak = max(peak, missed + top)
+    weight = mean = 0.0
+    for k in range(count):
+        found[k] /= total
+        variance = sds[k] * sds[k] + shape_variance
+        wide = variance + spread_variance
+        error = offsets[k] - expected
+        one = found[k] * (DEGREES + 1.0) / (DEGREES + error * error / wide) / variance
+        weight += one
+        mean += one * error
+    if weight > 0.0:
+        mean /= weight
+    return 2.0 * np.log(max(peak / total, 1.0)), weight, mean, 1.0 - missed / total
+
+
+@njit(cache=True)
+def _gather(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, scale, pixel, normal, count,
+            offsets, sds, inside, outside, expected_sd, clutter, information, pull, seen):
+    """Add what the slices say to `information` (COLUMNS, COLUMNS) and `pull` (COLUMNS,); returns their cost."""
+    slices = capsule.shape[0]
+    offset, rows, widths = np.zeros(slices), np.zeros((slices, COLUMNS)), np.zeros(slices)
+    good, found = np.zeros(slices, np.bool_), np.empty(offsets.shape[1])
+    follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, widths,
+           good)
+    cost, s = 0.0, 0
+    common, own = np.empty(COLUMNS), np.empty(COLUMNS, np.int64)
+    while s < slices:
+        k = capsule[s]
+        common[:] = 0.0
+        wide, drawn = 1.0 / RADIUS_SD**2, 0.0
+        while s < slices and capsule[s] == k:
+            if good[s]:
+                one, weight, error, present = _mix(
+                    count[s], offsets[s], sds[s], inside[s], outside[s], behind[s], offset[s],
+                    (SHAPE_SD_M * scale[s]) ** 2, expected_sd[s] ** 2, clutter[s], found)
+                cost += one
+                seen[surface.group[k], 0] += present
+                seen[surface.group[k], 1] += 1.0
+                if weight > 0.0:
+                    used = 0
+                    for i in range(COLUMNS):
+                        if rows[s, i] != 0.0:
+                            own[used] = i
+                            used += 1
+                    for p in range(used):
+                        i = own[p]
+                        a = weight * rows[s, i]
+                        pull[i] += a * error
+                        common[i] += a * widths[s]
+                        for q in range(p + 1):
+                            information[i, own[q]] += a * rows[s, own[q]]
+                    wide += weight * widths[s] ** 2
+                    drawn += weight * widths[s] * error
+            s += 1
+        for i in range(COLUMNS):  # the capsule's radius is integrated out
+            if common[i] != 0.0:
+                pull[i] -= common[i] * drawn / wide
+                for j in range(i + 1):
+                    information[i, j] -= common[i] * common[j] / wide
+    for i in range(COLUMNS):
+        for j in range(i):
+            information[j, i] = information[i, j]
+    return cost

@@ -1,0 +1,47 @@
+"""Pictures for people: the contours that a hand is expected to have, the slices, and what was found on them."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contour_residual import ContourFrame
+from rhot_app.barehand.contours import INNER
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+SILHOUETTE_RGB, INNER_RGB, FOUND_RGB, OTHER_RGB, BONE_RGB = (40, 230, 80), (60, 140, 255), (255, 40, 40), (255, 220, 0), (255, 255, 255)
+_SUB = 4  # bits of a pixel's fraction in OpenCV's drawing
+
+
+def overlay(image: Image, frame: ContourFrame, state: Array, joints: Array | None = None, zoom: int = 1) -> Image:
+    """A copy of `image` (H, W, 3) RGB, `zoom` times as large, with the contour of the hand in `state`: green beside the
+    background, blue within the hand. Slices are thin; edges on them yellow, and red where they are probably the hand's.
+    `joints` (21, 2) px are joined to a skeleton."""
+    out = cv2.resize(image, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_LINEAR)
+
+    def place(p: Array) -> tuple[int, int]:
+        x, y = (np.asarray(p) + 0.5) * zoom - 0.5
+        return round(float(x) * 2**_SUB), round(float(y) * 2**_SUB)
+
+    offset, _, good = frame.predict(state)
+    found, _ = frame.weights(state)
+    edges = frame.edges
+    for s in np.flatnonzero(good):
+        colour = INNER_RGB if frame.points.behind[s] == INNER else SILHOUETTE_RGB
+        centre, normal, half = frame.slices[s, :2], frame.slices[s, 2:4], frame.slices[s, 4]
+        cv2.line(out, place(centre - half * normal), place(centre + half * normal), (110, 110, 110), 1, cv2.LINE_AA, _SUB)
+        cv2.circle(out, place(centre + offset[s] * normal), zoom << _SUB, colour, -1, cv2.LINE_AA, _SUB)
+        for k in range(int(edges.count[s]) if edges is not None else 0):
+            assert edges is not None
+            cv2.circle(out, place(centre + edges.offset[s, k] * normal), round(0.7 * zoom) << _SUB,
+                       FOUND_RGB if found[s, k] > 0.5 else OTHER_RGB, -1, cv2.LINE_AA, _SUB)
+    if joints is not None:
+        for finger in range(5):
+            chain = [0, *range(1 + 4 * finger, 5 + 4 * finger)]
+            for a, b in zip(chain, chain[1:], strict=False):
+                if np.isfinite(joints[[a, b]]).all():
+                    cv2.line(out, place(joints[a]), place(joints[b]), BONE_RGB, 1, cv2.LINE_AA, _SUB)
+    return np.asarray(out, dtype=np.uint8)

@@ -1,0 +1,178 @@
+"""How well a posed hand covers the foreground of small images: a cheap score for many poses, and a search with it.
+
+Every pixel is worth the log odds that it shows the hand. What lies where the forearm may be is worth nothing either way,
+because the wrist bends. The search draws poses from a Gaussian, keeps the best and draws again (cross-entropy method,
+Rubinstein 1999).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contours import project
+from rhot_app.barehand.surface import FOREARM, SHAPE, Surface, place_capsules
+from rhot_app.hand.kinematics import move
+
+Array = NDArray[np.float64]
+
+UNSURE = 0.05
+"""Probability that a foreground probability of 0 or 1 is wrong: shadows, sleeves, other skin."""
+
+ARM_M, ARM_SPREAD = 0.5, 0.35
+"""m, and radius per m: the cone behind the wrist in which a forearm may lie, about 20 degrees to every side."""
+
+
+class Silhouettes(NamedTuple):
+    """Log odds (C, h, w) of every `step`-th pixel of C images; `poses` (C, 3, 4) and `intrinsics` (C, 9) of the cameras.
+    Images of other sizes are padded with 0."""
+
+    odds: Array
+    step: int
+    poses: Array
+    intrinsics: Array
+
+
+def silhouettes(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array], intrinsics: Sequence[Array]) \
+        -> Silhouettes:
+    """From foreground probabilities (h, w) of each camera (`foreground_map`)."""
+    height, width = max(one.shape[0] for one in maps), max(one.shape[1] for one in maps)
+    odds = np.zeros((len(maps), height, width))
+    for camera, one in enumerate(maps):
+        sure = UNSURE + (1.0 - 2.0 * UNSURE) * np.asarray(one, dtype=np.float64)
+        odds[camera, :one.shape[0], :one.shape[1]] = np.log(sure / (1.0 - sure))
+    return Silhouettes(odds, step, np.array(poses), np.array(intrinsics))
+
+
+@njit(cache=True)
+def _paint(c0, c1, r0, r1, pose, intrinsics, step, mask, value, a, b, slope):
+    """Mark the pixels of a capsule in `mask` (h, w) that are not marked yet."""
+    if not (project(c0[0], c0[1], c0[2], pose, intrinsics, a, slope)):
+        return
+    if not (project(c1[0], c1[1], c1[2], pose, intrinsics, b, slope)):
+        return
+    z0 = pose[2, 3] + pose[2, 0] * c0[0] + pose[2, 1] * c0[1] + pose[2, 2] * c0[2]
+    z1 = pose[2, 3] + pose[2, 0] * c1[0] + pose[2, 1] * c1[1] + pose[2, 2] * c1[2]
+    u0, v0, u1, v1 = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5, (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
+    s0, s1 = intrinsics[0] * r0 / z0 / step, intrinsics[0] * r1 / z1 / step
+    height, width = mask.shape
+    left, right = max(int(min(u0 - s0, u1 - s1)), 0), min(int(max(u0 + s0, u1 + s1)) + 1, width - 1)
+    top, bottom = max(int(min(v0 - s0, v1 - s1)), 0), min(int(max(v0 + s0, v1 + s1)) + 1, height - 1)
+    du, dv = u1 - u0, v1 - v0
+    square = max(du * du + dv * dv, 1e-9)
+    for row in range(top, bottom + 1):
+        for column in range(left, right + 1):
+            if mask[row, column]:
+                continue
+            t = min(max(((column - u0) * du + (row - v0) * dv) / square, 0.0), 1.0)
+            x, y, r = column - u0 - t * du, row - v0 - t * dv, s0 + t * (s1 - s0)
+            if x * x + y * y <= r * r:
+                mask[row, column] = value
+
+
+@njit(cache=True)
+def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, parts):
+    """Log likelihood of the images under a pose over that without a hand; `parts` (C, 3): of each camera the sum of log
+    odds on the hand, its pixels, and the foreground pixels that neither hand nor forearm covers."""
+    count = surface.row.shape[0]
+    frames = np.empty((surface.dh.parent.shape[0], 3, 4))
+    centres, radii = np.empty((count, 2, 3)), np.empty((count, 2))
+    place_capsules(surface, world, angles, size, frames, centres, radii)
+    a, b, slope = np.empty(2), np.empty(2), np.empty((2, 3))
+    wrist, elbow = world[:3, 3].copy(), world[:3, 3] - ARM_M * world[:3, 0]
+    thick, total = 0.0, 0.0
+    for k in range(count):
+        if surface.group[k] == FOREARM:
+            thick = max(thick, radii[k, 0])
+    for camera in range(odds.shape[0]):
+        mask[:] = 0
+        for k in range(count):
+            if surface.group[k] != FOREARM:
+                _paint(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1], poses[camera], intrinsics[camera], step,
+                       mask, 1, a, b, slope)
+        # the arm ends at the camera's housing at the latest
+        end, depth0, depth1 = 1.0, 0.0, 0.0
+        for i in range(3):
+            depth0 += poses[camera, 2, i] * wrist[i]
+            depth1 += poses[camera, 2, i] * elbow[i]
+        depth0, depth1 = depth0 + poses[camera, 2, 3], depth1 + poses[camera, 2, 3]
+        if depth1 < 0.1 and depth0 > 0.1:
+            end = (depth0 - 0.1) / (depth0 - depth1)
+        reach = wrist + end * (elbow - wrist)
+        _paint(wrist, reach, thick, thick + end * ARM_M * ARM_SPREAD, poses[camera], intrinsics[camera], step, mask, 2,
+               a, b, slope)
+        own = covered = area = 0.0
+        for row in range(mask.shape[0]):
+            for column in range(mask.shape[1]):
+                value = mask[row, column]
+                o = odds[camera, row, column]
+                if value == 1:
+                    own += o
+                    area += 1.0
+                elif value == 2 and o > 0.0:
+                    covered += o
+        parts[camera, 0], parts[camera, 1], parts[camera, 2] = own, area, covered
+        total += own + covered
+    return total
+
+
+def score(surface: Surface, world: Array, angles: Array, size: Array, images: Silhouettes) -> tuple[float, Array]:
+    """Log likelihood of the images with the hand at `world` (4, 4), `angles` (21,) over that without it, and per camera
+    the sum of the log odds on the hand, its pixels, and the log odds of the forearm (C, 3)."""
+    parts = np.zeros((len(images.odds), 3))
+    mask = np.zeros(images.odds.shape[1:], np.uint8)
+    return float(_score(surface, world, angles, size, images.odds, images.step, images.poses, images.intrinsics, mask,
+                        parts)), parts
+
+
+@njit(cache=True)
+def _score_many(surface, world, angles, steps, limits, size, odds, step, poses, intrinsics, scores):
+    mask, parts = np.zeros(odds.shape[1:], np.uint8), np.zeros((odds.shape[0], 3))
+    moved, turned = np.empty((4, 4)), np.empty(21)
+    for n in range(steps.shape[0]):
+        move(world, angles, steps[n], moved, turned)
+        for i in range(21):
+            turned[i] = min(max(turned[i], limits[i, 0]), limits[i, 1])
+        scores[n] = _score(surface, moved, turned, size, odds, step, poses, intrinsics, mask, parts)
+
+
+def score_steps(surface: Surface, world: Array, angles: Array, steps: Array, limits: Array, size: Array,
+                images: Silhouettes) -> Array:
+    """(N,) scores of the hand moved by `steps` (N, 27) of twist and angles; angles stay within `limits` (21, 2)."""
+    scores = np.empty(len(steps))
+    _score_many(surface, world, angles, np.ascontiguousarray(steps), limits, size, images.odds, images.step,
+                images.poses, images.intrinsics, scores)
+    return scores
+
+
+def search(surface: Surface, world: Array, angles: Array, covariance: Array, limits: Array, size: Array,
+           images: Silhouettes, rng: np.random.Generator, draws: int = 100, rounds: int = 3, best: int = 10) \
+        -> tuple[Array, Array, float]:
+    """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, and its score.
+
+    The prior itself counts: -1/2 of the squared Mahalanobis distance.
+    """
+    root = np.linalg.cholesky(covariance + 1e-12 * np.eye(len(covariance)))
+    mean, spread = np.zeros(len(root)), np.ones(len(root))
+    top = (-np.inf, np.zeros(len(root)))
+    for _ in range(rounds):
+        white = mean + spread * rng.standard_normal((draws, len(root)))
+        white[0] = mean
+        scores = score_steps(surface, world, angles, white @ root.T, limits, size, images)
+        scores -= 0.5 * np.sum(white * white, axis=1)
+        order = np.argsort(-scores)[:best]
+        if scores[order[0]] > top[0]:
+            top = float(scores[order[0]]), white[order[0]]
+        mean, spread = white[order].mean(axis=0), np.sqrt(white[order].var(axis=0) + 0.01)
+    moved, turned = np.empty((4, 4)), np.empty(21)
+    move(world, angles, root @ top[1], moved, turned)
+    return moved, np.clip(turned, limits[:, 0], limits[:, 1]), top[0]
+
+
+def no_size() -> Array:
+    """(SHAPE,) a hand as large as its file says."""
+    return np.zeros(SHAPE)

@@ -1,0 +1,164 @@
+"""Finds a hand of which nothing is known, in the foreground of one image of each camera.
+
+Places where the foreground is as thick as a palm are candidates. Of each, many rotations and some shapes of the hand are
+scored by how well they cover the foreground (`silhouette`), and the best are refined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rhot_app.barehand.silhouette import score_steps, search, silhouettes
+from rhot_app.barehand.surface import Surface
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.transforms import rigid
+from rhot_app.hand.model import HandModel
+from rhot_app.hand.skeleton import FLEXIONS, HandPose
+from rhot_node.detect.foreground import Foreground, foreground_map
+
+Array = NDArray[np.float64]
+
+STEP = 8
+"""px: every so many-th pixel is looked at."""
+
+ROTATIONS = 240
+"""Rotations tried at a candidate: 30 degrees apart."""
+
+KEPT = 6
+"""Poses refined of each candidate."""
+
+PALMS = 6
+"""Candidates of each camera."""
+
+_CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
+_POINTING = 3
+_SPREAD = 0.03, 0.35, 0.35  # m, rad, rad between the poses tried
+_PALM_RADIUS = 0.6, 1.7  # of half the palm's breadth: thinner or thicker foreground is none
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A pose that may be the hand's, and its score: log likelihood of the foreground, more is better."""
+
+    pose: HandPose
+    score: float
+
+
+def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[CameraModel],
+              foreground: Sequence[Foreground], model: HandModel, surface: Surface, size: Array,
+              rng: np.random.Generator, most: int = 3) -> list[Found]:
+    """The most probable hands in images (H, W, 3) RGB of some cameras, best first, at most `most`; none without
+    foreground as thick as a palm."""
+    used = [c for c, image in enumerate(images) if image is not None]
+    maps = [foreground_map(images[c], foreground[c], STEP) for c in used]  # type: ignore[arg-type]
+    seen = silhouettes(maps, STEP, [cameras[c].camera_from_world[:3] for c in used],
+                       [cameras[c].intrinsics for c in used])
+    breadth = 0.5 * float(np.exp(size[0])) * float(model.base[1, 1] - model.base[4, 1] + model.radii[1, 0]
+                                                   + model.radii[4, 0])
+    centres = _palm_centres(maps, [cameras[c] for c in used], breadth)
+    found: list[Found] = []
+    shapes = _shapes(model)
+    turns = Rotation.random(ROTATIONS, random_state=int(rng.integers(2**31))).as_matrix()
+    tried: list[tuple[float, Array, Array]] = []
+    middle = np.array([0.6 * model.base[2, 0] * np.exp(size[0]), 0.0, 0.0])
+    for centre, (turn, angles) in product(centres, product(turns, shapes)):
+        world = rigid(turn, centre - turn @ middle)
+        value = float(score_steps(surface, world, angles, np.zeros((1, 27)), model.limits, size, seen)[0])
+        tried.append((value, world, angles))
+    tried.sort(key=lambda one: -one[0])
+    covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
+    covariance[6:, 6:] = np.linalg.inv(model.natural.information + np.eye(21) / _SPREAD[2] ** 2)
+    for _, world, angles in _distinct(tried, KEPT * max(min(len(centres), 2), 1)):
+        moved, bent, value = search(surface, world, angles, covariance, model.limits, size, seen, rng, 80, 4, 8)
+        found.append(Found(HandPose(moved, bent), value))
+    found.sort(key=lambda one: -one.score)
+    return found[:most]
+
+
+def _distinct(tried: list[tuple[float, Array, Array]], most: int) -> list[tuple[float, Array, Array]]:
+    """The best poses that are not turned alike within half a radian."""
+    kept: list[tuple[float, Array, Array]] = []
+    for one in tried:
+        if all(np.trace(one[1][:3, :3].T @ other[1][:3, :3]) < 1.0 + 2.0 * np.cos(0.5)
+               or np.linalg.norm(one[1][:3, 3] - other[1][:3, 3]) > _SPREAD[0] for other in kept):
+            kept.append(one)
+            if len(kept) == most:
+                break
+    return kept
+
+
+def _shapes(model: HandModel) -> list[Array]:
+    """Angles (21,) of an open, a relaxed, a closed and a pointing hand."""
+    out = []
+    for curl in _CURLS_DEG:
+        angles = model.natural.mean.copy()
+        for flexions in FLEXIONS[1:]:
+            angles[list(flexions)] = np.radians(curl)
+        out.append(angles)
+    pointing = out[2].copy()
+    pointing[list(FLEXIONS[1])] = np.radians(_CURLS_DEG[0])
+    return [*out, pointing]
+
+
+def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraModel], breadth: float) -> list[Array]:
+    """(3,) m places of palms: where thick foreground of two cameras meets, or of one at the distance its size tells."""
+    peaks = [_thick(one) for one in maps]
+    found: list[tuple[float, Array]] = []
+    for a in range(len(maps)):
+        for b in range(a):
+            for p, q in product(peaks[a], peaks[b]):
+                rays = [cameras[k].undistort(peak[None, :2])[0] for k, peak in ((a, p), (b, q))]
+                matrices = [cameras[k].camera_from_world[:3] for k in (a, b)]
+                point = cv2.triangulatePoints(matrices[0], matrices[1], rays[0].reshape(2, 1), rays[1].reshape(2, 1))
+                place = (point[:3] / point[3]).ravel()
+                error = 0.0
+                for k, peak in ((a, p), (b, q)):
+                    pixel = cameras[k].project(place)[0]
+                    error += float(np.linalg.norm(pixel - peak[:2]) / peak[2]) if np.isfinite(pixel).all() else np.inf
+                    error += _unlike(cameras[k], place, peak[2], breadth)
+                if np.isfinite(error):
+                    found.append((error, place))
+    if len(maps) == 1:
+        camera = cameras[0]
+        for peak in peaks[0]:
+            x, y = camera.undistort(peak[None, :2])[0]
+            depth = camera.intrinsics[0] * breadth / peak[2]
+            place = camera.world_from_camera[:3, :3] @ (depth * np.array([x, y, 1.0])) + camera.centre
+            found.append((0.0, place))
+    found.sort(key=lambda one: one[0])
+    return [place for _, place in found[:PALMS]]
+
+
+def _unlike(camera: CameraModel, place: Array, radius: float, breadth: float) -> float:
+    """How much a radius px differs from a palm's at a place: |ln|, inf beyond what palms show."""
+    depth = float((camera.camera_from_world[:3, :3] @ place + camera.camera_from_world[:3, 3])[2])
+    if not depth > 0.05:
+        return np.inf
+    ratio = radius * depth / (camera.intrinsics[0] * breadth)
+    return abs(float(np.log(ratio))) if _PALM_RADIUS[0] * 0.6 < ratio < _PALM_RADIUS[1] else np.inf
+
+
+def _thick(probability: NDArray[np.float32]) -> list[Array]:
+    """(3,) px centres x, y and radii of the largest discs of foreground, thickest first, that do not touch."""
+    solid = (probability > 0.5).astype(np.uint8)
+    distance = cv2.distanceTransform(cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_REPLICATE), cv2.DIST_L2, 5)
+    distance = distance[1:-1, 1:-1].copy()
+    ridge = (distance >= cv2.dilate(distance, np.ones((3, 3)))) & (distance > 1.0)
+    rows, columns = np.nonzero(ridge)
+    order = np.argsort(-distance[rows, columns])
+    out: list[Array] = []
+    for k in order:
+        radius = float(distance[rows[k], columns[k]])
+        place = np.array([(columns[k] + 0.5) * STEP - 0.5, (rows[k] + 0.5) * STEP - 0.5, radius * STEP])
+        if all(np.linalg.norm(place[:2] - other[:2]) > 0.7 * other[2] for other in out):
+            out.append(place)
+            if len(out) == 4 * PALMS:
+                break
+    return out

@@ -1,0 +1,329 @@
+"""Tracks a hand without markers in the images of any number of cameras, each image at its own time.
+
+Contours are one more kind of residual of the estimator (`rhot_app.estimation`): every image is searched along slices
+across the contours that the prediction expects, the state is estimated, and the image is searched once more where the
+contours are then. Marker and landmark residuals of the same state may be added at any time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contour_residual import GROUPS, ContourFrame, JointLimits, slices_of
+from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.silhouette import Silhouettes, score, search, silhouettes
+from rhot_app.barehand.start import STEP, Found, find_hand
+from rhot_app.barehand.surface import PALM, SHAPE, sized_table, surface_of
+from rhot_app.errors import TrackingError
+from rhot_app.estimation.filter import IteratedFilter, Knot, update
+from rhot_app.estimation.residual import Residual
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.hand.model import build_model
+from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, HandPose
+from rhot_app.project import Rig
+from rhot_app.tracking.estimator_state import INFERRED_M, INFERRED_RAD, MEASURED_M, MEASURED_RAD
+from rhot_app.tracking.hand_process import (
+    ACCELERATION,
+    ANGLES,
+    BIAS,
+    FASTEST,
+    MOTION,
+    PALM_SPREAD,
+    POSE,
+    VELOCITY,
+    HandProcess,
+)
+from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_node.detect.edges import find_edges, noise_of
+from rhot_node.detect.foreground import Foreground, foreground_map, no_foreground
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+CONFUSED_PX = 6.0
+"""px: a contour expected this much less certainly may be taken for its neighbour's: half of a finger at 0.5 m."""
+
+REACH = 3.0
+"""Standard deviations of the prediction that a slice reaches to both sides: 99.7 % of contours lie on it."""
+
+LONGEST_PX = REACH * CONFUSED_PX + 6.0
+"""px: half of the longest slice. Farther away, other fingers' edges are as probable."""
+
+START_SD = 0.015, 0.2, 0.2
+"""m, rad and rad: standard deviation of place, rotation and angles where a start is given: of landmarks, about a thumb's
+breadth."""
+
+START_PASSES = 8
+"""Searches of the first image. Each halves how far from the contour an edge may be."""
+
+SIZE_SD = 0.1, 0.05, 0.08
+"""Standard deviations of a hand whose size is unknown: logarithms of its length, of its fingers' part of it, and of
+its thickness beyond that, in adults (`tracking.hand_size`; Buryanov and Kotiuk 2010)."""
+
+SIZE_S = 1e3
+"""s: correlation time of the size. It does not change; what the surface model has wrong of it does."""
+
+DRAWS = 250, 6, 15
+"""Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
+
+COVER_DROP, COVER_SHARE = 0.3, 0.1
+"""Log odds per pixel by which a prediction may cover the foreground worse than the hand did of late, a factor of 1.35,
+and the share of a new image in that memory."""
+
+SAME_TIME_S = 1e-3
+"""s: images nearer in time are solved together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How well the last image of each camera shows the hand: `seen` (C, GROUPS, 2) slices whose contour was found, and
+    all; of the fingers and the palm."""
+
+    seen: Array
+
+    @property
+    def support(self) -> Array:
+        """(GROUPS,) part of the contour that was found, of all cameras together; NaN where none is expected."""
+        total = self.seen.sum(axis=0)
+        return np.asarray(total[:, 0] / np.where(total[:, 1] > 0.0, total[:, 1], np.nan))
+
+
+class BareHandTracker:
+    """One bare hand before the cameras of a rig."""
+
+    def __init__(self, rig: Rig, *, known_size: bool = True, foreground: Sequence[Foreground] | None = None) -> None:
+        """`known_size`: the hand is as the rig's hand file says; otherwise its size is estimated from there.
+        `foreground`: what each camera's node has learnt of hand and background; nothing by default."""
+        self.model = build_model(rig.hand)
+        self.surface = surface_of(self.model)
+        self.cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+        self.names = tuple(node.name for node in rig.nodes)
+        self.poses = [np.ascontiguousarray(camera.camera_from_world[:3]) for camera in self.cameras]
+        self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
+        natural = self.model.natural
+        size = np.diag(np.square(SIZE_SD)) if not known_size else np.zeros((SHAPE, SHAPE))
+        self.process = HandProcess(self.surface.dh, self.model.limits, natural.mean,
+                                   np.asarray(np.linalg.inv(natural.information)), PALM_SPREAD, np.full(3, FASTEST), FASTEST,
+                                   size[None], SIZE_S)
+        self.filter = IteratedFilter(self.process)
+        self._limits = JointLimits(self.model.limits)
+        self.tracking = False
+        self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
+        self.noise = [0.0] * len(self.cameras)
+        self._sequence, self._epoch_ns, self._fresh = 0, 0, False
+        self._cover, self._rng = 0.0, np.random.default_rng(0)
+
+    def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
+              size: Array | None = None) -> None:
+        """Begin at a pose whose place, rotation and angles are known to `place_sd`, m, rad and rad. `size` (SHAPE,): as
+        far as it is known."""
+        self._epoch_ns = t_ns
+        state, covariance = self.process.start(pose.world_from_palm, pose.angles, place_sd[:2])
+        known = np.linalg.inv(covariance[6:POSE, 6:POSE]) + np.eye(POSE - 6) / place_sd[2] ** 2
+        covariance[6:POSE, 6:POSE] = np.linalg.inv(known)
+        if size is not None:
+            state[BIAS:BIAS + SHAPE] = size
+        self.filter.start(0.0, state, covariance)
+        self.tracking = self._fresh = True
+
+    def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
+        """Look for a hand of which nothing is known, and begin with the most probable one. False without any.
+
+        The best poses by the foreground are followed in the same images; the one whose contour is found best stays.
+        """
+        size = np.zeros(SHAPE)
+        best: tuple[float, Found] | None = None
+        for found in find_hand(images, self.cameras, self.foreground, self.model, self.surface, size, self._rng):
+            self.start(found.pose, t_ns)
+            self.see({c: image for c, image in enumerate(images) if image is not None}, t_ns)
+            seen = self.fit.seen.sum(axis=(0, 1))
+            quality = found.score * seen[0] / max(seen[1], 1.0)
+            if best is None or quality > best[0]:
+                best = quality, found
+        if best is None:
+            self.tracking = False
+            return False
+        self.start(best[1].pose, t_ns)
+        return True
+
+    def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
+        """The hand after one image (H, W, 3) RGB of each camera, None where it has none, of master times `t_ns`."""
+        begun = time.perf_counter()
+        order = sorted((t, c) for c, (t, image) in enumerate(zip(t_ns, images, strict=True)) if image is not None)
+        if not self.tracking:
+            raise TrackingError("the bare hand has no start; give one by start(pose), or find one by find_hand(images)")
+        while order:
+            t = order[0][0]
+            group = [c for u, c in order if 1e-9 * (u - t) < SAME_TIME_S]
+            order = [(u, c) for u, c in order if c not in group]
+            self.see({c: images[c] for c in group}, t)  # type: ignore[misc]
+        return self.state(begun)
+
+    def see(self, images: dict[int, Image], t_ns: int, extra: Sequence[Residual] = ()) -> Knot:
+        """Weigh the images of some cameras at one instant, and other residuals of the same state."""
+        t_s = 1e-9 * (t_ns - self._epoch_ns)
+        prediction = self.filter.predict(t_s)
+        residuals: list[Residual] = []
+        state, covariance = prediction
+        seen = self._silhouettes(images)
+        if seen is not None:
+            state = self._relocate(seen, prediction, t_s - self.filter.newest.t_s)
+        initial = state
+        passes = START_PASSES if self._fresh else 2
+        for number in range(passes):
+            wide = covariance if not self._fresh else prediction[1] * 0.25**number
+            frames = [self._search(camera, image, state, wide, number == passes - 1)
+                      for camera, image in images.items()]
+            residuals = [*frames, self._limits, *extra]
+            if number < passes - 1:
+                knot = update(self.process, t_s, prediction, residuals, initial)
+                initial = state = knot.state
+                covariance = knot.covariance
+        knot = self.filter.add(t_s, residuals, prediction, initial)
+        if seen is not None:
+            self._cover += (1.0 if self._fresh else COVER_SHARE) * (self._covered(seen, knot.state) - self._cover)
+        self._fresh = False
+        return knot
+
+    def _silhouettes(self, images: dict[int, Image]) -> Silhouettes | None:
+        """The images' foreground, None while no camera knows any."""
+        known = [c for c in images if self.foreground[c].informative]
+        if not known:
+            return None
+        maps = [foreground_map(images[c], self.foreground[c], STEP) for c in known]
+        return silhouettes(maps, STEP, [self.poses[c] for c in known], [self.cameras[c].intrinsics for c in known])
+
+    def _covered(self, seen: Silhouettes, state: Array) -> float:
+        """Mean log odds of the foreground on the hand in `state`."""
+        world = np.eye(4)
+        world[:3] = state[:ANGLES].reshape(3, 4)
+        _, parts = score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)
+        return float(parts[:, 0].sum() / max(parts[:, 1].sum(), 1.0))
+
+    def _relocate(self, seen: Silhouettes, prediction: tuple[Array, Array], dt_s: float) -> Array:
+        """The state at which to begin: the prediction, or where the foreground is if the prediction covers it worse
+        than the hand did of late."""
+        state, covariance = prediction
+        depth = self.poses[0][2] @ np.array([*state[[3, 7, 11]], 1.0])
+        wide = np.sqrt(np.trace(covariance[:3, :3]) / 3.0) * self.cameras[0].intrinsics[0] / depth
+        if wide < CONFUSED_PX and self._covered(seen, state) > self._cover - COVER_DROP:
+            return state
+        world = np.eye(4)
+        world[:3] = state[:ANGLES].reshape(3, 4)
+        pace = FASTEST / np.sqrt(3.0) * dt_s
+        spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
+        world, angles, _ = search(self.surface, world, state[ANGLES:VELOCITY].copy(), spread, self.model.limits,
+                                  state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, *DRAWS)
+        covariance[:POSE, :POSE] = spread
+        out = state.copy()
+        out[:ANGLES], out[ANGLES:VELOCITY] = world[:3].ravel(), angles
+        return out
+
+    def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool) -> ContourFrame:
+        model = self.cameras[camera]
+        if not self.noise[camera]:
+            self.noise[camera] = noise_of(image)
+        frame = slices_of(self.surface, state, covariance, self.poses[camera], model.intrinsics,
+                          (model.width, model.height), MOTION, 0.0, REACH, LONGEST_PX,
+                          STEP_M if last else 2.0 * STEP_M)
+        frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
+        frame.expected_sd = np.minimum(frame.expected_sd, CONFUSED_PX)
+        if last:
+            self.frames[camera] = frame
+        return frame
+
+    @property
+    def fit(self) -> Fit:
+        """How well the last images show the hand."""
+        return Fit(np.array([np.zeros((GROUPS, 2)) if frame is None else frame.seen for frame in self.frames]))
+
+    def state(self, begun: float | None = None) -> HandState:
+        """The hand at the newest instant."""
+        begun = time.perf_counter() if begun is None else begun
+        knot = self.filter.newest
+        state, covariance = knot.state, knot.covariance
+        points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
+        _joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
+        deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        shown = np.array([np.sum([frame.seen[:, 0] >= 3.0 for frame in self.frames if frame is not None], axis=0)
+                          ]).reshape(GROUPS) if any(f is not None for f in self.frames) else np.zeros(GROUPS)
+        joint_sd = np.sqrt(np.trace(covariances, axis1=1, axis2=2))
+        joints, angles = np.empty(21, np.uint8), np.empty(21, np.uint8)
+        joints[0] = _know(joint_sd[0], shown[PALM] >= 2, MEASURED_M, INFERRED_M)
+        for finger in range(5):
+            seen = shown[finger] >= 2
+            for k in range(JOINT_SLICES[finger].start, JOINT_SLICES[finger].stop):
+                joints[k] = _know(joint_sd[k], seen, MEASURED_M, INFERRED_M)
+            for k in range(ANGLE_SLICES[finger].start, ANGLE_SLICES[finger].stop):
+                angles[k] = _know(deviation[6 + k], seen, MEASURED_RAD, INFERRED_RAD)
+        turn_sd = float(np.sqrt(np.trace(covariance[3:6, 3:6])))
+        world = np.eye(4)
+        world[:3] = state[:ANGLES].reshape(3, 4)
+        self._sequence += 1
+        nothing, cameras = np.empty((0, 3)), len(self.cameras)
+        t_ns = self._epoch_ns + round(1e9 * knot.t_s)
+        return HandState(
+            sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=t_ns,
+            condition=Condition.TRACKING if np.all(shown[[*range(6)]] >= 1) else Condition.PARTIAL,
+            marker_ids=(), marker_positions=nothing, marker_raw_positions=nothing,
+            marker_covariances=np.empty((0, 3, 3)), marker_knowledge=np.empty(0, np.uint8), camera_names=self.names,
+            camera_pixels=np.empty((cameras, 0, 2)), camera_flags=np.empty((cameras, 0), np.uint16),
+            joint_positions=points[:21], joint_knowledge=joints, fingertip_positions=points[21:],
+            angles=state[ANGLES:VELOCITY].copy(), angle_knowledge=angles, world_from_palm=world,
+            palm_knowledge=Knowledge(_know(turn_sd, shown[PALM] >= 2, MEASURED_RAD, INFERRED_RAD)),
+            epipolar_error_px=np.empty(0),
+            **UNESTIMATED | {
+                "joint_covariances": covariances[:21], "fingertip_covariances": covariances[21:],
+                "angle_sd": deviation[6:POSE].copy(), "palm_covariance": covariance[:6, :6].copy(),
+                "velocity": state[VELOCITY:ACCELERATION].copy(), "acceleration": state[ACCELERATION:BIAS].copy(),
+                "velocity_sd": deviation[POSE:2 * POSE], "acceleration_sd": deviation[2 * POSE:3 * POSE],
+                "joint_velocity_sd": motion[0], "joint_acceleration_sd": motion[1],
+                "hand_scale": float(np.exp(state[BIAS])), "hand_scale_sd": float(deviation[MOTION])},
+            latency_s={"filter": time.perf_counter() - begun})
+
+
+def _know(sd: float, shown: bool, measured: float, inferred: float) -> int:
+    if sd <= measured and shown:
+        return int(Knowledge.MEASURED)
+    return int(Knowledge.INFERRED if sd <= inferred else Knowledge.GUESSED)
+
+
+@njit(cache=True)
+def _joints(state, covariance, dh, bone, points, covariances, motion):
+    """Fill `points` (26, 3) m, their covariances (26, 3, 3), and `motion` (2, 21), roots of the traces of the joints'
+    velocities' and accelerations' covariances."""
+    frames, world = np.empty((dh.parent.shape[0], 3, 4)), np.eye(4)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
+    sized_table(dh, bone, state[BIAS:BIAS + SHAPE], a, d)
+    factor = np.exp(state[BIAS])
+    table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
+                     dh.point_offset * factor)
+    forward_arrays(table, world, state[ANGLES:VELOCITY], frames, points)
+    jacobian = np.empty((points.shape[0], 3, POSE + 1))
+    jacobian_arrays(table, world, frames, points, jacobian)
+    own = np.empty(POSE + 1, np.int64)
+    for order in range(3):
+        for j in range(POSE):
+            own[j] = order * POSE + j
+        own[POSE] = MOTION
+        block = np.empty((POSE + 1, POSE + 1))
+        for i in range(POSE + 1):
+            for j in range(POSE + 1):
+                block[i, j] = covariance[own[i], own[j]]
+        for p in range(points.shape[0] if order == 0 else 21):
+            for i in range(3):
+                jacobian[p, i, POSE] = points[p, i] - world[i, 3] if order == 0 else 0.0
+            one = np.dot(jacobian[p], np.dot(block, jacobian[p].T))
+            if order == 0:
+                covariances[p] = one
+            else:
+                motion[order - 1, p] = np.sqrt(max(one[0, 0] + one[1, 1] + one[2, 2], 0.0))

@@ -1,0 +1,78 @@
+"""The table of `rhot evaluate --bare-hand`, with published figures of other trackers beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from rhot_app.evaluation.bare_hand import BareHandRun, Case, Figures, figures_of
+from rhot_app.evaluation.compare import cell
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedFigure:
+    """What others measured with other hands, other truths and other pictures: an order of magnitude, no comparison."""
+
+    tracker: str
+    quantity: str
+    value: float
+    unit: str
+
+
+PUBLISHED: Final = (
+    PublishedFigure("Leap Motion Controller 2", "palm position", 5.2, "mm"),
+    PublishedFigure("Leap Motion Controller 2", "joint angles", 14.8, "deg"),
+    PublishedFigure("Meta Quest 2", "fingertip position", 11.0, "mm"),
+    PublishedFigure("Meta Quest 2", "latency", 38.0, "ms"),
+    PublishedFigure("MediaPipe Hands", "joint angles", 22.5, "deg"),
+)
+
+COLUMNS: Final = (
+    ("joint_mm_median", "median", ".1f"), ("joint_mm_p95", "p95", ".1f"), ("joint_mm_worst_seed", "worst", ".1f"),
+    ("angle_deg_median", "median", ".1f"), ("angle_deg_p95", "p95", ".1f"), ("angle_deg_worst_seed", "worst", ".1f"),
+    ("image_px_median", "median", ".1f"), ("image_px_p95", "p95", ".1f"),
+    ("within_3_sd", "3 sg", ".3f"), ("lost_part", "lost", ".3f"), ("start_s_median", "start s", ".2f"),
+    ("started", "started", ".0f"), ("rate_hz_median", "Hz", ".0f"), ("step_ms_p99", "p99 ms", ".0f"))
+_GROUPS: Final = (("joints mm", 3), ("angles deg", 3), ("image px", 2), ("", 6))
+_WIDTH: Final = 8
+
+LEGEND: Final = """\
+Over all judged frames of all seeds; worst: the seed with the largest mean.
+  joints, angles  mean error of the 21 joints, and of the 21 angles, of a frame
+  image           the same of the joints in the first camera's picture
+  3 sg            part of the joints within three sigma of their covariance (0.997 where it is true)
+  lost            part of the frames that show the whole hand and have no state, or one off by more than 20 mm
+  start           from the first frame that shows the whole hand, or the end of a loss, to the first good state; in how
+                  many seeds there was one
+  Hz, p99         steps of the tracker on this machine, one process"""
+
+
+def bare_hand_table(found: Sequence[tuple[Case, Sequence[BareHandRun]]]) -> str:
+    """One line per case, what the columns mean, and the published figures."""
+    margin = max(len(case.name) for case, _ in found) + 1
+    lines = [" " * margin + "".join(name.center(count * _WIDTH) for name, count in _GROUPS).rstrip(),
+             " " * margin + "".join(heading.rjust(_WIDTH) for _, heading, _ in COLUMNS)]
+    for case, runs in found:
+        figures = figures_of(runs)
+        lines.append(case.name.ljust(margin) + "".join(cell(figures[key], form).rjust(_WIDTH)
+                                                       for key, _, form in COLUMNS))
+    return "\n".join([*lines, "", LEGEND, "", *published_lines()])
+
+
+def published_lines() -> list[str]:
+    """Figures of other trackers, a line each."""
+    return ["Published figures of other trackers, each with its own hands and truth (docs/twin.md):",
+            *(f"  {one.tracker:<26}{one.quantity:<20}{one.value:g} {one.unit}" for one in PUBLISHED)]
+
+
+def bare_hand_fields(found: Sequence[tuple[Case, Sequence[BareHandRun]]], seconds: float) -> dict[str, object]:
+    """For JSON: each case's figures, those of each of its seeds, and the published ones."""
+    def of_run(run: BareHandRun) -> dict[str, object]:
+        figures: Figures = figures_of([run])
+        return {"seed": run.seed, "motion": run.motion, **figures}
+
+    return {"seconds": seconds,
+            "cases": {case.name: {**figures_of(runs), "runs": [of_run(run) for run in runs]} for case, runs in found},
+            "published": [{"tracker": one.tracker, "quantity": one.quantity, "value": one.value, "unit": one.unit}
+                          for one in PUBLISHED]}

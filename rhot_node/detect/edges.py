@@ -1,0 +1,164 @@
+"""Edges along slices: short line segments in an image, each across an expected edge (Rehg 1995, 4.3.1).
+
+The node knows no hands. For every slice it reports all intensity steps along it, with their places, standard
+deviations, signs, and the foreground probability on both sides. What of it is the hand's edge, the master decides.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_node.detect.foreground import Foreground, foreground_at
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+MOST = 6
+"""Edges reported of one slice, the strongest."""
+
+SIGNIFICANT = 4.0
+"""Standard deviations of the noise that a step must exceed: one false step in 10 000 samples."""
+
+BEYOND = 6
+"""px of a profile beyond its slice's ends, for the smoothing and for the sides of an edge."""
+
+BLUR_PX = 1.5
+"""px: standard deviation of the Gaussian whose derivative finds the steps (Canny 1986), as wide as lenses and
+demosaicing blur them."""
+
+FOREGROUND_STEP = 100.0
+"""A step of the foreground probability from 0 to 1 counts as one of so many grey levels: skin before a dark or a bright
+wall."""
+
+_HALF = 4
+_PLACES = np.arange(-_HALF, _HALF + 1.0)
+_TAPS = np.exp(-0.5 * (_PLACES / BLUR_PX) ** 2) * _PLACES
+_TAPS /= np.sum(_TAPS * _PLACES)  # answers with the slope of a ramp
+
+_TAPS_NOISE = math.sqrt(float(np.sum(_TAPS**2)) / 2.0)  # of a profile that is a mean of about two pixels
+
+_LEAST_SD, _MOST_SD = 0.05, 3.0  # px
+
+
+class Edges(NamedTuple):
+    """Edges of N slices. `count` (N,); the others (N, MOST), the first `count` of each row are valid.
+
+    `offset` px along the slice's normal from its centre, `sd` px; `strength` of 255 per px: positive where it gets
+    brighter along the normal; `inside`, `outside`: foreground probability before and behind the edge.
+    """
+
+    count: NDArray[np.int64]
+    offset: Array
+    sd: Array
+    strength: Array
+    inside: Array
+    outside: Array
+
+
+def find_edges(image: Image, slices: Array, foreground: Foreground, noise: float) -> Edges:
+    """The edges on `slices` (N, 5): centre x, y px, unit normal x, y, half length px. `image` (H, W, 3) RGB.
+
+    `noise`: standard deviation of a pixel's value, of 255 (`noise_of`).
+    """
+    n = len(slices)
+    edges = Edges(np.zeros(n, np.int64), *(np.zeros((n, MOST)) for _ in range(5)))
+    longest = 2 * int(math.ceil(slices[:, 4].max())) + 1 + 2 * BEYOND if n else 1
+    _find(image, slices, foreground.hand, foreground.rest, foreground.mean, foreground.sd,
+          noise, np.empty((longest, 4)), np.empty(longest), np.empty(longest), *edges)
+    return edges
+
+
+def noise_of(image: Image) -> float:
+    """Standard deviation of a pixel's noise, of 255: the median deviation of green from its neighbours' mean."""
+    green = image[::2, :, 1].astype(np.float32)
+    deviation = np.abs(green[:, 1:-1] - 0.5 * (green[:, :-2] + green[:, 2:]))
+    return max(1.0, float(np.median(deviation)) / (0.6745 * math.sqrt(1.5)))
+
+
+@njit(cache=True)
+def _sample(image, x, y, out, weight):
+    """Add `weight` times the bilinear value at (x, y) to `out` (3,). False outside of the image."""
+    column, row = int(math.floor(x)), int(math.floor(y))
+    if column < 0 or row < 0 or column + 1 >= image.shape[1] or row + 1 >= image.shape[0]:
+        return False
+    fx, fy = x - column, y - row
+    for k in range(3):
+        top = image[row, column, k] * (1.0 - fx) + image[row, column + 1, k] * fx
+        bottom = image[row + 1, column, k] * (1.0 - fx) + image[row + 1, column + 1, k] * fx
+        out[k] += weight * (top * (1.0 - fy) + bottom * fy)
+    return True
+
+
+@njit(cache=True)
+def _find(image, slices, hand, rest, mean, sd, noise, profile, ours, slope, count, offset, spread, strength, inside,
+          outside):
+    noise_slope = noise * _TAPS_NOISE
+    derivative = np.empty((profile.shape[0], 4))
+    for s in range(slices.shape[0]):
+        cx, cy, nx, ny = slices[s, 0], slices[s, 1], slices[s, 2], slices[s, 3]
+        half = int(math.ceil(slices[s, 4]))
+        length = 2 * half + 1 + 2 * BEYOND
+        first, last = length, -1  # samples within the image
+        for i in range(length):
+            along = i - half - BEYOND
+            x, y = cx + along * nx, cy + along * ny
+            profile[i, 0] = profile[i, 1] = profile[i, 2] = 0.0
+            good = _sample(image, x, y, profile[i], 0.5)
+            good = good and _sample(image, x - ny, y + nx, profile[i], 0.25)
+            good = good and _sample(image, x + ny, y - nx, profile[i], 0.25)
+            ours[i] = profile[i, 3] = 0.0
+            if good:
+                first, last = min(first, i), i
+                ours[i] = foreground_at(image, int(y + 0.5), int(x + 0.5), hand, rest, mean, sd)
+                profile[i, 3] = FOREGROUND_STEP * ours[i]
+        for i in range(length):
+            slope[i] = 0.0
+            if i - _HALF < first or i + _HALF > last:
+                continue
+            total = 0.0
+            for k in range(4):
+                value = 0.0
+                for j in range(2 * _HALF + 1):
+                    value += _TAPS[j] * profile[i + j - _HALF, k]
+                derivative[i, k] = value
+                total += value * value
+            slope[i] = math.sqrt(total)
+        found = 0
+        for i in range(BEYOND, length - BEYOND):
+            if slope[i] < SIGNIFICANT * noise_slope or slope[i] < slope[i - 1] or slope[i] <= slope[i + 1]:
+                continue
+            place = found
+            if found == MOST:  # in place of the weakest, if that is weaker
+                place = 0
+                for k in range(1, MOST):
+                    if abs(strength[s, k]) < abs(strength[s, place]):
+                        place = k
+                if abs(strength[s, place]) >= slope[i]:
+                    continue
+            else:
+                found += 1
+            bend = 2.0 * slope[i] - slope[i - 1] - slope[i + 1]
+            shift = 0.5 * (slope[i + 1] - slope[i - 1]) / max(bend, 1e-9)
+            offset[s, place] = i - half - BEYOND + min(max(shift, -0.5), 0.5)
+            spread[s, place] = min(max(0.7 * noise_slope / max(bend, 1e-9), _LEAST_SD), _MOST_SD)
+            brighter = derivative[i, 0] + derivative[i, 1] + derivative[i, 2]
+            strength[s, place] = slope[i] if brighter >= 0.0 else -slope[i]
+            inside[s, place] = _mean_beside(ours, i, -1, first, last)
+            outside[s, place] = _mean_beside(ours, i, 1, first, last)
+        count[s] = found
+
+
+@njit(cache=True)
+def _mean_beside(ours, i, direction, first, last):
+    total, number = 0.0, 0
+    for k in range(2, 6):
+        j = i + direction * k
+        if first <= j <= last:
+            total += ours[j]
+            number += 1
+    return total / number if number else 0.5

@@ -1,0 +1,158 @@
+"""Foreground probability of single pixels, from a learnt background and a colour model. Each part is optional.
+
+A pixel is weighed by Bayes' rule: the density of its colour on the hand against that of the background at its place.
+What was not learnt has the density of any colour, so it decides nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array32 = NDArray[np.float32]
+Image = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
+
+BINS = 32
+"""Bins of a colour histogram per channel, as in Jones and Rehg 1999, section 3."""
+
+ANY = 1.0 / 256.0**3
+"""Density of a colour of which nothing is known."""
+
+SKIN_CB, SKIN_CR = (77, 127), (133, 173)
+"""Chroma of skin of any tone (Chai and Ngan 1999)."""
+
+UNUSUAL = 0.02
+"""Probability that a pixel shows what the learnt colours do not: highlights, shadows, new things."""
+
+_FOREIGN = 4.0  # standard deviations of the background
+_OPEN_PX, _LEAST_PIXELS = 3, 400  # smaller patches of skin are none
+_LEAST_SD = 2.0  # of 255: quantisation and compression, below which no background is known
+
+
+class Foreground(NamedTuple):
+    """What is known of hand and background. `hand`, `rest` (BINS^3,) densities of colours; `mean`, `sd` (H, W, 3) of
+    the background, empty while it is not learnt."""
+
+    hand: Array32
+    rest: Array32
+    mean: Array32
+    sd: Array32
+
+    @property
+    def informative(self) -> bool:
+        """Whether anything is known."""
+        return bool(self.mean.size) or float(self.hand.max()) > 1.001 * ANY
+
+    @property
+    def sentence(self) -> str:
+        """What is known, for the operator."""
+        background = "The background is learnt" if self.mean.size else "No background is learnt"
+        colours = "the hand's colours are known" if self.hand.max() > 1.001 * ANY else "no colours of the hand are known"
+        return f"{background}; {colours}."
+
+
+def no_foreground() -> Foreground:
+    """Nothing is known: every pixel has probability 1/2."""
+    flat, empty = np.full(BINS**3, ANY, np.float32), np.empty((0, 0, 3), np.float32)
+    return Foreground(flat, flat, empty, empty)
+
+
+def skin_foreground() -> Foreground:
+    """Skin of any tone, by its chroma alone."""
+    centres = (np.arange(BINS) * (256 // BINS) + 128 // BINS).astype(np.uint8)
+    grid = np.stack(np.meshgrid(centres, centres, centres, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    skin = skin_mask(grid).ravel()
+    hand = np.where(skin, (1.0 - UNUSUAL) / max(skin.mean(), 1e-6), UNUSUAL) * ANY
+    nothing = no_foreground()
+    return nothing._replace(hand=hand.astype(np.float32))
+
+
+def skin_mask(image: Image) -> Mask:
+    """(H, W) where an image (H, W, 3) RGB has the chroma of skin."""
+    chroma = cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2YCrCb)
+    cr, cb = chroma[..., 1], chroma[..., 2]
+    return np.asarray((cb >= SKIN_CB[0]) & (cb <= SKIN_CB[1]) & (cr >= SKIN_CR[0]) & (cr <= SKIN_CR[1]))
+
+
+def learn_background(model: Foreground, images: Sequence[Image]) -> Foreground:
+    """The model with a background from images (H, W, 3) RGB of the empty scene. Raises ValueError without images."""
+    if not images:
+        raise ValueError("the background needs at least one image of the scene without a hand")
+    stack = np.stack(images).astype(np.float32)
+    mean = stack.mean(axis=0)
+    return model._replace(mean=mean, sd=np.maximum(stack.std(axis=0), _LEAST_SD).astype(np.float32))
+
+
+def learn_colours(model: Foreground, image: Image, hand: Mask, rest: Mask) -> Foreground:
+    """The model with the colours of an image's pixels that surely show the hand (H, W), and surely not."""
+    return model._replace(hand=_density(image[hand]), rest=_density(image[rest]))
+
+
+def learn_skin(image: Image, model: Foreground | None = None) -> Foreground:
+    """The model with the colours of one image's skin, told from the rest by its chroma at first. The model that is not
+    given knows nothing; where an image shows no skin the generic colours of skin are taken."""
+    model = no_foreground() if model is None else model
+    skin = skin_mask(image)
+    if model.mean.size:  # skin of which the background has none
+        skin &= np.max(np.abs(image - model.mean) / model.sd, axis=2) > _FOREIGN
+    kernel = np.ones((2 * _OPEN_PX + 1, 2 * _OPEN_PX + 1), np.uint8)
+    large = cv2.morphologyEx(skin.astype(np.uint8), cv2.MORPH_OPEN, kernel)
+    hand, rest = cv2.erode(large, kernel) > 0, cv2.dilate(large, kernel) == 0
+    if np.count_nonzero(hand) < _LEAST_PIXELS:
+        return skin_foreground()._replace(mean=model.mean, sd=model.sd)
+    return learn_colours(model, image, hand, rest)
+
+
+def _density(pixels: Image) -> Array32:
+    index = (pixels // (256 // BINS)).astype(np.int64)
+    counts = np.bincount((index[:, 0] * BINS + index[:, 1]) * BINS + index[:, 2], minlength=BINS**3)
+    cube = counts.reshape(BINS, BINS, BINS).astype(np.float32)
+    for axis in range(3):  # colours near one that was seen
+        padded = np.pad(cube, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
+        before, after = np.take(padded, range(BINS), axis), np.take(padded, range(2, BINS + 2), axis)
+        cube = (0.5 * cube + 0.25 * (before + after)).astype(np.float32)
+    total = max(float(cube.sum()), 1.0)
+    return ((1.0 - UNUSUAL) * BINS**3 * ANY * cube / total + UNUSUAL * ANY).astype(np.float32).ravel()
+
+
+@njit(cache=True)
+def foreground_at(image, row, column, hand, rest, mean, sd):
+    """Probability that a pixel shows the hand."""
+    r, g, b = image[row, column, 0], image[row, column, 1], image[row, column, 2]
+    index = (np.int64(r) // 8 * 32 + np.int64(g) // 8) * 32 + np.int64(b) // 8
+    ours, theirs = hand[index], rest[index]
+    if mean.shape[0]:
+        squared, density = 0.0, 1.0
+        for k in range(3):
+            z = (image[row, column, k] - mean[row, column, k]) / sd[row, column, k]
+            squared += z * z
+            density *= 0.3989423 / sd[row, column, k]
+        theirs = (1.0 - UNUSUAL) * density * np.exp(-0.5 * squared) + UNUSUAL * theirs
+    return ours / (ours + theirs)
+
+
+@njit(cache=True)
+def _fill(image, hand, rest, mean, sd, out):
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = foreground_at(image, i, j, hand, rest, mean, sd)
+
+
+def foreground_map(image: Image, model: Foreground, step: int = 4) -> Array32:
+    """(H // step, W // step) foreground probabilities of an image (H, W, 3) RGB, of every `step`-th pixel."""
+    height, width = image.shape[0] // step, image.shape[1] // step
+    if step == 1:
+        small, mean, sd = image, model.mean, model.sd
+    else:
+        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        mean, sd = model.mean[step // 2::step, step // 2::step], model.sd[step // 2::step, step // 2::step]
+    out = np.empty((height, width), np.float32)
+    _fill(small, model.hand, model.rest, np.ascontiguousarray(mean[:height, :width]),
+          np.ascontiguousarray(sd[:height, :width]), out)
+    return out

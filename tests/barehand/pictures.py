@@ -1,0 +1,114 @@
+"""Simple pictures of a bare hand: ray cast, shaded, before a cluttered wall. Radii, forearm, light and noise are free."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contours import camera_centre
+from rhot_app.barehand.surface import FOREARM, Surface, capsules_of, meet
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.transforms import inverse, rigid
+
+Array = NDArray[np.float64]
+SKIN = np.array([205.0, 150.0, 125.0])
+LIGHT = np.array([-0.4, -0.7, -0.59])
+WALL_M = 1.2
+
+
+def look_at(place: Array, target: Array, focal: float = 600.0, width: int = 640, height: int = 480) -> CameraModel:
+    """A camera without distortion that looks from `place` to `target`, image down along world y."""
+    z = (target - place) / np.linalg.norm(target - place)
+    x = np.cross([0.0, 1.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    world = rigid(np.column_stack([x, np.cross(z, x), z]), place)
+    return CameraModel(width, height, np.array([focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5, 0, 0, 0, 0, 0.0]),
+                       world, inverse(world))
+
+
+def two_cameras(baseline: float = 0.25, distance: float = 0.55) -> list[CameraModel]:
+    """Two cameras 640x480 that look at a place `distance` m before the world's origin."""
+    target = np.array([0.0, 0.0, distance])
+    return [look_at(np.array([x, 0.0, 0.0]), target) for x in (-0.5 * baseline, 0.5 * baseline)]
+
+
+def wall(camera: CameraModel, seed: int, clutter: bool) -> Array:
+    """(H, W, 3) a background: soft shades, and with `clutter` boxes and lines of any colour."""
+    rng = np.random.default_rng(seed)
+    soft = cv2.resize(rng.uniform(60.0, 140.0, (8, 10, 3)), (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)
+    if clutter:
+        for _ in range(25):
+            corner = rng.integers(0, [camera.width, camera.height])
+            size = rng.integers(10, 120, 2)
+            colour = tuple(float(v) for v in rng.uniform(20.0, 230.0, 3))
+            end = tuple(int(v) for v in corner + size)
+            if rng.random() < 0.5:
+                cv2.rectangle(soft, tuple(int(v) for v in corner), end, colour, -1)
+            else:
+                cv2.line(soft, tuple(int(v) for v in corner), end, colour, int(rng.integers(1, 5)))
+    return np.asarray(soft)
+
+
+def picture(surface: Surface, world: Array, angles: Array, camera: CameraModel, background: Array, seed: int,
+            forearm_m: float = 0.4, blur_px: float = 0.8, noise: float = 2.0) -> NDArray[np.uint8]:
+    """(H, W, 3) RGB of a hand."""
+    centres, radii = capsules_of(surface, world, angles)
+    for k in np.flatnonzero(surface.group == FOREARM):
+        line = centres[k, 1] - centres[k, 0]
+        centres[k, 1] = centres[k, 0] + line * forearm_m / np.linalg.norm(line)
+    out = background.copy()
+    pose = camera.camera_from_world[:3]
+    o = np.empty(3)
+    camera_centre(pose, o)
+    _draw(centres, radii, o, camera.camera_from_world[:3, :3].copy(), camera.intrinsics, LIGHT / np.linalg.norm(LIGHT),
+          out)
+    out = cv2.GaussianBlur(out, (0, 0), blur_px) if blur_px else out
+    out += np.random.default_rng([seed, 7]).normal(0.0, noise, out.shape)
+    return np.clip(out + 0.5, 0.0, 255.0).astype(np.uint8)
+
+
+@njit(cache=True)
+def _draw(centres, radii, o, rotation, intrinsics, light, out):
+    boxes = np.empty((len(centres), 4))
+    for k in range(len(centres)):
+        boxes[k] = np.array([1e9, 1e9, -1e9, -1e9])
+        for e in range(2):
+            local = rotation @ (centres[k, e] - o)
+            z = max(local[2], 0.05)
+            u, v = intrinsics[0] * local[0] / z + intrinsics[2], intrinsics[1] * local[1] / z + intrinsics[3]
+            r = 1.1 * intrinsics[0] * radii[k, e] / max(z - radii[k, e], 0.02) + 2.0
+            boxes[k, 0], boxes[k, 1] = min(boxes[k, 0], u - r), min(boxes[k, 1], v - r)
+            boxes[k, 2], boxes[k, 3] = max(boxes[k, 2], u + r), max(boxes[k, 3], v + r)
+    skin = np.array([205.0, 150.0, 125.0])
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            near = False
+            for k in range(len(centres)):
+                near |= boxes[k, 0] <= x <= boxes[k, 2] and boxes[k, 1] <= y <= boxes[k, 3]
+            if not near:
+                continue
+            colour, hits = np.zeros(3), 0
+            for sub in range(4):
+                a, b = x - 0.25 + 0.5 * (sub % 2), y - 0.25 + 0.5 * (sub // 2)
+                d = np.array([(a - intrinsics[2]) / intrinsics[0], (b - intrinsics[3]) / intrinsics[1], 1.0])
+                d = rotation.T @ (d / np.sqrt(np.sum(d * d)))
+                best, which = 1e9, -1
+                for k in range(len(centres)):
+                    if boxes[k, 0] <= x <= boxes[k, 2] and boxes[k, 1] <= y <= boxes[k, 3]:
+                        t = meet(o[0], o[1], o[2], d[0], d[1], d[2], centres[k, 0], centres[k, 1], radii[k, 0],
+                                 radii[k, 1])
+                        if 0.0 < t < best:
+                            best, which = t, k
+                if which >= 0:
+                    p = o + best * d
+                    ba = centres[which, 1] - centres[which, 0]
+                    h = min(max(np.sum((p - centres[which, 0]) * ba) / np.sum(ba * ba), 0.0), 1.0)
+                    n = p - centres[which, 0] - h * ba
+                    n = n / np.sqrt(np.sum(n * n))
+                    shade = 0.55 + 0.45 * max(-np.sum(n * light), 0.0) - 0.15 * (1.0 + np.sum(n * d))
+                    colour += skin * shade
+                    hits += 1
+            if hits:
+                out[y, x] = colour / 4.0 + out[y, x] * (4 - hits) / 4.0
