@@ -74,7 +74,7 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     control_port: Port = 47801
     preview_port: Port = 47802
     broadcast_port: Annotated[int, Meta(ge=1, le=65535)] | None = 47799
-    detector: str = "fast"  # or "reference", or "plug:NAME", a detector plug-in
+    detector: str = "fast"  # or "reference", "keypoints:NAME", a model card, or "plug:NAME", a detector plug-in
     camera: CameraSettings = CameraSettings()
     preview_hz: Annotated[float, Meta(ge=0.01, le=30)] = 4.0
     late_frames: Literal["send", "drop"] = "send"  # frames whose processing took longer than the budget (RHOT 7.2)
@@ -87,9 +87,9 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     version: Literal[1] = VERSION
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"fast|reference|plug:[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", self.detector):
-            raise ValueError(f"detector is {self.detector!r}; it may be \"fast\", \"reference\", or \"plug:NAME\" with "
-                             "the name of a plug-in")
+        if not re.fullmatch(r"fast|reference|(plug|keypoints):[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", self.detector):
+            raise ValueError(f"detector is {self.detector!r}; it may be \"fast\", \"reference\", \"keypoints:NAME\" "
+                             "with the name of a model card, or \"plug:NAME\" with the name of a plug-in")
         used: dict[int, str] = {}
         for field in ("control_port", "preview_port", "pairing_port"):
             port = getattr(self, field)

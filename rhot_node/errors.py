@@ -33,6 +33,10 @@ class PluginError(NodeError):
     """A plug-in is missing, cannot be loaded, or does not do what it should."""
 
 
+class KeypointError(NodeError):
+    """A model card or its network is missing, another one than described, or does not fit the marker set."""
+
+
 class TrustError(NodeError):
     """A key file is missing, open to others or broken, or a pairing was refused."""
 

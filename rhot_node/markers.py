@@ -23,7 +23,7 @@ Byte = Annotated[int, Meta(ge=0, le=255)]
 Millimetres = Annotated[float, Meta(gt=0, le=1000)]
 MarkerId = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"\A[A-Za-z0-9_.-]+\Z")]
 
-Shape = Literal["disc", "sphere", "capsule", "band", "blob"]
+Shape = Literal["disc", "sphere", "capsule", "band", "blob", "landmark"]
 Patch = Literal["segment", "nail", "pulp", "ring"]
 Side = Literal["dorsal", "palmar", "radial", "ulnar"]
 

@@ -10,8 +10,10 @@ from typing import Any, Final
 
 from rhot_node.config import NodeSettings
 from rhot_node.detect.image import Detector, YuvImage
-from rhot_node.errors import PluginError
+from rhot_node.errors import KeypointError, PluginError
 from rhot_node.health.checks import Check
+from rhot_node.keypoints.detector import PREFIX as KEYPOINTS
+from rhot_node.keypoints.detector import keypoint_detector
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import CANDIDATES_MAX, MarkerFlag, MarkerObservation
 
@@ -112,8 +114,24 @@ class PluginDetector:
         self.trouble = sentence
 
 
+class NoDetector:
+    """Finds nothing: all markers are lost."""
+
+    def __init__(self, markers: MarkerSet) -> None:
+        self._count = len(markers.markers)
+
+    def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """See `Detector`."""
+        return tuple(MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+                     for index in range(self._count))
+
+    def reset(self) -> None:
+        """See `Detector`."""
+
+
 class DetectorChoice:
-    """Makes the detector that the settings ask for; where that is a plug-in that cannot begin, the fast one."""
+    """Makes the detector that the settings ask for; where that is a plug-in that cannot begin, the fast one. Landmarks
+    have no colour: where their detector cannot begin, or none is named, they are lost."""
 
     def __init__(self, otherwise: Callable[[NodeSettings], Detector]) -> None:
         """`otherwise`: makes the detectors that are no plug-ins."""
@@ -124,15 +142,31 @@ class DetectorChoice:
     def make(self, settings: NodeSettings) -> Detector:
         """A new detector."""
         self._refusal, self._detector = "", None
+        landmarks = any(marker.shape == "landmark" for marker in settings.markers.markers)
+        if settings.detector.startswith(KEYPOINTS):
+            try:
+                return keypoint_detector(settings.detector.removeprefix(KEYPOINTS), settings.markers)
+            except KeypointError as exc:
+                return self._refuse(settings, str(exc))
+        if landmarks and not settings.detector.startswith(PREFIX):
+            return self._refuse(settings, f"the detector {settings.detector!r} finds no landmarks, which the marker "
+                                          "set has. Choose keypoints:NAME or a plug-in.")
         if settings.detector.startswith(PREFIX):
             try:
                 self._detector = PluginDetector(settings.detector.removeprefix(PREFIX), settings.markers)
             except PluginError as exc:
+                if landmarks:
+                    return self._refuse(settings, str(exc))
                 log.error("%s The fast detector works in its place.", exc)
                 self._refusal = f"{exc} The fast detector works in its place."
             else:
                 return self._detector
         return self._otherwise(settings)
+
+    def _refuse(self, settings: NodeSettings, why: str) -> Detector:
+        self._refusal = f"{why} All markers are lost."
+        log.error("%s", self._refusal)
+        return NoDetector(settings.markers)
 
     def troubles(self) -> list[Check]:
         """What is wrong with the plug-in, for the node's report."""

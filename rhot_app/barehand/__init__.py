@@ -1,1 +1,1 @@
-"""The bare hand: its surface, its contours in images, and a tracker without markers."""
+"""The bare hand: what is observed of it without markers, and trackers of that."""

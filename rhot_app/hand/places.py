@@ -3,7 +3,8 @@
 Roles: the five ``<finger>_tip`` (the last segment, painted as the marker's `patch` says), ``wrist`` (a band),
 ``palm_<finger>`` (a painted knuckle, which moves with the palm), ``<finger>_<bone>`` for the inner bones (a ball
 glued to the back of the finger, half-way), and ``hand_1`` to ``hand_3`` (balls on the back of the hand: below index
-and little knuckle, and near the wrist).
+and little knuckle, and near the wrist). ``landmark_<joint>`` is a joint's centre or a finger's end, which no marker
+shows but a landmark detector reports.
 """
 
 from __future__ import annotations
@@ -127,7 +128,8 @@ def gap_middle(marker: Marker, mirror: float) -> float:
 KNUCKLE_ROLES = tuple(f"palm_{finger}" for finger in FINGERS)
 INNER_ROLES = tuple(f"{finger}_{bone}" for finger, bones in zip(FINGERS, BONES, strict=True) for bone in bones[:2])
 BACK_ROLES = ("hand_1", "hand_2", "hand_3")
-ROLES = (*TIP_ROLES, WRIST_ROLE, *KNUCKLE_ROLES, *INNER_ROLES, *BACK_ROLES)
+LANDMARK_ROLES = tuple(f"landmark_{joint}" for joint in JOINTS)
+ROLES = (*TIP_ROLES, WRIST_ROLE, *KNUCKLE_ROLES, *INNER_ROLES, *BACK_ROLES, *LANDMARK_ROLES)
 
 _BACK = {"hand_1": (1, 0.7, 0.8), "hand_2": (4, 0.75, 0.8), "hand_3": (2, 0.3, 0.0)}
 """On the back of the hand: which finger's knuckle, and which parts of the way there, along and across the palm."""
@@ -165,6 +167,12 @@ def place_of(marker: Marker, model: HandModel) -> Place:
         finger, along, across = _BACK[role]
         skin = 0.5e-3 * model.anatomy.palm_thickness_mm
         return Place(ROOT, mirrored * (along * model.base[finger, 0], across * model.base[finger, 1], skin), -1)
+    if role in LANDMARK_ROLES:
+        joint = LANDMARK_ROLES.index(role)
+        finger, along = divmod(joint - 1, 4)
+        if joint == 0 or along == 0:  # the wrist and the fingers' roots
+            return Place(ROOT, mirrored * model.base[finger] if joint else np.zeros(3), -1)
+        return Place(int(dh.point_row[joint]), dh.point_offset[joint].copy(), finger)
     if role in INNER_ROLES:
         finger, bone = divmod(INNER_ROLES.index(role), 2)
         row = int(dh.point_row[1 + 4 * finger + bone + 1])

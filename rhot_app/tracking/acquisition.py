@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.barehand.landmarks import LASTING_M, NOISE_M
 from rhot_app.geometry.transforms import fit_rigid
 from rhot_app.hand.finger_ik import solve_fingers
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
@@ -21,6 +22,7 @@ from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.marker_model import MarkerModel
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import RigArrays
+from rhot_app.tracking.size_evidence import Posture, implausibility
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
@@ -122,12 +124,22 @@ class Starter:
             own = np.array([self._markers.places[m].point for m in on_palm])
             if np.linalg.norm(np.cross(own[1] - own[0], own[2] - own[0])) > 2.0 * FLATTEST_M2:
                 pose = neutral_pose(fit_rigid(own, markers[on_palm]))
+                if self._markers.landmark.any():
+                    return self._fit_all(markers, pose)
                 solution = solve_fingers(self._markers.model, pose, tips, target_sd=_TARGET_SD_M)
                 return HandPose(pose.world_from_palm, solution.angles)
         if not np.isfinite(wrist[0]) and np.count_nonzero(np.isfinite(tips[:, 0])) < TIPS_WITHOUT_WRIST:
             return None
         fit = fit_palm(self._markers.model, wrist, tips, None, 0.0)
         return None if fit is None else fit.pose
+
+    def _fit_all(self, markers: Array, pose: HandPose) -> HandPose:
+        """The pose that all markers (M, 3) m make the most plausible, by a descent from `pose`."""
+        m, world, angles = self._markers, pose.world_from_palm.copy(), pose.angles.copy()
+        variance = m.paint_variance + np.where(m.landmark, LASTING_M**2 + NOISE_M**2, _TARGET_SD_M**2)
+        posture = Posture(m.dh, m.limits, m.natural.mean, m.natural.information)
+        implausibility(posture, markers, np.eye(3) / variance[:, None, None], 0.0, world, angles)
+        return HandPose(world, angles)
 
 
 @njit(cache=True)

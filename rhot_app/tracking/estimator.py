@@ -13,6 +13,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.landmarks import LASTING_M, LASTING_S
 from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
@@ -172,6 +173,7 @@ class Estimator:
         candidates = np.count_nonzero(frame.seen)
         prediction = self._filter.predict(t_s)
         self._sightings.note_sizes(frame, prediction[0])
+        frame.add_landmark_noise(prediction[0])
         pixels, covariances = frame.predict_pixels(*prediction)
         distances = _distances(frame, pixels, covariances)
         frame = self._associate(frame, pixels, covariances, distances)
@@ -195,11 +197,14 @@ class Estimator:
 
     def _reacquire(self, frame: MarkerFrame, accepted: Mask, distances: Array) -> None:
         """Inflate the covariance of a finger, or of the palm, whose marker one camera rejects REJECTIONS times in
-        a row: outliers do not last. `distances` (M,): squared Mahalanobis distances, 2 on average."""
+        a row: outliers do not last. All rejections of a landmark within the correlation time of its error count as one.
+        `distances` (M,): squared Mahalanobis distances, 2 on average."""
         rejected = self._rejected[frame.camera]
         rejected[accepted] = 0
         rejected[self._reported(frame) & ~accepted] += 1
-        for m in np.flatnonzero((rejected >= REJECTIONS) & (distances > GATE)):
+        lasting = max(LASTING_S / self._sightings.periods_s[frame.camera], 1.0)
+        enough = REJECTIONS * np.where(self._markers.landmark, lasting, 1.0)
+        for m in np.flatnonzero((rejected >= enough) & (distances > GATE)):
             finger, knot = self._markers.finger[m], self._filter.newest
             angles = ANGLE_SLICES[finger]
             chosen = slice(6 + angles.start, 6 + angles.stop) if finger >= 0 else slice(0, 6)
@@ -214,13 +219,16 @@ class Estimator:
         """The frame with the blob of each marker, predicted at `pixels` (M, 2) with `covariances` (M, 2, 2) px^2."""
         if frame.observations.further is None and not np.any(distances > GATE):
             return frame
+        landmark = self._markers.landmark
         return frame.associated(lambda listed, listed_covariances, own: assign(
             np.nan_to_num(pixels), np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2)), listed,
-            listed_covariances, np.where(own, 0.0, -2.0 * np.log(CONFUSION)))[0])
+            listed_covariances, np.where(own, 0.0, np.where(landmark[:, None] | own[landmark].any(axis=0), np.inf,
+                                                            -2.0 * np.log(CONFUSION))))[0])
 
     def _note_bias(self, state: Array) -> None:
         m, bias = self._markers, np.empty((len(self._markers.finger), 3, 3))
-        triangulation_covariance(state, m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX, m.paint_variance, bias)
+        triangulation_covariance(state, m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
+                                 np.where(m.landmark, LASTING_M, 0.0), m.paint_variance, bias)
         self._process.set_bias(bias)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.barehand.landmarks import LASTING_S
 from rhot_app.estimation.gauss_markov import integrated, integrated_noise, matern52, matern52_noise
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, move, rotation_vector
@@ -62,17 +63,19 @@ _GROUPS = np.array([0] * 3 + [1] * 3 + [2] * 21)
 class HandProcess:
     """Implements `estimation.residual.Process`; M markers.
 
-    `dh` has a point for each marker; of a hand without points the whole pose is remembered. `limits` (21, 2) rad. `mean` (21,) rad and `covariance` (21, 21) of the natural
-    pose. `spread` (2,): standard deviations of the palm's translation, m, and rotation, rad, over one correlation time.
+    `dh` has a point for each marker; of a hand without points the whole pose is remembered. `limits` (21, 2) rad.
+    `mean` (21,) rad and `covariance` (21, 21) of the natural pose. `spread` (2,): standard deviations of the palm's
+    translation, m, and rotation, rad, over one correlation time.
     `slowest` (3,) and `fastest` 1/s: limits of the rates of translation, rotation and angles. `bias` (M, 3, 3) m^2:
-    covariances of the paint biases, and `bias_s` their correlation time.
+    covariances of the paint biases, and `bias_s`, one for all or (M,), their correlation times.
     """
 
     def __init__(self, dh: DhArrays, limits: Array, mean: Array, covariance: Array, spread: Array, slowest: Array,
-                 fastest: float, bias: Array, bias_s: float) -> None:
+                 fastest: float, bias: Array, bias_s: float | Array) -> None:
         self.dh, self._limits, self.mean = dh, limits, mean
         self._angles, self._information = covariance, np.linalg.inv(covariance)
-        self._spread, self._slowest, self._fastest, self._bias_s = spread, slowest, fastest, bias_s
+        self._spread, self._slowest, self._fastest = spread, slowest, fastest
+        self._bias_s = np.full(len(bias), bias_s, dtype=np.float64)
         self._marked = len(dh.point_row) > 0
         self.size = MOTION + 3 * len(bias)
         self.stationary = np.zeros((self.size, self.size))
@@ -87,7 +90,7 @@ class HandProcess:
         """The process of recorded hands, of a hand that wears these markers; paint biases are 0 until `set_bias`."""
         covariance = np.asarray(np.linalg.inv(markers.natural.information), dtype=np.float64)
         return cls(markers.dh, markers.limits, markers.natural.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
-                   np.zeros((len(markers.finger), 3, 3)), BIAS_S)
+                   np.zeros((len(markers.finger), 3, 3)), np.where(markers.landmark, LASTING_S, BIAS_S))
 
     def set_bias(self, bias: Array) -> None:
         """Change the covariances (M, 3, 3) m^2 of the paint biases."""
@@ -244,7 +247,7 @@ def _predict(state, covariance, dt, mean, pose_covariance, information, spread, 
                 for i in range(21):
                     for j in range(21):
                         covariance[POSE * a + 6 + i, POSE * b + 6 + j] += noise[2, a, b] * pose_covariance[i, j]
-    _forget_bias(state, covariance, math.exp(-dt / bias_s), bias)
+    _forget_bias(state, covariance, np.repeat(np.exp(-dt / bias_s), 3), bias)
 
 
 @njit(cache=True)
@@ -258,7 +261,8 @@ def _transition(state, out, dt, mean, information, spread, slowest, fastest, bia
         left -= step if left - step > 1e-9 else left
         _carry(state, mean, rate, step, blocks, turn)
         _apply(blocks, turn, out)
-    out[MOTION:] *= math.exp(-dt / bias_s)
+    for i in range(3 * bias_s.shape[0]):
+        out[MOTION + i] *= math.exp(-dt / bias_s[i // 3])
 
 
 @njit(cache=True)
@@ -314,14 +318,14 @@ def _transpose(matrix):
 def _forget_bias(state, covariance, kept, bias):
     size = covariance.shape[0]
     for i in range(MOTION, size):
-        state[BIAS - MOTION + i] *= kept
+        state[BIAS - MOTION + i] *= kept[i - MOTION]
         for j in range(size):
-            covariance[i, j] *= kept
-            covariance[j, i] *= kept
+            covariance[i, j] *= kept[i - MOTION]
+            covariance[j, i] *= kept[i - MOTION]
     for m in range(bias.shape[0]):
         for i in range(3):
             for j in range(3):
-                covariance[MOTION + 3 * m + i, MOTION + 3 * m + j] += (1.0 - kept * kept) * bias[m, i, j]
+                covariance[MOTION + 3 * m + i, MOTION + 3 * m + j] += (1.0 - kept[3 * m]**2) * bias[m, i, j]
 
 
 @njit(cache=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.barehand.landmarks import ANATOMY_SD_M
 from rhot_app.errors import RigError
 from rhot_app.geometry.camera import CameraModel, distort
 from rhot_app.hand.dh import DhArrays
@@ -23,9 +24,11 @@ from rhot_node.markers import FLAT_PATCHES, Marker
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-PAINT_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3}
+PAINT_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3,
+              "landmark": ANATOMY_SD_M}
 """m: standard deviation of a marker's centre about the place that the hand file gives it, by its shape: paint, its
-shading and the skin under it (`python benchmarks/sight_errors.py`). A blob is paint that nobody measured."""
+shading and the skin under it (`python benchmarks/sight_errors.py`). A blob is paint that nobody measured. For a
+landmark see `barehand.landmarks`."""
 
 LASTING_PX = 0.01
 """px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/sight_errors.py`)."""
@@ -43,6 +46,7 @@ class MarkerModel:
     `dh`: the hand's table with one point per marker. `finger` (M,): the finger, -1 on the palm. `half_axes` (M, 3) m of
     their bodies along the palm's axes, zero for flat ones. `slender` (M,): visible area of a fingertip from its side
     over that from its end, less 1; negative where the size says nothing of the distance. `paint_variance` (M,) m^2.
+    `landmark` (M,) bool: landmarks, which err as `barehand.landmarks` says.
     `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 9) as `CameraModel`. `limits` (21, 2) rad.
     """
 
@@ -52,6 +56,7 @@ class MarkerModel:
     half_axes: Array
     slender: Array
     paint_variance: Array
+    landmark: NDArray[np.bool_]
     poses: Array
     intrinsics: Array
     natural: NaturalPose
@@ -84,6 +89,7 @@ def compile_markers(rig: Rig) -> MarkerModel:
         np.array([_half_axes(marker, model) for marker in rig.markers.markers]),
         np.array([_slenderness(marker, model) for marker in rig.markers.markers]),
         np.array([PAINT_SD_M[marker.shape] ** 2 for marker in rig.markers.markers]),
+        np.array([marker.shape == "landmark" for marker in rig.markers.markers]),
         np.array([camera.camera_from_world[:3] for camera in cameras]),
         np.array([camera.intrinsics for camera in cameras]),
         natural_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),

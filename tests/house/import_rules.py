@@ -36,7 +36,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.filters": APP_BASE,
     "rhot_app.estimation": (),
     "rhot_app.hand": (*APP_BASE, *MODELS),
-    "rhot_app.calibration": (*APP_BASE, *MODELS, "rhot_app.hand"),
+    "rhot_app.calibration": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand.landmarks"),
     "rhot_app.calibration.commands": BELOW_ENGINE,  # they read logs
     "rhot_app.calibration.recorded_observations": BELOW_ENGINE,  # reads them for all
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),

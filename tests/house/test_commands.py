@@ -22,6 +22,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),
     "rhot recover": ("LOG", "--out", "--rig"),
+    "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",
                     "--smooth", "--again"),
     "rhot batch": ("LOG", "--do", "--out", "--workers", "--scheduler", "--again", "--format", "--rig", "--tracker"),

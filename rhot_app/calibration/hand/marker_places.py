@@ -3,7 +3,7 @@
 A segment is the palm, or one of a finger's three bones. Known words: ``index_proximal``, ``index_medial``,
 ``index_distal`` (``index_tip`` is the same bone; the thumb's are metacarpal, proximal and distal), ``index_middle`` for
 a marker on one of the two inner bones, whichever fits; anything that begins with ``hand_``, ``palm_`` or
-``back_of_hand`` for the palm; and ``wrist`` for a band round the wrist.
+``back_of_hand`` for the palm; ``wrist`` for a band round the wrist; and ``landmark_<joint>`` for a joint itself.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import CalibrationError
+from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.hand.skeleton import BONES, FINGERS, WRIST_ROLE
 
 # -- What is known of a hand before it is measured: how bone lengths of adults scatter, and how they go ----------------
@@ -85,13 +86,15 @@ class MarkerPlace:
     """One marker of a hand. `finger` indexes `FINGERS` and `segment` its bones; both PALM on the palm.
 
     `painted`: the marker is the paint on the whole last bone, or a band round the wrist, so that its centre lies
-    inside the limb at a known part of it; else it is a dot somewhere on the skin.
+    inside the limb at a known part of it; else it is a dot somewhere on the skin. `joint`: a landmark's index in
+    `skeleton.JOINTS`, -1 for a marker; its segment is the bone that ends there, or the palm.
     """
 
     name: str
     finger: int
     segment: int
     painted: bool = False
+    joint: int = -1
 
     @property
     def on_palm(self) -> bool:
@@ -143,7 +146,8 @@ def tracks_of(times_s: Array, positions: Array, names: Sequence[str], roles: Map
             raise CalibrationError(f"{word!r} is no place on the hand; say for example index_tip, index_medial, palm_1 "
                                    "or wrist.")
         if spot is not None:
-            places.append(MarkerPlace(name, *spot, name in painted or word == WRIST_ROLE))
+            joint = LANDMARK_ROLES.index(word) if word in LANDMARK_ROLES else -1
+            places.append(MarkerPlace(name, *spot, name in painted or word == WRIST_ROLE or joint >= 0, joint))
             columns.append(column)
     if not places:
         raise CalibrationError(f"none of the markers {', '.join(names)} names a place on the hand; give --roles "
@@ -155,6 +159,9 @@ def _spot(word: str, track: Array, tracks: Mapping[str, Array]) -> tuple[int, in
     """(finger, segment) of a role; None when it is no place on the hand."""
     if word == WRIST_ROLE or word.startswith(_PALM_WORDS):
         return PALM, PALM
+    if word in LANDMARK_ROLES:
+        finger, along = divmod(LANDMARK_ROLES.index(word) - 1, 4)
+        return (PALM, PALM) if finger < 0 or along == 0 else (finger, along - 1)
     name, _, segment = word.partition("_")
     if name not in FINGERS:
         return None

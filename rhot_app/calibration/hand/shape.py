@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rhot_app.barehand.landmarks import ANATOMY_SD_M
 from rhot_app.calibration.hand import marker_places as hand_prior
 from rhot_app.calibration.hand.marker_places import DISTAL, MarkerPlace, Prior
 from rhot_app.geometry.transforms import skew
@@ -110,7 +111,7 @@ class HandUnknowns:
         """(5,) m from the last joint along the distal bone: measured, or the same part of the bone as before."""
         along = self._model.marker / self._model.bones[:, DISTAL] * shape.bones[:, DISTAL]
         for place, marker in zip(self.places, shape.markers, strict=True):
-            if place.segment == DISTAL:
+            if place.segment == DISTAL and place.joint < 0:
                 along[place.finger] = marker[0]
         return along
 
@@ -132,6 +133,9 @@ class HandUnknowns:
             causes[rows, rows] = np.diag(scatter)
             if not place.on_palm:
                 causes[rows.start] += bone_part * causes[3 * place.finger + place.segment]
+            elif place.joint > 0:  # the landmark of a finger's root moves with it
+                root = ROOTS + 3 * ((place.joint - 1) // 4)
+                causes[rows] += causes[root:root + 3]
         slides = np.arange(self.slides, count)
         causes[slides, slides] = SLIDE_SD_M
         size = mean.copy()
@@ -142,6 +146,11 @@ class HandUnknowns:
     def _marker_prior(self, place: MarkerPlace) -> tuple[Array, Array, float]:
         """Mean (3,) and scatter (3,) m of a marker's place, and at which part of its bone it sits."""
         model = self._model
+        if place.joint >= 0:
+            along = model.base[(place.joint - 1) // 4] if place.on_palm and place.joint else np.zeros(3)
+            if not place.on_palm:
+                along = np.array([model.bones[place.finger, place.segment], 0.0, 0.0])
+            return along, np.full(3, ANATOMY_SD_M), float(not place.on_palm)
         if place.name == WRIST_ROLE or (place.on_palm and place.painted):
             return np.zeros(3), np.full(3, _WRIST_SD_M), 0.0
         if place.on_palm:

@@ -1,0 +1,102 @@
+"""``rhot landmarks``: landmark tables of a bare hand as a raw log, tracked once, with a summary."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from rhot_app.project import Rig
+    from rhot_app.tracking.state import HandState
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot landmarks``."""
+    parser.add_argument("tables", type=Path, nargs="+", metavar="CSV",
+                        help="a landmark table for each camera, in the rig's order (docs/landmarks.md)")
+    parser.add_argument("--rig", type=Path, required=True, metavar="FILE",
+                        help="the calibrated rig, with the marker set landmarks21")
+    parser.add_argument("--out", type=Path, required=True, metavar="LOG", help="the raw log to write; a new file")
+    parser.add_argument("--fps", type=float, default=None, metavar="N",
+                        help="frames per second of tables without times")
+    parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the log, track it, print the summary. Raises RecordingError and RigError."""
+    from rhot_app.errors import RecordingError
+    from rhot_app.project import load_rig, with_tracker
+    from rhot_app.recording.landmark_log import landmark_order, read_landmark_table, write_landmark_log
+    from rhot_node.compiled import announce_compilation
+
+    if args.out.exists():
+        raise RecordingError(f"{args.out}: exists already; a log is never written over. Choose another name.")
+    if args.fps is not None and not 1.0 <= args.fps <= 1000.0:
+        raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from 1 to 1000.")
+    rig = with_tracker(load_rig(args.rig), "estimator")
+    landmark_order(rig)
+    tables = [read_landmark_table(path, args.fps) for path in args.tables]
+    counted = not all(table.timed for table in tables)
+    bound_s = 0.5 / args.fps if counted and args.fps is not None else 1e-5
+    frames = write_landmark_log(args.out, rig, tables, bound_s)
+    announce_compilation()
+    summary: dict[str, Any] = {"log": str(args.out), "frames": frames} | summarise(rig, args.out)
+    if args.json:
+        print(json.dumps(summary))
+        return 0
+    print(f"{args.out}: {frames} frames of {len(tables)} camera{'' if len(tables) == 1 else 's'}.")
+    if not summary["tracked"]:
+        print("No hand was found in them. Are the tables in the rig's order, and is the rig's hand of the right side?")
+        return 0
+    print(f"Tracked in {100 * summary['tracked']:.0f} % of the states, from {summary['start_s']:.2f} s on.\n"
+          f"Reprojection error of the joints: median {summary['reprojection_px']:.1f} px.\n"
+          f"Stated standard deviation of the joints: {summary['joint_sd_mm']:.1f} mm per axis.\n"
+          "rhot export writes the hand for other programs; rhot calibrate bones measures its bones.")
+    return 0
+
+
+def summarise(rig: Rig, path: Path) -> dict[str, Any]:
+    """What the estimator makes of a landmark log. `tracked`: part of the states with a hand; `start_s`: of the first of
+    them, after the first frame; `reprojection_px`: median distance of the landmarks from their joints' images."""
+    from rhot_app.geometry.camera import CameraModel
+    from rhot_app.recording.landmark_log import landmark_order
+
+    joints, order = [], np.array(landmark_order(rig))
+    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+    errors, first_ns = [], None
+    states = track(rig, path)
+    for state in states:
+        first_ns = state.t_master_ns if first_ns is None else first_ns
+        if state.tracked:
+            joints.append(state)
+            for camera, pixels in zip(cameras, state.camera_pixels, strict=True):
+                expected = camera.project(state.joint_positions)
+                errors.append(np.linalg.norm(expected[order[order >= 0]] - pixels[order >= 0], axis=1))
+    if not joints:
+        return {"tracked": 0.0, "start_s": None, "reprojection_px": None, "joint_sd_mm": None}
+    variances = np.array([np.einsum("jii->ji", state.joint_covariances) for state in joints])
+    return {"tracked": len(joints) / len(states), "start_s": 1e-9 * (joints[0].t_master_ns - (first_ns or 0)),
+            "reprojection_px": float(np.nanmedian(errors)), "joint_sd_mm": 1e3 * float(np.sqrt(variances.mean()))}
+
+
+def track(rig: Rig, path: Path) -> list[HandState]:
+    """The states of a log by the rig's tracker, one after every frame."""
+    from rhot_app.recording.raw_log import LogReader
+    from rhot_app.sources.replay import LogValidator
+    from rhot_app.tracking.trackers import make_tracker
+
+    states, validator, tracker = [], LogValidator(rig), make_tracker(rig)
+    with contextlib.closing(LogReader(path)) as reader:
+        for record in reader:
+            frame = validator.feed(record)
+            if frame is not None:
+                tracker.ingest(frame)
+                state = tracker.solve()
+                if state is not None:
+                    states.append(state)
+    return states

@@ -1,0 +1,173 @@
+"""Landmark tables, one per camera, as a raw log. Then every command that takes a log takes landmarks.
+
+A table is a CSV file with a header. docs/landmarks.md describes its columns.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.errors import RecordingError
+from rhot_app.hand.places import LANDMARK_ROLES
+from rhot_app.project import Rig, RigNode
+from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
+from rhot_node.files import replacing
+from rhot_node.wire.codec import encode
+from rhot_node.wire.messages import (
+    ClockReply,
+    ClockRequest,
+    MarkerFlag,
+    MarkerObservation,
+    NodeState,
+    Observations,
+    Start,
+    StartEntry,
+)
+
+Array = NDArray[np.float64]
+
+LANDMARKS: Final = len(LANDMARK_ROLES)
+
+SIGMA_PX: Final = 0.3
+"""px: stated of landmarks whose table has no column `sigma_px`: they are rounded to pixels (1 / sqrt(12))."""
+
+DIAMETER_PX: Final = 1.0  # a point has none
+_BEGIN_NS, _EXCHANGE_NS = 1_000_000_000_000, 500_000_000
+_SESSION, _LONGEST_S = 1, 86_400.0
+_LARGEST_PX = 16_384.0
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkTable:
+    """One camera's landmarks in T frames: `times_s` (T,), ascending; `pixels` (T, 21, 2) px, raw image, NaN where there
+    is none; `scores` (T,) 0..1; `sigma_px` (T,), standard deviation that the detector states. `timed`: the times are
+    the file's, not counted frames."""
+
+    times_s: Array
+    pixels: Array
+    scores: Array
+    sigma_px: Array
+    timed: bool
+
+
+def read_landmark_table(path: Path, fps: float | None) -> LandmarkTable:
+    """Read a table; its frames are `fps` per second unless it has times. Raises RecordingError naming file and row."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = csv.DictReader(file)
+            names = rows.fieldnames or []
+            return _parse(path, list(names), list(rows), fps)
+    except (OSError, UnicodeDecodeError, csv.Error) as exc:
+        raise RecordingError(f"{path}: cannot be read as a landmark table ({exc}). Give a CSV file with the columns "
+                             "of docs/landmarks.md.") from exc
+
+
+def _parse(path: Path, names: list[str], rows: list[dict[str, str]], fps: float | None) -> LandmarkTable:
+    places = [f"{axis}{k}" for k in range(LANDMARKS) for axis in "xy"]
+    missing = [name for name in places if name not in names]
+    timed = "time_s" in names
+    if missing or not (timed or "frame" in names):
+        what = missing[0] if missing else "frame or time_s"
+        raise RecordingError(f"{path}: has no column {what}; a landmark table has frame or time_s and x0, y0 to "
+                             f"x{LANDMARKS - 1}, y{LANDMARKS - 1}.")
+    if not timed and fps is None:
+        raise RecordingError(f"{path}: has frame numbers but no column time_s; give --fps, the frames per second.")
+    if not rows:
+        raise RecordingError(f"{path}: holds no frames.")
+    table = np.empty((len(rows), 3 + 2 * LANDMARKS))
+    for number, row in enumerate(rows):
+        try:
+            table[number] = [float(row["time_s"]) if timed else float(row["frame"]) / (fps or 1.0),
+                             float(row.get("score") or 1.0), float(row.get("sigma_px") or SIGMA_PX),
+                             *(float(row[name] or "nan") for name in places)]
+        except (TypeError, ValueError) as exc:
+            raise RecordingError(f"{path}: line {number + 2} holds something that is no number ({exc}). Mend or "
+                                 "remove the line.") from exc
+    times, scores, sigma, pixels = table[:, 0], table[:, 1], table[:, 2], table[:, 3:].reshape(-1, LANDMARKS, 2)
+    pixels[~np.isfinite(pixels).all(axis=2)] = np.nan
+    for wrong, what in ((~np.isfinite(times) | (np.abs(times) > _LONGEST_S), "a time beyond a day"),
+                        (np.diff(times, prepend=-math.inf) <= 0.0, "a time that is not after the one before"),
+                        (~((scores >= 0.0) & (scores <= 1.0)), "a score that is not from 0 to 1"),
+                        (~((sigma > 0.0) & (sigma <= 1e3)), "a sigma_px that is not from 0 to 1000"),
+                        ((np.abs(pixels) > _LARGEST_PX).any(axis=(1, 2)), "a pixel in no image")):
+        if wrong.any():
+            raise RecordingError(f"{path}: line {int(np.argmax(wrong)) + 2} has {what}.")
+    return LandmarkTable(times, pixels, scores, sigma, timed)
+
+
+def landmark_order(rig: Rig) -> list[int]:
+    """The landmark of each of the rig's markers, -1 for another marker. Raises RecordingError when it has none."""
+    order = [LANDMARK_ROLES.index(marker.role) if marker.role in LANDMARK_ROLES else -1
+             for marker in rig.markers.markers]
+    if max(order) < 0:
+        raise RecordingError(f"rig {rig.name!r}: none of its markers is a landmark. Give it the marker set "
+                             "landmarks21 (resources/markers/landmarks21.json).")
+    return order
+
+
+def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable], time_bound_s: float) -> int:
+    """Write one table per node as a raw log; returns the number of frames.
+
+    `time_bound_s`: half-width of the tables' time errors. Raises RecordingError when tables and nodes do not match, or
+    the file cannot be written.
+    """
+    if len(tables) != len(rig.nodes):
+        raise RecordingError(f"{len(tables)} landmark tables, but rig {rig.name!r} has {len(rig.nodes)} cameras; give "
+                             "one table for each, in the rig's order.")
+    order, first_s = landmark_order(rig), min(table.times_s[0] for table in tables)
+    bound_ns = round(1e9 * time_bound_s)
+    begin_ns = _BEGIN_NS + 10 * _EXCHANGE_NS
+    last_ns = begin_ns + round(1e9 * (max(table.times_s[-1] for table in tables) - first_s)) + _EXCHANGE_NS
+    said = [Record(RecordKind.START, 0, _BEGIN_NS - 1, encode(Start(
+        _SESSION, 0, tuple(StartEntry(node.node_id, 1, 0) for node in rig.nodes))))]
+    for node, table in zip(rig.nodes, tables, strict=True):
+        for sequence, t_ns in enumerate(range(_BEGIN_NS, last_ns, _EXCHANGE_NS)):
+            said += _exchange(node, sequence, t_ns, bound_ns)
+        for number, t_s in enumerate(table.times_s):
+            said.append(_datagram(node, rig, number, begin_ns + round(1e9 * (t_s - first_s)),
+                                  _observations(node, order, table, number)))
+    try:
+        with replacing(path) as file:
+            file.write(encode_header(rig, {}))
+            for record in sorted(said, key=lambda record: record.t_master_ns):
+                file.write(encode_record(record))
+    except OSError as exc:
+        raise RecordingError(f"{path}: cannot be written ({exc.strerror}). Choose another --out.") from exc
+    return sum(len(table.times_s) for table in tables)
+
+
+def _exchange(node: RigNode, sequence: int, t_ns: int, bound_ns: int) -> list[Record]:
+    """A clock exchange of one clock, whose way takes as long as the times are uncertain."""
+    request = ClockRequest(node.node_id, _SESSION, sequence, t_ns)
+    reply = ClockReply(node.node_id, _SESSION, sequence, t_ns, t_ns + bound_ns, t_ns + bound_ns, 1, NodeState.STREAMING)
+    return [Record(RecordKind.CLOCK_REQUEST, node.node_id, t_ns, encode(request)),
+            Record(RecordKind.CLOCK_REPLY, node.node_id, t_ns + 2 * bound_ns, encode(reply))]
+
+
+def _datagram(node: RigNode, rig: Rig, number: int, t_ns: int, markers: tuple[MarkerObservation, ...]) -> Record:
+    lens = node.intrinsics
+    return Record(RecordKind.DATAGRAM, node.node_id, t_ns, encode(Observations(
+        node_id=node.node_id, session=_SESSION, sequence=number, t_frame_node_ns=t_ns, t_send_node_ns=t_ns,
+        processing_ns=0, exposure_ns=0, row_time_ns=0, width=lens.width, height=lens.height, frame_number=number,
+        marker_checksum=rig.markers.checksum, markers=markers)))
+
+
+def _observations(node: RigNode, order: list[int], table: LandmarkTable, number: int) -> tuple[MarkerObservation, ...]:
+    lens, out = node.intrinsics, []
+    variance = float(table.sigma_px[number]) ** 2
+    for index, landmark in enumerate(order):
+        x, y = table.pixels[number, landmark] if landmark >= 0 else (math.nan, math.nan)
+        if -0.5 <= x <= lens.width - 0.5 and -0.5 <= y <= lens.height - 0.5:
+            out.append(MarkerObservation(index, float(x), float(y), DIAMETER_PX, variance, 0.0, variance,
+                                         float(table.scores[number])))
+        else:
+            out.append(MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST))
+    return tuple(out)

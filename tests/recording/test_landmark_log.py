@@ -1,0 +1,77 @@
+"""Landmark tables: what they may hold, what is refused, and the log that is made of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot_app.__main__ import main
+from rhot_app.errors import RecordingError
+from rhot_app.project import load_rig, save_rig
+from rhot_app.recording.landmark_log import read_landmark_table, write_landmark_log
+from rhot_app.recording.raw_log import LogReader
+from rhot_app.simulator.nodes.landmark_detector import landmark_rig
+from rhot_app.sources.replay import LogValidator
+from rhot_node.files import resource_path
+
+PLACES = [f"{axis}{k}" for k in range(21) for axis in "xy"]
+FPS = 30.0
+
+
+def table(path: Path, frames: list[int], change: dict[str, str] | None = None, head: str = "frame,score") -> Path:
+    lines = [",".join([head, *PLACES])]
+    for frame in frames:
+        cells = dict(zip(PLACES, (f"{200 + frame + k / 2}" for k in range(42)), strict=True)) | (change or {})
+        lines.append(",".join([str(frame), *["0.9"] * head.count(","), *(cells[name] for name in PLACES)]))
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_the_log_gives_the_tables_back(tmp_path: Path) -> None:
+    rig = landmark_rig()
+    tables = [read_landmark_table(table(tmp_path / "left.csv", [3, 4, 6]), FPS),
+              read_landmark_table(table(tmp_path / "right.csv", [4, 5], {"x7": "", "y20": "9999"}), FPS)]
+    assert write_landmark_log(tmp_path / "a.log", rig, tables, 0.5 / FPS) == 5
+    reader, validator = LogReader(tmp_path / "a.log"), LogValidator(rig)
+    frames = [frame for frame in map(validator.feed, reader) if frame is not None]
+    reader.close()
+    assert [frame.camera for frame in frames] == [0, 0, 1, 1, 0]
+    first = frames[0].t_row0_master_ns
+    assert [round(1e-9 * (frame.t_row0_master_ns - first) * FPS, 3) for frame in frames] == [0.0, 1.0, 1.0, 2.0, 3.0]
+    assert all(0.5 / FPS <= frame.clock_bound_s < 0.6 / FPS for frame in frames)
+    np.testing.assert_allclose(frames[0].pixels, tables[0].pixels[0], atol=1e-4)
+    lost = np.isnan(frames[2].pixels[:, 0])
+    assert set(np.flatnonzero(lost)) == {7, 20}  # none, and outside of the image
+
+
+@pytest.mark.parametrize(("frames", "change", "head", "fps", "says"), [
+    ([1, 1], {}, "frame,score", FPS, "line 3 has a time that is not after the one before"),
+    ([1], {"x3": "abc"}, "frame,score", FPS, "line 2 holds something that is no number"),
+    ([1], {"x3": "1e9"}, "frame,score", FPS, "line 2 has a pixel in no image"),
+    ([1], {}, "frame,sigma", None, "give --fps"),
+    ([1], {}, "number", FPS, "has no column frame or time_s"),
+    ([], {}, "frame,score", FPS, "holds no frames"),
+])
+def test_what_is_no_table_is_refused(tmp_path: Path, frames: list[int], change: dict[str, str], head: str,
+                                     fps: float | None, says: str) -> None:
+    with pytest.raises(RecordingError, match=says):
+        read_landmark_table(table(tmp_path / "a.csv", frames, change, head), fps)
+
+
+def test_the_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one, rig_path, out = table(tmp_path / "a.csv", [1, 2]), tmp_path / "rig.json", tmp_path / "a.log"
+    save_rig(rig_path, landmark_rig())
+    say = ["landmarks", str(one), "--rig", str(rig_path), "--out", str(out), "--fps", "30"]
+    assert main(say) == 2
+    assert "1 landmark tables, but rig 'landmarks' has 2 cameras" in capsys.readouterr().err
+    assert not out.exists()
+    painted = load_rig(resource_path("rigs", "two_pis.json"))
+    save_rig(rig_path, msgspec.structs.replace(painted))
+    assert main([*say[:2], str(one), *say[2:]]) == 2
+    assert "none of its markers is a landmark" in capsys.readouterr().err
+    out.write_text("")
+    assert main(say) == 2
+    assert "exists already" in capsys.readouterr().err

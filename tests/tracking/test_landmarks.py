@@ -1,0 +1,185 @@
+"""Landmarks of a bare hand in the estimator: their rows, start, errors against triangulation, one camera, and paint."""
+
+from dataclasses import replace
+from functools import cache
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot_app.barehand.landmarks import COMMON_M
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.places import LANDMARK_ROLES
+from rhot_app.hand.skeleton import JOINTS
+from rhot_app.simulator.nodes.landmark_detector import (
+    DISTANCE_M,
+    EPOCH_NS,
+    LandmarkErrors,
+    detected_landmarks,
+    landmark_rig,
+    moving_hand,
+)
+from rhot_app.tracking.hand_process import HandProcess
+from rhot_app.tracking.marker_model import compile_markers
+from rhot_app.tracking.marker_residual import MarkerFrame
+from rhot_app.tracking.trackers import make_tracker
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+from rhot_node.wire.messages import MarkerFlag
+
+FPS, SECONDS, SETTLED_S = 30.0, 2.5, 1.0
+MOST_START_S = 0.5
+RIG = landmark_rig()
+TIPS = [JOINTS.index(f"{finger}_tip") for finger in ("thumb", "index", "middle", "ring", "little")]
+
+
+def states_of(rig, frames):
+    tracker, states = make_tracker(rig), []
+    for frame in frames:
+        tracker.ingest(frame)
+        states.append(tracker.solve())
+    return states
+
+
+@cache
+def hand(motion="grasp", bone_sd=0.0):
+    return moving_hand(RIG, motion, SECONDS, FPS, 1, bone_sd)
+
+
+@cache
+def tracked(motion="grasp", bone_sd=0.0):
+    return states_of(RIG, detected_landmarks(RIG, hand(motion, bone_sd), 1))
+
+
+def off(states, truth, begin=SETTLED_S):
+    """Errors (N, 21, 3) m of the joints, their covariances, and the joints (N, 21, 3) that were triangulated."""
+    chosen = [state for state in states if state.tracked and 1e-9 * (state.t_master_ns - EPOCH_NS) >= begin]
+    rows = [round(1e-9 * (state.t_master_ns - EPOCH_NS) * FPS) for state in chosen]
+    joints = truth.joints()[rows]
+    return (np.array([state.joint_positions for state in chosen]) - joints,
+            np.array([state.joint_covariances for state in chosen]),
+            np.array([state.marker_raw_positions for state in chosen])[:, :21] - joints)
+
+
+def rms_mm(errors):
+    return 1e3 * float(np.sqrt(np.nanmean(np.sum(errors**2, axis=-1))))
+
+
+def test_the_marker_set_has_the_joints_in_the_usual_order():
+    markers = load_markers(resource_path("markers", "landmarks21.json"))
+    assert markers.ids == JOINTS
+    assert tuple(marker.role for marker in markers.markers) == LANDMARK_ROLES
+
+
+def test_a_landmark_is_at_its_joint():
+    rig = landmark_rig()
+    model, truth = compile_markers(rig), moving_hand(rig, "grasp", 0.1, FPS, 1)
+    process = HandProcess.of(model)
+    state = process.start(truth.worlds[0], truth.angles[0], (0.01, 0.1))[0]
+    frame = MarkerFrame(model, detected_landmarks(rig, truth, 1)[0])
+    lens = CameraModel.from_rig(rig.nodes[0].intrinsics, rig.nodes[0].pose)
+    np.testing.assert_allclose(frame.expected(state), lens.project(truth.joints()[0]), atol=1e-6)
+
+
+def test_rows_have_the_noise_that_all_landmarks_share():
+    """Whitened rows give the normal equations of the full covariance, whose Jacobian is by finite differences."""
+    model, truth = compile_markers(RIG), hand()
+    process, observations = HandProcess.of(model), detected_landmarks(RIG, hand(), 1)[0]
+    bound_s = 0.01
+    frame = MarkerFrame(model, replace(observations, clock_bound_s=bound_s))
+    state = process.start(truth.worlds[0], truth.angles[0], (0.01, 0.1))[0]
+    rng = np.random.default_rng(2)
+    state[33:60] = rng.normal(0.0, 0.2, 27)  # velocity
+    frame.add_landmark_noise(state)
+    rows = frame.linearise(state)
+
+    def seen(step):
+        return frame.expected(process.retract(state, step)).ravel()
+
+    size, small = process.size, 1e-6
+    jacobian = np.array([(seen(small * unit) - seen(-small * unit)) / (2 * small) for unit in np.eye(size)]).T
+    covariance = np.zeros((42, 42))
+    for m in range(21):
+        covariance[2 * m:2 * m + 2, 2 * m:2 * m + 2] = frame.covariances[m] + 0.02**2 * np.eye(2)
+    slopes = [jacobian[2 * m:2 * m + 2, :3] for m in range(21)]
+    px_per_m = [np.sqrt(np.linalg.norm(np.cross(slope[0], slope[1]))) for slope in slopes]
+    shift = COMMON_M * np.array([[px * axis, px * (1 - axis)] for px in px_per_m for axis in (1, 0)])
+    late = bound_s / np.sqrt(3.0) * (jacobian[:, :27] @ state[33:60])
+    covariance += shift @ shift.T + np.outer(late, late)
+    error = (observations.pixels - frame.expected(state)).ravel()
+    np.testing.assert_allclose(rows.jacobian.T @ rows.jacobian,
+                               jacobian.T @ np.linalg.solve(covariance, jacobian), rtol=1e-3, atol=1.0)
+    np.testing.assert_allclose(rows.error @ rows.error, error @ np.linalg.solve(covariance, error), rtol=1e-3)
+
+
+def test_the_hand_is_found_from_the_first_frames_of_two_cameras():
+    first = next(state for state in tracked() if state.tracked)
+    assert 1e-9 * (first.t_master_ns - EPOCH_NS) <= MOST_START_S
+
+
+@pytest.mark.parametrize(("motion", "bone_sd"), [("grasp", 0.0), ("grasp", 0.05), ("rest", 0.05)])
+def test_joints_are_better_than_triangulated_and_their_covariances_true(motion, bone_sd):
+    errors, covariances, triangulated = off(tracked(motion, bone_sd), hand(motion, bone_sd))
+    assert rms_mm(errors) < (1.0 if bone_sd else 0.9) * rms_mm(triangulated)
+    nees = np.einsum("nji,njik,njk->nj", errors, np.linalg.inv(covariances), errors) / 3.0
+    assert 0.1 < nees.mean() < (3.0 if bone_sd else 2.0)
+    within = np.abs(errors) <= 3.0 * np.sqrt(np.einsum("njii->nji", covariances))
+    assert within.mean() >= (0.95 if bone_sd else 0.97)
+
+
+def test_one_camera_keeps_the_hand_and_says_that_it_knows_the_distance_less():
+    frames = [frame for frame in detected_landmarks(RIG, hand(), 1)
+              if frame.camera == 0 or frame.t_row0_master_ns < EPOCH_NS + 10**9]
+    alone = [state for state in states_of(RIG, frames) if state.t_master_ns > EPOCH_NS + 17 * 10**8]
+    assert alone and all(state.tracked for state in alone)
+    errors, covariances, _ = off(alone, hand())
+    line = CameraModel.from_rig(RIG.nodes[0].intrinsics, RIG.nodes[0].pose).camera_from_world[2, :3]
+    along, across = line, np.array([0.0, 1.0, 0.0])
+    depth = np.sqrt(np.einsum("i,njik,k->nj", along, covariances, along))
+    assert depth.mean() > 1.5 * np.sqrt(np.einsum("i,njik,k->nj", across, covariances, across)).mean()
+    assert (np.abs(errors @ along) <= 3.0 * depth).mean() >= 0.7
+    assert np.abs(errors @ along).max() < 0.15 * DISTANCE_M
+
+
+def test_one_wrong_landmark_does_not_take_another_ones_place():
+    """The index fingertip reported where the middle one is: a detector errs so, and no painted marker is confused."""
+    truth, frames = hand("rest"), []
+    for frame in detected_landmarks(RIG, hand("rest"), 1):
+        pixels = frame.pixels.copy()
+        if frame.t_row0_master_ns > EPOCH_NS + 15 * 10**8 and frame.camera == 0:
+            pixels[TIPS[1]] = pixels[TIPS[2]] + 1.0
+        frames.append(replace(frame, pixels=pixels))
+    errors, _, _ = off(states_of(RIG, frames), truth, 2.0)
+    right, _, _ = off(tracked("rest"), truth, 2.0)
+    assert rms_mm(errors[:, TIPS[2]]) < rms_mm(right[:, TIPS[2]]) + 2.0
+
+
+def mixed_rig():
+    """Two painted fingertips, landmarks for all other joints."""
+    painted = {marker.role: msgspec.structs.replace(marker, id=f"paint_{marker.id}", shape="disc", radius_mm=None)
+               for marker in load_markers(resource_path("markers", "rhot6.json")).markers}
+    landmarks = load_markers(resource_path("markers", "landmarks21.json"))
+    rest = tuple(marker for marker in landmarks.markers if marker.id not in ("thumb_tip", "index_tip"))
+    return landmark_rig(markers=msgspec.structs.replace(
+        landmarks, markers=(*rest, painted["thumb_tip"], painted["index_tip"])))
+
+
+def test_two_painted_fingertips_and_landmarks_are_better_than_either():
+    rig, truth = mixed_rig(), hand()
+    mixed, covariances, _ = off(states_of(rig, detected_landmarks(rig, truth, 1)), truth)
+    alone, _, _ = off(tracked(), truth)
+    two = TIPS[:2]
+    assert rms_mm(mixed[:, two]) < 0.9 * rms_mm(alone[:, two])
+    assert rms_mm(mixed) < rms_mm(alone)
+    nees = np.einsum("nji,njik,njk->nj", mixed, np.linalg.inv(covariances), mixed) / 3.0
+    assert nees.mean() < 2.0
+    only = [replace(frame, flags=np.where(np.arange(len(frame.flags)) < 19, int(MarkerFlag.LOST), 0).astype(np.uint16),
+                    pixels=np.where(np.arange(len(frame.flags))[:, None] < 19, np.nan, frame.pixels))
+            for frame in detected_landmarks(rig, truth, 1)]
+    assert not any(state.tracked for state in states_of(rig, only))  # two fingertips alone are no hand
+
+
+def test_without_errors_the_hand_is_where_it_is():
+    exact = LandmarkErrors(0.0, 0.0, 0.0, 0.0)
+    errors, _, _ = off(states_of(RIG, detected_landmarks(RIG, hand(), 1, exact)), hand())
+    assert rms_mm(errors) < 1.0
