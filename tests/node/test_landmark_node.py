@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import select
 import socket
 import sys
 import time
@@ -57,7 +58,7 @@ def test_the_example_speaks_the_wire(example: ModuleType) -> None:
 
         def say(message: ClockRequest | Start | Stop) -> None:
             master.sendto(encode(message), ("127.0.0.1", node.socket.getsockname()[1]))
-            time.sleep(0.05)
+            select.select([node.socket], [], [], 5.0)
             node.poll()
 
         points = [(100.0 + k, 200.5) for k in range(21)]
