@@ -1,11 +1,11 @@
 """The residual of one camera's edges: contour points of the hand against the edges that were found near them.
 
-On a slice, the hand's edge is one of the edges found, or none of them was found as an edge (Isard and Blake 1998). Clutter
-is a Poisson process along the slice. An edge counts by the probability that it is the hand's, at the present state.
-So a slice without edges, or with edges of other things only, changes nothing.
+On a slice, the hand's edge is one of the edges found, or none of them (Isard and Blake 1998). Clutter is a Poisson
+process along the slice. An edge counts by the probability that it is the hand's, at the present state. So a slice
+without edges, or with edges of other things only, changes nothing.
 
-What the surface model has wrong is the same along a phalanx: its radius is a nuisance, integrated out for each capsule in
-each camera. Two opposite edges then determine the axis, as in feature mode, and one edge alone is less certain.
+What the surface model has wrong is the same along a phalanx: its radius is a nuisance, integrated out for each capsule
+in each camera. Two opposite edges then determine the axis, as in feature mode, and one edge alone is less certain.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, contour_points, follow
+from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, follow
 from rhot_app.barehand.surface import PALM, SHAPE, Surface
 from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.tracking.hand_process import ANGLES, BIAS, LIMIT_SD_RAD, MOTION, POSE
@@ -65,13 +65,13 @@ class ContourFrame:
         """Take the edges of the slices. The density of edges that are at least as strong is that of the clutter."""
         self.edges = edges
         length = float(np.sum(2.0 * self.slices[:, 4] + 1.0))
-        valid = np.arange(edges.offset.shape[1]) < edges.count[:, None]
+        valid = np.arange(edges.offset.shape[1]) < edges.number[:, None]
         strength = np.abs(edges.strength)
         stronger = len(strength[valid]) - np.searchsorted(np.sort(strength[valid]), strength)
         self.clutter = np.maximum(stronger / max(length, 1.0), _LEAST_CLUTTER)
 
     def predict(self, state: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """The contour on each slice: `offset` (K,) px from its centre, its derivative (K, COLUMNS), whether it exists."""
+        """The contour on each slice: (K,) px from its centre, its derivative (K, COLUMNS), and whether it exists."""
         count = len(self.slices)
         offset, rows, widths = np.zeros(count), np.zeros((count, COLUMNS)), np.zeros(count)
         good = np.zeros(count, np.bool_)
@@ -93,7 +93,7 @@ class ContourFrame:
         for s in range(len(offset)):
             if good[s]:
                 scale = self.points.scale[s]
-                _, weight, mean, _ = _mix(self.edges.count[s], self.edges.offset[s], self.edges.sd[s],
+                _, weight, mean, _ = _mix(self.edges.number[s], self.edges.offset[s], self.edges.sd[s],
                                           self.edges.inside[s], self.edges.outside[s], self.points.behind[s],
                                           offset[s], (SHAPE_SD_M * scale) ** 2, self.expected_sd[s] ** 2,
                                           self.clutter[s], found[s])
@@ -108,7 +108,7 @@ class ContourFrame:
         information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
         self.seen = np.zeros((GROUPS, 2))
         cost = _gather(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule,
-                       p.kind, p.along, p.behind, p.scale, self.pixel, self.normal, e.count, e.offset, e.sd, e.inside,
+                       p.kind, p.along, p.behind, p.scale, self.pixel, self.normal, e.number, e.offset, e.sd, e.inside,
                        e.outside, self.expected_sd, self.clutter, information, pull, self.seen)
         return compressed(information, pull, cost, len(state) - BIAS + MOTION, self.size_column)
 
@@ -140,13 +140,9 @@ class JointLimits:
 
 
 def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, intrinsics: Array,
-              image_size: tuple[int, int], size_column: int, row_s: float, reach: float, longest_px: float,
-              step_m: float) -> ContourFrame:
-    """The slices that a camera should search when the hand is expected in `state` with `covariance` (n, n): `reach`
-    standard deviations to both sides, at most `longest_px`."""
-    first = BIAS - MOTION + size_column
-    points = contour_points(surface, state, np.ascontiguousarray(state[first:first + SHAPE]), pose, intrinsics,
-                            image_size, step_m)
+              points: ContourPoints, size_column: int, row_s: float, reach: float, longest_px: float) -> ContourFrame:
+    """The slices that a camera should search at `points`, which are expected of a hand in `state` with `covariance`
+    (n, n): `reach` standard deviations to both sides, at most `longest_px`. `row_s`: time between rows, s."""
     count = len(points.along)
     late = row_s * (points.pixel[:, 1] - points.pixel[:, 1].mean()) if count and row_s else np.zeros(count)
     slices = np.column_stack([points.pixel, points.normal, np.ones(count)])

@@ -108,8 +108,11 @@ def side_normals(c0, c1, r0, r1, o, normals):
     if not rest > 1e-9:
         return False
     s = math.sqrt(rest / square)
-    normals[0, 0], normals[0, 1], normals[0, 2] = p * px + q * qx + s * sx, p * py + q * qy + s * sy, p * pz + q * qz + s * sz
-    normals[1, 0], normals[1, 1], normals[1, 2] = p * px + q * qx - s * sx, p * py + q * qy - s * sy, p * pz + q * qz - s * sz
+    for kind in range(2):
+        sign = s if kind == 0 else -s
+        normals[kind, 0] = p * px + q * qx + sign * sx
+        normals[kind, 1] = p * py + q * qy + sign * sy
+        normals[kind, 2] = p * pz + q * qz + sign * sz
     return True
 
 
@@ -247,8 +250,9 @@ def _behind(surface, centres, radii, o, px, py, pz, n):
     out = SILHOUETTE
     for j in range(centres.shape[0]):
         # the ball about both of the capsule's
-        mx, my, mz = (0.5 * (centres[j, 0, 0] + centres[j, 1, 0]) - o[0], 0.5 * (centres[j, 0, 1] + centres[j, 1, 1]) - o[1],
-                      0.5 * (centres[j, 0, 2] + centres[j, 1, 2]) - o[2])
+        mx = 0.5 * (centres[j, 0, 0] + centres[j, 1, 0]) - o[0]
+        my = 0.5 * (centres[j, 0, 1] + centres[j, 1, 1]) - o[1]
+        mz = 0.5 * (centres[j, 0, 2] + centres[j, 1, 2]) - o[2]
         half = 0.5 * math.sqrt((centres[j, 0, 0] - centres[j, 1, 0]) ** 2 + (centres[j, 0, 1] - centres[j, 1, 1]) ** 2
                                + (centres[j, 0, 2] - centres[j, 1, 2]) ** 2) + max(radii[j, 0], radii[j, 1])
         dot = mx * ux + my * uy + mz * uz
@@ -266,8 +270,8 @@ def _behind(surface, centres, radii, o, px, py, pz, n):
 def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, widths,
            good):
     """How the contour crosses K slices at `state`: fill `offset` (K,) px along each slice's normal from its centre
-    `pixel` (K, 2), `rows` (K, COLUMNS) its derivative by pose and size, `widths` (K,) its derivative by the logarithm of
-    the capsule's radius, and `good` (K,). `late_s` (K,): a slice's time less the state's."""
+    `pixel` (K, 2), `rows` (K, COLUMNS) its derivative by pose and size, `widths` (K,) that by the logarithm of the
+    capsule's radius, and `good` (K,). `late_s` (K,): a slice's time less the state's."""
     world, frames = np.eye(4), np.empty((surface.dh.parent.shape[0], 3, 4))
     world[:3] = state[:ANGLES].reshape(3, 4)
     count = surface.row.shape[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,8 @@ from rhot_app.barehand.contours import INNER
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-SILHOUETTE_RGB, INNER_RGB, FOUND_RGB, OTHER_RGB, BONE_RGB = (40, 230, 80), (60, 140, 255), (255, 40, 40), (255, 220, 0), (255, 255, 255)
+SILHOUETTE_RGB, INNER_RGB, BONE_RGB = (40, 230, 80), (60, 140, 255), (255, 255, 255)
+FOUND_RGB, OTHER_RGB, SLICE_RGB = (255, 40, 40), (255, 220, 0), (110, 110, 110)
 _SUB = 4  # bits of a pixel's fraction in OpenCV's drawing
 
 
@@ -32,16 +35,17 @@ def overlay(image: Image, frame: ContourFrame, state: Array, joints: Array | Non
     for s in np.flatnonzero(good):
         colour = INNER_RGB if frame.points.behind[s] == INNER else SILHOUETTE_RGB
         centre, normal, half = frame.slices[s, :2], frame.slices[s, 2:4], frame.slices[s, 4]
-        cv2.line(out, place(centre - half * normal), place(centre + half * normal), (110, 110, 110), 1, cv2.LINE_AA, _SUB)
+        cv2.line(out, place(centre - half * normal), place(centre + half * normal), SLICE_RGB, 1, cv2.LINE_AA,
+                 _SUB)
         cv2.circle(out, place(centre + offset[s] * normal), zoom << _SUB, colour, -1, cv2.LINE_AA, _SUB)
-        for k in range(int(edges.count[s]) if edges is not None else 0):
+        for k in range(int(edges.number[s]) if edges is not None else 0):
             assert edges is not None
             cv2.circle(out, place(centre + edges.offset[s, k] * normal), round(0.7 * zoom) << _SUB,
                        FOUND_RGB if found[s, k] > 0.5 else OTHER_RGB, -1, cv2.LINE_AA, _SUB)
     if joints is not None:
         for finger in range(5):
             chain = [0, *range(1 + 4 * finger, 5 + 4 * finger)]
-            for a, b in zip(chain, chain[1:], strict=False):
+            for a, b in pairwise(chain):
                 if np.isfinite(joints[[a, b]]).all():
                     cv2.line(out, place(joints[a]), place(joints[b]), BONE_RGB, 1, cv2.LINE_AA, _SUB)
     return np.asarray(out, dtype=np.uint8)

@@ -1,8 +1,8 @@
-"""How well a posed hand covers the foreground of small images: a cheap score for many poses, and a search with it.
+"""How well a posed hand covers the foreground of small images: a quick score for many poses, and a search with it.
 
-Every pixel is worth the log odds that it shows the hand. What lies where the forearm may be is worth nothing either way,
-because the wrist bends. The search draws poses from a Gaussian, keeps the best and draws again (cross-entropy method,
-Rubinstein 1999).
+Every pixel on the hand is worth the log odds that it shows the hand, and every pixel in a ring about it the log odds
+that it does not. Where the forearm may be there is no ring, because the wrist bends. Other foreground does not count.
+The search draws poses from a Gaussian, keeps the best and draws again (cross-entropy method, Rubinstein 1999).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import project
-from rhot_app.barehand.surface import FOREARM, SHAPE, Surface, place_capsules
+from rhot_app.barehand.surface import FOREARM, Surface, place_capsules
 from rhot_app.hand.kinematics import move
 
 Array = NDArray[np.float64]
@@ -23,12 +23,19 @@ Array = NDArray[np.float64]
 UNSURE = 0.05
 """Probability that a foreground probability of 0 or 1 is wrong: shadows, sleeves, other skin."""
 
+CORRELATED = 8.0
+"""Pixels that count as one observation: where the model's contour or the foreground is wrong, it is so along a finger's
+breadth."""
+
+RING_M = 0.012
+"""m: width of the ring, a finger's half breadth."""
+
 ARM_M, ARM_SPREAD = 0.5, 0.35
 """m, and radius per m: the cone behind the wrist in which a forearm may lie, about 20 degrees to every side."""
 
 
 class Silhouettes(NamedTuple):
-    """Log odds (C, h, w) of every `step`-th pixel of C images; `poses` (C, 3, 4) and `intrinsics` (C, 9) of the cameras.
+    """Log odds (C, h, w) of every `step`-th pixel of C images; `poses` (C, 3, 4), `intrinsics` (C, 9) of the cameras.
     Images of other sizes are padded with 0."""
 
     odds: Array
@@ -37,8 +44,8 @@ class Silhouettes(NamedTuple):
     intrinsics: Array
 
 
-def silhouettes(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array], intrinsics: Sequence[Array]) \
-        -> Silhouettes:
+def silhouettes(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array],
+                intrinsics: Sequence[Array]) -> Silhouettes:
     """From foreground probabilities (h, w) of each camera (`foreground_map`)."""
     height, width = max(one.shape[0] for one in maps), max(one.shape[1] for one in maps)
     odds = np.zeros((len(maps), height, width))
@@ -57,7 +64,8 @@ def _paint(c0, c1, r0, r1, pose, intrinsics, step, mask, value, a, b, slope):
         return
     z0 = pose[2, 3] + pose[2, 0] * c0[0] + pose[2, 1] * c0[1] + pose[2, 2] * c0[2]
     z1 = pose[2, 3] + pose[2, 0] * c1[0] + pose[2, 1] * c1[1] + pose[2, 2] * c1[2]
-    u0, v0, u1, v1 = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5, (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
+    u0, v0 = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
+    u1, v1 = (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
     s0, s1 = intrinsics[0] * r0 / z0 / step, intrinsics[0] * r1 / z1 / step
     height, width = mask.shape
     left, right = max(int(min(u0 - s0, u1 - s1)), 0), min(int(max(u0 + s0, u1 + s1)) + 1, width - 1)
@@ -76,8 +84,8 @@ def _paint(c0, c1, r0, r1, pose, intrinsics, step, mask, value, a, b, slope):
 
 @njit(cache=True)
 def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, parts):
-    """Log likelihood of the images under a pose over that without a hand; `parts` (C, 3): of each camera the sum of log
-    odds on the hand, its pixels, and the foreground pixels that neither hand nor forearm covers."""
+    """Log odds of a pose; `parts` (C, 3): of each camera the sum of log odds on the hand, its pixels, and the sum of
+    log odds in the ring about it."""
     count = surface.row.shape[0]
     frames = np.empty((surface.dh.parent.shape[0], 3, 4))
     centres, radii = np.empty((count, 2, 3)), np.empty((count, 2))
@@ -105,7 +113,11 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
         reach = wrist + end * (elbow - wrist)
         _paint(wrist, reach, thick, thick + end * ARM_M * ARM_SPREAD, poses[camera], intrinsics[camera], step, mask, 2,
                a, b, slope)
-        own = covered = area = 0.0
+        for k in range(count):
+            if surface.group[k] != FOREARM:
+                _paint(centres[k, 0], centres[k, 1], radii[k, 0] + RING_M, radii[k, 1] + RING_M, poses[camera],
+                       intrinsics[camera], step, mask, 3, a, b, slope)
+        own = ring = area = 0.0
         for row in range(mask.shape[0]):
             for column in range(mask.shape[1]):
                 value = mask[row, column]
@@ -113,16 +125,16 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
                 if value == 1:
                     own += o
                     area += 1.0
-                elif value == 2 and o > 0.0:
-                    covered += o
-        parts[camera, 0], parts[camera, 1], parts[camera, 2] = own, area, covered
-        total += own + covered
+                elif value == 3:
+                    ring += o
+        parts[camera, 0], parts[camera, 1], parts[camera, 2] = own, area, ring
+        total += own - ring
     return total
 
 
 def score(surface: Surface, world: Array, angles: Array, size: Array, images: Silhouettes) -> tuple[float, Array]:
-    """Log likelihood of the images with the hand at `world` (4, 4), `angles` (21,) over that without it, and per camera
-    the sum of the log odds on the hand, its pixels, and the log odds of the forearm (C, 3)."""
+    """Log odds of the hand at `world` (4, 4), `angles` (21,); and (C, 3) of each camera the sum of log odds on the
+    hand, its pixels, and the sum of log odds in the ring about it."""
     parts = np.zeros((len(images.odds), 3))
     mask = np.zeros(images.odds.shape[1:], np.uint8)
     return float(_score(surface, world, angles, size, images.odds, images.step, images.poses, images.intrinsics, mask,
@@ -154,7 +166,7 @@ def search(surface: Surface, world: Array, angles: Array, covariance: Array, lim
         -> tuple[Array, Array, float]:
     """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, and its score.
 
-    The prior itself counts: -1/2 of the squared Mahalanobis distance.
+    The score is that of the images as correlated as they are, less half of the squared Mahalanobis distance.
     """
     root = np.linalg.cholesky(covariance + 1e-12 * np.eye(len(covariance)))
     mean, spread = np.zeros(len(root)), np.ones(len(root))
@@ -163,7 +175,7 @@ def search(surface: Surface, world: Array, angles: Array, covariance: Array, lim
         white = mean + spread * rng.standard_normal((draws, len(root)))
         white[0] = mean
         scores = score_steps(surface, world, angles, white @ root.T, limits, size, images)
-        scores -= 0.5 * np.sum(white * white, axis=1)
+        scores = scores / CORRELATED - 0.5 * np.sum(white * white, axis=1)
         order = np.argsort(-scores)[:best]
         if scores[order[0]] > top[0]:
             top = float(scores[order[0]]), white[order[0]]
@@ -171,8 +183,3 @@ def search(surface: Surface, world: Array, angles: Array, covariance: Array, lim
     moved, turned = np.empty((4, 4)), np.empty(21)
     move(world, angles, root @ top[1], moved, turned)
     return moved, np.clip(turned, limits[:, 0], limits[:, 1]), top[0]
-
-
-def no_size() -> Array:
-    """(SHAPE,) a hand as large as its file says."""
-    return np.zeros(SHAPE)

@@ -1,7 +1,7 @@
 """Finds a hand of which nothing is known, in the foreground of one image of each camera.
 
-Places where the foreground is as thick as a palm are candidates. Of each, many rotations and some shapes of the hand are
-scored by how well they cover the foreground (`silhouette`), and the best are refined.
+Places where the foreground is as thick as a palm are candidates. Of each, many rotations and some shapes of the hand
+are scored by how well they cover the foreground (`silhouette`), and the best are refined.
 """
 
 from __future__ import annotations
@@ -28,24 +28,23 @@ Array = NDArray[np.float64]
 STEP = 8
 """px: every so many-th pixel is looked at."""
 
-ROTATIONS = 240
-"""Rotations tried at a candidate: 30 degrees apart."""
+ROTATIONS = 400
+"""Rotations tried at a candidate: 25 degrees apart."""
 
-KEPT = 6
+KEPT = 10
 """Poses refined of each candidate."""
 
 PALMS = 6
 """Candidates of each camera."""
 
 _CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
-_POINTING = 3
 _SPREAD = 0.03, 0.35, 0.35  # m, rad, rad between the poses tried
 _PALM_RADIUS = 0.6, 1.7  # of half the palm's breadth: thinner or thicker foreground is none
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A pose that may be the hand's, and its score: log likelihood of the foreground, more is better."""
+    """A pose that may be the hand's, and its score (`silhouette.search`), more is better."""
 
     pose: HandPose
     score: float
@@ -76,10 +75,26 @@ def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[Came
     covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
     covariance[6:, 6:] = np.linalg.inv(model.natural.information + np.eye(21) / _SPREAD[2] ** 2)
     for _, world, angles in _distinct(tried, KEPT * max(min(len(centres), 2), 1)):
-        moved, bent, value = search(surface, world, angles, covariance, model.limits, size, seen, rng, 80, 4, 8)
+        moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, seen, rng, 60, 4, 8)
+        bent = bend_fingers(surface, moved, bent, model.limits, size, seen)
+        moved, bent, value = search(surface, moved, bent, 0.25 * covariance, model.limits, size, seen, rng, 60, 4, 8)
         found.append(Found(HandPose(moved, bent), value))
     found.sort(key=lambda one: -one.score)
     return found[:most]
+
+
+def bend_fingers(surface: Surface, world: Array, angles: Array, limits: Array, size: Array,
+                 images: Silhouettes) -> Array:
+    """The angles (21,) with each finger as it is, open, relaxed or closed, whichever the foreground says, one finger
+    after the other, twice."""
+    angles = angles.copy()
+    for flexions in [*FLEXIONS[1:], *FLEXIONS[1:]]:
+        steps = np.zeros((1 + len(_CURLS_DEG), 27))
+        for k, curl in enumerate(_CURLS_DEG):
+            steps[1 + k, 6 + np.array(flexions)] = np.radians(curl) - angles[list(flexions)]
+        best = int(np.argmax(score_steps(surface, world, angles, steps, limits, size, images)))
+        angles += steps[best, 6:]
+    return angles
 
 
 def _distinct(tried: list[tuple[float, Array, Array]], most: int) -> list[tuple[float, Array, Array]]:

@@ -10,22 +10,22 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import GROUPS, ContourFrame, JointLimits, slices_of
-from rhot_app.barehand.contours import STEP_M
-from rhot_app.barehand.silhouette import Silhouettes, score, search, silhouettes
+from rhot_app.barehand.contours import STEP_M, contour_points
+from rhot_app.barehand.features import feature_points
+from rhot_app.barehand.joints import know, place_joints
+from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search, silhouettes
 from rhot_app.barehand.start import STEP, Found, find_hand
-from rhot_app.barehand.surface import PALM, SHAPE, sized_table, surface_of
+from rhot_app.barehand.surface import PALM, SHAPE, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, HandPose
 from rhot_app.project import Rig
@@ -58,11 +58,12 @@ LONGEST_PX = REACH * CONFUSED_PX + 6.0
 """px: half of the longest slice. Farther away, other fingers' edges are as probable."""
 
 START_SD = 0.015, 0.2, 0.2
-"""m, rad and rad: standard deviation of place, rotation and angles where a start is given: of landmarks, about a thumb's
-breadth."""
+"""m, rad and rad: standard deviation of place, rotation and angles where a start is given: of landmarks, about a
+thumb's breadth."""
 
-START_PASSES = 8
-"""Searches of the first image. Each halves how far from the contour an edge may be."""
+PASSES, START_PASSES = 2, 5
+"""Searches of an image, and of one in which the hand is not where it was expected. Each halves how far from the contour
+an edge may be."""
 
 SIZE_SD = 0.1, 0.05, 0.08
 """Standard deviations of a hand whose size is unknown: logarithms of its length, of its fingers' part of it, and of
@@ -71,8 +72,15 @@ its thickness beyond that, in adults (`tracking.hand_size`; Buryanov and Kotiuk 
 SIZE_S = 1e3
 """s: correlation time of the size. It does not change; what the surface model has wrong of it does."""
 
-DRAWS = 250, 6, 15
+DRAWS = 100, 4, 10
 """Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
+
+SURELY = 5.0
+"""Log odds by which a pose that was searched for must be better than the predicted one: 150 to 1."""
+
+LEAST_SUPPORT = 0.77
+"""Part of a finger's contour that is found at least: 0.9 (`contour_residual.MISSED`) less two standard deviations of
+twenty slices."""
 
 COVER_DROP, COVER_SHARE = 0.3, 0.1
 """Log odds per pixel by which a prediction may cover the foreground worse than the hand did of late, a factor of 1.35,
@@ -99,20 +107,25 @@ class Fit:
 class BareHandTracker:
     """One bare hand before the cameras of a rig."""
 
-    def __init__(self, rig: Rig, *, known_size: bool = True, foreground: Sequence[Foreground] | None = None) -> None:
-        """`known_size`: the hand is as the rig's hand file says; otherwise its size is estimated from there.
-        `foreground`: what each camera's node has learnt of hand and background; nothing by default."""
+    def __init__(self, rig: Rig, *, mode: Literal["contour", "feature"] = "contour", known_size: bool = True,
+                 foreground: Sequence[Foreground] | None = None, row_s: Sequence[float] | None = None) -> None:
+        """`mode`: slices across the visible contour, or across the links' axes (`features`). `known_size`:
+        the hand is as the rig's hand file says; otherwise its size is estimated from there. `foreground`: what each
+        camera's node has learnt of hand and background; nothing by default. `row_s`: each camera's time between two
+        rows, s; 0 by default."""
+        self.mode = mode
         self.model = build_model(rig.hand)
         self.surface = surface_of(self.model)
         self.cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
         self.names = tuple(node.name for node in rig.nodes)
         self.poses = [np.ascontiguousarray(camera.camera_from_world[:3]) for camera in self.cameras]
+        self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
         natural = self.model.natural
         size = np.diag(np.square(SIZE_SD)) if not known_size else np.zeros((SHAPE, SHAPE))
         self.process = HandProcess(self.surface.dh, self.model.limits, natural.mean,
-                                   np.asarray(np.linalg.inv(natural.information)), PALM_SPREAD, np.full(3, FASTEST), FASTEST,
-                                   size[None], SIZE_S)
+                                   np.asarray(np.linalg.inv(natural.information)), PALM_SPREAD, np.full(3, FASTEST),
+                                   FASTEST, size[None], SIZE_S)
         self.filter = IteratedFilter(self.process)
         self._limits = JointLimits(self.model.limits)
         self.tracking = False
@@ -171,27 +184,41 @@ class BareHandTracker:
         """Weigh the images of some cameras at one instant, and other residuals of the same state."""
         t_s = 1e-9 * (t_ns - self._epoch_ns)
         prediction = self.filter.predict(t_s)
-        residuals: list[Residual] = []
-        state, covariance = prediction
         seen = self._silhouettes(images)
+        start = None if seen is None or self._fresh else self._relocate(seen, prediction, t_s - self.filter.newest.t_s)
+        passes = START_PASSES if self._fresh or start is not None else PASSES
+        knot = self._fit(images, t_s, prediction, prediction[0] if start is None else start, extra, passes)
         if seen is not None:
-            state = self._relocate(seen, prediction, t_s - self.filter.newest.t_s)
-        initial = state
-        passes = START_PASSES if self._fresh else 2
+            covered = self._covered(seen, knot.state)
+            if start is not None and covered < self._covered(seen, start) - COVER_DROP:
+                knot = self._anew(images, t_s, start, extra)  # the contour led away from the foreground
+                covered = self._covered(seen, knot.state)
+            self._cover += (1.0 if self._fresh else COVER_SHARE) * (covered - self._cover)
+        self._fresh = False
+        return knot
+
+    def _anew(self, images: dict[int, Image], t_s: float, start: Array, extra: Sequence[Residual]) -> Knot:
+        """Begin again at rest in the state `start`."""
+        world = np.eye(4)
+        world[:3] = start[:ANGLES].reshape(3, 4)
+        state, covariance = self.process.start(world, start[ANGLES:VELOCITY], START_SD[:2])
+        state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
+        covariance[own, own] = self.filter.newest.covariance[own, own]
+        self.filter.start(t_s, state, covariance)
+        return self._fit(images, t_s, (state, covariance), state, extra, START_PASSES)
+
+    def _fit(self, images: dict[int, Image], t_s: float, prediction: tuple[Array, Array], initial: Array,
+             extra: Sequence[Residual], passes: int) -> Knot:
+        """Search the images and estimate, `passes` times; the first time about the state `initial`."""
+        residuals: list[Residual] = []
+        state, covariance = initial, prediction[1]
         for number in range(passes):
-            wide = covariance if not self._fresh else prediction[1] * 0.25**number
-            frames = [self._search(camera, image, state, wide, number == passes - 1)
+            frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1)
                       for camera, image in images.items()]
             residuals = [*frames, self._limits, *extra]
             if number < passes - 1:
-                knot = update(self.process, t_s, prediction, residuals, initial)
-                initial = state = knot.state
-                covariance = knot.covariance
-        knot = self.filter.add(t_s, residuals, prediction, initial)
-        if seen is not None:
-            self._cover += (1.0 if self._fresh else COVER_SHARE) * (self._covered(seen, knot.state) - self._cover)
-        self._fresh = False
-        return knot
+                initial = state = update(self.process, t_s, prediction, residuals, initial).state
+        return self.filter.add(t_s, residuals, prediction, initial)
 
     def _silhouettes(self, images: dict[int, Image]) -> Silhouettes | None:
         """The images' foreground, None while no camera knows any."""
@@ -201,41 +228,60 @@ class BareHandTracker:
         maps = [foreground_map(images[c], self.foreground[c], STEP) for c in known]
         return silhouettes(maps, STEP, [self.poses[c] for c in known], [self.cameras[c].intrinsics for c in known])
 
+    def _score(self, seen: Silhouettes, state: Array) -> float:
+        """Log odds of the hand in `state` by the foreground."""
+        world = np.eye(4)
+        world[:3] = state[:ANGLES].reshape(3, 4)
+        return score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)[0]
+
     def _covered(self, seen: Silhouettes, state: Array) -> float:
-        """Mean log odds of the foreground on the hand in `state`."""
+        """Log odds of the hand in `state` by the foreground, per pixel of the hand."""
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
         _, parts = score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)
-        return float(parts[:, 0].sum() / max(parts[:, 1].sum(), 1.0))
+        return float((parts[:, 0] - parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
 
-    def _relocate(self, seen: Silhouettes, prediction: tuple[Array, Array], dt_s: float) -> Array:
-        """The state at which to begin: the prediction, or where the foreground is if the prediction covers it worse
-        than the hand did of late."""
+    def _relocate(self, seen: Silhouettes, prediction: tuple[Array, Array], dt_s: float) -> Array | None:
+        """A state that covers the foreground, where the prediction does so worse than the hand did of late or is too
+        uncertain to tell fingers apart, or where a finger's contour was not found; None where none is surely better.
+        Such a state, or such a finger, widens the prediction by how far hands go in `dt_s`."""
         state, covariance = prediction
         depth = self.poses[0][2] @ np.array([*state[[3, 7, 11]], 1.0])
         wide = np.sqrt(np.trace(covariance[:3, :3]) / 3.0) * self.cameras[0].intrinsics[0] / depth
-        if wide < CONFUSED_PX and self._covered(seen, state) > self._cover - COVER_DROP:
-            return state
-        world = np.eye(4)
-        world[:3] = state[:ANGLES].reshape(3, 4)
+        unfound = float(np.min(np.nan_to_num(self.fit.support, nan=1.0))) < LEAST_SUPPORT
+        if wide < CONFUSED_PX and not unfound and self._covered(seen, state) > self._cover - COVER_DROP:
+            return None
         pace = FASTEST / np.sqrt(3.0) * dt_s
         spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
-        world, angles, _ = search(self.surface, world, state[ANGLES:VELOCITY].copy(), spread, self.model.limits,
-                                  state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, *DRAWS)
-        covariance[:POSE, :POSE] = spread
-        out = state.copy()
-        out[:ANGLES], out[ANGLES:VELOCITY] = world[:3].ravel(), angles
-        return out
+        best: tuple[float, Array | None] = self._score(seen, state) / CORRELATED + SURELY, None
+        for begin in (state, self.filter.newest.state):
+            world = np.eye(4)
+            world[:3] = begin[:ANGLES].reshape(3, 4)
+            world, angles, value = search(self.surface, world, begin[ANGLES:VELOCITY].copy(), spread, self.model.limits,
+                                          begin[BIAS:BIAS + SHAPE].copy(), seen, self._rng, *DRAWS)
+            if value > best[0]:
+                out = state.copy()
+                out[:ANGLES], out[ANGLES:VELOCITY] = world[:3].ravel(), angles
+                best = value, out
+        if best[1] is not None or unfound:
+            covariance[:POSE, :POSE] = spread
+        return best[1]
 
     def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool) -> ContourFrame:
+        """Search one image along the contours of a hand in `state`."""
         model = self.cameras[camera]
         if not self.noise[camera]:
             self.noise[camera] = noise_of(image)
-        frame = slices_of(self.surface, state, covariance, self.poses[camera], model.intrinsics,
-                          (model.width, model.height), MOTION, 0.0, REACH, LONGEST_PX,
-                          STEP_M if last else 2.0 * STEP_M)
-        frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
+        size, pose, image_size = state[BIAS:BIAS + SHAPE].copy(), self.poses[camera], (model.width, model.height)
+        if self.mode == "feature":
+            points = feature_points(self.surface, state, size, pose, model.intrinsics, image_size)
+        else:
+            points = contour_points(self.surface, state, size, pose, model.intrinsics, image_size,
+                                    STEP_M if last else 2.0 * STEP_M)
+        frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, MOTION, self.row_s[camera],
+                          REACH, LONGEST_PX)
         frame.expected_sd = np.minimum(frame.expected_sd, CONFUSED_PX)
+        frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
         if last:
             self.frames[camera] = frame
         return frame
@@ -251,19 +297,19 @@ class BareHandTracker:
         knot = self.filter.newest
         state, covariance = knot.state, knot.covariance
         points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
-        _joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
+        place_joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
         deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         shown = np.array([np.sum([frame.seen[:, 0] >= 3.0 for frame in self.frames if frame is not None], axis=0)
                           ]).reshape(GROUPS) if any(f is not None for f in self.frames) else np.zeros(GROUPS)
         joint_sd = np.sqrt(np.trace(covariances, axis1=1, axis2=2))
         joints, angles = np.empty(21, np.uint8), np.empty(21, np.uint8)
-        joints[0] = _know(joint_sd[0], shown[PALM] >= 2, MEASURED_M, INFERRED_M)
+        joints[0] = know(joint_sd[0], shown[PALM] >= 2, MEASURED_M, INFERRED_M)
         for finger in range(5):
             seen = shown[finger] >= 2
             for k in range(JOINT_SLICES[finger].start, JOINT_SLICES[finger].stop):
-                joints[k] = _know(joint_sd[k], seen, MEASURED_M, INFERRED_M)
+                joints[k] = know(joint_sd[k], seen, MEASURED_M, INFERRED_M)
             for k in range(ANGLE_SLICES[finger].start, ANGLE_SLICES[finger].stop):
-                angles[k] = _know(deviation[6 + k], seen, MEASURED_RAD, INFERRED_RAD)
+                angles[k] = know(deviation[6 + k], seen, MEASURED_RAD, INFERRED_RAD)
         turn_sd = float(np.sqrt(np.trace(covariance[3:6, 3:6])))
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
@@ -278,7 +324,7 @@ class BareHandTracker:
             camera_pixels=np.empty((cameras, 0, 2)), camera_flags=np.empty((cameras, 0), np.uint16),
             joint_positions=points[:21], joint_knowledge=joints, fingertip_positions=points[21:],
             angles=state[ANGLES:VELOCITY].copy(), angle_knowledge=angles, world_from_palm=world,
-            palm_knowledge=Knowledge(_know(turn_sd, shown[PALM] >= 2, MEASURED_RAD, INFERRED_RAD)),
+            palm_knowledge=Knowledge(know(turn_sd, shown[PALM] >= 2, MEASURED_RAD, INFERRED_RAD)),
             epipolar_error_px=np.empty(0),
             **UNESTIMATED | {
                 "joint_covariances": covariances[:21], "fingertip_covariances": covariances[21:],
@@ -288,42 +334,3 @@ class BareHandTracker:
                 "joint_velocity_sd": motion[0], "joint_acceleration_sd": motion[1],
                 "hand_scale": float(np.exp(state[BIAS])), "hand_scale_sd": float(deviation[MOTION])},
             latency_s={"filter": time.perf_counter() - begun})
-
-
-def _know(sd: float, shown: bool, measured: float, inferred: float) -> int:
-    if sd <= measured and shown:
-        return int(Knowledge.MEASURED)
-    return int(Knowledge.INFERRED if sd <= inferred else Knowledge.GUESSED)
-
-
-@njit(cache=True)
-def _joints(state, covariance, dh, bone, points, covariances, motion):
-    """Fill `points` (26, 3) m, their covariances (26, 3, 3), and `motion` (2, 21), roots of the traces of the joints'
-    velocities' and accelerations' covariances."""
-    frames, world = np.empty((dh.parent.shape[0], 3, 4)), np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
-    sized_table(dh, bone, state[BIAS:BIAS + SHAPE], a, d)
-    factor = np.exp(state[BIAS])
-    table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
-                     dh.point_offset * factor)
-    forward_arrays(table, world, state[ANGLES:VELOCITY], frames, points)
-    jacobian = np.empty((points.shape[0], 3, POSE + 1))
-    jacobian_arrays(table, world, frames, points, jacobian)
-    own = np.empty(POSE + 1, np.int64)
-    for order in range(3):
-        for j in range(POSE):
-            own[j] = order * POSE + j
-        own[POSE] = MOTION
-        block = np.empty((POSE + 1, POSE + 1))
-        for i in range(POSE + 1):
-            for j in range(POSE + 1):
-                block[i, j] = covariance[own[i], own[j]]
-        for p in range(points.shape[0] if order == 0 else 21):
-            for i in range(3):
-                jacobian[p, i, POSE] = points[p, i] - world[i, 3] if order == 0 else 0.0
-            one = np.dot(jacobian[p], np.dot(block, jacobian[p].T))
-            if order == 0:
-                covariances[p] = one
-            else:
-                motion[order - 1, p] = np.sqrt(max(one[0, 0] + one[1, 1] + one[2, 2], 0.0))

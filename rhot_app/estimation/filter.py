@@ -68,8 +68,8 @@ class IteratedFilter:
             prediction: tuple[Array, Array] | None = None, initial: Array | None = None) -> Knot:
         """Take in `residuals` of the instant `t_s` and return its knot.
 
-        `prediction`: what `predict(t_s)` returned, to save doing it again. `initial`: see `update`. An observation from before the oldest knot
-        enters that one.
+        `prediction`: what `predict(t_s)` returned, to save doing it again. `initial`: see `update`. An
+        observation from before the oldest knot enters that one.
         """
         place = bisect_right(self.knots, t_s, key=lambda knot: knot.t_s)
         if place == 0:

@@ -46,13 +46,13 @@ _LEAST_SD, _MOST_SD = 0.05, 3.0  # px
 
 
 class Edges(NamedTuple):
-    """Edges of N slices. `count` (N,); the others (N, MOST), the first `count` of each row are valid.
+    """Edges of N slices. `number` (N,); the others (N, MOST), the first `number` of each row are valid.
 
     `offset` px along the slice's normal from its centre, `sd` px; `strength` of 255 per px: positive where it gets
     brighter along the normal; `inside`, `outside`: foreground probability before and behind the edge.
     """
 
-    count: NDArray[np.int64]
+    number: NDArray[np.int64]
     offset: Array
     sd: Array
     strength: Array
@@ -67,7 +67,7 @@ def find_edges(image: Image, slices: Array, foreground: Foreground, noise: float
     """
     n = len(slices)
     edges = Edges(np.zeros(n, np.int64), *(np.zeros((n, MOST)) for _ in range(5)))
-    longest = 2 * int(math.ceil(slices[:, 4].max())) + 1 + 2 * BEYOND if n else 1
+    longest = 2 * math.ceil(slices[:, 4].max()) + 1 + 2 * BEYOND if n else 1
     _find(image, slices, foreground.hand, foreground.rest, foreground.mean, foreground.sd,
           noise, np.empty((longest, 4)), np.empty(longest), np.empty(longest), *edges)
     return edges
@@ -83,7 +83,7 @@ def noise_of(image: Image) -> float:
 @njit(cache=True)
 def _sample(image, x, y, out, weight):
     """Add `weight` times the bilinear value at (x, y) to `out` (3,). False outside of the image."""
-    column, row = int(math.floor(x)), int(math.floor(y))
+    column, row = math.floor(x), math.floor(y)
     if column < 0 or row < 0 or column + 1 >= image.shape[1] or row + 1 >= image.shape[0]:
         return False
     fx, fy = x - column, y - row
@@ -101,7 +101,7 @@ def _find(image, slices, hand, rest, mean, sd, noise, profile, ours, slope, coun
     derivative = np.empty((profile.shape[0], 4))
     for s in range(slices.shape[0]):
         cx, cy, nx, ny = slices[s, 0], slices[s, 1], slices[s, 2], slices[s, 3]
-        half = int(math.ceil(slices[s, 4]))
+        half = math.ceil(slices[s, 4])
         length = 2 * half + 1 + 2 * BEYOND
         first, last = length, -1  # samples within the image
         for i in range(length):

@@ -53,7 +53,8 @@ class Foreground(NamedTuple):
     def sentence(self) -> str:
         """What is known, for the operator."""
         background = "The background is learnt" if self.mean.size else "No background is learnt"
-        colours = "the hand's colours are known" if self.hand.max() > 1.001 * ANY else "no colours of the hand are known"
+        known = self.hand.max() > 1.001 * ANY
+        colours = "the hand's colours are known" if known else "no colours of the hand are known"
         return f"{background}; {colours}."
 
 
@@ -147,12 +148,11 @@ def _fill(image, hand, rest, mean, sd, out):
 def foreground_map(image: Image, model: Foreground, step: int = 4) -> Array32:
     """(H // step, W // step) foreground probabilities of an image (H, W, 3) RGB, of every `step`-th pixel."""
     height, width = image.shape[0] // step, image.shape[1] // step
-    if step == 1:
-        small, mean, sd = image, model.mean, model.sd
-    else:
-        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    mean, sd = model.mean, model.sd
+    if step > 1:
+        image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
         mean, sd = model.mean[step // 2::step, step // 2::step], model.sd[step // 2::step, step // 2::step]
     out = np.empty((height, width), np.float32)
-    _fill(small, model.hand, model.rest, np.ascontiguousarray(mean[:height, :width]),
+    _fill(image, model.hand, model.rest, np.ascontiguousarray(mean[:height, :width]),
           np.ascontiguousarray(sd[:height, :width]), out)
     return out

@@ -10,6 +10,7 @@ from struct import error as struct_error
 
 from rhot_node.errors import WireError
 from rhot_node.wire.discovery import decode_find, decode_here, encode_find, encode_here
+from rhot_node.wire.edges import decode_edges, edges_fit, encode_edges
 from rhot_node.wire.fiducials import decode_fiducials, encode_fiducials, fiducials_fit
 from rhot_node.wire.marker_table import candidate_table, marker_table
 from rhot_node.wire.messages import (
@@ -22,6 +23,7 @@ from rhot_node.wire.messages import (
     Message,
     NodeState,
     Observations,
+    SliceEdges,
     Start,
     StartEntry,
     Stop,
@@ -81,6 +83,7 @@ TYPE_STOP = 5
 TYPE_FIND = 6
 TYPE_HERE = 7
 TYPE_FIDUCIALS = 8
+TYPE_EDGES = 9
 
 MARKERS_MAX = 64
 DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
@@ -93,6 +96,7 @@ _OBSERVATIONS = Struct("<qqIIIHHIIB3s")
 _MARKER = Struct("<HHfffffff")
 CANDIDATES_FIT = (DATAGRAM_MAX - _HEADER.size - _OBSERVATIONS.size - TAG_LENGTH) // _MARKER.size
 FIDUCIALS_FIT = fiducials_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
+EDGES_FIT = edges_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 _CLOCK_REQUEST = Struct("<q")
 _CLOCK_REPLY = Struct("<qqqIB3s")
 _START = Struct("<B3s")
@@ -215,6 +219,11 @@ def _encode(message: Message) -> bytes:
         case Fiducials():
             return (_header(TYPE_FIDUCIALS, message.node_id, message.session, message.sequence)
                     + encode_fiducials(message, FIDUCIALS_FIT))
+        case SliceEdges():
+            if len(message.edges) > EDGES_FIT:
+                raise WireError("count", f"{len(message.edges)} edges, at most {EDGES_FIT} in a datagram")
+            return (_header(TYPE_EDGES, message.node_id, message.session, message.sequence)
+                    + encode_edges(message))
 
 
 def _header(kind: int, node_id: int, session: int, sequence: int, version: int = VERSION) -> bytes:
@@ -323,4 +332,5 @@ _DECODERS: dict[int, Callable[[memoryview, int, int, int], Message]] = {
     TYPE_FIND: decode_find,
     TYPE_HERE: decode_here,
     TYPE_FIDUCIALS: decode_fiducials,
+    TYPE_EDGES: decode_edges,
 }

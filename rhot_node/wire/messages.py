@@ -234,4 +234,43 @@ class Fiducials:
     truncated: bool = False
 
 
-Message = Observations | ClockRequest | ClockReply | Start | Stop | Find | Here | Fiducials
+@dataclass(frozen=True, slots=True)
+class SliceEdge:
+    """One edge on a slice, a short line segment in the image that the master asked for.
+
+    `offset` px along the slice's normal from its centre, with standard deviation `sd` px. `strength`: grey levels per
+    px, positive where it gets brighter along the normal. `inside`, `outside`: foreground probability on both sides.
+    """
+
+    slice_index: int
+    offset: float
+    sd: float
+    strength: float
+    inside: float
+    outside: float
+
+
+@dataclass(frozen=True, slots=True)
+class SliceEdges:
+    """The edges of one frame on the `slice_count` slices of the master's `request`; part `part` of `parts`. Times and
+    image size are as in `Observations`; a slice at row y is later than `t_frame_node_ns` by y * `row_time_ns`."""
+
+    node_id: int
+    session: int
+    sequence: int
+    t_frame_node_ns: int
+    t_send_node_ns: int
+    processing_ns: int
+    exposure_ns: int
+    row_time_ns: int
+    width: int
+    height: int
+    frame_number: int
+    request: int
+    slice_count: int
+    part: int
+    parts: int
+    edges: Sequence[SliceEdge]
+
+
+Message = Observations | ClockRequest | ClockReply | Start | Stop | Find | Here | Fiducials | SliceEdges

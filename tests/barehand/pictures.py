@@ -1,4 +1,4 @@
-"""Simple pictures of a bare hand: ray cast, shaded, before a cluttered wall. Radii, forearm, light and noise are free."""
+"""Simple pictures of a bare hand: ray cast, shaded, before a cluttered wall."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import inverse, rigid
 
 Array = NDArray[np.float64]
-SKIN = np.array([205.0, 150.0, 125.0])
 LIGHT = np.array([-0.4, -0.7, -0.59])
-WALL_M = 1.2
 
 
 def look_at(place: Array, target: Array, focal: float = 600.0, width: int = 640, height: int = 480) -> CameraModel:
@@ -37,7 +35,8 @@ def two_cameras(baseline: float = 0.25, distance: float = 0.55) -> list[CameraMo
 def wall(camera: CameraModel, seed: int, clutter: bool) -> Array:
     """(H, W, 3) a background: soft shades, and with `clutter` boxes and lines of any colour."""
     rng = np.random.default_rng(seed)
-    soft = cv2.resize(rng.uniform(60.0, 140.0, (8, 10, 3)), (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)
+    soft = cv2.resize(rng.uniform(60.0, 140.0, (8, 10, 3)), (camera.width, camera.height),
+                      interpolation=cv2.INTER_CUBIC)
     if clutter:
         for _ in range(25):
             corner = rng.integers(0, [camera.width, camera.height])

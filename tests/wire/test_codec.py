@@ -19,6 +19,7 @@ from wire_samples import (
     SIX,
     TAGGED,
     VERSION_1,
+    edges,
     fiducial,
     fiducials,
     found,
@@ -38,6 +39,7 @@ from rhot_node.wire.messages import (
     MarkerObservation,
     Message,
     Observations,
+    SliceEdge,
     Start,
     StartEntry,
     Stop,
@@ -129,7 +131,7 @@ HEADER_FAULTS: list[Fault] = [
     (0, "<4s", (b"rhot",), "magic"),
     (4, "<B", (3,), "version"),
     (5, "<B", (0,), "type"),
-    (5, "<B", (9,), "type"),
+    (5, "<B", (10,), "type"),
     (6, "<H", (1,), "tag"),
     (6, "<H", (2,), "flags"),
     (6, "<H", (0x8001,), "flags"),
@@ -283,3 +285,20 @@ def test_decoding_six_markers_keeps_pace_with_a_flood() -> None:
     data = packet("observations_six")
     best = min(timeit.repeat(lambda: decode(data), number=200, repeat=20)) / 200
     assert best < 60e-6, f"{best * 1e6:.1f} us; about 20 us is normal here"
+
+
+@pytest.mark.parametrize(("offset", "layout", "values", "reason"), [
+    (64, "<H", (231,), "index"),  # fewer slices than the edges name
+    (66, "<H", (3,), "length"),
+    (68, "<B", (3,), "index"),  # the part after the last
+    (70, "<B", (1,), "reserved"),
+    (72 + 6, "<B", (0,), "range"),  # an edge known without error
+])
+def test_a_fault_in_edges_is_refused_by_its_reason(offset: int, layout: str, values: tuple[float],
+                                                   reason: str) -> None:
+    assert refused(patched("edges_two", offset, layout, *values)) == reason
+
+
+def test_more_edges_than_a_datagram_holds_are_refused() -> None:
+    with pytest.raises(WireError, match="in a datagram"):
+        encode(edges((SliceEdge(0, 0.0, 1.0, 1.0, 0.5, 0.5),) * 400))

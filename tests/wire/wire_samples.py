@@ -19,6 +19,8 @@ from rhot_node.wire.messages import (
     Message,
     NodeState,
     Observations,
+    SliceEdge,
+    SliceEdges,
     Start,
     StartEntry,
     Stop,
@@ -63,6 +65,13 @@ def fiducials(found: tuple[Fiducial, ...], truncated: bool = False) -> Fiducials
         fiducials=found, truncated=truncated)
 
 
+def edges(found: tuple[SliceEdge, ...], part: int = 0, parts: int = 1) -> SliceEdges:
+    return SliceEdges(
+        node_id=2, session=SESSION, sequence=7, t_frame_node_ns=FRAME_NS, t_send_node_ns=FRAME_NS + 27_000_000,
+        processing_ns=1_500_000, exposure_ns=4_000_000, row_time_ns=48_000, width=640, height=480, frame_number=41,
+        request=12, slice_count=232, part=part, parts=parts, edges=found)
+
+
 SIX = tuple(found(i, 100.5 + 64.25 * i, 200.125 - 8.5 * i) for i in range(6))
 
 SAMPLES: dict[str, Message] = {
@@ -96,6 +105,9 @@ SAMPLES: dict[str, Message] = {
     "fiducials_none": fiducials(()),
     "fiducials_two": fiducials((fiducial(20, 586, 100.5, 200.125), fiducial(0, 49, -3.5, 440.25))),
     "fiducials_truncated": fiducials(tuple(fiducial(3, 999 - k, 30.0 * k, 20.5 * k) for k in range(16)), True),
+    "edges_none": edges(()),
+    "edges_two": edges((SliceEdge(0, -3.5, 0.25, -12.5, 1.0, 0.0),
+                        SliceEdge(231, 17.0078125, 3.0, 40.03125, 51 / 255, 1.0)), 1, 3),
 }
 
 SIXTY_FOUR = observations(tuple(found(i, 8.0 * i, 4.0 * i) for i in range(64)), 2**32 - 1)

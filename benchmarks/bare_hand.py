@@ -1,0 +1,138 @@
+"""The bare hand on drawn sequences with known truth: joint and angle errors, consistency, processor time.
+
+    python benchmarks/bare_hand.py [--frames 60] [--seeds 3] [--only matched,feature,mismatched,one,lost]
+
+Times are of the process, in one thread, so that a busy machine changes them little.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import dataclasses
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand")]
+
+from bare_scenes import rig_of, right_hand  # noqa: E402
+from pictures import picture, two_cameras, wall  # noqa: E402
+
+from rhot_app.barehand.surface import surface_of  # noqa: E402
+from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
+from rhot_app.estimation.residual import stack  # noqa: E402
+from rhot_app.geometry.camera import CameraModel  # noqa: E402
+from rhot_app.geometry.transforms import exp_so3, inverse  # noqa: E402
+from rhot_app.hand.anatomy import HandAnatomy  # noqa: E402
+from rhot_app.hand.kinematics import forward  # noqa: E402
+from rhot_app.hand.model import build_model  # noqa: E402
+from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
+from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground  # noqa: E402
+
+FPS = 60.0
+MOTIONS = "grasp", "spread", "pinch"
+CHI2_3 = 14.16  # 99.73 % of a chi-squared variable of 3 degrees of freedom: 3 sigma
+
+
+def mistaken(hand: HandAnatomy, rng: np.random.Generator) -> HandAnatomy:
+    """The hand with bones wrong by 5 % (standard deviation) and radii by 8 %."""
+    fingers = {}
+    for name, finger in hand.fingers.items():
+        bones = tuple(float(v) for v in np.array(finger.bones_mm) * (1.0 + 0.05 * rng.standard_normal(3)))
+        radii = tuple(float(v) for v in np.array(finger.radii_mm) * (1.0 + 0.08 * rng.standard_normal(3)))
+        fingers[name] = msgspec.structs.replace(finger, bones_mm=bones, radii_mm=radii,
+                                                marker_mm=min(finger.marker_mm, bones[2]))
+    return msgspec.structs.replace(hand, fingers=fingers)
+
+
+def moved(camera: CameraModel, rng: np.random.Generator) -> CameraModel:
+    """The camera as a calibration says that errs by 0.2 degrees and 1 mm."""
+    world = camera.world_from_camera.copy()
+    world[:3, :3] = world[:3, :3] @ exp_so3(np.radians(0.2) * rng.standard_normal(3))
+    world[:3, 3] += 1e-3 * rng.standard_normal(3)
+    return dataclasses.replace(camera, world_from_camera=world, camera_from_world=inverse(world))
+
+
+def iteration_ms(tracker: BareHandTracker) -> float:
+    """Processor time of one Gauss-Newton step of the last images: residuals, Jacobians and solution."""
+    knot, frames = tracker.filter.newest, [frame for frame in tracker.frames if frame is not None]
+    begun = time.process_time()
+    for _ in range(50):
+        rows = [frame.linearise(knot.state) for frame in frames]
+        error, jacobian, variances, _, _ = stack(rows, tracker.process.size, True)
+        information = jacobian.T @ (jacobian / variances[:, None]) + np.eye(tracker.process.size)
+        np.linalg.solve(information, jacobian.T @ (error / variances))
+    return 20.0 * (time.process_time() - begun)
+
+
+def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
+    rng, bad = np.random.default_rng(seed), case == "mismatched"
+    hand, cameras = right_hand(), two_cameras()
+    model = build_model(hand)
+    surface = surface_of(model)
+    walls = [wall(camera, 10 * seed + k, bad) for k, camera in enumerate(cameras)]
+    moving = load_motion(motion, model, np.array([0.0, 0.0, 0.55]), seed)
+    rig = rig_of([moved(camera, rng) for camera in cameras] if bad else cameras, mistaken(hand, rng) if bad else hand)
+    tracker: BareHandTracker | None = None
+    joints, angles, nees, times, found = [], [], [], [], True
+    for k in range(frames):
+        pose = moving.pose(k / FPS)
+        images = [picture(surface, pose.world_from_palm, pose.angles, camera, walls[c], 1000 * seed + k,
+                          blur_px=1.5 if bad else 0.8) for c, camera in enumerate(cameras)]
+        t_ns = round(1e9 * k / FPS)
+        if tracker is None:
+            foreground = None
+            if bad:
+                foreground = [learn_skin(image, learn_background(
+                    skin_foreground(), [np.clip(empty, 0, 255).astype(np.uint8)]))
+                    for image, empty in zip(images, walls, strict=True)]
+            tracker = BareHandTracker(rig, foreground=foreground,
+                                      mode="feature" if case == "feature" else "contour")
+            if bad:
+                found = tracker.find(images, t_ns)
+            if not bad or not found:
+                tracker.start(pose, t_ns)
+        shown = [images[0], None] if case == "one" or (case == "lost" and 10 <= k < 40) else images
+        begun = time.process_time()
+        state = tracker.step(shown, [t_ns] * 2)
+        times.append(time.process_time() - begun)
+        error = state.joint_positions - forward(model, pose).joints
+        joints.append(1e3 * np.linalg.norm(error, axis=1))
+        angles.append(np.degrees(np.abs(state.angles - pose.angles)))
+        nees.append([e @ np.linalg.solve(c + 1e-12 * np.eye(3), e)
+                     for e, c in zip(error, state.joint_covariances, strict=True)])
+    taken = 1e3 * np.array(times[2:])
+    assert tracker is not None
+    return {"ms a step": iteration_ms(tracker),
+            "joint mm": float(np.mean(joints)), "p95 mm": float(np.percentile(joints, 95)),
+            "angle deg": float(np.mean(angles)), "in 3 sigma": float(np.mean(np.array(nees) < CHI2_3)),
+            "ms": float(np.median(taken)), "p99 ms": float(np.percentile(taken, 99)), "found": float(found)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--only", default="matched,feature,mismatched,one,lost")
+    arguments = parser.parse_args()
+    print("case         figure       median     p95   worst (seed)")
+    for case in arguments.only.split(","):
+        runs = [run(case, MOTIONS[seed % len(MOTIONS)], seed, arguments.frames) for seed in range(arguments.seeds)]
+        for figure in runs[0]:
+            values = np.array([one[figure] for one in runs])
+            low = figure in ("in 3 sigma", "found")
+            worst = int(np.argmin(values) if low else np.argmax(values))
+            print(f"{case:12s} {figure:11s} {np.median(values):8.2f} {np.percentile(values, 5 if low else 95):7.2f} "
+                  f"{values[worst]:7.2f} ({worst})", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""Places of a bare hand's joints, with their covariances."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from rhot_app.barehand.surface import SHAPE, sized_table
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.tracking.state import Knowledge
+
+
+def know(sd: float, shown: bool, measured: float, inferred: float) -> int:
+    if sd <= measured and shown:
+        return int(Knowledge.MEASURED)
+    return int(Knowledge.INFERRED if sd <= inferred else Knowledge.GUESSED)
+
+
+@njit(cache=True)
+def place_joints(state, covariance, dh, bone, points, covariances, motion):
+    """Fill `points` (26, 3) m, their covariances (26, 3, 3), and `motion` (2, 21), roots of the traces of the joints'
+    velocities' and accelerations' covariances."""
+    frames, world = np.empty((dh.parent.shape[0], 3, 4)), np.eye(4)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
+    sized_table(dh, bone, state[BIAS:BIAS + SHAPE], a, d)
+    factor = np.exp(state[BIAS])
+    table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
+                     dh.point_offset * factor)
+    forward_arrays(table, world, state[ANGLES:VELOCITY], frames, points)
+    jacobian = np.empty((points.shape[0], 3, POSE + 1))
+    jacobian_arrays(table, world, frames, points, jacobian)
+    own = np.empty(POSE + 1, np.int64)
+    for order in range(3):
+        for j in range(POSE):
+            own[j] = order * POSE + j
+        own[POSE] = MOTION
+        block = np.empty((POSE + 1, POSE + 1))
+        for i in range(POSE + 1):
+            for j in range(POSE + 1):
+                block[i, j] = covariance[own[i], own[j]]
+        for p in range(points.shape[0] if order == 0 else 21):
+            for i in range(3):
+                jacobian[p, i, POSE] = points[p, i] - world[i, 3] if order == 0 else 0.0
+            one = np.dot(jacobian[p], np.dot(block, jacobian[p].T))
+            if order == 0:
+                covariances[p] = one
+            else:
+                motion[order - 1, p] = np.sqrt(max(one[0, 0] + one[1, 1] + one[2, 2], 0.0))

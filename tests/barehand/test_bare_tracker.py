@@ -1,0 +1,100 @@
+"""The tracker on drawn pictures: follows, mixes kinds, goes on with one camera, starts from nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene, state_of
+
+from rhot_app.barehand.overlay import overlay
+from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.errors import TrackingError
+from rhot_app.estimation.residual import Rows
+from rhot_app.hand.kinematics import forward
+from rhot_app.tracking.hand_process import BIAS, MOTION
+from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
+
+FPS = 60.0
+TIMES = tuple(k / FPS for k in range(5))
+
+
+@pytest.fixture(scope="module")
+def film() -> list[tuple[list, list, list]]:
+    return [scene(pose, k) for k, pose in enumerate(poses("grasp", TIMES))]
+
+
+def errors_mm(tracker: BareHandTracker, pose) -> np.ndarray:
+    model, _ = model_and_surface()
+    return 1e3 * np.linalg.norm(tracker.state().joint_positions - forward(model, pose).joints, axis=1)
+
+
+@pytest.mark.parametrize(("mode", "most_mm"), [("contour", 1.5), ("feature", 3.0)])
+def test_it_follows_a_hand_from_a_start(film, mode, most_mm) -> None:
+    tracker = BareHandTracker(rig_of(film[0][0], right_hand()), mode=mode)
+    moving = poses("grasp", TIMES)
+    tracker.start(moving[0], 0)
+    for t, pose, (_, images, _) in zip(TIMES, moving, film, strict=True):
+        state = tracker.step(images, [round(1e9 * t)] * 2)
+        assert errors_mm(tracker, pose).mean() < most_mm
+    assert state.tracked
+    assert state.joint_covariances.shape == (21, 3, 3)
+    assert np.nanmin(tracker.fit.support) > 0.5
+
+
+def test_one_camera_is_less_sure_of_the_distance_than_two(film) -> None:
+    pose = poses("grasp", TIMES)[0]
+    spread = []
+    for second in (True, False):
+        tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
+        tracker.start(pose, 0)
+        state = tracker.step([film[0][1][0], film[0][1][1] if second else None], [0, 0])
+        spread.append(float(np.sqrt(state.palm_covariance[2, 2])))
+    assert spread[1] > 2.0 * spread[0]
+
+
+def test_other_kinds_of_observations_are_weighed_with_the_contour(film) -> None:
+    class Place:
+        def linearise(self, state: np.ndarray) -> Rows:
+            jacobian = np.zeros((1, len(state) - BIAS + MOTION))
+            jacobian[0, 0] = 1.0
+            return Rows(np.array([0.5 - state[3]]), jacobian, np.array([1e-12]))
+
+    tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
+    tracker.start(poses("grasp", TIMES)[0], 0)
+    knot = tracker.see({0: film[0][1][0]}, 0, [Place()])
+    assert abs(knot.state[3] - 0.5) < 1e-3
+
+
+def test_without_a_start_it_says_what_to_do(film) -> None:
+    tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
+    with pytest.raises(TrackingError, match="start"):
+        tracker.step(film[0][1], [0, 0])
+
+
+def test_it_begins_from_nothing(film) -> None:
+    cameras, images, walls = film[0]
+    known = [learn_skin(image, learn_background(skin_foreground(), [empty]))
+             for image, empty in zip(images, walls, strict=True)]
+    tracker = BareHandTracker(rig_of(cameras, right_hand()), foreground=known)
+    assert tracker.find(images, 0)
+    tracker.step(images, [0, 0])
+    assert np.median(errors_mm(tracker, poses("grasp", TIMES)[0])) < 10.0
+
+
+def test_an_empty_scene_has_no_hand(film) -> None:
+    cameras, _, walls = film[0]
+    tracker = BareHandTracker(rig_of(cameras, right_hand()),
+                              foreground=[learn_background(skin_foreground(), [empty]) for empty in walls])
+    assert not tracker.find(walls, 0)
+
+
+def test_the_overlay_shows_the_contour(film) -> None:
+    pose = poses("grasp", TIMES)[0]
+    tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
+    tracker.start(pose, 0)
+    tracker.step(film[0][1], [0, 0])
+    frame = tracker.frames[0]
+    assert frame is not None
+    shown = overlay(film[0][1][0], frame, state_of(pose), zoom=2)
+    assert shown.shape == (960, 1280, 3)
+    assert np.any(shown != np.repeat(np.repeat(film[0][1][0], 2, 0), 2, 1))

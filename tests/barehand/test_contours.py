@@ -1,0 +1,110 @@
+"""Contours of the capsule hand against ray-cast pictures, and their derivatives against finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bare_scenes import model_and_surface, poses, scene, state_of
+from pictures import picture, two_cameras
+
+from rhot_app.barehand.contour_residual import ContourFrame, slices_of
+from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_points
+from rhot_app.barehand.features import feature_points
+from rhot_app.barehand.surface import Surface
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.tracking.hand_process import FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
+from rhot_node.detect.edges import MOST, Edges, find_edges, noise_of
+from rhot_node.detect.foreground import learn_background, skin_foreground
+
+
+def process_of(side: str = "right") -> HandProcess:
+    model, surface = model_and_surface(side)
+    return HandProcess(surface.dh, model.limits, model.natural.mean, np.linalg.inv(model.natural.information),
+                       PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.zeros((1, 3, 3)), 1e3)
+
+
+def frame_of(surface: Surface, state: np.ndarray, camera: CameraModel, features: bool = False) -> ContourFrame:
+    source = feature_points if features else contour_points
+    pose, size = camera.camera_from_world[:3].copy(), (camera.width, camera.height)
+    points = source(surface, state, np.zeros(3), pose, camera.intrinsics, size)
+    return slices_of(surface, state, 1e-6 * np.eye(process_of().size), pose, camera.intrinsics, points, MOTION, 0.0,
+                     3.0, 20.0)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("motion", ["grasp", "cross"])
+def test_silhouette_points_lie_between_hand_and_background(side: str, motion: str) -> None:
+    _, surface = model_and_surface(side)
+    pose = poses(motion, (0.6,), side)[0]
+    for camera in two_cameras():
+        bright = np.zeros((camera.height, camera.width, 3))
+        drawn = picture(surface, pose.world_from_palm, pose.angles, camera, bright, 0, blur_px=0.0, noise=0.0)
+        mask = drawn[..., 0] > 0
+        points = contour_points(surface, state_of(pose), np.zeros(3), camera.camera_from_world[:3].copy(),
+                                camera.intrinsics, (camera.width, camera.height))
+        silhouette = points.behind == SILHOUETTE
+        assert np.count_nonzero(silhouette) > 80
+        for side_px, expected, most in ((-2.0, True, 0.97), (2.0, False, 0.9)):  # gaps between fingers are narrow
+            at = np.rint(points.pixel[silhouette] + side_px * points.normal[silhouette]).astype(int)
+            assert np.mean(mask[at[:, 1], at[:, 0]] == expected) > most
+
+
+@pytest.mark.parametrize("features", [False, True])
+def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> None:
+    _, surface = model_and_surface()
+    process, pose = process_of(), poses("grasp", (0.9,))[0]
+    camera, state = two_cameras()[1], state_of(pose)
+    frame = frame_of(surface, state, camera, features)
+    start, rows, good = frame.predict(state)
+    assert good.all()
+    assert np.abs(start).max() < 1e-3
+    for column in range(COLUMNS):
+        moved = []
+        for sign in (-1.0, 1.0):
+            step = np.zeros(process.size)
+            step[column if column < POSE else MOTION + column - POSE] = sign * 2e-5
+            moved.append(frame.predict(process.retract(state, step))[0])
+        difference = (moved[1] - moved[0]) / 4e-5
+        scale = max(np.abs(difference).max(), 1.0)
+        assert np.abs(difference - rows[:, column]).max() < 2e-3 * scale, f"column {column}"
+
+
+def test_edges_within_the_hand_are_told_from_its_silhouette() -> None:
+    _, surface = model_and_surface()
+    pose, camera = poses("grasp", (1.4,))[0], two_cameras()[0]
+    points = contour_points(surface, state_of(pose), np.zeros(3), camera.camera_from_world[:3].copy(),
+                            camera.intrinsics, (camera.width, camera.height))
+    assert np.any(points.behind == INNER)
+
+
+def test_a_slice_without_edges_changes_nothing() -> None:
+    _, surface = model_and_surface()
+    camera, state = two_cameras()[0], state_of(poses("grasp", (0.9,))[0])
+    frame = frame_of(surface, state, camera)
+    empty = np.zeros((len(frame.slices), MOST))
+    frame.observe(Edges(np.zeros(len(empty), np.int64), *(empty.copy() for _ in range(5))))
+    rows = frame.linearise(state)
+    assert np.abs(rows.jacobian.T @ rows.error).max() < 1e-9
+    assert np.abs(rows.jacobian).max() < 0.1  # as good as no information, per m and rad
+
+
+def test_edges_beside_the_contour_draw_the_hand_to_them() -> None:
+    _, surface = model_and_surface()
+    process, pose = process_of(), poses("grasp", (0.9,))[0]
+    cameras, images, walls = scene(pose)
+    away = np.zeros(process.size)
+    away[:3] = 0.002, -0.001, 0.0015
+    state = process.retract(state_of(pose), away)
+    known = [learn_background(skin_foreground(), [empty]) for empty in walls]
+    for _ in range(3):
+        information, pull = np.zeros((process.size, process.size)), np.zeros(process.size)
+        for camera, image, foreground in zip(cameras, images, known, strict=True):
+            frame = frame_of(surface, state, camera)
+            frame.observe(find_edges(image, frame.slices, foreground, noise_of(image)))
+            rows = frame.linearise(state)
+            information += rows.jacobian.T @ rows.jacobian
+            pull += rows.jacobian.T @ rows.error
+        step = np.zeros(process.size)
+        step[:3] = np.linalg.solve(information[:3, :3], pull[:3])
+        state = process.retract(state, step)
+    assert np.linalg.norm(process.difference(state, state_of(pose))[:3]) < 0.5e-3
