@@ -19,8 +19,10 @@ from rhot_app.export.export import Exported, export_log
 from rhot_app.export.plan import ExportOptions, Frame, Hand, Tracker, Units
 from rhot_app.export.recording import TrackedLog, read_log
 from rhot_app.export.resample import Resampler, checked_rate
-from rhot_app.export.states import HandStates, joined
+from rhot_app.export.states import HandStates, ObjectStates, joined
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
+from rhot_app.objects.object_file import ObjectModel, load_object, save_object
+from rhot_app.objects.state import ObjectState, Validity
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, save_rig
 from rhot_app.project import load_rig as _load_rig
@@ -32,9 +34,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ANGLES", "FINGERS", "JOINTS", "CalibrationError", "CharucoBoard", "Chessboard", "Condition", "EngineClient",
-    "EngineError", "ExportError", "Exported", "Extrapolator", "HandState", "HandStates", "Knowledge", "Recording",
-    "RecordingError", "RhotError", "Rig", "RigError", "StereoCalibration", "calibrate_stereo", "export", "live",
-    "load_rig", "open_recording", "save_rig",
+    "EngineError", "ExportError", "Exported", "Extrapolator", "HandState", "HandStates", "Knowledge", "ObjectModel",
+    "ObjectState", "ObjectStates", "Recording", "RecordingError", "RhotError", "Rig", "RigError",
+    "StereoCalibration", "Validity", "calibrate_stereo", "export", "live", "load_object", "load_rig",
+    "open_recording", "save_object", "save_rig",
 ]
 
 PATIENCE_S = 5.0

@@ -5,15 +5,18 @@ docs/rig.md describes the format. Nothing else on the master is configured anywh
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
 
-from rhot_app.errors import RigError
+from rhot_app.errors import ObjectError, RigError
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_node.files import PRINTABLE, decode_document, read_document, write_document
+from rhot_app.objects.object_file import Name, ObjectModel, load_object, require_distinct
+from rhot_node.files import decode_document, read_document, write_document
 from rhot_node.markers import MarkerSet
 
 FORMAT: Final = "rhot-rig"
@@ -30,7 +33,6 @@ Focal = Annotated[float, Meta(gt=0, le=1e6)]
 Pixel = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Coefficient = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Metres = Annotated[float, Meta(ge=-1000, le=1000)]
-Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=PRINTABLE)]
 Address = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9._:%-]{1,253}\Z")]
 """Of a machine: its name, IPv4 or IPv6 address."""
 PublicKey = Annotated[str, Meta(pattern=r"\A([0-9a-f]{64})?\Z")]
@@ -193,6 +195,24 @@ class OutputSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return f"{self.kind}{':' if self.target else ''}{self.target}{'?' if options else ''}{'&'.join(options)}"
 
 
+class RigObject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A tracked object of the rig.
+
+    `file`: its object file (docs/objects.md), in the rig file relative to that; absolute in a rig that was read.
+    `name`: how states name it; None: as the object file does. `model`: what the file says. A rig file has it only where
+    there is no such file, as of a rig that came from a log.
+    """
+
+    file: Annotated[str, Meta(min_length=1, max_length=4096)]
+    name: Name | None = None
+    model: ObjectModel | None = None
+
+    @property
+    def folder(self) -> Path | None:
+        """Where a mesh lies beside the object file; None when that is not known."""
+        return Path(self.file).parent if Path(self.file).is_absolute() else None
+
+
 class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole rig."""
 
@@ -208,6 +228,7 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     other_hand: HandAnatomy | None = None  # a second one at the same time
     calibration: CameraCalibration | None = None  # of lenses and poses together; none: nothing is recorded
     outputs: tuple[OutputSettings, ...] = ()  # live streams of a live engine
+    objects: Annotated[tuple[RigObject, ...], Meta(max_length=16)] = ()  # tracked beside the hand
     format: Literal["rhot-rig"] = FORMAT
     version: Literal[1] = VERSION
 
@@ -223,11 +244,34 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.depth.mode == "disparity" and len(self.nodes) != 2:
             raise ValueError(f"depth.mode is \"disparity\", which needs two cameras; the rig has {len(self.nodes)}")
         self._check_hands()
+        self._check_objects()
         known = set(self.markers.ids)
         for field in ("pixel_markers", "position_markers"):
             unknown = sorted(set(getattr(self.filters, field)) - known)
             if unknown:
                 raise ValueError(f"filters.{field} names a marker {unknown[0]!r} that the marker set does not have")
+
+    @property
+    def models(self) -> tuple[ObjectModel, ...]:
+        """The objects, those that were read."""
+        return tuple(one.model for one in self.objects if one.model is not None)
+
+    def _check_objects(self) -> None:
+        """Objects can be told apart, and their markers are in the marker set and on no hand."""
+        read = [one for one in self.objects if one.model is not None]
+        try:
+            require_distinct(self.models, [one.file for one in read])
+        except ObjectError as exc:
+            raise ValueError(str(exc).removesuffix(".")) from exc
+        roles = {marker.id: marker.role for marker in self.markers.markers}
+        for one, model in zip(read, self.models, strict=True):
+            for marker in model.markers:
+                if marker.marker not in roles:
+                    raise ValueError(f"{one.file}: the marker {marker.marker!r} of {model.name!r} is not in the rig's "
+                                     "marker set; add it there, or name another")
+                if roles[marker.marker] is not None:
+                    raise ValueError(f"{one.file}: the marker {marker.marker!r} of {model.name!r} has the role "
+                                     f"{roles[marker.marker]!r} on the hand; take it away, or name another marker")
 
     def _check_hands(self) -> None:
         """Each hand of the rig has markers, and each marker a hand of the rig."""
@@ -270,16 +314,66 @@ def with_tracker(rig: Rig, kind: TrackerKind) -> Rig:
     return msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, kind=kind))
 
 
-def load_rig(path: Path) -> Rig:
-    """Read and validate a rig file; raises RigError naming file and field."""
-    return read_document(path, Rig, format_name=FORMAT, version=VERSION, error=RigError)
+def load_rig(path: Path, folder: Path | None = None) -> Rig:
+    """Read and validate a rig file and its objects; raises RigError naming file and field.
+
+    `folder`: where the paths of objects begin, by default the file's own folder.
+    """
+    rig = read_document(path, Rig, format_name=FORMAT, version=VERSION, error=RigError)
+    return _with_models(rig, path.parent if folder is None else folder, str(path))
 
 
 def parse_rig(data: bytes, where: str) -> Rig:
-    """Decode a rig document; `where` begins every error message. Raises RigError."""
-    return decode_document(data, Rig, format_name=FORMAT, version=VERSION, where=where, error=RigError)
+    """Decode a rig document, whose objects have models or absolute paths; `where` begins every error message. Raises
+    RigError."""
+    return _with_models(decode_document(data, Rig, format_name=FORMAT, version=VERSION, where=where, error=RigError),
+                        None, where)
 
 
 def save_rig(path: Path, rig: Rig) -> None:
     """Write a rig file atomically; raises OSError, the old file then stays as it was."""
-    write_document(path, rig)
+    folder = path.resolve().parent
+
+    def written(one: RigObject) -> RigObject:
+        if not Path(one.file).is_absolute():
+            return one
+        relative = os.path.relpath(one.file, folder)
+        return RigObject(relative, one.name, None if Path(one.file).exists() else one.model)
+    write_document(path, _with_objects(rig, written))
+
+
+def with_object(rig: Rig, path: Path, name: str | None = None) -> Rig:
+    """The rig with another object, read from its file. Raises ObjectError (the file) or RigError (it does not go with
+    the rig)."""
+    model = load_object(path)
+    added = RigObject(str(path.resolve()), name, model if name is None else msgspec.structs.replace(model, name=name))
+    try:
+        return msgspec.structs.replace(rig, objects=(*rig.objects, added))
+    except ValueError as exc:
+        raise RigError(f"{exc}.") from exc
+
+
+def _with_objects(rig: Rig, change: Callable[[RigObject], RigObject]) -> Rig:
+    return msgspec.structs.replace(rig, objects=tuple(map(change, rig.objects))) if rig.objects else rig
+
+
+def _with_models(rig: Rig, folder: Path | None, where: str) -> Rig:
+    """The rig with its object files read: those below `folder`, and with None only objects that have no model."""
+    def read(one: RigObject) -> RigObject:
+        if folder is None:
+            if one.model is not None:
+                return one
+            if not Path(one.file).is_absolute():
+                raise RigError(f"{where}: the object file {one.file!r} is relative, and to what is not known. Give an "
+                               "absolute path.")
+        path = ((folder or Path()) / one.file).resolve()
+        try:
+            model = one.model if one.model is not None and not path.exists() else load_object(path)
+        except ObjectError as exc:
+            raise RigError(f"{where}: an object of the rig cannot be read. {exc}") from exc
+        name = one.name
+        return RigObject(str(path), name, model if name is None else msgspec.structs.replace(model, name=name))
+    try:
+        return _with_objects(rig, read)
+    except ValueError as exc:
+        raise RigError(f"{where}: {exc}.") from exc

@@ -66,9 +66,14 @@ def restore(path: Path, version: Version) -> Rig:
 
     Raises RigError when the version cannot be read or the rig not written.
     """
-    rig = load_rig(version.path)
+    rig = load_version(path, version)
     accept(path, rig, "restoring an earlier version")
     return rig
+
+
+def load_version(path: Path, version: Version) -> Rig:
+    """The rig of a kept version of `path`, whose objects lie where those of `path` do. Raises RigError."""
+    return load_rig(version.path, path.absolute().parent)
 
 
 def _folder(path: Path) -> Path:

@@ -13,6 +13,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.errors import SettingsError
 from rhot_node.files import PRINTABLE, decode_document, read_document, write_document
 from rhot_node.markers import MarkerSet
+from rhot_node.wire.messages import FAMILIES
 
 FORMAT: Final = "rhot-node"
 VERSION: Final = 1
@@ -52,6 +53,28 @@ class CameraSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return round(self.row_time_us * 1000)
 
 
+class TagSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Fiducial tags: whether they are sought, and those of which dictionaries of cv2.aruco.
+
+    `rate_hz`: in at most so many frames a second; None: in as many as there is time for beside the markers.
+    """
+
+    enabled: bool = False
+    dictionaries: Annotated[tuple[str, ...], Meta(min_length=1, max_length=8)] = ("DICT_APRILTAG_36h11",)
+    rate_hz: Annotated[float, Meta(ge=0.1, le=1000)] | None = None
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.dictionaries if name not in FAMILIES]
+        if unknown:
+            raise ValueError(f"tags.dictionaries names {unknown[0]!r}, which is no tag dictionary; there are "
+                             f"{', '.join(FAMILIES)}")
+
+    @property
+    def sought(self) -> tuple[str, ...]:
+        """The dictionaries whose tags are sought, none when they are not."""
+        return tuple(dict.fromkeys(self.dictionaries)) if self.enabled else ()
+
+
 class ClockSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How far the node's clock is off; for simulated nodes on one machine, whose clocks must disagree."""
 
@@ -76,6 +99,7 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     broadcast_port: Annotated[int, Meta(ge=1, le=65535)] | None = 47799
     detector: str = "fast"  # or "reference", "keypoints:NAME", a model card, or "plug:NAME", a detector plug-in
     camera: CameraSettings = CameraSettings()
+    tags: TagSettings = TagSettings()
     preview_hz: Annotated[float, Meta(ge=0.01, le=30)] = 4.0
     late_frames: Literal["send", "drop"] = "send"  # frames whose processing took longer than the budget (RHOT 7.2)
     budget_ms: Annotated[float, Meta(gt=0, le=10_000)] | None = None  # None: as long as a frame lasts

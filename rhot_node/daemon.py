@@ -18,7 +18,8 @@ from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import SettingsStore
 from rhot_node.network.session import Sessions, Stream
-from rhot_node.wire.messages import MarkerObservation, NodeState, Observations
+from rhot_node.tag_search import TagSearch
+from rhot_node.wire.messages import Fiducials, MarkerObservation, NodeState, Observations
 
 log = logging.getLogger(__name__)
 
@@ -32,9 +33,9 @@ MakeDetector = Callable[[NodeSettings], Detector]
 
 
 class ObservationSender(Protocol):
-    """Where observations go; the UDP link or a fake."""
+    """Where observations go; the UDP link or a fake. Two threads call it."""
 
-    def send(self, observations: Observations, stream: Stream) -> bool:
+    def send(self, observations: Observations | Fiducials, stream: Stream) -> bool:
         """Send them where the stream goes; False when they could not be sent."""
         ...
 
@@ -73,6 +74,7 @@ class NodeDaemon:
         self._loop = loop
         self._troubles = troubles
         self._video = video
+        self._tags = TagSearch(store.current, clock)
         self._camera: Camera | None = None
         self._detector: Detector | None = None
         self._prepared = False
@@ -106,6 +108,7 @@ class NodeDaemon:
         return {"node_id": self._settings.node_id, "name": self._settings.name, "state": self.state.name.lower(),
                 "message": self._message, "session": stream.session if stream else 0,
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
+                "tags": list(self._settings.tags.sought),
                 "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns(),
                 "camera": camera.report() if isinstance(camera, Reporting) else {},
                 "health": [*self._troubles(), *([BLACK_PICTURE] if self._black else [])]}
@@ -116,17 +119,22 @@ class NodeDaemon:
 
     def count(self) -> dict[str, Any]:
         """Counters, for the control channel."""
-        return dataclasses.asdict(self.counters)
+        return dataclasses.asdict(self.counters) | self._tags.count()
 
     def prepare(self) -> None:
         """Make the detector and open the camera: the node is then ready. Raises CameraError."""
         self._detector = self._make_detector(self._settings)
+        self._tags.prepare()
         self._open()
         self._prepared = True
         self._show_state()
 
     def close(self) -> None:
-        """Close the camera."""
+        """Close the camera and end the search for tags."""
+        self._tags.close()
+        self._close_camera()
+
+    def _close_camera(self) -> None:
         if self._camera is not None:
             self._camera.close()
             self._camera = None
@@ -158,6 +166,7 @@ class NodeDaemon:
                 self.counters.late_dropped += 1
             else:
                 self._send(frame, markers, stream, sender)
+            self._tags.offer(frame, stream, sender)
         pictures.offer(frame)
         if self._video is not None:
             self._video(frame)
@@ -212,7 +221,7 @@ class NodeDaemon:
     def _fail(self, error: CameraError) -> None:
         self.counters.faults += 1
         self._message = str(error)
-        self.close()
+        self._close_camera()
         self._retry_s = time.monotonic() + REOPEN_S
         self._show_state()
 
@@ -247,10 +256,11 @@ class NodeDaemon:
         """Apply changed settings as far as a running node can."""
         old, self._settings = self._settings, settings
         pictures.preview_hz = settings.preview_hz
+        self._tags.configure(settings)
         if (settings.detector, settings.markers) != (old.detector, old.markers):
             self._detector = self._make_detector(settings)
         if settings.camera != old.camera and self._camera_takes_settings and self._camera is not None:
-            self.close()
+            self._close_camera()
             self._message = "the camera is being opened again with new settings"
             self._reopen()
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rhot_app.barehand.silhouette import score_steps, search, silhouettes
+from rhot_app.barehand.silhouette import Silhouettes, score_steps, search, silhouettes
 from rhot_app.barehand.surface import Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid

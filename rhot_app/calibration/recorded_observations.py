@@ -64,7 +64,7 @@ def _frames(reader: LogReader, rig: Rig) -> Iterator[CameraObservations]:
     count = 0
     for record in reader:
         frame = door.feed(record)
-        if frame is not None:
+        if isinstance(frame, CameraObservations):
             count += 1
             yield frame
     if not count:

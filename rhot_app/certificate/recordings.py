@@ -203,7 +203,7 @@ def _frames(path: Path, rig: Rig, progress: Progress) -> tuple[list[CameraObserv
                 if number % 512 == 0:
                     progress(f"reading {path.name}", min(1.0, 400.0 * number / size))
                 frame = validator.feed(record)
-                if frame is None:
+                if not isinstance(frame, CameraObservations):
                     continue
                 if validator.changes != changes:
                     changes = validator.changes

@@ -64,6 +64,7 @@ class _Peer:
     video_told_s: float = -1e9
     video_dropped: int = 0
     video_advice: tuple[Advice, ...] = ()
+    tag_advice: tuple[Advice, ...] = ()
 
 
 class NodeControl:
@@ -77,6 +78,7 @@ class NodeControl:
         self._own = own
         self._peers: dict[int, _Peer] = {}
         self._rig: Rig | None = None
+        self._dictionaries: list[str] = []  # of the tags on the rig's objects
         self._preview = False
         self._numbers = itertools.count(1)
 
@@ -85,6 +87,7 @@ class NodeControl:
         if rig is self._rig:
             return
         self._rig = rig
+        self._dictionaries = sorted({tag.family for model in rig.models for tag in model.fiducials})
         wanted = {node.node_id: node for node in rig.nodes
                   if not node.text_datagrams and (self._own is not None or not node.public_key)}
         for node_id in [*self._peers]:
@@ -123,10 +126,15 @@ class NodeControl:
             for asked, answer, attachment in _receive(peer):
                 if asked.command == "video":
                     _take_video_answer(peer, answer)
+                elif asked.command == "tags":
+                    peer.tag_advice = () if answer.get("ok") else (Advice(
+                        "warning", f"The tags of objects are not looked for: {answer.get('error')} Does rhot-node have "
+                        "the version of this program there?"),)
                 elif asked.client is None:
                     state = answer.get("answer", {})
                     peer.message = printable(str(state.get("message", "")))
                     peer.health, peer.black = health_advice(peer.node.name, state), sees_black(state)
+                    self._want_tags(peer, state.get("tags"))
                 else:
                     done.append((asked.client, (answer, attachment)))
             for asked in [asked for asked in peer.asked.values() if now_s > asked.deadline_s]:
@@ -196,7 +204,18 @@ class NodeControl:
 
     def advice(self) -> tuple[Advice, ...]:
         """What the nodes' machines lack, and what their videos do, for the operator."""
-        return tuple(advice for peer in self._peers.values() for advice in (*peer.health, *peer.video_advice))
+        return tuple(advice for peer in self._peers.values()
+                     for advice in (*peer.health, *peer.video_advice, *peer.tag_advice))
+
+    def _want_tags(self, peer: _Peer, sought: object) -> None:
+        """Have a node look for the tags of the rig's objects, if its state says that it does not. It does so until it
+        starts anew; its file stays as it is."""
+        known = [str(name) for name in sought] if isinstance(sought, list) else []
+        if self._own is None or not self._dictionaries:
+            peer.tag_advice = ()
+        elif not set(self._dictionaries) <= set(known):
+            tags = {"enabled": True, "dictionaries": sorted({*known, *self._dictionaries})}
+            self._put(peer, None, "tags", {"request": "set_settings", "settings": {"tags": tags}, "save": False})
 
     def message(self, node_id: int) -> str:
         """What the node says about its fault; empty when it has none or did not say yet."""

@@ -19,12 +19,14 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.hand.places import ROLES, place_of
+from rhot_app.objects.object_file import ObjectModel
+from rhot_app.objects.observations import FiducialFrame
 from rhot_app.project import OTHER_HAND, Rig, RigNode
 from rhot_app.sources.source import ObservationSource
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.marker_model import points_on
 from rhot_app.tracking.state import LATENCY_STAGES, HandState
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, feed
 from rhot_node.wire.codec import decode as decode_datagram
 from rhot_node.wire.codec import encode as encode_datagram
 from rhot_node.wire.marker_table import MarkerTable
@@ -88,7 +90,7 @@ class Pipeline:
             self.failure = ""
             self._previous = {}
 
-    def take(self, source: ObservationSource, frames: list[CameraObservations]) -> None:
+    def take(self, source: ObservationSource, frames: list[CameraFrame]) -> None:
         """Take frames of one camera in and publish the state that is due, if any. Never raises: a tracker's fault must
         not end the stream for good. Frames of a source that has been replaced are ignored."""
         with self._lock:
@@ -106,27 +108,33 @@ class Pipeline:
             if state is not None:
                 self._after_state()
 
-    def _process(self, work: Work, frames: list[CameraObservations]) -> HandState | None:
+    def _process(self, work: Work, frames: list[CameraFrame]) -> HandState | None:
         if work.source.changes != self._changes:
             self._changes = work.source.changes
             work.tracker.reset()
-        self.frame_count += len(frames)
+        markers = work.last_seen_ns.shape[1]
+        observations = [frame for frame in frames if isinstance(frame, CameraObservations)
+                        and len(frame.pixels) == markers]  # some may be of the rig before
+        self.frame_count += len(observations)
         live = work.source.live
         now_ns = time.monotonic_ns()
         state = None
-        markers = work.last_seen_ns.shape[1]
-        frames = [frame for frame in frames if len(frame.pixels) == markers]  # some may be of the rig before
-        for k, frame in enumerate(frames, start=1):
+        for frame in frames:
+            if not isinstance(frame, CameraObservations):
+                feed(work.tracker, frame)  # the next state tells of it
+                continue
+            if len(frame.pixels) != markers:
+                continue
             work.tracker.ingest(frame)
             # Live, only the newest instant matters to anybody; a replay leaves none out.
-            if not live or k == len(frames):
+            if not live or frame is observations[-1]:
                 solved = work.tracker.solve()
                 if solved is not None:
                     self._send(solved, live)
                     state = solved
-        for frame in frames:  # once the state is out: nobody waits for this
+        for frame in observations:  # once the state is out: nobody waits for this
             work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = now_ns
-        self.recent.extend(frames)
+        self.recent.extend(observations)
         return state
 
     def _send(self, state: HandState, live: bool) -> None:
@@ -213,6 +221,9 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
 
     Compiled code is read from numba's cache where it can be written, else it is compiled here: seconds, once.
     """
+    tags = [fiducials for model in rig.models for fiducials in _tag_frames(model, rig)]
+    for fiducials in tags:
+        feed(tracker, fiducials)
     points_m, extrapolator = _worn_points(rig), Extrapolator(rig) if rig.tracker.kind == "estimator" else None
     for frame in range(FRAMES):
         moved_m = points_m + np.array([0.002 * frame, 0.0, 0.0])
@@ -225,6 +236,22 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
                     extrapolator.at(state, state.t_master_ns + _PERIOD_NS)  # windows find it compiled
     tracker.reset()
     _read_one(rig)
+
+
+def _tag_frames(model: ObjectModel, rig: Rig) -> list[FiducialFrame]:
+    """Three exact frames of an object's largest tag, which faces the first camera."""
+    if not model.fiducials:
+        return []
+    tag = max(model.fiducials, key=lambda one: one.size_mm)
+    node = rig.nodes[0]
+    camera = CameraModel.from_rig(node.intrinsics, node.pose)
+    half = 0.5e-3 * tag.size_mm
+    square = np.array([[-half, -half, 0.0], [half, -half, 0.1 * half], [half, half, 0.1 * half], [-half, half, 0.0]])
+    world_from_camera = np.linalg.inv(camera.camera_from_world)
+    places = (square + _CAMERA_FROM_PALM[:3, 3]) @ world_from_camera[:3, :3].T + world_from_camera[:3, 3]
+    pixels = camera.project(places)[None]
+    return [FiducialFrame(0, 10**9 + frame * _PERIOD_NS, 10_000, np.array([tag.key]), pixels,
+                          np.tile(0.01 * np.eye(2), (1, 4, 1, 1))) for frame in range(3)]
 
 
 def _worn_points(rig: Rig) -> np.ndarray:

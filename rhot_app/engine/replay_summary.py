@@ -20,7 +20,7 @@ from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.state import HandState, Knowledge
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker, feed
 
 
 class FrameSmoother(Protocol):
@@ -53,10 +53,11 @@ def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracke
         if door.changes != changes:
             changes = door.changes
             tracker.reset()
-        tracker.ingest(frame)
-        state = tracker.solve()
-        if state is not None:
-            yield state
+        feed(tracker, frame)
+        if isinstance(frame, CameraObservations):
+            state = tracker.solve()
+            if state is not None:
+                yield state
 
 
 def smoothed_states(records: Iterable[Record], door: LogValidator, tracker: FrameSmoother) -> Iterator[HandState]:
@@ -69,8 +70,11 @@ def smoothed_states(records: Iterable[Record], door: LogValidator, tracker: Fram
         if door.changes != changes:
             changes = door.changes
             tracker.reset()
-        tracker.ingest(frame)
-        yield from tracker.states()
+        if isinstance(frame, CameraObservations):
+            tracker.ingest(frame)
+            yield from tracker.states()
+        elif isinstance(tracker, ObjectTracking):
+            tracker.ingest_fiducials(frame)
     yield from tracker.finish()
 
 
@@ -93,7 +97,8 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker | SmoothedTracker) -
         "smoothed": isinstance(tracker, SmoothedTracker),
         "states": len(states), "state_rate_hz": (len(states) - 1) / duration_s if duration_s else 0.0,
         "nodes": {link.node.name: {
-            "received": link.door.received, "accepted": link.door.accepted, "lost": link.door.sequence.lost,
+            "received": link.door.received, "accepted": link.door.accepted,
+            "fiducials": link.door.fiducials, "lost": link.door.sequence.lost,
             "dropped": link.door.dropped, "clock_offset_s": link.clock.offset_s, "clock_bound_s": link.clock.bound_s,
         } for link in door.links},
         "markers": _marker_statistics(states, rig),

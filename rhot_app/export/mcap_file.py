@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.export.plan import Plan, require
-from rhot_app.export.states import CONDITIONS, HandStates
+from rhot_app.export.states import CONDITIONS, OBJECT_ARRAYS, VALIDITIES, HandStates
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import OTHER_HAND
@@ -84,9 +84,17 @@ def hand_state(markers: int) -> Schema:
         epipolar_error_px=_list(_MAYBE, markers), other=_object(**hand), **hand)}
 
 
+OBJECT_STATES: Final[Schema] = {"title": "rhot.ObjectStates", **_object(
+    t_master_ns=_WHOLE, objects=_list(_object(
+        name=_TEXT, validity={"enum": [validity.value for validity in VALIDITIES]},
+        world_from_object=_list(_list(_MAYBE, 4), 4), covariance=_list(_list(_MAYBE, 6), 6),
+        velocity=_list(_MAYBE, 6), distances=_list(_MAYBE, 5), distance_sd=_list(_MAYBE, 5),
+        contacts=_list(_WHOLE, 5))))}
+"""The schema of ``rhot.ObjectStates``: the fields of docs/objects.md, metres and radians; null is unknown."""
+
 OF_HAND: Final = tuple(name for name in hand_state(0)["properties"]
                        if name in HandStates.__slots__ and not name.startswith(("marker", "sequence", "t_", "epi"))
-                       and name not in ("condition", "other"))
+                       and name not in ("condition", "other", "objects"))
 """The arrays that each hand has for itself."""
 
 
@@ -110,6 +118,8 @@ class McapWriter:
             "/tf": self._channel("/tf", "foxglove.FrameTransforms", FRAME_TRANSFORMS),
             "/hand/scene": self._channel("/hand/scene", "foxglove.SceneUpdate", SCENE_UPDATE),
             "/hand/state": self._channel("/hand/state", "rhot.HandState", hand_state(len(plan.rig.markers.ids)))}
+        if plan.rig.objects:
+            self._channels["/objects/state"] = self._channel("/objects/state", "rhot.ObjectStates", OBJECT_STATES)
         self._send("/tf_static", plan.first_ns, {"transforms": [
             _transform(plan.first_ns, f"camera_{node.name}", node.pose.translation_m, node.pose.rotation_wxyz)
             for node in plan.rig.nodes]})
@@ -122,6 +132,10 @@ class McapWriter:
         """Write the messages of these states."""
         hands = [("", states)] if states.other is None else [("", states), (OTHER_HAND, states.other)]
         turns = [quaternion_from_rotation(hand.world_from_palm[:, :3, :3]).tolist() for _, hand in hands]
+        object_turns = [quaternion_from_rotation(one.world_from_object[:, :3, :3]).tolist() for one in states.objects]
+        object_tables: list[dict[str, list[Any]]] = [
+            {"name": [one.name] * len(states), **{name: getattr(one, name).tolist() for name in OBJECT_ARRAYS},
+             "validity": list(one.validities)} for one in states.objects]
         tables = [_rows(states, with_markers=True)] + [_rows(hand) for _, hand in hands[1:]]
         for number, t_ns in enumerate(states.t_master_ns.tolist()):
             rows = [{name: column[number] for name, column in table.items()} for table in tables]
@@ -136,6 +150,12 @@ class McapWriter:
                              for name, row, there in zip(names, rows, shown, strict=True) if there]})
             frames = [_transform(t_ns, f"{prefix}palm", hand.world_from_palm[number, :3, 3].tolist(), turn[number])
                       for (prefix, hand), turn, there in zip(hands, turns, shown, strict=True) if there]
+            frames += [_transform(t_ns, one.name, one.world_from_object[number, :3, 3].tolist(), turn[number])
+                       for one, turn in zip(states.objects, object_turns, strict=True)
+                       if np.isfinite(one.world_from_object[number]).all()]
+            if states.objects:
+                self._send("/objects/state", t_ns, {"t_master_ns": t_ns, "objects": [
+                    {name: column[number] for name, column in table.items()} for table in object_tables]})
             if frames:
                 self._send("/tf", t_ns, {"transforms": frames})
 

@@ -13,12 +13,13 @@ from rhot_app.calibration.recorded_observations import why_none
 from rhot_app.engine.replay_summary import replay_states, smoothed_states
 from rhot_app.errors import ExportError, RecordingError, take_losses
 from rhot_app.export.states import HandStates, in_blocks
+from rhot_app.objects.observations import FiducialFrame
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker
 from rhot_app.tracking.trackers import make_tracker
 
 RATE_AFTER_S = 5.0
@@ -133,6 +134,7 @@ class _FrameCount:
             self.states, self.finish = tracker.states, tracker.finish
         else:
             self.solve, self.newest_frames = tracker.solve, tracker.newest_frames
+        self._inner = tracker
         self._take: Callable[[CameraObservations], None] = tracker.ingest
         self._times_ns: list[list[int]] = [[] for _ in range(cameras)]  # of the first seconds
 
@@ -143,6 +145,11 @@ class _FrameCount:
         if not times or t_ns - times[0] < 1e9 * RATE_AFTER_S:
             times.append(t_ns)
         self._take(observations)
+
+    def ingest_fiducials(self, frame: FiducialFrame) -> None:
+        """Pass the tags of one frame on to a tracker of objects."""
+        if isinstance(self._inner, ObjectTracking):
+            self._inner.ingest_fiducials(frame)
 
     @property
     def rate_hz(self) -> float:

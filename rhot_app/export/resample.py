@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import ExportError
-from rhot_app.export.states import ARRAYS, CONDITIONS, HandStates, joined
+from rhot_app.export.states import ARRAYS, CONDITIONS, VALIDITIES, HandStates, ObjectStates, joined
+from rhot_app.objects.state import Validity
 from rhot_app.tracking.state import Condition, Knowledge
 
 BRIDGED_PERIODS = 2.5
@@ -26,6 +27,8 @@ MOST_HZ = 1000.0
 _LOST = CONDITIONS.index(Condition.LOST)
 _SEVERITY = np.array([{Condition.TRACKING: 0, Condition.PARTIAL: 1, Condition.LOST: 2, Condition.SEARCHING: 3,
                        Condition.IDLE: 4, Condition.FAULT: 5}[one] for one in CONDITIONS])
+_UNSURE = np.array([{Validity.TRACKED: 0, Validity.AMBIGUOUS: 1, Validity.PREDICTED: 2, Validity.LOST: 3,
+                     Validity.SEARCHING: 4}[one] for one in VALIDITIES])
 _LINEAR = tuple(name for name in ARRAYS if name not in ("sequence", "t_master_ns", "condition", "world_from_palm")
                 and not name.endswith("knowledge"))
 
@@ -93,7 +96,20 @@ def _mixed(first: HandStates, second: HandStates, weight: NDArray[np.float64]) -
     worse = (_SEVERITY[second.condition] > _SEVERITY[first.condition]) & (weight > 0.0)
     other = None if first.other is None or second.other is None else _mixed(first.other, second.other, weight)
     return replace(first, **changed, condition=np.where(worse, second.condition, first.condition),
-                   world_from_palm=_moved(first.world_from_palm, second.world_from_palm, weight), other=other)
+                   world_from_palm=_moved(first.world_from_palm, second.world_from_palm, weight), other=other,
+                   objects=tuple(_mixed_object(*pair, weight)
+                                 for pair in zip(first.objects, second.objects, strict=True)))
+
+
+def _mixed_object(first: ObjectStates, second: ObjectStates, weight: NDArray[np.float64]) -> ObjectStates:
+    """Between two states each; the less certain validity of the two, and contacts that both have."""
+    later = weight > 0.0
+    worse = (_UNSURE[second.validity] > _UNSURE[first.validity]) & later
+    changed: dict[str, Any] = {name: _linear(getattr(first, name), getattr(second, name), weight)
+                               for name in ("covariance", "velocity", "distances", "distance_sd")}
+    return replace(first, **changed, validity=np.where(worse, second.validity, first.validity),
+                   world_from_object=_moved(first.world_from_object, second.world_from_object, weight),
+                   contacts=np.where(later[:, None], first.contacts & second.contacts, first.contacts))
 
 
 def _linear(first: NDArray[Any], second: NDArray[Any], weight: NDArray[np.float64]) -> NDArray[Any]:
@@ -128,7 +144,16 @@ def _blanked(states: HandStates, gap: NDArray[np.bool_]) -> HandStates:
             column = getattr(states, name)
             changed[name] = np.where(gap.reshape(-1, *[1] * (column.ndim - 1)), np.uint8(Knowledge.UNKNOWN), column)
     other = None if states.other is None else _blanked(states.other, gap)
-    return replace(states, **changed, condition=np.where(gap, np.uint8(_LOST), states.condition), other=other)
+    return replace(states, **changed, condition=np.where(gap, np.uint8(_LOST), states.condition), other=other,
+                   objects=tuple(_blanked_object(one, gap) for one in states.objects))
+
+
+def _blanked_object(one: ObjectStates, gap: NDArray[np.bool_]) -> ObjectStates:
+    changed: dict[str, Any] = {}
+    for name in ("world_from_object", "covariance", "velocity", "distances", "distance_sd"):
+        changed[name] = np.where(gap.reshape(-1, *[1] * (getattr(one, name).ndim - 1)), np.nan, getattr(one, name))
+    return replace(one, **changed, validity=np.where(gap, np.uint8(VALIDITIES.index(Validity.LOST)), one.validity),
+                   contacts=np.where(gap[:, None], np.uint8(0), one.contacts))
 
 
 def _stamped(states: HandStates, grid_ns: NDArray[np.int64]) -> HandStates:

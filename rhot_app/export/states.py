@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.objects.state import Validity
 from rhot_app.tracking.state import Condition, HandState
 
 if TYPE_CHECKING:
@@ -21,10 +22,36 @@ Mask = NDArray[np.bool_]
 CONDITIONS: tuple[Condition, ...] = tuple(Condition)
 """A condition's code is its place here."""
 
+VALIDITIES: tuple[Validity, ...] = tuple(Validity)
+"""Likewise of a validity's code."""
+
 BLOCK = 256
 """States that travel together through an export: some 2 MB."""
 
 _TRACKED = np.array([one in (Condition.TRACKING, Condition.PARTIAL) for one in CONDITIONS])
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectStates:
+    """N states of one tracked object at the hand's instants; fields are those of `ObjectState` (docs/objects.md)."""
+
+    name: str
+    validity: Codes  # (N,) index into VALIDITIES
+    world_from_object: Array  # (N, 4, 4)
+    covariance: Array  # (N, 6, 6) m^2 and rad^2
+    velocity: Array  # (N, 6) m/s and rad/s
+    distances: Array  # (N, 5) m
+    distance_sd: Array  # (N, 5) m
+    contacts: Codes  # (N, 5) 1 where a fingertip touches
+
+    @property
+    def validities(self) -> tuple[str, ...]:
+        """The N validities as words."""
+        return tuple(VALIDITIES[code].value for code in self.validity)
+
+    def map(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> ObjectStates:
+        """The states with every array changed."""
+        return ObjectStates(self.name, **{name: change(getattr(self, name)) for name in OBJECT_ARRAYS})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +85,7 @@ class HandStates:
     hand_scale: Array  # (N,)
     hand_scale_sd: Array  # (N,)
     other: HandStates | None = None
+    objects: tuple[ObjectStates, ...] = ()  # the rig's tracked objects
 
     def __len__(self) -> int:
         return len(self.t_master_ns)
@@ -80,7 +108,8 @@ class HandStates:
     def map(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> HandStates:
         """The states with every array changed, those of the other hand too."""
         arrays = {name: change(getattr(self, name)) for name in ARRAYS}
-        return HandStates(marker_ids=self.marker_ids, **arrays, other=self.other and self.other.map(change))
+        return HandStates(marker_ids=self.marker_ids, **arrays, other=self.other and self.other.map(change),
+                          objects=tuple(one.map(change) for one in self.objects))
 
     def where(self, chosen: Mask | NDArray[np.intp] | slice) -> HandStates:
         """The states that a mask (N,), indices or a slice choose."""
@@ -98,8 +127,12 @@ class HandStates:
         return frame.DataFrame(dict(columns(self, 1000.0 if units == "mm" else 1.0, first_ns=None)))
 
 
-ARRAYS: tuple[str, ...] = tuple(field.name for field in fields(HandStates) if field.name not in ("marker_ids", "other"))
+ARRAYS: tuple[str, ...] = tuple(field.name for field in fields(HandStates) if field.name not in ("marker_ids", "other",
+                                                                                         "objects"))
 """The fields whose first axis counts states."""
+
+OBJECT_ARRAYS: tuple[str, ...] = tuple(field.name for field in fields(ObjectStates) if field.name != "name")
+"""Likewise of an object."""
 
 _KINDS: dict[str, Any] = {name: np.uint8 for name in ARRAYS if name.endswith("knowledge")} | {
     "sequence": np.int64, "t_master_ns": np.int64}
@@ -112,7 +145,21 @@ def states_of(states: Sequence[HandState]) -> HandStates:
     codes = np.array([CONDITIONS.index(state.condition) for state in states], dtype=np.uint8)
     others = [state.other for state in states if state.other is not None]
     return HandStates(marker_ids=states[0].marker_ids, condition=codes, **arrays,
-                      other=states_of(others) if len(others) == len(states) else None)
+                      other=states_of(others) if len(others) == len(states) else None, objects=_objects_of(states))
+
+
+def _objects_of(states: Sequence[HandState]) -> tuple[ObjectStates, ...]:
+    """The objects that all states have."""
+    count = min(len(state.objects) for state in states)
+    found = []
+    for number in range(count):
+        own = [state.objects[number] for state in states]
+        arrays = {name: np.array([getattr(one, name) for one in own], np.float64)
+                  for name in OBJECT_ARRAYS if name not in ("validity", "contacts")}
+        found.append(ObjectStates(
+            own[0].name, validity=np.array([VALIDITIES.index(one.validity) for one in own], np.uint8),
+            contacts=np.array([one.contacts for one in own], np.uint8), **arrays))
+    return tuple(found)
 
 
 def joined(parts: Sequence[HandStates]) -> HandStates:
@@ -121,7 +168,10 @@ def joined(parts: Sequence[HandStates]) -> HandStates:
     return HandStates(
         marker_ids=parts[0].marker_ids,
         **{name: np.concatenate([getattr(part, name) for part in parts]) for name in ARRAYS},
-        other=joined(others) if len(others) == len(parts) else None)
+        other=joined(others) if len(others) == len(parts) else None,
+        objects=tuple(ObjectStates(same[0].name, **{name: np.concatenate([getattr(one, name) for one in same])
+                                                    for name in OBJECT_ARRAYS})
+                      for same in zip(*(part.objects for part in parts), strict=True)))
 
 
 def in_blocks(states: Iterable[HandState], size: int = BLOCK) -> Iterator[HandStates]:

@@ -11,16 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.export.plan import Plan, require
-from rhot_app.export.states import ARRAYS, HandStates
+from rhot_app.export.states import ARRAYS, OBJECT_ARRAYS, HandStates, ObjectStates
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
 
 Column = NDArray[Any]
 
+_OF_FINGERTIPS = "distances", "distance_sd", "contacts"
+"""What an object's state says of a hand."""
+
 ROW_GROUP = 4096  # states in a row group of a Parquet file
 
 _AXES = "x", "y", "z"
+_TURN = "_qw", "_qx", "_qy", "_qz"
 _TWIST = "x", "y", "z", "rx", "ry", "rz"
 
 
@@ -46,6 +50,35 @@ def columns(states: HandStates, scale: float, first_ns: int | None) -> Iterator[
     if states.other is not None:
         yield f"{OTHER_HAND}condition", np.array(states.other.conditions, dtype=object)
         yield from _hand(OTHER_HAND, states.other, scale, unit)
+    for one in states.objects:
+        yield from _object(one, scale, unit)
+        yield from _fingertips("", one, scale, unit)
+    for one in states.other.objects if states.other is not None else ():
+        yield from _fingertips(OTHER_HAND, one, scale, unit)
+
+
+def _object(one: ObjectStates, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    name = f"object_{one.name}"
+    yield f"{name}_validity", np.array(one.validities, dtype=object)
+    yield from _point(name, one.world_from_object[:, :3, 3], scale, unit)
+    for index, part in enumerate(quaternion_from_rotation(one.world_from_object[:, :3, :3]).T):
+        yield f"{name}_q{'wxyz'[index]}", part
+    yield from _pose_covariance(name, one.covariance, scale, unit)
+
+
+def _fingertips(prefix: str, one: ObjectStates, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    """How far a hand's fingertips are from an object."""
+    for index, finger in enumerate(FINGERS):
+        name = f"object_{one.name}_{prefix}{finger}"
+        yield f"{name}_distance_{unit}", scale * one.distances[:, index]
+        yield f"{name}_distance_sd_{unit}", scale * one.distance_sd[:, index]
+        yield f"{name}_contact", one.contacts[:, index]
+
+
+def _pose_covariance(name: str, covariances: Column, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    for i, j in combinations_with_replacement(range(6), 2):
+        factor, of = ((scale * scale, f"{unit}2"), (scale, f"{unit}_rad"), (1.0, "rad2"))[(i > 2) + (j > 2)]
+        yield f"{name}_cov_{_TWIST[i]}_{_TWIST[j]}_{of}", factor * covariances[:, i, j]
 
 
 def _hand(prefix: str, states: HandStates, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
@@ -65,9 +98,7 @@ def _hand(prefix: str, states: HandStates, scale: float, unit: str) -> Iterator[
     yield from _point(f"{prefix}palm", states.world_from_palm[:, :3, 3], scale, unit)
     for index, part in enumerate(quaternion_from_rotation(states.world_from_palm[:, :3, :3]).T):
         yield f"{prefix}palm_q{'wxyz'[index]}", part
-    for i, j in combinations_with_replacement(range(6), 2):
-        factor, of = ((scale * scale, f"{unit}2"), (scale, f"{unit}_rad"), (1.0, "rad2"))[(i > 2) + (j > 2)]
-        yield f"{prefix}palm_cov_{_TWIST[i]}_{_TWIST[j]}_{of}", factor * states.palm_covariance[:, i, j]
+    yield from _pose_covariance(f"{prefix}palm", states.palm_covariance, scale, unit)
     yield f"{prefix}palm_knowledge", states.palm_knowledge
     yield f"{prefix}hand_scale", states.hand_scale
     yield f"{prefix}hand_scale_sd", states.hand_scale_sd
@@ -84,7 +115,8 @@ def _covariance(name: str, covariances: Column, scale: float, unit: str) -> Iter
 
 
 class CsvWriter:
-    """One line of names, then one line per state; what is unknown is an empty cell."""
+    """One line of names, then one line per state; what is unknown is an empty cell. Names with commas or quotes are
+    quoted."""
 
     def __init__(self, plan: Plan) -> None:
         self.notes: list[str] = []
@@ -96,7 +128,7 @@ class CsvWriter:
         """Write these rows."""
         table = list(columns(states, self._plan.scale, self._plan.first_ns))
         if not self._line:
-            self._file.write(",".join(name for name, _ in table) + "\n")
+            self._file.write(",".join(_quoted(name) for name, _ in table) + "\n")
             self._line = ",".join(_cell(name, column, self._plan.scale) for name, column in table) + "\n"
         rows = zip(*(column.tolist() for _, column in table), strict=True)
         self._file.write("".join([self._line % row for row in rows]).replace("nan", ""))
@@ -110,6 +142,10 @@ class CsvWriter:
         self._file.close()
 
 
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"' if set(name) & set(',"') else name
+
+
 def _cell(name: str, column: Column, scale: float) -> str:
     """How a column's numbers are written: lengths to 0.1 µm, angles to 0.0001 degree, times to the nanosecond."""
     if column.dtype == object:
@@ -120,9 +156,9 @@ def _cell(name: str, column: Column, scale: float) -> str:
         return "%.9f"
     if "_cov_" in name or "_sd" in name:
         return "%.6g"
-    if name.endswith("_m") or (scale == 1.0 and "_palm_q" in name):
+    if name.endswith("_m"):
         return "%.7f"
-    return "%.7f" if "palm_q" in name or "hand_scale" in name else "%.4f"
+    return "%.7f" if name.endswith(_TURN) or "hand_scale" in name else "%.4f"
 
 
 class ParquetWriter:
@@ -173,13 +209,15 @@ class ParquetWriter:
 
 
 class NpzWriter:
-    """The arrays of `HandStates`, 32-bit floats, by their names; those of the other hand begin with ``other_``."""
+    """The arrays of `HandStates`, 32-bit floats, by their names; the other hand's begin with ``other_``. Those of
+    K objects begin with ``object_`` and have the shape (N, K, ...)."""
 
     def __init__(self, plan: Plan) -> None:
         self.notes: list[str] = []
         self._plan = plan
         self._parts: dict[str, list[Column]] = {}
         self._ids: tuple[str, ...] = ()
+        self._objects: tuple[str, ...] = ()
 
     def add(self, states: HandStates) -> None:
         """Keep these states."""
@@ -195,10 +233,19 @@ class NpzWriter:
             column = getattr(states, name)
             kept = column.astype(np.float32) if column.dtype.kind == "f" else column
             self._parts.setdefault(prefix + name, []).append(_scaled(name, kept, self._plan.scale))
+        for name in OBJECT_ARRAYS if states.objects else ():
+            if prefix and name not in _OF_FINGERTIPS:
+                continue
+            self._objects = tuple(one.name for one in states.objects)
+            column = np.stack([getattr(one, name) for one in states.objects], axis=1)
+            kept = column.astype(np.float32) if column.dtype.kind == "f" else column
+            self._parts.setdefault(f"{prefix}object_{name}", []).append(_scaled_object(name, kept, self._plan.scale))
 
     def finish(self) -> None:
         """Write the archive, one array at a time."""
         names = {"marker_ids": self._ids, "joint_names": JOINTS, "angle_names": ANGLES, "finger_names": FINGERS}
+        if self._objects:
+            names["object_names"] = self._objects
         with zipfile.ZipFile(self._plan.path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             times = np.concatenate(self._parts["t_master_ns"])
             _store(archive, "times_s", 1e-9 * (times - self._plan.first_ns))
@@ -229,6 +276,20 @@ def _scaled(name: str, column: Column, scale: float) -> Column:
         return out
     per = np.where(np.arange(6) < 3, scale, 1.0).astype(np.float32)
     return out * per[:, None] * per
+
+
+def _scaled_object(name: str, column: Column, scale: float) -> Column:
+    """An array (N, K, ...) of objects in the file's unit of length."""
+    if scale == 1.0 or name in ("validity", "contacts"):
+        return column
+    if name in ("distances", "distance_sd"):
+        return column * np.float32(scale)
+    out = column.copy()
+    if name == "world_from_object":
+        out[..., :3, 3] *= np.float32(scale)
+        return out
+    per = np.where(np.arange(6) < 3, scale, 1.0).astype(np.float32)
+    return out * per if name == "velocity" else out * per[:, None] * per
 
 
 def _store(archive: zipfile.ZipFile, name: str, array: Column) -> None:

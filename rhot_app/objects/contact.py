@@ -151,12 +151,20 @@ class ContactMonitor:
         self.trigger = ContactTrigger()
 
     def update(self, world_from_palm: Array, angles: Array, fingertip_covariances: Array, world_from_object: Array,
-               object_covariance: Array) -> tuple[PadDistances, Array, Flags]:
-        """Distances, their standard deviations (5,) m and the contact flags (5,) of one instant."""
-        points = pad_points(self.pads, world_from_palm, angles)
-        found = pad_distances(self.pads, points, self.shape, world_from_object)
-        sd = distance_sd(found.normal, fingertip_covariances, object_covariance)
-        return found, sd, self.trigger.update(found.distance, sd)
+               object_covariance: Array, pads: FingertipPads | None = None) -> tuple[PadDistances, Array, Flags]:
+        """Distances, their standard deviations (5,) m and the contact flags (5,) of one instant.
+
+        `object_covariance` (6, 6): of the object's pose, as of `ObjectState`. Fingertips without covariances switch
+        their flags at the surface, without hysteresis. `pads`: of a hand of another size than the model's.
+        """
+        pads = self.pads if pads is None else pads
+        points = pad_points(pads, world_from_palm, angles)
+        found = pad_distances(pads, points, self.shape, world_from_object)
+        arms = found.place - world_from_object[:3, 3]
+        by_pose = np.concatenate([found.normal, np.cross(arms, found.normal)], axis=1)  # of the distance
+        surface = np.einsum("fi,ij,fj->f", by_pose, object_covariance, by_pose)
+        sd = np.sqrt(surface + distance_sd(found.normal, fingertip_covariances, np.zeros((3, 3))) ** 2)
+        return found, sd, self.trigger.update(found.distance, np.nan_to_num(sd))
 
     def residual(self, world_from_object: Array, sd_m: Array, size: int) -> ContactResidual | None:
         """The present contacts as a residual of a state whose tangent space has `size` numbers; None while nothing

@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import ObjectError
 from rhot_app.geometry.transforms import quaternion_from_rotation, rotation_from_quaternion
-from rhot_app.project import Name
-from rhot_node.detect.tags import family_number, family_size, tag_code
-from rhot_node.errors import SettingsError
-from rhot_node.files import read_document, write_document
+from rhot_node.files import PRINTABLE, read_document, write_document
+from rhot_node.wire.messages import FAMILIES
 
 FORMAT: Final = "rhot-object"
 VERSION: Final = 1
@@ -31,6 +29,7 @@ COLLINEAR_MM = 1.0
 centre is known no better (`marker_model.PAINT_SD_M`)."""
 
 Array = NDArray[np.float64]
+Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=PRINTABLE)]
 Millimetres = Annotated[float, Meta(ge=-10_000, le=10_000)]
 Size = Annotated[float, Meta(gt=0, le=10_000)]
 Vector = tuple[Millimetres, Millimetres, Millimetres]
@@ -52,12 +51,12 @@ class Tag(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     translation_mm: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        try:
-            number = family_number(self.family)
-        except SettingsError as exc:
-            raise ValueError(str(exc)) from exc
-        if self.id >= family_size(number):
-            raise ValueError(f"{self.family} has the tags 0 to {family_size(number) - 1}; there is no {self.id}")
+        from rhot_node.detect.tags import family_size  # here, because a rig without objects needs no OpenCV
+        if self.family not in FAMILIES:
+            raise ValueError(f"there is no tag dictionary {self.family!r}; cv2.aruco has {', '.join(FAMILIES)}")
+        count = family_size(FAMILIES.index(self.family))
+        if self.id >= count:
+            raise ValueError(f"{self.family} has the tags 0 to {count - 1}; there is no {self.id}")
         norm = sum(q * q for q in self.rotation_wxyz)
         if not 0.998 < norm < 1.002:
             raise ValueError(f"rotation_wxyz is not a unit quaternion (its squared norm is {norm:.4f})")
@@ -65,11 +64,12 @@ class Tag(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def key(self) -> tuple[int, int]:
         """Family, as an index into FAMILIES, and id: what a node reports."""
-        return family_number(self.family), self.id
+        return FAMILIES.index(self.family), self.id
 
     @property
     def code(self) -> bytes:
         """The bits that a detector reads."""
+        from rhot_node.detect.tags import tag_code
         return tag_code(*self.key)
 
     def corners(self) -> Array:
@@ -93,13 +93,51 @@ class Mesh(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit: Literal["m", "mm"] = "mm"
 
 
+class BoxShape(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="box"):
+    """A box about the object's origin, its sides along the axes."""
+
+    sides_mm: tuple[Size, Size, Size]
+
+    @property
+    def largest_mm(self) -> float:
+        """The largest side."""
+        return max(self.sides_mm)
+
+
+class SphereShape(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="sphere"):
+    """A sphere about the object's origin."""
+
+    diameter_mm: Size
+
+    @property
+    def largest_mm(self) -> float:
+        """The diameter."""
+        return self.diameter_mm
+
+
+class CylinderShape(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="cylinder"):
+    """A cylinder about the object's z axis, its middle in the origin."""
+
+    diameter_mm: Size
+    length_mm: Size
+
+    @property
+    def largest_mm(self) -> float:
+        """The larger of diameter and length."""
+        return max(self.diameter_mm, self.length_mm)
+
+
 class ObjectModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A rigid object with fiducial tags or at least three colour markers, and not both."""
+    """A rigid object with fiducial tags or at least three colour markers, and not both.
+
+    `shape`: its surface, for displays and the contacts of fingertips; a `mesh` is both where there is no shape.
+    """
 
     name: Name
     fiducials: Annotated[tuple[Tag, ...], Meta(max_length=256)] = ()
     markers: Annotated[tuple[ObjectMarker, ...], Meta(max_length=64)] = ()
     mesh: Mesh | None = None
+    shape: BoxShape | SphereShape | CylinderShape | None = None
     format: Literal["rhot-object"] = FORMAT
     version: Literal[1] = VERSION
 
@@ -116,6 +154,10 @@ class ObjectModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.markers and not spans_plane(np.array([marker.position_mm for marker in self.markers])):
             raise ValueError("the markers lie in one line, which leaves the rotation about it open; give three or more "
                              "that do not")
+        for tag in self.fiducials:
+            if self.shape is not None and tag.size_mm > self.shape.largest_mm:
+                raise ValueError(f"tag {tag.id} of {tag.family} is {tag.size_mm:g} mm wide, and the shape's largest "
+                                 f"side is {self.shape.largest_mm:g} mm; correct size_mm or the shape")
 
 
 def spans_plane(points_mm: Array) -> bool:
@@ -139,7 +181,7 @@ def cube(name: str, size_mm: float, tag_size_mm: float, family: str, first_id: i
         up = np.array([0.0, 1.0, 0.0]) if face[1] != "y" else np.array([0.0, 0.0, -normal[1]])
         rotation = np.column_stack([np.cross(up, normal), up, normal])
         tags.append(_tag(family, first_id + number, tag_size_mm, rotation, 0.5 * size_mm * normal))
-    return ObjectModel(name, tuple(tags))
+    return ObjectModel(name, tuple(tags), shape=BoxShape((size_mm, size_mm, size_mm)))
 
 
 def plate(name: str, columns: int, rows: int, tag_size_mm: float, gap_mm: float, family: str,

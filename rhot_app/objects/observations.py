@@ -22,7 +22,7 @@ class FiducialFrame:
 
     `camera`: index into the rig's nodes. `t_row0_master_ns`: mid-exposure of row 0. `keys` (N, 2): family, as an index
     into the wire's FAMILIES, and id. `corners` (N, 4, 2) raw px, NaN for one that is not observed, with `covariances`
-    (N, 4, 2, 2) px^2.
+    (N, 4, 2, 2) px^2. `t_receive_ns`: kernel receive time of the datagram.
     """
 
     camera: int
@@ -31,6 +31,7 @@ class FiducialFrame:
     keys: NDArray[np.int64]
     corners: Array
     covariances: Array
+    t_receive_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +108,7 @@ class ObjectPoints:
                           covariances[found])
 
 
-def fiducial_frame(message: Fiducials, camera: int, t_row0_master_ns: int) -> FiducialFrame:
+def fiducial_frame(message: Fiducials, camera: int, t_row0_master_ns: int, t_receive_ns: int = 0) -> FiducialFrame:
     """A decoded datagram as arrays. `camera`: the node's index in the rig; `t_row0_master_ns`: its frame's time by the
     clock model."""
     count = len(message.fiducials)
@@ -115,4 +116,4 @@ def fiducial_frame(message: Fiducials, camera: int, t_row0_master_ns: int) -> Fi
     corners = np.array([one.corners for one in message.fiducials], np.float64).reshape(count, 4, 2)
     numbers = np.array([one.covariances for one in message.fiducials], np.float64).reshape(count, 4, 3)
     return FiducialFrame(camera, t_row0_master_ns, message.row_time_ns, keys, corners,
-                         numbers[:, :, [0, 1, 1, 2]].reshape(count, 4, 2, 2))
+                         numbers[:, :, [0, 1, 1, 2]].reshape(count, 4, 2, 2), t_receive_ns)

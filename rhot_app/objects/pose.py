@@ -6,7 +6,6 @@ of all cameras together, and the refined modes are weighed by their posterior pr
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -31,6 +30,7 @@ from rhot_app.objects.motion import (
 )
 from rhot_app.objects.object_file import spans_plane
 from rhot_app.objects.observations import NO_TAG, ObjectPoints, ObjectView
+from rhot_app.objects.state import Validity
 
 Array = NDArray[np.float64]
 
@@ -48,16 +48,6 @@ STEPS, CONVERGED = 30, 1e-4
 
 _STARTS = 4  # refined of all, the best by the cost of all points
 _DAMPING = 1e-3
-
-
-class Validity(enum.StrEnum):
-    """What a pose is worth."""
-
-    SEARCHING = "searching"  # not observed yet; NaN
-    TRACKED = "tracked"
-    AMBIGUOUS = "ambiguous"  # a second pose, such as a planar tag's flip, has a probability of 1 % or more
-    PREDICTED = "predicted"  # not observed for some frames
-    LOST = "lost"  # was tracked; NaN
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.errors import RigError
+from rhot_app.objects.object_file import BoxShape, CylinderShape, ObjectModel, SphereShape
 from rhot_node.errors import printable
 from rhot_node.files import require_file, why
 
@@ -165,6 +166,23 @@ class Mesh:
         distance, normal = np.empty(len(points)), np.empty((len(points), 3))
         _mesh_distance(self._arrays, points, distance, normal)
         return distance, normal
+
+
+def shape_of(model: ObjectModel, folder: Path | None) -> Shape | None:
+    """An object's surface: its shape, else its mesh, a file in `folder`; None without both, or without a folder.
+
+    Raises RigError when the mesh cannot be used.
+    """
+    match model.shape:
+        case BoxShape(sides_mm=(x, y, z)):
+            return Box((1e-3 * x, 1e-3 * y, 1e-3 * z))
+        case SphereShape(diameter_mm=diameter):
+            return Sphere(0.5e-3 * diameter)
+        case CylinderShape(diameter_mm=diameter, length_mm=length):
+            return Cylinder(0.5e-3 * diameter, 1e-3 * length)
+    if model.mesh is None or folder is None:
+        return None
+    return load_mesh(folder / model.mesh.file, model.mesh.unit)
 
 
 def load_mesh(path: Path, unit: str) -> Mesh:

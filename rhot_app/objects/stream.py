@@ -19,7 +19,8 @@ from rhot_app.errors import ObjectError
 from rhot_app.geometry.transforms import log_so3, rigid, rotation_from_quaternion
 from rhot_app.objects.motion import POSE, START_SPEED, PoseResidual, state_of
 from rhot_app.objects.pose import Mode
-from rhot_app.objects.track import GATE_6, Gated, ObjectState, Track
+from rhot_app.objects.state import ObjectState
+from rhot_app.objects.track import GATE_6, Gated, Track
 from rhot_node.errors import printable
 from rhot_node.files import read_input, why
 

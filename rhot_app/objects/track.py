@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.estimation.filter import IteratedFilter, Knot
+from rhot_app.estimation.filter import Estimate, IteratedFilter, Knot
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.objects.motion import POSE, SIZE, VELOCITY, CameraArrays, ObjectProcess, StatePrior, pose_of
@@ -23,7 +23,6 @@ from rhot_app.objects.observations import FiducialFrame, MarkerPoints, ObjectPoi
 from rhot_app.objects.pose import (
     AMBIGUOUS,
     Mode,
-    Validity,
     faces_camera,
     find_modes,
     log_mass,
@@ -32,6 +31,7 @@ from rhot_app.objects.pose import (
     reversed_state,
     same_pose,
 )
+from rhot_app.objects.state import ObjectState, Validity, unknown_object
 
 Array = NDArray[np.float64]
 
@@ -48,29 +48,15 @@ PREDICTED_AFTER_NS, LOST_AFTER_NS = 100_000_000, 500_000_000
 FORGET = 1e-4
 """Probability under which a hypothesis is dropped: a hundredth of an ambiguous one's."""
 
+OUTLIER = math.sqrt(FORGET)
+"""Probability that a frame is an outlier, as of a misread tag: a hypothesis outlives one that another hypothesis
+explains, and is forgotten after some in a row."""
+
+REJECTION = -2.0 * math.log(OUTLIER / (1.0 - OUTLIER))
+"""-2 log likelihood of a frame under a hypothesis for which it is an outlier, beyond that under the best one."""
+
 EXCLUDED = -2.0 * math.log(FORGET)
 """Squared Mahalanobis distance from a prediction beyond which a second hypothesis is as improbable."""
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectState:
-    """An object at one instant, in the rig frame.
-
-    `world_from_object` (4, 4) m. `covariance` (6, 6) m^2 and rad^2: translation, then rotation about the object's
-    origin, world axes. `velocity` (6,): of the origin, m/s, and angular, rad/s, world axes. All NaN unless `tracked`.
-    """
-
-    name: str
-    t_master_ns: int
-    validity: Validity
-    world_from_object: Array
-    covariance: Array
-    velocity: Array
-
-    @property
-    def tracked(self) -> bool:
-        """Whether there is a pose."""
-        return self.validity not in (Validity.SEARCHING, Validity.LOST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,12 +178,12 @@ class Track:
         return self._rejected >= REJECTIONS and self._start(measurement)
 
     def state(self, t_ns: int) -> ObjectState:
-        """The state at master time `t_ns`, or at the newest measurement's if that is later."""
+        """The state at master time `t_ns` by the measurements before it. The newest ones are kept for that: at an
+        earlier time than all of them it is that of the oldest."""
         if not self._hypotheses or t_ns - self._accepted_ns > LOST_AFTER_NS:
-            return ObjectState(self.name, t_ns, Validity.LOST if self._ever else Validity.SEARCHING,
-                               np.full((4, 4), np.nan), np.full((POSE, POSE), np.nan), np.full(POSE, np.nan))
+            return unknown_object(self.name, t_ns, Validity.LOST if self._ever else Validity.SEARCHING)
         best = self._hypotheses[0]
-        t_s = max(1e-9 * (t_ns - self._epoch_ns), best.filter.newest.t_s)
+        t_s = max(1e-9 * (t_ns - self._epoch_ns), best.filter.knots[0].t_s)
         state, covariance = best.filter.predict(t_s)
         validity = Validity.TRACKED
         if len(self._hypotheses) > 1 and math.exp(self._hypotheses[1].log_weight) >= AMBIGUOUS:
@@ -206,6 +192,16 @@ class Track:
             validity = Validity.PREDICTED
         return ObjectState(self.name, self._epoch_ns + round(1e9 * t_s), validity, pose_of(state),
                            covariance[:POSE, :POSE], state[VELOCITY:])
+
+    def estimate(self) -> tuple[int, Estimate] | None:
+        """Master time, ns, and the most probable hypothesis after the newest measurement, labelled by its filter; None
+        without one."""
+        if not self._hypotheses:
+            return None
+        best = self._hypotheses[0].filter
+        knot = best.newest
+        return self._epoch_ns + round(1e9 * knot.t_s), Estimate(knot.t_s, knot.state, knot.covariance, self._process,
+                                                                id(best))
 
     def _start(self, measurement: Measurement) -> bool:
         modes = measurement.modes()
@@ -222,33 +218,37 @@ class Track:
         return True
 
     def _update(self, measurement: Measurement, t_s: float) -> bool:
-        """Update every hypothesis that accepts the measurement, and drop the others; False, and nothing is changed,
-        when none does."""
-        accepting, younger = [], []
+        """Update every hypothesis that accepts the measurement; for the others it is an outlier. False, and nothing is
+        changed, when none does."""
+        accepting, rejecting, younger = [], [], []
         for hypothesis in self._hypotheses:
             if t_s < hypothesis.filter.knots[0].t_s:  # it began with a later frame of another camera
                 younger.append(hypothesis)
                 continue
             prediction = hypothesis.filter.predict(t_s)
             gated = measurement.gate(*prediction)
-            if gated.residual is not None:
-                accepting.append((hypothesis, gated, prediction))
+            if gated.residual is None:
+                rejecting.append(hypothesis)
+            else:
+                accepting.append((hypothesis, gated.residual, gated.cost, prediction))
+        least = min((cost for _, _, cost, _ in accepting), default=math.inf)
         kept: list[_Hypothesis] = []
-        for hypothesis, gated, prediction in accepting:
-            assert gated.residual is not None
+        for hypothesis, residual, cost, prediction in accepting:
             try:
-                knot = hypothesis.filter.add(t_s, [gated.residual], prediction)
+                knot = hypothesis.filter.add(t_s, [residual], prediction)
             except np.linalg.LinAlgError:  # the estimate contradicts itself
                 continue
-            hypothesis.log_weight -= 0.5 * gated.cost
+            hypothesis.log_weight -= 0.5 * min(cost, least + REJECTION)
             kept.append(hypothesis)
-            if len(accepting) == 1 and knot is hypothesis.filter.newest:
+            if len(accepting) == 1 and not rejecting and knot is hypothesis.filter.newest:
                 kept += self._second(measurement, hypothesis, knot, prediction)
         if not kept:
             return False
+        for hypothesis in rejecting:
+            hypothesis.log_weight -= 0.5 * (least + REJECTION)
         for hypothesis in younger:  # the frame tells nothing of it
-            hypothesis.log_weight -= 0.5 * min(gated.cost for _, gated, _ in accepting)
-        self._hypotheses = kept + younger
+            hypothesis.log_weight -= 0.5 * least
+        self._hypotheses = kept + rejecting + younger
         self._normalise()
         return True
 
@@ -291,6 +291,19 @@ class ObjectTracker:
     def take(self, frame: FiducialFrame | MarkerPoints) -> list[ObjectState]:
         """Weigh one frame; the state of every object after it, at the time of the object's points or of row 0."""
         return [self._take(number, frame) for number in range(len(self._tracks))]
+
+    def states(self, t_ns: int) -> list[ObjectState]:
+        """The state of every object at master time `t_ns`, by what has been taken."""
+        return [track.state(t_ns) for track in self._tracks]
+
+    def estimates(self) -> list[tuple[int, Estimate] | None]:
+        """Of every object, as `Track.estimate`."""
+        return [track.estimate() for track in self._tracks]
+
+    def reset(self) -> None:
+        """Forget everything: a new session, or a node's clock was set."""
+        self._tracks = [Track(track.name) for track in self._tracks]
+        self._newest = [{} for _ in self._tracks]
 
     def _take(self, number: int, frame: FiducialFrame | MarkerPoints) -> ObjectState:
         track, newest = self._tracks[number], self._newest[number]

@@ -15,6 +15,7 @@ from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.hand.skeleton import JOINTS, HandPose
+from rhot_app.objects.state import ObjectState
 from rhot_app.outputs.openxr import OPENXR_JOINTS, OUR_JOINTS, openxr_hand, openxr_map
 from rhot_app.project import Rig
 from rhot_app.tracking.state import Codes, HandState
@@ -62,6 +63,19 @@ class HandSample:
 
 
 @dataclass(frozen=True, slots=True)
+class ObjectSample:
+    """One tracked object as an output sends it, in the axes of the hands: `position` (3,) m and `orientation` (4,)
+    xyzw, NaN when unknown. `distances` (5,) m and `contacts` (5,) are of the first hand's fingertips."""
+
+    name: str
+    validity: str
+    position: Array
+    orientation: Array
+    distances: Array
+    contacts: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
 class Sample:
     """One instant as an output sends it. `age_s`: since the instant that it describes; NaN for a replayed log.
     `joints`: the names of each hand's rows. `state`: where it comes from, for what is not in here."""
@@ -71,12 +85,14 @@ class Sample:
     age_s: float
     hands: tuple[HandSample, ...]
     state: HandState
+    objects: tuple[ObjectSample, ...] = ()
 
 
 class JointConverter:
     """Turns states of one rig into samples. Any thread may call it; it keeps nothing between calls."""
 
     def __init__(self, rig: Rig) -> None:
+        self._upright = np.array(_UPRIGHT[rig.up])
         self._hands = [_Hand(rig.hand, rig.hand.side, rig.up)]
         if rig.other_hand is not None:
             side = rig.other_hand.side
@@ -88,7 +104,16 @@ class JointConverter:
         age_s = 1e-9 * (time.monotonic_ns() - state.t_master_ns)
         states = [state] if state.other is None else [state, state.other]
         hands = tuple(hand.sample(one, joint_set) for hand, one in zip(self._hands, states, strict=False))
-        return Sample(joint_set, JOINT_NAMES[joint_set], age_s if 0.0 <= age_s < LIVE_S else math.nan, hands, state)
+        objects = tuple(self._object(one, joint_set) for one in state.objects)
+        return Sample(joint_set, JOINT_NAMES[joint_set], age_s if 0.0 <= age_s < LIVE_S else math.nan, hands, state,
+                      objects)
+
+    def _object(self, one: ObjectState, joint_set: JointSet) -> ObjectSample:
+        position = one.world_from_object[:3, 3]
+        turn = quaternion_from_rotation(one.world_from_object[:3, :3]) if one.tracked else np.full(4, np.nan)
+        if joint_set == "openxr":
+            position, turn = _turned(self._upright, position), _product(self._upright, turn)
+        return ObjectSample(one.name, one.validity.value, position, _xyzw(turn), one.distances, one.contacts)
 
     def rehearse(self) -> None:
         """Compile what the conversion needs, before the first state."""
@@ -155,7 +180,14 @@ def json_message(sample: Sample) -> bytes:
     age_s = None if math.isnan(sample.age_s) else round(sample.age_s, _DIGITS)
     return msgspec.json.encode({
         "sequence": sample.state.sequence, "t_master_ns": sample.state.t_master_ns, "age_s": age_s,
-        "joint_set": sample.joint_set, "joints": sample.joints, "hands": [_hand(hand) for hand in sample.hands]})
+        "joint_set": sample.joint_set, "joints": sample.joints, "hands": [_hand(hand) for hand in sample.hands],
+        **({"objects": [_object(one) for one in sample.objects]} if sample.objects else {})})
+
+
+def _object(one: ObjectSample) -> dict[str, Any]:
+    return {"name": one.name, "validity": one.validity, "position": _rows(one.position[None])[0],
+            "orientation": _rows(one.orientation[None])[0], "distances": np.round(one.distances, _DIGITS).tolist(),
+            "contacts": one.contacts.tolist()}
 
 
 def _hand(hand: HandSample) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 import socket
 import struct
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ from rhot_app.project import OutputSettings
 
 BUNDLE: Final = b"#bundle\0" + struct.pack(">Q", 1)  # the time tag 1: now
 DATAGRAM_MAX: Final = 1432  # bytes: what passes through Ethernet in one piece, with IPv6
+_WORD: Final = re.compile(r"[^A-Za-z0-9_.-]")  # OSC's addresses have no spaces and no wild cards
 Argument = int | float | str
 
 
@@ -61,6 +63,19 @@ def hand_messages(sample: Sample, hand: HandSample) -> Iterator[bytes]:
     for joint, row, known in zip(sample.joints, rows, hand.knowledge.tolist(), strict=True):
         if all(map(math.isfinite, row)):
             yield _head(f"{begin}/joint/{joint}", types) + pack(*row, known)
+
+
+def object_messages(sample: Sample) -> Iterator[bytes]:
+    """What is said of the tracked objects; a pose that is unknown is left out, and distances without a shape."""
+    for one in sample.objects:
+        begin = f"/rhot/object/{_WORD.sub('_', one.name)}"
+        yield osc_message(f"{begin}/validity", one.validity)
+        pose = [*one.position.tolist(), *one.orientation.tolist()]
+        if all(map(math.isfinite, pose)):
+            yield osc_message(f"{begin}/pose", *pose)
+        distances = one.distances.tolist()
+        if all(map(math.isfinite, distances)):
+            yield osc_message(f"{begin}/fingertips", *distances, *map(int, one.contacts.tolist()))
 
 
 class UdpSink:
@@ -109,6 +124,9 @@ class OscSink(UdpSink):
         """Send one state."""
         for hand in sample.hands:
             for datagram in bundles(hand_messages(sample, hand)):
+                self.send(datagram)
+        if sample.objects:
+            for datagram in bundles(object_messages(sample)):
                 self.send(datagram)
 
 

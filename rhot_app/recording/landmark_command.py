@@ -88,13 +88,14 @@ def track(rig: Rig, path: Path) -> list[HandState]:
     """The states of a log by the rig's tracker, one after every frame."""
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogValidator
+    from rhot_app.tracking.tracker import CameraObservations
     from rhot_app.tracking.trackers import make_tracker
 
     states, validator, tracker = [], LogValidator(rig), make_tracker(rig)
     with contextlib.closing(LogReader(path)) as reader:
         for record in reader:
             frame = validator.feed(record)
-            if frame is not None:
+            if isinstance(frame, CameraObservations):
                 tracker.ingest(frame)
                 state = tracker.solve()
                 if state is not None:

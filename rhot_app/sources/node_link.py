@@ -97,7 +97,7 @@ class NodeLink:
             self.clock_changes += 1
         if reply.boot_id != self._boot_id:
             self._boot_id = reply.boot_id
-            self.door.sequence.restart()  # a daemon that starts anew counts from 0 again
+            self.door.restart_sequences()  # a daemon that starts anew counts from 0 again
         self.state = reply.state
         self.session = reply.session
         self._was_ours |= self.wanted != 0 and reply.session == self.wanted

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from rhot_app.errors import SourceError
 from rhot_app.sources.validation import DatagramValidator, Verified
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
 
 # -- Precedence for the threads between a datagram and its state: of the system's scheduler, and of the ----------------
@@ -69,11 +69,11 @@ _WAIT = struct.pack("@ll", 0, 200_000)  # a blocked read returns after 0.2 s to 
 DatagramTap = Callable[[int, bytes], None]
 """``tap(t_receive_ns, data)``: sees every genuine datagram before it is judged."""
 
-Deliver = Callable[[list[CameraObservations]], None]
+Deliver = Callable[[list[CameraFrame]], None]
 """Takes verified frames of one camera, oldest first, in the thread that received them. May take as long as a state."""
 
 
-def to_nobody(frames: list[CameraObservations]) -> None:
+def to_nobody(frames: list[CameraFrame]) -> None:
     """The `Deliver` of a source that nobody listens to yet."""
 
 

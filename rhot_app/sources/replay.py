@@ -15,7 +15,7 @@ from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
 from rhot_app.sources.source import RecordSink
 from rhot_app.sources.validation import RECORDED
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.errors import WireError
 from rhot_node.wire.messages import ClockReply, ClockRequest, Start
 
@@ -45,7 +45,7 @@ class LogValidator:
         """Sessions so far, and clocks that were set: the tracker must then forget."""
         return self.starts + sum(link.clock_changes for link in self.links)
 
-    def feed(self, record: Record) -> CameraObservations | None:
+    def feed(self, record: Record) -> CameraFrame | None:
         """Take one record in; a frame when it holds one that is admitted."""
         if record.kind is RecordKind.DATAGRAM:
             link = self._by_id.get(record.node_id)

@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rhot_app.objects.observations import fiducial_frame
 from rhot_app.project import Rig, RigNode
 from rhot_app.sources.clock import ClockEstimate, NodeClockModel
-from rhot_app.tracking.tracker import CameraObservations, Candidates
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Candidates
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import Seal, decode, decode_sealed, decode_verified, is_tagged
 from rhot_node.wire.marker_table import MarkerTable
-from rhot_node.wire.messages import MarkerFlag, Message, Observations
+from rhot_node.wire.messages import Fiducials, MarkerFlag, Message, Observations
 from rhot_node.wire.sequence import SequenceWindow, Verdict
 from rhot_node.wire.text import parse_text
 
@@ -53,7 +54,7 @@ RECORDED = Authentication(decode_verified, lambda data: True)
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""
 
-Verified = tuple[Observations, int, int, int, float] | CameraObservations
+Verified = tuple[Observations | Fiducials, int, int, int, float] | CameraObservations
 """A message with its row-0, send and receive times, master ns, and clock bound, s; text needs no second half."""
 
 _CLOCK_SLACK_NS = 1_000_000  # scheduling between the stamps at both ends
@@ -66,9 +67,11 @@ class DatagramValidator:
         """`camera` is the node's index in the rig."""
         self.clock = clock
         self.admission = ANYBODY
-        self.sequence = SequenceWindow()
+        self.sequence = SequenceWindow()  # of observations
+        self.fiducial_sequence = SequenceWindow()
         self.received = 0  # datagrams of any kind
-        self.accepted = 0
+        self.accepted = 0  # observations
+        self.fiducials = 0  # accepted ones
         self.dropped: dict[str, int] = {}
         self.image_size: tuple[int, int] | None = None  # of the last refused frame of another size
         self.last_t_receive_ns = 0  # of the last accepted one
@@ -95,10 +98,15 @@ class DatagramValidator:
     def expect_session(self, session: int) -> None:
         """Admit only datagrams of `session` from now on (0: none), counted from a new first number."""
         self._session = session
-        self.sequence.restart()
+        self.restart_sequences()
 
-    def admit(self, data: bytes, t_receive_ns: int) -> CameraObservations | None:
-        """The datagram as observations, or None when it was dropped and counted."""
+    def restart_sequences(self) -> None:
+        """The node counts from a new first number."""
+        self.sequence.restart()
+        self.fiducial_sequence.restart()
+
+    def admit(self, data: bytes, t_receive_ns: int) -> CameraFrame | None:
+        """The datagram as observations or fiducials, or None when it was dropped and counted."""
         verified = self.verify(data, t_receive_ns)
         return None if verified is None else self.convert(verified)
 
@@ -117,13 +125,21 @@ class DatagramValidator:
         if isinstance(verified, str):
             self.drop(verified)
             return None
-        self.accepted += 1
+        if isinstance(verified, tuple) and isinstance(verified[0], Fiducials):
+            self.fiducials += 1
+        else:
+            self.accepted += 1
         self.last_t_receive_ns = t_receive_ns
         return verified
 
-    def convert(self, verified: Verified) -> CameraObservations:
+    def convert(self, verified: Verified) -> CameraFrame:
         """Second half of `admit`: arrays in the rig's marker order, times in master time."""
-        return verified if isinstance(verified, CameraObservations) else self._build(*verified)
+        if isinstance(verified, CameraObservations):
+            return verified
+        message, t_row0_ns, t_send_ns, t_receive_ns, bound_s = verified
+        if isinstance(message, Fiducials):
+            return fiducial_frame(message, self._camera, t_row0_ns, t_receive_ns)
+        return self._build(message, t_row0_ns, t_send_ns, t_receive_ns, bound_s)
 
     def _verify_text(self, data: bytes, t_receive_ns: int) -> Verified | str:
         if not self._session:
@@ -133,35 +149,37 @@ class DatagramValidator:
 
     def _verify(self, data: bytes, t_receive_ns: int) -> Verified | str:
         message = self.admission.open(data)
-        if not isinstance(message, Observations):
+        if not isinstance(message, Observations | Fiducials):
             return "kind"
-        reason = self._objection(message)
+        sequence = self.sequence if isinstance(message, Observations) else self.fiducial_sequence
+        reason = self._objection(message, sequence)
         if reason is not None:
             return reason
         estimate = self.clock.estimate_at(t_receive_ns)
         if estimate is None:
-            self.sequence.take(message.sequence)  # it came, so it is not lost
+            sequence.take(message.sequence)  # it came, so it is not lost
             return "no_clock"
         t_row0_ns = estimate.to_master_ns(message.t_frame_node_ns) + self._time_offset_ns
         t_send_ns = estimate.to_master_ns(message.t_send_node_ns)
         bound_s = estimate.bound_s(t_receive_ns)
         if not self._plausible(t_row0_ns, t_send_ns, t_receive_ns, bound_s):
             return "time"
-        self.sequence.take(message.sequence)  # also what is refused for its clock has come
+        sequence.take(message.sequence)  # also what is refused for its clock has come
         if not self._travel.believed(t_receive_ns - t_send_ns, t_receive_ns, estimate):
             return "clock_in_doubt"
         return message, t_row0_ns, t_send_ns, t_receive_ns, bound_s
 
-    def _objection(self, message: Observations) -> str | None:
+    def _objection(self, message: Observations | Fiducials, sequence: SequenceWindow) -> str | None:
         """Why this message is not one of the stream we asked for; None when it is."""
         if message.node_id != self._node_id:
             return "foreign_node"
         if message.session != self._session:
             return "session" if self._session else "not_started"
-        verdict = self.sequence.judge(message.sequence)
+        verdict = sequence.judge(message.sequence)
         if verdict is not Verdict.FRESH and verdict is not Verdict.LATE:
             return verdict.name.lower()
-        if message.marker_checksum != self._checksum or message.marker_count != self._count:
+        if isinstance(message, Observations) and (message.marker_checksum != self._checksum
+                                                  or message.marker_count != self._count):
             return "marker_set"
         if (message.width, message.height) != self._size:
             self.image_size = (message.width, message.height)

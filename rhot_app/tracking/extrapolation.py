@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.skeleton import JOINT_SLICES
+from rhot_app.objects.motion import POSE, SIZE, ObjectProcess, pose_of
+from rhot_app.objects.state import ObjectState
 from rhot_app.project import Rig
 from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, VELOCITY, HandProcess
 from rhot_app.tracking.marker_model import compile_markers, scaled_table
@@ -53,7 +55,7 @@ class Extrapolator:
         if ahead_s > GONE_AFTER_S or not (state.tracked or (state.other is not None and state.other.tracked)):
             return None
         dt_s = min(max(ahead_s, 0.0), FARTHEST_AHEAD_S)
-        moved = self._hands[0].moved(state, dt_s)
+        moved = replace(self._hands[0].moved(state, dt_s), objects=tuple(_later(one, dt_s) for one in state.objects))
         if state.other is None:
             return moved
         second, columns = self._hands[1].moved(state.other, dt_s), self._hands[1].columns
@@ -101,6 +103,18 @@ class _Hand:
             fingertip_covariances=_grown(state.fingertip_covariances, way_m[_FINGERTIPS]),
             palm_covariance=state.palm_covariance * np.outer(growth[:6], growth[:6]),
             angle_sd=state.angle_sd * growth[6:])
+
+
+def _later(one: ObjectState, dt_s: float) -> ObjectState:
+    """An object's state, `dt_s` later; its covariance grows by the process noise, not by that of its velocity."""
+    if not one.tracked or dt_s == 0.0:
+        return one
+    covariance = np.zeros((SIZE, SIZE))
+    covariance[:POSE, :POSE] = one.covariance
+    state, grown = ObjectProcess().predict(np.concatenate([one.world_from_object[:3].ravel(), one.velocity]),
+                                           covariance, dt_s)
+    return replace(one, t_master_ns=one.t_master_ns + round(1e9 * dt_s), world_from_object=pose_of(state),
+                   covariance=grown[:POSE, :POSE])
 
 
 def _grown(covariances: Array, way_m: Array) -> Array:

@@ -64,17 +64,10 @@ class HandProcess:
     """Implements `estimation.residual.Process`; M markers.
 
     `dh` has a point for each marker; of a hand without points the whole pose is remembered. `limits` (21, 2) rad.
-<<<<<<< ours
     `mean` (21,) rad and `covariance` (21, 21) of the natural pose. `spread` (2,): standard deviations of the palm's
     translation, m, and rotation, rad, over one correlation time.
     `slowest` (3,) and `fastest` 1/s: limits of the rates of translation, rotation and angles. `bias` (M, 3, 3) m^2:
     covariances of the paint biases, and `bias_s`, one for all or (M,), their correlation times.
-=======
-    `mean` (21,) rad and `covariance` (21, 21) of the natural pose. `spread` (2,): standard deviations of
-    the palm's translation, m, and rotation, rad, over one correlation time. `slowest` (3,) and `fastest` 1/s: limits
-    of the rates of translation, rotation and angles. `bias` (M, 3, 3) m^2:
-    covariances of the paint biases, and `bias_s` their correlation time.
->>>>>>> theirs
     """
 
     def __init__(self, dh: DhArrays, limits: Array, mean: Array, covariance: Array, spread: Array, slowest: Array,

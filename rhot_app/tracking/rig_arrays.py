@@ -122,10 +122,11 @@ class RigArrays:
 
 
 def rigs_of_hands(rig: Rig) -> list[tuple[Rig, NDArray[np.intp]]]:
-    """The rig as if each of its one or two hands were alone, with the numbers of that hand's markers. The filters are
-    not an estimator's."""
+    """The rig as if each of its one or two hands were alone, with the numbers of that hand's markers, which those of
+    objects are not. The filters are not an estimator's."""
+    rig, own = without_objects(rig)
     if rig.other_hand is None:
-        return [(rig, np.arange(len(rig.markers.markers)))]
+        return [(rig, own)]
     found = []
     for hand, wanted in ((rig.hand, False), (rig.other_hand, True)):
         columns = np.flatnonzero([(one.role or "").startswith(OTHER_HAND) == wanted for one in rig.markers.markers])
@@ -133,8 +134,19 @@ def rigs_of_hands(rig: Rig) -> list[tuple[Rig, NDArray[np.intp]]]:
                       for one in (rig.markers.markers[m] for m in columns))
         markers = msgspec.structs.replace(rig.markers, markers=alone)
         found.append((msgspec.structs.replace(rig, markers=markers, hand=hand, other_hand=None,
-                                              filters=FilterSettings()), columns))
+                                              filters=FilterSettings()), own[columns]))
     return found
+
+
+def without_objects(rig: Rig) -> tuple[Rig, NDArray[np.intp]]:
+    """The rig without objects and their markers, and the numbers of the markers that remain."""
+    taken = {marker.marker for model in rig.models for marker in model.markers}
+    own = np.flatnonzero([marker.id not in taken for marker in rig.markers.markers])
+    if not rig.objects or not len(own):
+        return rig, own
+    chosen = msgspec.structs.replace(rig.markers, markers=tuple(rig.markers.markers[m] for m in own))
+    filters = FilterSettings() if taken else rig.filters
+    return msgspec.structs.replace(rig, objects=(), markers=chosen, filters=filters), own
 
 
 def compile_rig(rig: Rig) -> RigArrays:

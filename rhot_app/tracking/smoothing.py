@@ -17,12 +17,15 @@ import numpy as np
 
 from rhot_app.estimation.filter import ChunkedSmoother, Estimate, Knot
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.objects.observations import FiducialFrame
 from rhot_app.project import Rig
 from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
 from rhot_app.tracking.hand_process import HandProcess
 from rhot_app.tracking.marker_residual import MarkerFrame
+from rhot_app.tracking.rig_arrays import without_objects
+from rhot_app.tracking.rig_objects import MarkersBeside, SmoothedObjects
 from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import TwoHands, require_estimator
@@ -234,7 +237,10 @@ class SmoothedTracker:
         """Raises RigError as `make_tracker` does; the rig's tracker must be the estimator."""
         assert rig.tracker.kind == "estimator"
         require_estimator(rig)
-        self._tracker = RecordingEstimator(rig) if rig.other_hand is None else TwoRecordingEstimators(rig)
+        hand, own = without_objects(rig)
+        self._tracker = RecordingEstimator(hand) if rig.other_hand is None else TwoRecordingEstimators(hand)
+        self._objects = SmoothedObjects(rig) if rig.objects else None
+        self._markers = MarkersBeside(rig, own)
         self._sequence = 0
         self._last_ns: int | None = None
 
@@ -244,8 +250,16 @@ class SmoothedTracker:
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in."""
+        if self._objects is not None:
+            self._objects.ingest_markers(observations)
+            observations = self._markers.of_hand(observations)
         self._tracker.ingest(observations)
         self._tracker.solve()
+
+    def ingest_fiducials(self, frame: FiducialFrame) -> None:
+        """Take the tags of one frame in."""
+        if self._objects is not None:
+            self._objects.ingest_fiducials(frame)
 
     def states(self) -> Iterator[HandState]:
         """The states that have become final."""
@@ -255,12 +269,18 @@ class SmoothedTracker:
                 self._last_ns = before_ns
                 continue  # a frame without a hand that was late
             other = None if state.other is None else replace(state.other, sequence=self._sequence)
-            yield replace(state, sequence=self._sequence, other=other)
+            found = replace(state, sequence=self._sequence, other=other)
+            if self._objects is not None:
+                objects = self._objects.states(state.t_master_ns)
+                found = self._objects.told_with(self._markers.completed(found, objects), objects)
+            yield found
             self._sequence += 1
 
     def finish(self) -> Iterator[HandState]:
         """The rest of the states."""
         self._tracker.conclude()
+        if self._objects is not None:
+            self._objects.finish()
         yield from self.states()
 
 

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.objects.state import ObjectState
+
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 
@@ -89,6 +91,7 @@ class HandState:
     hand_scale_sd: float
     latency_s: dict[str, float]  # by LATENCY_STAGES
     other: HandState | None = None  # of the rig's other hand at the same instant, with its own markers only
+    objects: tuple[ObjectState, ...] = ()  # the rig's tracked objects at the same instant
 
     @property
     def tracked(self) -> bool:

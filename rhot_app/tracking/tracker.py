@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.objects.observations import FiducialFrame
 from rhot_app.tracking.state import HandState
 
 Array = NDArray[np.float64]
@@ -78,3 +79,24 @@ class Tracker(Protocol):
     def reset(self) -> None:
         """Forget everything: a new session, or a node's clock was set."""
         ...
+
+
+@runtime_checkable
+class ObjectTracking(Protocol):
+    """A tracker that tracks objects as well."""
+
+    def ingest_fiducials(self, frame: FiducialFrame) -> None:
+        """Take the fiducial tags of one frame in."""
+        ...
+
+
+CameraFrame = CameraObservations | FiducialFrame
+"""What a node sends of one frame: its markers, or its fiducial tags."""
+
+
+def feed(tracker: Tracker, frame: CameraFrame) -> None:
+    """Have `tracker` take a frame in. Tags are for those that track objects."""
+    if isinstance(frame, CameraObservations):
+        tracker.ingest(frame)
+    elif isinstance(tracker, ObjectTracking):
+        tracker.ingest_fiducials(frame)

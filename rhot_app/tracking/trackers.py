@@ -14,7 +14,8 @@ from rhot_app.project import Rig, estimator_obstacle
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.rig_arrays import rigs_of_hands
+from rhot_app.tracking.rig_arrays import rigs_of_hands, without_objects
+from rhot_app.tracking.rig_objects import WithObjects
 from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import CameraObservations, Tracker
 
@@ -93,12 +94,16 @@ class TwoHands:
 # -- Which tracker a rig gets ------------------------------------------------------------------------------------------
 
 def make_tracker(rig: Rig) -> Tracker:
-    """A new tracker for `rig`. Raises RigError when the estimator cannot work with its markers, cameras or
-    nodes."""
+    """A new tracker for `rig` and its objects. Raises RigError when the estimator cannot work with its markers, cameras
+    or nodes, or the mesh of an object cannot be used."""
     if rig.tracker.kind == "classic":
-        return ClassicTracker(rig)
-    require_estimator(rig)
-    return Estimator(rig) if rig.other_hand is None else TwoHands(rig)
+        own = np.arange(len(rig.markers.markers))  # it locates markers wherever they are
+        tracker: Tracker = ClassicTracker(rig)
+    else:
+        require_estimator(rig)
+        hand, own = without_objects(rig)
+        tracker = Estimator(hand) if rig.other_hand is None else TwoHands(hand)
+    return WithObjects(rig, tracker, own) if rig.objects else tracker
 
 
 def require_estimator(rig: Rig) -> None:

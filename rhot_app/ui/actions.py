@@ -48,6 +48,10 @@ class Actions(QObject):
                                      "delete.")
         self.outputs = self._make("Outputs …", "", "Live streams to other programs: OSC, VMC, WebSocket, web view and "
                                   "others; which run, and how they go.")
+        self.add_object = self._make("Add a tracked object …", "", "Track an object with tags or colour markers beside "
+                                     "the hand: choose its object file.")
+        self.objects = QMenu("Remove a tracked object", parent)
+        self.objects.setToolTipsVisible(True)
         self.save_rig = self._make("Save rig", "Ctrl+S", "Write the rig as it is now to its file; what stood there is "
                                    "kept beside it.")
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
@@ -150,6 +154,7 @@ class MainToolBar(QToolBar):
         a = actions
         self.rig_button, self.rig_menu = self._add_menu("Rig", [
             a.twin, a.open, a.nodes, None, a.open_recording, a.recordings, a.video, a.bookmark, a.export, None,
+            a.add_object, a.objects.menuAction(), None,
             a.outputs, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig, a.close_rig,
             None, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [

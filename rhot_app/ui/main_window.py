@@ -32,6 +32,7 @@ from rhot_app.ui.shapes import show_overflow
 from rhot_app.ui.simulated_rig_menus import LensCaps, TwinShows
 from rhot_app.ui.status_words import RigWatch, label_of, look_of, notices_of
 from rhot_app.ui.theme import scheme_named
+from rhot_app.ui.tracked_objects import TrackedObjects
 from rhot_app.ui.welcome import WelcomePage
 from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, WIZARDS, wizard_named
 from rhot_app.ui.wizards.launcher import Launcher
@@ -77,6 +78,8 @@ class MainWindow(QMainWindow):
         self.lens_caps = LensCaps(controller, self.actions_.caps, self.tell)
         self.twin_shows = TwinShows(controller, self.actions_.shows, self.tell)
         self.wizards.twin_menu = self.twin_shows.menu
+        self.tracked_objects = TrackedObjects(controller, self.actions_.add_object, self.actions_.objects, self.tell,
+                                              self.rig_watch.look_soon, self)
         self.docks = Docks(self)
         self._add_docks()
         self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)
@@ -97,7 +100,7 @@ class MainWindow(QMainWindow):
         self.docks.add("Nodes", parts.nodes, "left", scroll=True)
         self.docks.add("Markers", parts.markers, "left", scroll=True)
         self.docks.add("Cameras", parts.cameras, "right")
-        self.docks.add("Hand", parts.hand, "right")
+        self.docks.add("Hand", parts.hand_and_objects, "right")
         self.docks.add("Plots", parts.plots, "bottom", title=False)
 
     def _connect_actions(self) -> None:
@@ -295,8 +298,8 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.close_rig, a.properties.menuAction(), a.frame, a.home,
-                a.names, a.clouds, a.now]
+        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.add_object, a.close_rig, a.properties.menuAction(),
+                a.frame, a.home, a.names, a.clouds, a.now]
 
     def _show_busy(self) -> None:
         if self.controller.opened is None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QByteArray, Qt, QTimer
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QSplitter, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
 from rhot_app.project import Rig
 from rhot_app.tracking.state import Condition, HandState
@@ -19,6 +19,7 @@ from rhot_app.ui.panels.camera_panel import CameraPanel
 from rhot_app.ui.panels.hand_panel import HandPanel
 from rhot_app.ui.panels.markers_panel import MarkersPanel
 from rhot_app.ui.panels.nodes_panel import NodesPanel
+from rhot_app.ui.panels.objects_panel import ObjectsPanel
 from rhot_app.ui.plots.live_plots import JitterPlot, LatencyPlot, RatePlot
 from rhot_app.ui.plots.plot_panel import PlotPanel
 from rhot_app.ui.scene.view import SceneView
@@ -42,6 +43,13 @@ class Screen:
         self.markers = MarkersPanel(scheme)
         self.cameras = CameraPanel(scheme)
         self.hand = HandPanel(scheme)
+        self.objects = ObjectsPanel(scheme)
+        self.hand_and_objects = QWidget()
+        beneath = QVBoxLayout(self.hand_and_objects)
+        beneath.setContentsMargins(0, 0, 0, 0)
+        beneath.setSpacing(0)
+        beneath.addWidget(self.hand, 1)
+        beneath.addWidget(self.objects)
         self.jitter = JitterPlot(scheme)
         self.latency = LatencyPlot(scheme)
         self.rate = RatePlot(scheme)
@@ -63,7 +71,7 @@ class Screen:
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours everywhere."""
-        for part in (self.scene, self.nodes, self.markers, self.cameras, self.hand):
+        for part in (self.scene, self.nodes, self.markers, self.cameras, self.hand, self.objects):
             part.set_scheme(scheme)
         for plot in self.all_plots:
             plot.set_scheme(scheme)
@@ -79,6 +87,7 @@ class Screen:
             plot.begin_anew()
         self.nodes.show_status(None)
         self.hand.show_rig(rig)
+        self.objects.show_rig(rig)
         self._drawn_state = self._drawn_preview = self._framed_session = -1
         self._state_seen_at = 0.0
 
@@ -131,6 +140,8 @@ class Screen:
             self.markers.show_state(fresh, running=running)
         if self.hand.isVisible():
             self.hand.show_state(fresh)
+        if self.objects.isVisible():
+            self.objects.show_state(fresh)
 
     @property
     def frame_cost_s(self) -> float:

@@ -32,6 +32,10 @@ edges blur into it (`tests/objects/test_tag_detector.py`, a lens blur of 0.7 px)
 UNREFINED_PX = 0.7
 """px: standard deviation of a corner as cv2.aruco finds it (`tests/objects/test_tag_detector.py`)."""
 
+APART = 0.05
+"""Of a quadrangle's perimeter: others whose corners are nearer are taken for the same one, and the largest is read.
+OpenCV 4's later default of 0.125 takes the edge of the paper for the tag (`python benchmarks/tags.py`)."""
+
 _ITERATIONS = 3  # of fitting the lines where the last ones lay; the first lie within 1.5 px
 _NEAREST, _FARTHEST = 1.0, 3.0  # px from the edge: its blur, and noise beyond it
 _END_PX = 2.0  # from a corner, where both edges blur
@@ -44,10 +48,9 @@ def family_number(name: str) -> int:
 
     Raises SettingsError when there is no such dictionary.
     """
-    number = getattr(cv2.aruco, name, None) if name.startswith("DICT_") else None
-    if not isinstance(number, int) or not 0 <= number < len(FAMILIES):
+    if name not in FAMILIES:
         raise SettingsError(f"there is no tag dictionary {name!r}; cv2.aruco has {', '.join(FAMILIES)}.")
-    return number
+    return FAMILIES.index(name)
 
 
 def family_size(number: int) -> int:
@@ -70,6 +73,7 @@ class TagDetector:
         for number in dict.fromkeys(family_number(name) for name in families):
             parameters = cv2.aruco.DetectorParameters()
             parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
+            parameters.minMarkerDistanceRate = APART
             dictionary = cv2.aruco.getPredefinedDictionary(number)
             self._detectors.append((number, dictionary.markerSize + 2, cv2.aruco.ArucoDetector(dictionary, parameters)))
 

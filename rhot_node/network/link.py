@@ -19,7 +19,17 @@ from rhot_node.errors import LinkError, WireError
 from rhot_node.network.presence import Presence
 from rhot_node.network.session import LinkKeys, Sessions, Stream
 from rhot_node.wire.codec import Seal, asks_who_is_there, decode, encode
-from rhot_node.wire.messages import ClockReply, ClockRequest, Find, Message, NodeState, Observations, Start, Stop
+from rhot_node.wire.messages import (
+    ClockReply,
+    ClockRequest,
+    Fiducials,
+    Find,
+    Message,
+    NodeState,
+    Observations,
+    Start,
+    Stop,
+)
 
 log = logging.getLogger(__name__)
 
@@ -63,8 +73,9 @@ class UdpLink:
         for number in self._sockets:
             self._poll.register(number, select.POLLIN)
 
-    def send(self, observations: Observations, stream: Stream) -> bool:
-        """Send one frame's observations; False when the network refused them, which costs that frame only."""
+    def send(self, observations: Observations | Fiducials, stream: Stream) -> bool:
+        """Send one frame's observations; False when the network refused them, which costs that frame only. Any thread
+        may call it."""
         try:
             self._socket.sendto(encode(observations, stream.seal), stream.address)
         except (OSError, WireError) as exc:

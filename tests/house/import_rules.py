@@ -31,7 +31,9 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.progress": (),
     "rhot_app.keys": ("rhot_node",),
     "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project"),
-    "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy"),
+    "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy",
+                         "rhot_app.objects.object_file"),
+    "rhot_app.objects.object_file": ("rhot_node", "rhot_app.errors", "rhot_app.geometry.transforms"),
     "rhot_app.geometry": APP_BASE,
     "rhot_app.filters": APP_BASE,
     "rhot_app.estimation": (),
@@ -42,11 +44,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),
     "rhot_app.objects.alignment_command": BELOW_ENGINE,
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.tracking.hand_process",
-<<<<<<< ours
-                          "rhot_app.tracking.state", "rhot_app.tracking.estimator_state"),
-=======
                           "rhot_app.tracking.state", "rhot_app.tracking.estimator_state"),  # one process for all kinds
->>>>>>> theirs
     "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS),
     "rhot_app.recording": BELOW_ENGINE,
     "rhot_app.sources": BELOW_ENGINE,

@@ -11,7 +11,8 @@ import pytest
 from rhot_app import project
 from rhot_app.calibration.lens import intrinsics
 from rhot_app.hand import anatomy, articulated
-from rhot_app.objects import alignment_file
+from rhot_app.objects import alignment_file, object_file
+from rhot_app.objects.state import ObjectState
 from rhot_app.tracking.state import HandState
 from rhot_node import config, markers
 
@@ -20,18 +21,22 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGES: tuple[tuple[str, str, int, tuple[type[msgspec.Struct], ...]], ...] = (
     ("rig.md", project.FORMAT, project.VERSION, (
         project.Rig, project.RigNode, project.Intrinsics, project.CameraPose, project.CameraCalibration,
-        project.Broadcast, project.FilterSettings, project.OneEuroSettings)),
+        project.RigObject, project.Broadcast, project.FilterSettings, project.OneEuroSettings)),
     ("markers.md", markers.FORMAT, markers.VERSION, (
         markers.MarkerSet, markers.Marker, markers.ChromaModel, markers.RangeModel)),
     ("calibration-files.md", intrinsics.FORMAT, intrinsics.VERSION, (
         intrinsics.IntrinsicsFile, intrinsics.BoardUsed)),
     ("alignment.md", alignment_file.FORMAT, alignment_file.VERSION, (
         alignment_file.Alignment, alignment_file.RigidTransform)),
+    ("objects.md", object_file.FORMAT, object_file.VERSION, (
+        object_file.ObjectModel, object_file.Tag, object_file.ObjectMarker, object_file.Mesh, object_file.BoxShape,
+        object_file.SphereShape, object_file.CylinderShape)),
     ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy, anatomy.Coupling)),
     ("hand.md", articulated.FORMAT, articulated.VERSION, (
         articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, anatomy.Coupling,
         articulated.Point, articulated.Capsule, articulated.Box)),
-    ("node.md", config.FORMAT, config.VERSION, (config.NodeSettings, config.CameraSettings, config.ClockSettings)),
+    ("node.md", config.FORMAT, config.VERSION, (
+        config.NodeSettings, config.CameraSettings, config.TagSettings, config.ClockSettings)),
 )
 
 
@@ -59,3 +64,6 @@ def test_the_page_about_states_names_every_field() -> None:
     text = (DOCS / "states.md").read_text()
     missing = [name for name in HandState.__slots__ if f"`{name}`" not in text]
     assert not missing, f"docs/states.md does not explain {', '.join(missing)}"
+    text = (DOCS / "objects.md").read_text()
+    missing = [name for name in ObjectState.__slots__ if f"`{name}`" not in text]
+    assert not missing, f"docs/objects.md does not explain {', '.join(missing)}"

@@ -151,7 +151,22 @@ def test_contacts_are_no_observations_unless_asked_for():
         monitor = ContactMonitor(model, Sphere(0.06), as_observation=as_observation)
         assert monitor.residual(world, np.full(5, 1e-3), 99) is None
         found, sd, flags = monitor.update(pose.world_from_palm, pose.angles, np.tile(1e-6 * np.eye(3), (5, 1, 1)),
-                                          world, 3e-6 * np.eye(3))
+                                          world, np.diag([3e-6] * 3 + [0.0] * 3))
         np.testing.assert_allclose(sd, 2e-3)
         assert flags.any() and (flags == (found.distance <= 0.0)).all()
         assert (monitor.residual(world, np.full(5, 1e-3), 99) is not None) == as_observation
+
+
+def test_a_turn_of_the_object_moves_its_surface():
+    model, pose = hand(), neutral_pose()
+    box, world = Box((0.2, 0.2, 0.02)), rigid(np.eye(3), [0.05, 0.0, -0.05])
+    monitor = ContactMonitor(model, box)
+    covariance = np.diag([0.0] * 3 + [1e-4] * 3)  # 0.01 rad
+    _, sd, _ = monitor.update(pose.world_from_palm, pose.angles, np.zeros((5, 3, 3)), world, covariance)
+    points = pad_points(monitor.pads, pose.world_from_palm, pose.angles)
+    moved = np.zeros((5, 3))
+    for axis in range(3):
+        turned = [pad_distances(monitor.pads, points, box, world @ rigid(exp_so3(step * np.eye(3)[axis]), [0.0] * 3))
+                  for step in (1e-6, -1e-6)]
+        moved[:, axis] = (turned[0].distance - turned[1].distance) / 2e-6
+    np.testing.assert_allclose(sd, 0.01 * np.linalg.norm(moved, axis=1), rtol=1e-4)

@@ -8,7 +8,7 @@ from tag_pictures import render
 
 from rhot_app.geometry.transforms import log_so3
 from rhot_app.objects.observations import fiducial_frame
-from rhot_app.objects.pose import Validity
+from rhot_app.objects.state import Validity
 from rhot_app.objects.track import ObjectTracker
 from rhot_node.detect.tags import TagDetector
 from rhot_node.wire.codec import decode, encode

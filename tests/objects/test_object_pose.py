@@ -10,7 +10,8 @@ from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
 from rhot_app.objects.motion import CameraArrays
 from rhot_app.objects.object_file import ObjectMarker, ObjectModel, plate
 from rhot_app.objects.observations import MarkerPoints, ObjectPoints
-from rhot_app.objects.pose import ObjectPose, Validity, estimate_pose
+from rhot_app.objects.pose import ObjectPose, estimate_pose
+from rhot_app.objects.state import Validity
 
 CAMERAS = wide_cameras()
 ARRAYS = CameraArrays.of(CAMERAS)

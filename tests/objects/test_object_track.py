@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from rhot_app.errors import ObjectError
 from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
 from rhot_app.objects.object_file import ObjectModel, plate
 from rhot_app.objects.observations import FiducialFrame
-from rhot_app.objects.pose import Validity
-from rhot_app.objects.track import ObjectState, ObjectTracker
+from rhot_app.objects.pose import Mode
+from rhot_app.objects.state import ObjectState, Validity
+from rhot_app.objects.stream import PoseMeasurement
+from rhot_app.objects.track import ObjectTracker, Track
 
 CAMERAS = wide_cameras()
 START_NS = 5_000_000_000
@@ -164,3 +167,33 @@ def test_several_objects_are_tracked_at_once() -> None:
         assert errors([one[number] for one in states[10:]], where[name])[0].max() < 5e-3
     with pytest.raises(ObjectError, match="cannot be told apart"):
         ObjectTracker([CUBE, plate("other", 1, 1, 45.0, 0.0, "DICT_APRILTAG_36h11", 2)], CAMERAS)
+
+
+POSE_COVARIANCE = np.diag([1e-6] * 3 + [1e-4] * 3)  # m^2, rad^2
+
+
+class TwoPoses(PoseMeasurement):
+    """A first measurement that leaves two poses open."""
+
+    def __init__(self, t_ns: int, likely: np.ndarray, other: np.ndarray) -> None:
+        super().__init__(t_ns, likely, POSE_COVARIANCE)
+        self.poses = likely, other
+
+    def modes(self) -> list[Mode]:
+        found = [PoseMeasurement(self.t_ns, pose, POSE_COVARIANCE).modes()[0] for pose in self.poses]
+        return [replace(found[0], probability=0.9), replace(found[1], probability=0.1)]
+
+
+@pytest.mark.parametrize("wrong", [1, 3])
+def test_one_outlier_that_only_the_flip_explains_does_not_end_the_right_pose(wrong: int) -> None:
+    right, flip = rigid(np.eye(3), [0.0, 0.0, 0.6]), rigid(exp_so3([2.0, 0.0, 0.0]), [0.0, 0.0, 0.6])
+    track = Track("tag")
+    track.take(TwoPoses(0, right, flip))
+    for number in range(1, 1 + wrong):
+        assert track.take(PoseMeasurement(number * PERIOD_NS, flip, POSE_COVARIANCE))
+    accepted = track.take(PoseMeasurement((1 + wrong) * PERIOD_NS, right, POSE_COVARIANCE))
+    shown = track.state((1 + wrong) * PERIOD_NS).world_from_object
+    if wrong == 1:
+        assert accepted and np.linalg.norm(log_so3(shown[:3, :3])) < 0.05, "the right pose went on"
+    else:  # three in a row are no outliers
+        assert not accepted and np.linalg.norm(log_so3(shown[:3, :3] @ flip[:3, :3].T)) < 0.05

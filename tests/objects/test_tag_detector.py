@@ -103,3 +103,14 @@ def test_noise_and_every_shape_of_luma_raise_nothing() -> None:
     rng, detector = np.random.default_rng(3), TagDetector(["DICT_4X4_50"])
     for shape in ((480, 640), (16, 16), (1, 640), (3, 3)):
         detector.detect(rng.integers(0, 256, shape, dtype=np.uint8))
+
+
+@pytest.mark.parametrize("paper_px", [10, 16, 20, 32])
+def test_a_tag_on_a_narrow_paper_is_not_taken_for_its_paper(paper_px: int) -> None:
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    luma, detector = np.full((200, 200), 90, np.uint8), TagDetector(["DICT_APRILTAG_36h11"])
+    tag = np.pad(cv2.aruco.generateImageMarker(family, 5, 64), paper_px, constant_values=230)
+    luma[30:30 + len(tag), 30:30 + len(tag)] = tag
+    found = detector.detect(cv2.GaussianBlur(luma, (0, 0), 0.7))
+    assert [one.number for one in found] == [5]
+    np.testing.assert_allclose(found[0].corners[:2], 29.5 + paper_px, atol=0.1)

@@ -209,7 +209,7 @@ def check_rig(rig: Rig) -> RigReport:
     lenses = tuple(lens_figures(node) for node in rig.nodes) if calibrated else ()
     pairs = tuple(all_pairs(rig)) if calibrated else ()
     findings = [*_camera_findings(rig, lenses, pairs), *marker_findings(rig), *hand_findings(rig),
-                *filter_findings(rig), *link_findings(rig), *_tracker_findings(rig)]
+                *filter_findings(rig), *link_findings(rig), *_tracker_findings(rig), *object_findings(rig)]
     if len(rig.nodes) < 2:
         findings.append(Finding("one_camera", Grade.FAIR, "The rig has one camera.", "Depth needs two.",
                                 "Add a second node."))
@@ -333,3 +333,32 @@ _TUNE = "Tune the filters."
 
 def _slow(settings: OneEuroSettings) -> bool:
     return settings.min_cutoff_hz < 5.0
+
+
+# -- Whether the cameras can read the tags of the rig's objects --------------------------------------------------------
+
+LEAST_TAG_PX = 20.0
+"""px: smaller tags are seldom found, and their pose is poorly known (`tests/objects/test_tag_detector.py`)."""
+
+
+def object_findings(rig: Rig) -> list[Finding]:
+    """Tags that are too small for the cameras, and meshes that are not there."""
+    distance_m = 0.6 if rig.calibration is None else rig.calibration.distance_m
+    focal_px = max(min(node.intrinsics.fx, node.intrinsics.fy) for node in rig.nodes)
+    found = []
+    for one, model in zip([one for one in rig.objects if one.model is not None], rig.models, strict=True):
+        small = [tag for tag in model.fiducials if focal_px * 1e-3 * tag.size_mm / distance_m < LEAST_TAG_PX]
+        if small:
+            width_px = focal_px * 1e-3 * small[0].size_mm / distance_m
+            found.append(Finding(
+                "small_tag", Grade.FAIR,
+                f"Tag {small[0].id} of the object {model.name} is {small[0].size_mm:g} mm wide, which is "
+                f"{width_px:.0f} px at {distance_m:g} m.", f"Tags under {LEAST_TAG_PX:g} px are seldom found.",
+                f"Print it {LEAST_TAG_PX / focal_px * distance_m * 1e3:.0f} mm wide or larger, or correct size_mm in "
+                f"{one.file}."))
+        if model.mesh is not None and one.folder is not None and not (one.folder / model.mesh.file).is_file():
+            found.append(Finding(
+                "mesh", Grade.FAIR if model.shape is not None else Grade.POOR,
+                f"The mesh {model.mesh.file} of the object {model.name} is not in {one.folder}.", "",
+                f"Put it there, or take it out of {one.file}."))
+    return found

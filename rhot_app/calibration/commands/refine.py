@@ -69,10 +69,11 @@ def _frames(log: Path, rig: Rig) -> list[CameraObservations]:
     from rhot_app.errors import RecordingError
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogValidator
+    from rhot_app.tracking.tracker import CameraObservations
 
     validator = LogValidator(rig)
     with contextlib.closing(LogReader(log)) as reader:
-        frames = [frame for record in reader if (frame := validator.feed(record)) is not None]
+        frames = [frame for record in reader if isinstance(frame := validator.feed(record), CameraObservations)]
     if not frames:
         raise RecordingError(f"{log}: no frame in it can be used with the rig {rig.name!r} ({why_none(validator)}). "
                              "Give the rig that the log was recorded with, or record again.")

@@ -31,6 +31,7 @@ from rhot_app.simulator.scene.live_scene import LiveScene
 from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
 from rhot_app.simulator.scene.scene_arguments import add_show_arguments, show_of
 from rhot_app.simulator.scene.scene_description import Show
+from rhot_app.simulator.scene.scene_objects import write_held
 from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 from rhot_node.config import load_settings
 from rhot_node.errors import NodeError, SettingsError
@@ -171,7 +172,7 @@ def run(scene: Scene, show: Show, directory: Path, rig_path: Path) -> None:
         deadline = time.monotonic() + READY_TIMEOUT_S
         while (ports := supervisor.ports(deadline)) is None:
             cameras.step()
-        save_rig(rig_path, build_rig(scene, tuple(ports)))
+        save_rig(rig_path, build_rig(scene, tuple(ports), write_held(stage.setting.scene_object, rig_path.parent)))
         door.start()
         print(json.dumps({"event": "ready", "rig": str(rig_path), "pid": os.getpid()}), flush=True)
         pace = Pace(scene.preset.fps)

@@ -17,7 +17,7 @@ from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.scene.background import background_image
 from rhot_app.simulator.scene.scene import Scene, TwinSettings, build_rig, make_scene, node_settings
 from rhot_app.simulator.scene.scene_description import HandShow, Show
-from rhot_app.simulator.scene.scene_objects import SceneObject, make_object
+from rhot_app.simulator.scene.scene_objects import SceneObject, make_object, write_held
 from rhot_node.config import save_settings
 from rhot_node.files import read_document, write_document
 
@@ -99,6 +99,6 @@ def save_shot(shot: Shot, folder: Path) -> None:
     ports = tuple(NodePorts(first, first + 1, first + 2, first + 3) for first in firsts)
     for index, name in enumerate(scene.names):
         save_settings(folder / f"{name}.json", node_settings(scene, index, ports=ports[index], trust="open"))
-    save_rig(folder / RIG_NAME, build_rig(scene, ports))
+    save_rig(folder / RIG_NAME, build_rig(scene, ports, write_held(shot.scene_object, folder)))
     write_document(folder / SHOT_NAME, ShotFile(shot.scene_object.name, shot.seconds, scene.seed, sorted(shot.hidden),
                                                 scene.settings, shot.show))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board, CharucoBoard
+from rhot_app.objects.object_file import Tag
 
 Array = NDArray[np.float64]
 Levels = NDArray[np.float32]
@@ -74,6 +75,15 @@ def ruler_sheet(length_m: float) -> Sheet:
 def ruler_ends(length_m: float) -> Array:
     """(2, 3) m, the middles of the crosses in the sheet's frame."""
     return np.array([[0.0, 0.0, 0.0], [length_m, 0.0, 0.0]])
+
+
+def tag_sheet(tag: Tag, face_m: float) -> Sheet:
+    """A tag in the middle of a square of white paper of `face_m`; x right, y down, z into the paper."""
+    family = cv2.aruco.getPredefinedDictionary(tag.key[0])
+    modules = family.markerSize + 2
+    bits = cv2.aruco.generateImageMarker(family, tag.id, modules, borderBits=1)
+    lines = 1e-3 * tag.size_mm * (np.arange(modules + 1) / modules - 0.5)
+    return _on_paper(lines, lines, np.where(bits > 0, WHITE, BLACK), 0.5 * (face_m - 1e-3 * tag.size_mm))
 
 
 def _charuco_sheet(board: CharucoBoard) -> Sheet:

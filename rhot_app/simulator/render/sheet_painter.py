@@ -40,6 +40,18 @@ class SheetPainter:
         """Another light: the `background` as it is lit now, and factors (3,) on the paper's grey levels."""
         self._background, self._image, self._colour = background, background.copy(), np.asarray(level)
 
+    def over(self, background: Image, image: Image) -> None:
+        """Paint into `image` from now on, with `background` around the sheet; both (3, H, W)."""
+        self._background, self._image = background, image
+
+    def corners(self, source: PoseSource, t_s: float) -> Array:
+        """(4, 2) px where the paper's corners appear at a time."""
+        world_from_sheet, _ = source.sample(np.array([t_s]))
+        camera_from_sheet = self._camera.camera_from_world @ world_from_sheet[0]
+        points = self._sheet.outline @ camera_from_sheet[:3, :3].T + camera_from_sheet[:3, 3]
+        flat = points[:, :2] / np.maximum(points[:, 2:], NEAR_M)
+        return project_normalised(np.ascontiguousarray(flat), self._camera.intrinsics)
+
     def paint(self, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
         """Paint the sheet as `source` moves it during the frame."""
         world_from_sheet, _ = source.sample(time.nodes_s)

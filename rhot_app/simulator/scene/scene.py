@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import RigError, SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
-from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode, RigObject
 from rhot_app.simulator.nodes.nodes import NodePorts
 from rhot_app.simulator.scene.camera_controls import Controls, Lamp
 from rhot_node.config import CameraSettings, ClockSettings, NodeSettings
@@ -200,7 +200,7 @@ def node_settings(scene: Scene, index: int, *, detector: Literal["fast", "refere
         clock=ClockSettings(offset_s=scene.clocks[index].offset_s, drift_ppm=scene.clocks[index].drift_ppm))
 
 
-def build_rig(scene: Scene, ports: tuple[NodePorts, ...]) -> Rig:
+def build_rig(scene: Scene, ports: tuple[NodePorts, ...], objects: tuple[RigObject, ...] = ()) -> Rig:
     """The rig file that a perfect calibration of this scene would give, with the daemons' real ports."""
     nodes = tuple(
         RigNode(node_id=index + 1, name=name, intrinsics=scene.intrinsics, pose=scene.poses[index],
@@ -209,4 +209,4 @@ def build_rig(scene: Scene, ports: tuple[NodePorts, ...]) -> Rig:
                 public_key=ports[index].public_key)
         for index, name in enumerate(scene.names))
     return Rig(name="simulated", nodes=nodes, markers=scene.markers, hand=scene.hand,
-               calibration=CameraCalibration("exact", error_m=0.0))
+               calibration=CameraCalibration("exact", error_m=0.0), objects=objects)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     """What is shown, besides the hand's ``--motion``."""
+    parser.add_argument("--cube", action="store_true",
+                        help="the hand holds a cube with fiducial tags, which the rig then tracks")
     room = parser.add_argument_group("instead of a hand")
     room.add_argument("--show", default="hand", choices=("hand", "board", "ruler", "marker"),
                       help="what stands before the cameras (default hand)")
@@ -50,7 +52,7 @@ def show_of(args: argparse.Namespace) -> Show:
     if args.show == "hand" and args.bare:
         fields |= {"show": "bare_hand", "motion": args.motion, "tone": args.tone, "sleeve": args.sleeve}
     elif args.show == "hand":
-        fields["motion"] = args.motion
+        fields |= {"motion": args.motion, "cube": args.cube}
     elif args.show == "board":
         fields |= {"pattern": "charuco" if args.charuco else "chessboard", "square_mm": args.square_mm,
                    "size": args.board or (CHARUCO if args.charuco else BOARD), "marker_mm": args.marker_mm,

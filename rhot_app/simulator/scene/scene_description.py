@@ -22,9 +22,11 @@ class _Show(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 
 class HandShow(_Show, frozen=True, tag="hand"):
-    """A hand that wears the scene's markers. `motion` is a name of resources/motions or a file; see `load_motion`."""
+    """A hand that wears the scene's markers. `motion` is a name of resources/motions or a file; see `load_motion`.
+    `cube`: it holds a cube with a tag on each face (resources/objects/cube.json)."""
 
     motion: str = "grasp"
+    cube: bool = False
 
 
 class BareHandShow(_Show, frozen=True, tag="bare_hand"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,12 @@ from scipy.spatial.transform import Rotation
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
+from rhot_app.objects.object_file import ObjectModel, save_object
+from rhot_app.project import RigObject
 from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter
 from rhot_app.simulator.bare_hand.sequence import BareHandOptions, drawn_hand
 from rhot_app.simulator.render.body import HandBody, Look, build_body
+from rhot_app.simulator.render.held_painter import HeldPainter, held_cube
 from rhot_app.simulator.render.painter import Image, Painter, PoseSource
 from rhot_app.simulator.render.sheet import Sheet, board_sheet, ruler_sheet
 from rhot_app.simulator.render.sheet_painter import SheetPainter
@@ -40,6 +44,7 @@ class SceneObject:
     name: str
     thing: HandBody | BareHand | RigidTarget | Sheet
     source: PoseSource
+    held: ObjectModel | None = None  # an object in the hand, at PALM_FROM_OBJECT
 
     def painter(self, camera: CameraModel, background: Image, shading: float, seed: int) -> Painter:
         """The painter of this act for one camera."""
@@ -47,6 +52,8 @@ class SceneObject:
             return SheetPainter(self.thing, camera, background, shading, seed)
         if isinstance(self.thing, BareHand):
             return BareHandPainter(self.thing, camera, background)
+        if self.held is not None:
+            return HeldPainter(self.thing, self.held, camera, background, shading, seed)
         return SolidsPainter(self.thing, camera, background, shading, seed)
 
 
@@ -59,7 +66,8 @@ def make_object(show: Show, scene: Scene, hidden: frozenset[str] = frozenset()) 
         case HandShow():
             model, motion, settings = *_moved_hand(show.motion, scene), scene.settings
             look = Look(settings.worn_paint, settings.uneven_paint, settings.glove_rgb, scene.seed)
-            return SceneObject(motion.name, build_body(model, scene.markers, hidden, look), motion)
+            return SceneObject(motion.name, build_body(model, scene.markers, hidden, look), motion,
+                               held_cube() if show.cube else None)
         case BareHandShow():
             model, motion = _moved_hand(show.motion, scene)
             options = BareHandOptions(tone=show.tone, sleeve=show.sleeve)
@@ -80,6 +88,16 @@ def _moved_hand(motion: str, scene: Scene) -> tuple[HandModel, Motion]:
     model = build_model(scene.hand)
     moved = load_motion(motion, model, scene.centre, scene.seed)
     return model, replace(moved, facing=BACK_FACING) if scene.settings.facing == "back" else moved
+
+
+def write_held(scene_object: SceneObject, folder: Path) -> tuple[RigObject, ...]:
+    """Write the file of what the hand holds to `folder`; the entry of a rig there."""
+    held = scene_object.held
+    if held is None:
+        return ()
+    path = folder.resolve() / f"{held.name}.json"
+    save_object(path, held)
+    return (RigObject(str(path), None, held),)
 
 
 def _board_act(show: BoardShow, scene: Scene) -> SceneObject:

@@ -214,8 +214,8 @@ def _show_named(what: str) -> Show:
     kind, _, detail = what.partition(":")
     with contextlib.suppress(ValueError):
         match kind:
-            case "hand":
-                return HandShow(detail)
+            case "hand" | "held":
+                return HandShow(detail, kind == "held")
             case "bare":
                 return BareHandShow(detail)
             case "board":
@@ -240,7 +240,7 @@ def _key_of(show: Show) -> str:
     )
 
     if isinstance(show, HandShow):
-        return f"hand:{show.motion}"
+        return f"{'held' if show.cube else 'hand'}:{show.motion}"
     if isinstance(show, BareHandShow):
         return f"bare:{show.motion}" if show == BareHandShow(show.motion) else ""
     if isinstance(show, MarkerShow):

@@ -125,16 +125,23 @@ def camera_like_state(state: HandState, up: Up) -> HandState:
     if up == "-y":
         return state
     turn = DISPLAY_FROM_RIG.T
-    palm = state.world_from_palm.copy()
-    palm[:3, :3] = turn @ palm[:3, :3]
-    palm[:3, 3] = camera_like(palm[:3, 3], up)
+    palm = _camera_like_pose(state.world_from_palm, up)
     return replace(state, marker_positions=camera_like(state.marker_positions, up), world_from_palm=palm,
                    joint_positions=camera_like(state.joint_positions, up),
                    fingertip_positions=camera_like(state.fingertip_positions, up),
                    marker_covariances=turn @ state.marker_covariances @ turn.T,
                    joint_covariances=turn @ state.joint_covariances @ turn.T,
                    fingertip_covariances=turn @ state.fingertip_covariances @ turn.T,
+                   objects=tuple(replace(one, world_from_object=_camera_like_pose(one.world_from_object, up))
+                                 for one in state.objects),
                    other=None if state.other is None else camera_like_state(state.other, up))
+
+
+def _camera_like_pose(pose: Array, up: Up) -> Array:
+    """(4, 4) a pose in axes like the left camera's."""
+    out = pose.copy()
+    out[:3, :3], out[:3, 3] = DISPLAY_FROM_RIG.T @ pose[:3, :3], camera_like(pose[:3, 3], up)
+    return out
 
 
 def to_display(points: Array) -> Array:

@@ -24,6 +24,7 @@ from rhot_app.ui.scene.frames import Up, camera_like, camera_like_state, frustum
 from rhot_app.ui.scene.hand_actors import HandActors
 from rhot_app.ui.scene.hands import hands_of, nearest, spots
 from rhot_app.ui.scene.labels import LabelPainter, Legend, TextStyle, ellipsoid_text, pixels_of
+from rhot_app.ui.scene.object_actors import ObjectActors
 
 Array = NDArray[np.float64]
 
@@ -287,8 +288,9 @@ class Actors:
 
     def __init__(self, rig: Rig, scheme: Scheme, opacity: float = 1.0) -> None:
         self._hands = tuple(HandActors(hand, scheme, opacity) for hand in hands_of(rig))
+        self._objects = ObjectActors(rig, scheme, opacity)
         self.ellipsoids: EllipsoidChoice | None = EllipsoidChoice()
-        self.items = tuple(item for hand in self._hands for item in hand.items)
+        self.items = (*(item for hand in self._hands for item in hand.items), *self._objects.items)
 
     @property
     def cut(self) -> bool:
@@ -299,11 +301,13 @@ class Actors:
         """Show nothing until the next pose."""
         for hand in self._hands:
             hand.hide()
+        self._objects.hide()
 
     def pose(self, state: HandState) -> None:
         """Show everything at a state of this rig."""
         for hand in self._hands:
             hand.pose(state, self.ellipsoids)
+        self._objects.pose(state.objects)
 
 
 _SECOND_OPACITY = 0.45

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QListWidget, QMenu, 
 
 from rhot_app import rig_history
 from rhot_app.errors import EngineError, RhotError
-from rhot_app.project import Rig, load_rig, parse_rig
+from rhot_app.project import Rig, parse_rig
 from rhot_app.rig_history import Version
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.job import Job
@@ -218,7 +218,7 @@ class VersionsDialog(QDialog):
         if not 0 <= number < len(self._versions):
             return
         try:
-            rows = rig_rows(self._rig, load_rig(self._versions[number].path))
+            rows = rig_rows(self._rig, rig_history.load_version(self._path, self._versions[number]))
         except RhotError as exc:
             self.table.show_rows(())
             self.sentence.setText(str(exc))
@@ -239,7 +239,7 @@ class VersionsDialog(QDialog):
     def _restore(self, version: Version) -> Rig:
         asker = self._connect()
         try:
-            set_rig(asker.command, load_rig(version.path))
+            set_rig(asker.command, rig_history.load_version(self._path, version))
             try:
                 return rig_history.restore(self._path, version)
             except RhotError:

@@ -1,0 +1,280 @@
+"""The tracked objects of a rig beside its hand: fed with fiducial tags and with colour markers, told with the hand.
+
+A state's objects are those at the hand's instant, by everything that has come until then.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.estimation.filter import AHEAD_S, Estimate, smooth
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.model import HandModel, build_model
+from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
+from rhot_app.objects.motion import POSE, VELOCITY, pose_of
+from rhot_app.objects.observations import FiducialFrame, MarkerPoints
+from rhot_app.objects.shape import shape_of
+from rhot_app.objects.state import ObjectState, Validity, unknown_object
+from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
+from rhot_app.project import Rig
+from rhot_app.tracking.marker_model import scaled_table
+from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_node.wire.messages import MarkerFlag
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_PER_SIGHT = ("pixels", "covariances", "diameters", "qualities", "flags")
+_UNKNOWN: dict[str, Any] = {
+    "marker_positions": np.nan, "marker_raw_positions": np.nan, "marker_covariances": np.nan,
+    "marker_knowledge": int(Knowledge.UNKNOWN), "epipolar_error_px": np.nan}
+_JUMP_NS = 1_000_000_000
+
+
+class RigObjects:
+    """The objects of a rig, and the contacts of its hands with them."""
+
+    def __init__(self, rig: Rig) -> None:
+        """Raises RigError when the mesh of an object cannot be used."""
+        self._tracker = ObjectTracker(rig.models, [CameraModel.from_rig(node.intrinsics, node.pose)
+                                                   for node in rig.nodes])
+        ids = rig.markers.ids
+        worn = [marker.marker for model in rig.models for marker in model.markers]
+        self._columns = np.array([ids.index(name) for name in worn], np.intp)
+        self._ids = tuple(ids[column] for column in self._columns)
+        shapes = [shape_of(one.model, one.folder) for one in rig.objects if one.model is not None]
+        hands = [build_model(hand) for hand in (rig.hand, rig.other_hand) if hand is not None]
+        self._contacts = [_HandContacts(hand, [None if shape is None else ContactMonitor(hand, shape)
+                                               for shape in shapes]) for hand in hands]
+
+    def reset(self) -> None:
+        """Forget everything: a new session, or a node's clock was set."""
+        self._tracker.reset()
+        for contacts in self._contacts:
+            contacts.reset()
+
+    def ingest_fiducials(self, frame: FiducialFrame) -> None:
+        """Take the tags of one frame in."""
+        self._tracker.take(frame)
+
+    def ingest_markers(self, frame: CameraObservations) -> None:
+        """Take the objects' markers of one frame in: the best candidate of each."""
+        if len(self._columns):
+            self._tracker.take(MarkerPoints(frame.camera, frame.t_row0_master_ns, frame.row_time_ns, self._ids,
+                                            frame.pixels[self._columns], frame.covariances[self._columns]))
+
+    def states(self, t_ns: int) -> list[ObjectState]:
+        """The objects at master time `t_ns`, without contacts."""
+        return self._tracker.states(t_ns)
+
+    def told_with(self, state: HandState, objects: list[ObjectState]) -> HandState:
+        """The state with the objects and each hand's contacts."""
+        other = state.other
+        if other is not None and len(self._contacts) > 1:
+            other = replace(other, objects=self._contacts[1].update(other, objects))
+        return replace(state, objects=self._contacts[0].update(state, objects), other=other)
+
+
+class _HandContacts:
+    """Contacts of one hand with each object; None for one without a shape."""
+
+    def __init__(self, hand: HandModel, monitors: list[ContactMonitor | None]) -> None:
+        self._pads, self._monitors = fingertip_pads(hand), monitors
+
+    def reset(self) -> None:
+        for monitor in self._monitors:
+            if monitor is not None:
+                monitor.trigger.touching[:] = False
+
+    def update(self, hand: HandState, objects: list[ObjectState]) -> tuple[ObjectState, ...]:
+        """The objects with distances and contacts of the hand's fingertips."""
+        pads, found = _scaled(self._pads, hand.hand_scale), []
+        for monitor, one in zip(self._monitors, objects, strict=True):
+            if monitor is None:
+                found.append(one)
+            elif hand.tracked and one.tracked:
+                pad, sd, touching = monitor.update(hand.world_from_palm, hand.angles, hand.fingertip_covariances,
+                                                   one.world_from_object, one.covariance, pads)
+                found.append(replace(one, distances=pad.distance, distance_sd=sd, contacts=touching))
+            else:
+                monitor.trigger.touching[:] = False
+                found.append(one)
+        return tuple(found)
+
+
+def _scaled(pads: FingertipPads, scale: float) -> FingertipPads:
+    return pads if scale == 1.0 else FingertipPads(scaled_table(pads.dh, scale), scale * pads.radii)
+
+
+class WithObjects:
+    """Implements `Tracker` for a rig with objects: the states of a hand's tracker, with the objects."""
+
+    def __init__(self, rig: Rig, hand: Tracker, own: Indices) -> None:
+        """`hand`: of the markers `own`, numbers in the rig. Raises RigError as `RigObjects`."""
+        self._objects, self._hand, self._markers = RigObjects(rig), hand, MarkersBeside(rig, own)
+
+    def reset(self) -> None:
+        """Forget everything but the count of states."""
+        self._objects.reset()
+        self._hand.reset()
+        self._markers.reset()
+
+    def ingest(self, observations: CameraObservations) -> None:
+        """Take one frame's markers in."""
+        self._objects.ingest_markers(observations)
+        self._hand.ingest(self._markers.of_hand(observations))
+
+    def ingest_fiducials(self, frame: FiducialFrame) -> None:
+        """Take one frame's tags in."""
+        self._objects.ingest_fiducials(frame)
+
+    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
+        """Each camera's newest frame, of all markers, None before its first."""
+        return self._hand.newest_frames() if self._markers.all_of_hand else tuple(self._markers.newest)
+
+    def solve(self) -> HandState | None:
+        """The hand's state that is due, with the objects at its instant."""
+        state = self._hand.solve()
+        if state is None:
+            return None
+        objects = self._objects.states(state.t_master_ns)
+        return self._objects.told_with(self._markers.completed(state, objects), objects)
+
+
+class MarkersBeside:
+    """The markers of a rig's objects beside those of its hands: taken away before the hand's tracker, which has no
+    place for them, and put back into its states."""
+
+    def __init__(self, rig: Rig, own: Indices) -> None:
+        self._ids, self._own = rig.markers.ids, own
+        self.all_of_hand = len(own) == len(self._ids)
+        self._places = [(number, self._ids.index(marker.marker), 1e-3 * np.array(marker.position_mm))
+                        for number, model in enumerate(rig.models) for marker in model.markers]
+        self.newest: list[CameraObservations | None] = [None] * len(rig.nodes)
+
+    def reset(self) -> None:
+        """Forget the frames."""
+        self.newest = [None] * len(self.newest)
+
+    def of_hand(self, frame: CameraObservations) -> CameraObservations:
+        """The frame with the hand's markers only."""
+        if self.all_of_hand:
+            return frame
+        last = self.newest[frame.camera]
+        if last is None or not 0 <= last.t_row0_master_ns - frame.t_row0_master_ns < _JUMP_NS:
+            self.newest[frame.camera] = frame
+        further = None if frame.further is None else frame.further.of(self._own)
+        return replace(frame, further=further, **{name: getattr(frame, name)[self._own] for name in _PER_SIGHT})
+
+    def completed(self, state: HandState, objects: list[ObjectState]) -> HandState:
+        """The state with all markers of the rig: those of objects lie where the object's pose puts them."""
+        if self.all_of_hand:
+            return state
+        count, columns = len(self._ids), dict[str, Any]()
+        for name, unknown in _UNKNOWN.items():
+            values = getattr(state, name)
+            columns[name] = np.full((count, *values.shape[1:]), unknown, values.dtype)
+            columns[name][self._own] = values
+        pixels = np.full((len(state.camera_names), count, 2), np.nan)
+        flags = np.full(pixels.shape[:2], int(MarkerFlag.LOST), state.camera_flags.dtype)
+        for camera, frame in enumerate(self.newest):
+            if frame is not None:
+                pixels[camera], flags[camera] = frame.pixels, frame.flags
+        pixels[:, self._own], flags[:, self._own] = state.camera_pixels, state.camera_flags
+        for number, marker, place in self._places:
+            pose = objects[number].world_from_object
+            if objects[number].tracked:
+                columns["marker_positions"][marker] = pose[:3, :3] @ place + pose[:3, 3]
+                columns["marker_knowledge"][marker] = Knowledge.INFERRED
+        return replace(state, marker_ids=self._ids, camera_pixels=pixels, camera_flags=flags, **columns)
+
+
+# -- Objects of a recording by all of it: Rauch-Tung-Striebel smoothing of each object's estimates ---------------------
+
+class SmoothedObjects(RigObjects):
+    """Takes the frames of a recording; `states` then tells of an instant by everything, the later frames included."""
+
+    def __init__(self, rig: Rig) -> None:
+        """Raises RigError as `RigObjects`."""
+        super().__init__(rig)
+        self._histories = [_History(model.name) for model in rig.models]
+
+    def ingest_fiducials(self, frame: FiducialFrame) -> None:
+        """Take the tags of one frame in."""
+        super().ingest_fiducials(frame)
+        self._keep()
+
+    def ingest_markers(self, frame: CameraObservations) -> None:
+        """Take the objects' markers of one frame in."""
+        super().ingest_markers(frame)
+        self._keep()
+
+    def finish(self) -> None:
+        """No frame comes any more."""
+        for history in self._histories:
+            history.over = True
+
+    def states(self, t_ns: int) -> list[ObjectState]:
+        """The objects at master time `t_ns`, without contacts. Ask in the order of time."""
+        return [history.at(t_ns) for history in self._histories]
+
+    def _keep(self) -> None:
+        for history, found in zip(self._histories, self._tracker.estimates(), strict=True):
+            if found is not None:
+                history.add(*found)
+
+
+class _History:
+    """Filtered estimates of one object, and the smoothed ones of those that are final. Times are s since the first."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.over = name, False
+        self._filtered: list[Estimate] = []
+        self._smoothed: list[Estimate] = []
+        self._final_s = -math.inf
+        self._first_ns: int | None = None
+
+    def add(self, t_ns: int, estimate: Estimate) -> None:
+        """Keep a newer estimate than the last one."""
+        self._first_ns = t_ns if self._first_ns is None else self._first_ns
+        t_s = 1e-9 * (t_ns - self._first_ns)
+        if not self._filtered or t_s > self._filtered[-1].t_s:
+            self._filtered.append(replace(estimate, t_s=t_s))
+
+    def at(self, t_ns: int) -> ObjectState:
+        """The state at a time, predicted from the smoothed estimate before it."""
+        if self._first_ns is None:
+            return unknown_object(self.name, t_ns, Validity.SEARCHING)
+        t_s = 1e-9 * (t_ns - self._first_ns)
+        if t_s > self._final_s:
+            self._smooth(t_s)
+        place = bisect_right(self._smoothed, t_s, key=lambda one: one.t_s) - 1
+        if place < 0:
+            return unknown_object(self.name, t_ns, Validity.SEARCHING)
+        here = self._smoothed[place]
+        late_ns = round(1e9 * (t_s - here.t_s))
+        if late_ns > LOST_AFTER_NS:
+            return unknown_object(self.name, t_ns, Validity.LOST)
+        state, covariance = here.process.predict(here.state, here.covariance, t_s - here.t_s)
+        return ObjectState(self.name, t_ns, Validity.PREDICTED if late_ns > PREDICTED_AFTER_NS else Validity.TRACKED,
+                           pose_of(state), covariance[:POSE, :POSE], state[VELOCITY:])
+
+    def _smooth(self, t_s: float) -> None:
+        """Smooth what there is, one run of one hypothesis after the other."""
+        first = max(bisect_right(self._filtered, t_s, key=lambda one: one.t_s) - 1, 0)
+        del self._filtered[:first]
+        runs: list[list[Estimate]] = []
+        for one in self._filtered:
+            if runs and one.label == runs[-1][-1].label and one.t_s - runs[-1][-1].t_s < 1e-9 * LOST_AFTER_NS:
+                runs[-1].append(one)
+            else:
+                runs.append([one])
+        self._smoothed = [one for run in runs for one in smooth(run)]
+        self._final_s = math.inf if self.over or not runs else self._filtered[-1].t_s - AHEAD_S

@@ -1,0 +1,128 @@
+"""Objects with colour markers beside the hand: both trackers, the hand's own markers, contacts, refusals, a check."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot_app.calibration.check.checks import check_rig
+from rhot_app.engine.pipeline import warm_up
+from rhot_app.errors import RigError
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.model import build_model, neutral_pose
+from rhot_app.objects.object_file import ObjectMarker, ObjectModel, SphereShape, plate, save_object
+from rhot_app.objects.state import Validity
+from rhot_app.outputs.joints import JointConverter, json_message
+from rhot_app.outputs.osc import object_messages
+from rhot_app.project import Rig, load_rig, with_object, with_tracker
+from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.trackers import make_tracker
+from rhot_node.files import resource_path
+
+PALM = np.array([[0.0, 1.0, 0.0, 0.04], [-1.0, 0.0, 0.0, 0.07], [0.0, 0.0, 1.0, 0.6], [0.0, 0.0, 0.0, 1.0]])
+OBJECT = rigid(exp_so3([0.2, 0.1, 0.0]), [-0.1, 0.0, 0.55])
+PLACES_MM = ((30.0, 0.0, 0.0), (0.0, 40.0, 0.0), (0.0, 0.0, -30.0))
+BALL = ObjectModel("ball", markers=tuple(ObjectMarker(f"ball{k}", place) for k, place in enumerate(PLACES_MM)),
+                   shape=SphereShape(80.0))
+PERIOD_NS = 25_000_000
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Rig:
+    plain = load_rig(resource_path("rigs", "two_pis.json"))
+    extra = tuple(msgspec.structs.replace(plain.markers.markers[0], id=f"ball{k}", role=None, shape="blob")
+                  for k in range(3))
+    own = plain.markers.markers
+    mixed = (*own[:2], extra[0], *own[2:], *extra[1:])  # not at the end
+    save_object(tmp_path / "ball.json", BALL)
+    return with_object(msgspec.structs.replace(plain, markers=msgspec.structs.replace(plain.markers, markers=mixed)),
+                       tmp_path / "ball.json")
+
+
+def frames(rig: Rig, count: int) -> list[CameraObservations]:
+    points = forward(build_model(rig.hand), neutral_pose(PALM))
+    hand = iter(np.vstack([points.marker_centres, points.joints[:1]]))
+    ball = iter(1e-3 * np.array(PLACES_MM) @ OBJECT[:3, :3].T + OBJECT[:3, 3])
+    world = np.array([next(ball) if marker.role is None else next(hand) for marker in rig.markers.markers])
+    found, size = [], len(world)
+    for number in range(count):
+        for camera, node in enumerate(rig.nodes):
+            t_ns = 10**9 + number * PERIOD_NS
+            pixels = CameraModel.from_rig(node.intrinsics, node.pose).project(world)
+            found.append(CameraObservations(
+                camera, t_ns, 0, 1e-5, t_ns + 5_000_000, 1e-3, 1e-3, pixels, np.tile(0.01 * np.eye(2), (size, 1, 1)),
+                np.full(size, 16.0), np.ones(size), np.zeros(size, np.uint16)))
+    return found
+
+
+def last_state(rig: Rig, count: int = 30) -> HandState:
+    tracker, state = make_tracker(rig), None
+    warm_up(tracker, rig)
+    for frame in frames(rig, count):
+        tracker.ingest(frame)
+        state = tracker.solve() or state
+    assert state is not None
+    return state
+
+
+@pytest.mark.parametrize("kind", ["classic", "estimator"])
+def test_an_object_of_markers_is_tracked_beside_the_hand(rig: Rig, kind: str) -> None:
+    state = last_state(with_tracker(rig, kind))  # type: ignore[arg-type]
+    assert state.condition is Condition.TRACKING
+    assert state.marker_ids == rig.markers.ids and state.marker_positions.shape == (len(rig.markers.ids), 3)
+    assert state.camera_pixels.shape == (2, len(rig.markers.ids), 2)
+    one = state.objects[0]
+    assert (one.name, one.validity, one.t_master_ns) == ("ball", Validity.TRACKED, state.t_master_ns)
+    assert np.linalg.norm(one.world_from_object[:3, 3] - OBJECT[:3, 3]) < 1e-3
+    assert np.linalg.norm(log_so3(one.world_from_object[:3, :3] @ OBJECT[:3, :3].T)) < np.radians(1.0)
+    ball = rig.markers.ids.index("ball1")
+    assert state.marker_knowledge[ball] < Knowledge.UNKNOWN
+    expected = OBJECT[:3, :3] @ (1e-3 * np.array(PLACES_MM[1])) + OBJECT[:3, 3]
+    assert np.linalg.norm(state.marker_positions[ball] - expected) < 2e-3
+    assert np.isfinite(one.distances).all() and not one.contacts.any() and (one.distances > 0.0).all()
+    assert np.isfinite(one.distance_sd).all() == (kind == "estimator")
+
+
+def test_the_window_and_the_outputs_get_objects_too(rig: Rig) -> None:
+    rig = with_tracker(rig, "estimator")
+    state = last_state(rig)
+    moved = replace(state, objects=(replace(state.objects[0], velocity=np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])),))
+    later = Extrapolator(rig).at(moved, state.t_master_ns + 10_000_000)
+    assert later is not None
+    step = later.objects[0].world_from_object[:3, 3] - state.objects[0].world_from_object[:3, 3]
+    np.testing.assert_allclose(step, [0.01, 0.0, 0.0], atol=1e-6)
+    assert later.objects[0].covariance[0, 0] > state.objects[0].covariance[0, 0]
+    sample = JointConverter(rig).sample(state, "own")
+    document = json.loads(json_message(sample))["objects"][0]
+    assert document["name"] == "ball" and document["validity"] == "tracked"
+    np.testing.assert_allclose(document["position"], OBJECT[:3, 3], atol=1e-3)
+    addresses = [message.split(b"\0")[0].decode() for message in object_messages(sample)]
+    assert addresses == ["/rhot/object/ball/validity", "/rhot/object/ball/pose", "/rhot/object/ball/fingertips"]
+
+
+def test_rigs_and_objects_that_do_not_go_together_are_refused(rig: Rig, tmp_path: Path) -> None:
+    with pytest.raises(RigError, match=r"as is that of|cannot be told apart"):
+        with_object(rig, tmp_path / "ball.json")
+    with pytest.raises(RigError, match="cannot be told apart"):
+        with_object(rig, tmp_path / "ball.json", name="another")
+    save_object(tmp_path / "odd.json", msgspec.structs.replace(BALL, name="odd", markers=tuple(
+        ObjectMarker(name, place) for name, place in zip(("index", "no", "wrist"), PLACES_MM, strict=True))))
+    with pytest.raises(RigError, match=r"has the role 'index_tip' on the hand"):
+        with_object(rig, tmp_path / "odd.json")
+
+
+def test_a_tag_that_is_too_small_for_the_cameras_is_found_by_the_check(rig: Rig, tmp_path: Path) -> None:
+    assert "small_tag" not in check_rig(rig).verdict.codes
+    save_object(tmp_path / "small.json", plate("small", 1, 1, 10.0, 0.0, "DICT_4X4_50"))
+    report = check_rig(with_object(rig, tmp_path / "small.json"))
+    sentence = next(found.sentence for found in report.verdict.findings if found.code == "small_tag")
+    assert "10 mm wide" in sentence and "small.json" in sentence
