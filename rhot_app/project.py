@@ -195,17 +195,38 @@ class OutputSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return f"{self.kind}{':' if self.target else ''}{self.target}{'?' if options else ''}{'&'.join(options)}"
 
 
+class ObjectPoses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Where the poses of an object come from that another tracker follows (docs/objects.md, "Another tracker").
+
+    `source`: `openvr`, `libsurvive`, `tcp:HOST:PORT` or `udp:PORT`; no program is started because a file says so.
+    `alignment`: the file of ``rhot calibrate alignment``, in the rig file relative to that. `tracker`: which one, by
+    serial number, name or role. `rotation_wxyz` and `translation_m`: the object in the tracker's frame.
+    """
+
+    source: Annotated[str, Meta(pattern=r"^(openvr|libsurvive|(tcp|udp):[\w.:\-\[\]]+)$", max_length=256)]
+    alignment: Annotated[str, Meta(min_length=1, max_length=4096)]
+    tracker: Annotated[str, Meta(max_length=64)] = ""
+    rotation_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    translation_m: tuple[Metres, Metres, Metres] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        norm = sum(q * q for q in self.rotation_wxyz)
+        if not 0.998 < norm < 1.002:
+            raise ValueError(f"rotation_wxyz is not a unit quaternion (its squared norm is {norm:.4f})")
+
+
 class RigObject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A tracked object of the rig.
 
     `file`: its object file (docs/objects.md), in the rig file relative to that; absolute in a rig that was read.
     `name`: how states name it; None: as the object file does. `model`: what the file says. A rig file has it only where
-    there is no such file, as of a rig that came from a log.
+    there is no such file, as of a rig that came from a log. `poses`: another tracker that follows it.
     """
 
     file: Annotated[str, Meta(min_length=1, max_length=4096)]
     name: Name | None = None
     model: ObjectModel | None = None
+    poses: ObjectPoses | None = None
 
     @property
     def folder(self) -> Path | None:
@@ -265,6 +286,9 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(str(exc).removesuffix(".")) from exc
         roles = {marker.id: marker.role for marker in self.markers.markers}
         for one, model in zip(read, self.models, strict=True):
+            if not (model.fiducials or model.markers or one.poses):
+                raise ValueError(f"{one.file}: {model.name!r} has neither fiducials nor markers, and the rig names no "
+                                 "poses of another tracker for it; give one of the three")
             for marker in model.markers:
                 if marker.marker not in roles:
                     raise ValueError(f"{one.file}: the marker {marker.marker!r} of {model.name!r} is not in the rig's "
@@ -337,8 +361,8 @@ def save_rig(path: Path, rig: Rig) -> None:
     def written(one: RigObject) -> RigObject:
         if not Path(one.file).is_absolute():
             return one
-        relative = os.path.relpath(one.file, folder)
-        return RigObject(relative, one.name, None if Path(one.file).exists() else one.model)
+        return RigObject(os.path.relpath(one.file, folder), one.name, None if Path(one.file).exists() else one.model,
+                         _aligned_by(one, lambda file: os.path.relpath(file, folder)))
     write_document(path, _with_objects(rig, written))
 
 
@@ -351,6 +375,12 @@ def with_object(rig: Rig, path: Path, name: str | None = None) -> Rig:
         return msgspec.structs.replace(rig, objects=(*rig.objects, added))
     except ValueError as exc:
         raise RigError(f"{exc}.") from exc
+
+
+def _aligned_by(one: RigObject, place: Callable[[str], str]) -> ObjectPoses | None:
+    """The object's poses with the path of their alignment as `place` gives it."""
+    poses = one.poses
+    return None if poses is None else msgspec.structs.replace(poses, alignment=place(poses.alignment))
 
 
 def _with_objects(rig: Rig, change: Callable[[RigObject], RigObject]) -> Rig:
@@ -372,7 +402,8 @@ def _with_models(rig: Rig, folder: Path | None, where: str) -> Rig:
         except ObjectError as exc:
             raise RigError(f"{where}: an object of the rig cannot be read. {exc}") from exc
         name = one.name
-        return RigObject(str(path), name, model if name is None else msgspec.structs.replace(model, name=name))
+        return RigObject(str(path), name, model if name is None else msgspec.structs.replace(model, name=name),
+                         _aligned_by(one, lambda file: str(((folder or Path()) / file).resolve())))
     try:
         return _with_objects(rig, read)
     except ValueError as exc:

@@ -74,7 +74,7 @@ def smoothed_states(records: Iterable[Record], door: LogValidator, tracker: Fram
             tracker.ingest(frame)
             yield from tracker.states()
         elif isinstance(tracker, ObjectTracking):
-            tracker.ingest_fiducials(frame)
+            tracker.ingest_objects(frame)
     yield from tracker.finish()
 
 

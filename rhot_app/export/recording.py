@@ -13,7 +13,7 @@ from rhot_app.calibration.recorded_observations import why_none
 from rhot_app.engine.replay_summary import replay_states, smoothed_states
 from rhot_app.errors import ExportError, RecordingError, take_losses
 from rhot_app.export.states import HandStates, in_blocks
-from rhot_app.objects.observations import FiducialFrame
+from rhot_app.objects.observations import ObjectFrame
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record
@@ -146,10 +146,10 @@ class _FrameCount:
             times.append(t_ns)
         self._take(observations)
 
-    def ingest_fiducials(self, frame: FiducialFrame) -> None:
+    def ingest_objects(self, frame: ObjectFrame) -> None:
         """Pass the tags of one frame on to a tracker of objects."""
         if isinstance(self._inner, ObjectTracking):
-            self._inner.ingest_fiducials(frame)
+            self._inner.ingest_objects(frame)
 
     @property
     def rate_hz(self) -> float:

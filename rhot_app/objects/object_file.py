@@ -128,7 +128,8 @@ class CylinderShape(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag
 
 
 class ObjectModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A rigid object with fiducial tags or at least three colour markers, and not both.
+    """A rigid object with fiducial tags or at least three colour markers, and not both; with neither where another
+    tracker follows it.
 
     `shape`: its surface, for displays and the contacts of fingertips; a `mesh` is both where there is no shape.
     """
@@ -142,7 +143,7 @@ class ObjectModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     version: Literal[1] = VERSION
 
     def __post_init__(self) -> None:
-        if bool(self.fiducials) == bool(self.markers):
+        if self.fiducials and self.markers:
             raise ValueError("an object has fiducials or markers; give one of the two")
         for one, other in combinations(self.fiducials, 2):
             if one.code == other.code:

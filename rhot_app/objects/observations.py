@@ -35,6 +35,21 @@ class FiducialFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class ObjectPose:
+    """A pose of the object `name` in the rig frame, `world_from_object` (4, 4) m, that another tracker measured at
+    master time `t_ns`. `covariance` (6, 6) m^2 and rad^2: translation, then rotation about its origin, world axes."""
+
+    name: str
+    t_ns: int
+    world_from_object: Array
+    covariance: Array
+
+
+ObjectFrame = FiducialFrame | ObjectPose
+"""What is observed of objects beside the markers: tags of one frame, or one pose."""
+
+
+@dataclass(frozen=True, slots=True)
 class MarkerPoints:
     """M colour markers in one frame of one camera, by their ids in the marker set; the rest as in `FiducialFrame`.
 

@@ -292,6 +292,10 @@ class ObjectTracker:
         """Weigh one frame; the state of every object after it, at the time of the object's points or of row 0."""
         return [self._take(number, frame) for number in range(len(self._tracks))]
 
+    def take_pose(self, name: str, measurement: Measurement) -> bool:
+        """Weigh a pose of the object `name`; whether it was accepted. One of an object that is not here is not."""
+        return any(track.take(measurement) for track in self._tracks if track.name == name)
+
     def states(self, t_ns: int) -> list[ObjectState]:
         """The state of every object at master time `t_ns`, by what has been taken."""
         return [track.state(t_ns) for track in self._tracks]

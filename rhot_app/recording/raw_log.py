@@ -47,11 +47,11 @@ class RecordKind(enum.IntEnum):
     STOP = 5  # sent to all nodes, as sent
     GAP = 6  # u32: records that could not be kept because the disk was too slow
     BOOKMARK = 7  # UTF-8 text about a moment (rhot_app.recording.bookmarks)
-    OBJECT_POSE = 8  # reserved
+    OBJECT_POSE = 8  # of another tracker, in the rig frame (rhot_app.recording.object_poses)
     LANDMARKS = 9  # reserved
 
 
-_KINDS = frozenset(int(kind) for kind in RecordKind) - {RecordKind.OBJECT_POSE, RecordKind.LANDMARKS}
+_KINDS = frozenset(int(kind) for kind in RecordKind) - {RecordKind.LANDMARKS}
 
 
 @dataclass(frozen=True, slots=True)

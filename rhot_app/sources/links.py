@@ -18,6 +18,7 @@ from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.key_exchange import KeyExchange
 from rhot_app.sources.lost_nodes import LostNodes
 from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.poses.followed import FollowedObjects
 from rhot_app.sources.receiver import DatagramTap, Deliver, NodeReceiver, open_data_socket
 from rhot_app.sources.source import RecordSink
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
@@ -274,8 +275,10 @@ class UdpNodes:
             self._commands = NodeLinks(rig, list(self.links), [receiver.port for receiver in self.receivers],
                                        own)
             stack.pop_all()
+        self._followed = FollowedObjects(rig)
         for receiver in self.receivers:
             receiver.start()
+        self._followed.start()
         self._commands.start_thread()
 
     @property
@@ -287,10 +290,11 @@ class UdpNodes:
         """Hand frames to `deliver` from now on, each camera's in its own thread."""
         for receiver in self.receivers:
             receiver.deliver = deliver
+        self._followed.deliver = deliver
 
     def notices(self) -> list[str]:
-        """A live source has nothing to say about itself: its links and receivers do."""
-        return []
+        """What is wrong with the trackers that follow objects. Links and receivers speak for themselves."""
+        return self._followed.notices()
 
     def configure(self, rig: Rig) -> None:
         """Expect what `rig` says about markers and images; the network is as it was."""
@@ -316,9 +320,11 @@ class UdpNodes:
         self._commands.record_to(tap)  # first what is known of sessions and clocks: datagrams mean nothing before
         for link, receiver in zip(self.links, self.receivers, strict=True):
             receiver.tap = None if tap is None else _datagram_tap(tap, link.node.node_id)
+        self._followed.tap = tap
 
     def close(self) -> None:
         """Close all ports."""
+        self._followed.close()
         self._commands.close()
         for receiver in self.receivers:
             receiver.close()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
+from rhot_app.recording.object_poses import decode_pose
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
@@ -52,6 +53,9 @@ class LogValidator:
             if link is not None:
                 return link.door.admit(record.data, record.t_master_ns)
             self.unknown_nodes += 1
+        elif record.kind is RecordKind.OBJECT_POSE:
+            with contextlib.suppress(RecordingError):
+                return decode_pose(record.data)
         elif record.kind is RecordKind.GAP:
             self.gaps += int.from_bytes(record.data[:4], "little")
         else:

@@ -80,9 +80,10 @@ class ObservationSource(Protocol):
 
 
 def same_network(one: Rig, other: Rig) -> bool:
-    """Whether both rigs reach the same nodes in the same way, so that no port need be opened anew."""
+    """Whether both rigs reach the same nodes and other trackers in the same way, so that nothing is opened anew."""
     def network(rig: Rig) -> list[tuple[object, ...]]:
         return [(rig.broadcast.address, rig.broadcast.port),
+                *((one.model.name, one.poses) for one in rig.objects if one.model is not None and one.poses),
                 *((node.node_id, node.address, node.udp_port, node.data_port, node.text_datagrams, node.public_key,
                    node.control_port if node.public_key else 0) for node in rig.nodes)]
     return network(one) == network(other)

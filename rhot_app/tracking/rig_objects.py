@@ -18,9 +18,10 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
 from rhot_app.objects.motion import POSE, VELOCITY, pose_of
-from rhot_app.objects.observations import FiducialFrame, MarkerPoints
+from rhot_app.objects.observations import MarkerPoints, ObjectFrame, ObjectPose
 from rhot_app.objects.shape import shape_of
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
+from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
 from rhot_app.project import Rig
 from rhot_app.tracking.marker_model import scaled_table
@@ -60,9 +61,12 @@ class RigObjects:
         for contacts in self._contacts:
             contacts.reset()
 
-    def ingest_fiducials(self, frame: FiducialFrame) -> None:
-        """Take the tags of one frame in."""
-        self._tracker.take(frame)
+    def ingest_objects(self, frame: ObjectFrame) -> None:
+        """Take the tags of one frame, or a pose of another tracker, in."""
+        if isinstance(frame, ObjectPose):
+            self._tracker.take_pose(frame.name, PoseMeasurement(frame.t_ns, frame.world_from_object, frame.covariance))
+        else:
+            self._tracker.take(frame)
 
     def ingest_markers(self, frame: CameraObservations) -> None:
         """Take the objects' markers of one frame in: the best candidate of each."""
@@ -131,9 +135,9 @@ class WithObjects:
         self._objects.ingest_markers(observations)
         self._hand.ingest(self._markers.of_hand(observations))
 
-    def ingest_fiducials(self, frame: FiducialFrame) -> None:
-        """Take one frame's tags in."""
-        self._objects.ingest_fiducials(frame)
+    def ingest_objects(self, frame: ObjectFrame) -> None:
+        """Take one frame's tags, or a pose of another tracker, in."""
+        self._objects.ingest_objects(frame)
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, of all markers, None before its first."""
@@ -206,9 +210,9 @@ class SmoothedObjects(RigObjects):
         super().__init__(rig)
         self._histories = [_History(model.name) for model in rig.models]
 
-    def ingest_fiducials(self, frame: FiducialFrame) -> None:
-        """Take the tags of one frame in."""
-        super().ingest_fiducials(frame)
+    def ingest_objects(self, frame: ObjectFrame) -> None:
+        """See `RigObjects`."""
+        super().ingest_objects(frame)
         self._keep()
 
     def ingest_markers(self, frame: CameraObservations) -> None:

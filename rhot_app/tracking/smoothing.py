@@ -17,7 +17,7 @@ import numpy as np
 
 from rhot_app.estimation.filter import ChunkedSmoother, Estimate, Knot
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.objects.observations import FiducialFrame
+from rhot_app.objects.observations import ObjectFrame
 from rhot_app.project import Rig
 from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.estimator import Estimator
@@ -256,10 +256,10 @@ class SmoothedTracker:
         self._tracker.ingest(observations)
         self._tracker.solve()
 
-    def ingest_fiducials(self, frame: FiducialFrame) -> None:
+    def ingest_objects(self, frame: ObjectFrame) -> None:
         """Take the tags of one frame in."""
         if self._objects is not None:
-            self._objects.ingest_fiducials(frame)
+            self._objects.ingest_objects(frame)
 
     def states(self) -> Iterator[HandState]:
         """The states that have become final."""

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.objects.observations import FiducialFrame
+from rhot_app.objects.observations import ObjectFrame
 from rhot_app.tracking.state import HandState
 
 Array = NDArray[np.float64]
@@ -85,18 +85,18 @@ class Tracker(Protocol):
 class ObjectTracking(Protocol):
     """A tracker that tracks objects as well."""
 
-    def ingest_fiducials(self, frame: FiducialFrame) -> None:
-        """Take the fiducial tags of one frame in."""
+    def ingest_objects(self, frame: ObjectFrame) -> None:
+        """Take the fiducial tags of one frame, or a pose of another tracker, in."""
         ...
 
 
-CameraFrame = CameraObservations | FiducialFrame
-"""What a node sends of one frame: its markers, or its fiducial tags."""
+CameraFrame = CameraObservations | ObjectFrame
+"""What a source delivers: markers or fiducial tags of one camera's frame, or a pose of another tracker."""
 
 
 def feed(tracker: Tracker, frame: CameraFrame) -> None:
-    """Have `tracker` take a frame in. Tags are for those that track objects."""
+    """Have `tracker` take a frame in. Tags and poses are for those that track objects."""
     if isinstance(frame, CameraObservations):
         tracker.ingest(frame)
     elif isinstance(tracker, ObjectTracking):
-        tracker.ingest_fiducials(frame)
+        tracker.ingest_objects(frame)

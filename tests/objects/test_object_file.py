@@ -88,7 +88,6 @@ def test_a_plates_tags_go_row_by_row() -> None:
     ({"fiducials": [TAG, TAG]}, "stands twice"),
     ({"fiducials": [TAG, {**TAG, "family": "DICT_4X4_1000"}]}, "stands twice"),  # the same bits
     ({"fiducials": [TAG], "markers": MARKERS}, "give one of the two"),
-    ({}, "give one of the two"),
     ({"markers": MARKERS[:2]}, "in one line"),
     ({"markers": [*MARKERS[:2], {"marker": "blue", "position_mm": [90, 0.1, 0]}]}, "in one line"),
     ({"markers": [*MARKERS, MARKERS[0]]}, "stands twice"),
