@@ -26,15 +26,23 @@ from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
 from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
-from rhot_node.detect.foreground import Foreground, learn_background, learn_skin, skin_foreground
+from rhot_node.detect.foreground import Foreground, foreground_map, learn_background, learn_skin, skin_foreground
 
 Image = NDArray[np.uint8]
+Points = NDArray[np.float64]
 
 BACKGROUND_PICTURES: Final = 16
 """Pictures of each camera from which its background is learnt: a pixel's noise is then known to 1/sqrt(2 n), 18 %."""
 
-LEAST_SUPPORT: Final = 0.5
-"""A hand is lost when less of its expected contour is found than not."""
+MOST: Final = 0.5
+"""Part above which more speaks for a hand than against it: of its contour that is found, of its joints on foreground."""
+
+CONFUSED_M: Final = 0.02
+"""Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
+apart in the hand files."""
+
+FASTEST_M_S: Final = 4.0
+"""Speed of a hand in quick reaching (Nagasaki 1989: 3 m/s), with a margin."""
 
 TABLES: Final = ("csv", "parquet", "npz")
 _CODECS: Final = {".avi": "MJPG", ".mp4": "mp4v"}
@@ -94,6 +102,7 @@ class BareHandRun:
         self._skin, self._empty_until_ns = foreground is None, empty_until_ns
         self._names = tuple(node.name for node in rig.nodes)
         self._following = False
+        self._proposed: tuple[int, Points] | None = None
         self._count = 0
 
     def step(self, frames: FrameSet) -> HandState:
@@ -101,15 +110,18 @@ class BareHandRun:
         begun = time.perf_counter()
         following = self._following
         if not following and not self._found(frames):
+            self._proposed = None
             return self._none(frames, begun)
         state = self.tracker.step(frames.images, frames.t_ns)
-        self._following = state.tracked and self._supported(frames)
+        good = state.tracked and self._supported(frames) and self._on_foreground(frames, state, whole=not following)
+        self._following = good and (following or self._confirmed(state))
         if not self._following:
             return self._none(frames, begun)
         if following:
             self.step_s.append(time.perf_counter() - begun)
         else:
             self.starts += 1
+            self._proposed = None
         self._count += 1
         return replace(state, sequence=self._count - 1)
 
@@ -130,7 +142,33 @@ class BareHandRun:
         """Whether the cameras of this set find the contour that the hand should have."""
         seen = np.sum([self.tracker.fit.seen[c].sum(axis=0) for c, image in enumerate(frames.images)
                        if image is not None], axis=0)
-        return bool(seen[0] > LEAST_SUPPORT * seen[1])
+        return bool(seen[0] > MOST * seen[1])
+
+    def _on_foreground(self, frames: FrameSet, state: HandState, *, whole: bool) -> bool:
+        """Whether most joints lie on foreground in every camera that shows most of them, of which there must be one;
+        `whole`: every camera must show most of them."""
+        shown = []
+        for camera, image, known in zip(self.tracker.cameras, frames.images, self.tracker.foreground, strict=True):
+            if image is None:
+                continue
+            places = camera.project(state.joint_positions)
+            inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
+            columns, rows = np.round(places[inside]).astype(int).T
+            shown.append(bool(np.mean(inside) > MOST))
+            if shown[-1] and np.mean(foreground_map(image, known, 1)[rows, columns] > 0.5) <= MOST:
+                return False
+        return all(shown) if whole else any(shown)
+
+    def _confirmed(self, state: HandState) -> bool:
+        """Whether the hand that was found in the frame set before is the same one. Finding is a random search: two of
+        them agree by chance on a wrong hand less probably than one is wrong."""
+        before, self._proposed = self._proposed, (state.t_master_ns, state.joint_positions)
+        if before is None:
+            return False
+        centre, earlier = state.joint_positions.mean(axis=0), before[1].mean(axis=0)
+        pace = float(np.linalg.norm(centre - earlier)) / max(1e-9 * (state.t_master_ns - before[0]), 1e-3)
+        shape = np.linalg.norm((state.joint_positions - centre) - (before[1] - earlier), axis=1)
+        return pace < FASTEST_M_S and float(np.mean(shape)) < CONFUSED_M
 
     def _none(self, frames: FrameSet, begun: float) -> HandState:
         self._count += 1
@@ -219,10 +257,8 @@ def check_pictures(video: Path, target: Path, again: bool) -> None:
     """Refuse a film or a folder that cannot be written, before anything is tracked. Raises ExportError."""
     if target.suffix.lower() in _CODECS:
         check_place(video, target, again)
-    elif target.suffix:
-        raise ExportError(f"{target}: pictures go to a film (.avi or .mp4) or to a folder, whose name has no ending.")
     elif target.exists():
-        raise ExportError(f"{target} exists already; name a new folder for the pictures.")
+        raise ExportError(f"{target} exists already; name a new folder for the pictures, or a film (.avi, .mp4).")
     elif not target.absolute().parent.is_dir():
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first.")
 
@@ -312,7 +348,7 @@ class _Folder:
 @contextlib.contextmanager
 def _drawn(target: Path, videos: Sequence[CameraVideo]) -> Iterator[_Pictures]:
     """A film or a folder that is there when it is whole."""
-    if target.suffix:
+    if target.suffix.lower() in _CODECS:
         fps = 1e9 / min(video.period_ns for video in videos)
         with (whole_file(target, lambda: None) as path,
               contextlib.closing(_Film(path, _CODECS[target.suffix.lower()], fps)) as film):

@@ -195,7 +195,8 @@ def on_master_clock(video: CameraVideo, *, needed: bool) -> CameraVideo:
         if not needed:
             return video
         raise RecordingError(f"{video.path}: its times are of the node's own clock, and the log {log.name} that "
-                             f"compares the clocks is not beside it. Put it there, or give --offset-s {video.camera}=S.")
+                             f"compares the clocks is not beside it. Put it there, or give "
+                             f"--offset-s {video.camera}=S.")
     with contextlib.closing(LogReader(log)) as reader:
         node = next((node for node in reader.rig.nodes if video_path(log, node.name).name == video.path.name), None)
         clocks = [] if node is None else _clock_estimates(reader, reader.rig, node.node_id)
