@@ -35,7 +35,7 @@ BACKGROUND_PICTURES: Final = 16
 """Pictures of each camera from which its background is learnt: a pixel's noise is then known to 1/sqrt(2 n), 18 %."""
 
 MOST: Final = 0.5
-"""Part above which more speaks for a hand than against it: of its contour that is found, of its joints on foreground."""
+"""Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
 
 CONFUSED_M: Final = 0.02
 """Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
