@@ -31,6 +31,7 @@ SUBCOMMANDS = {
     "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
     "video": Subcommand("rhot_app.recording.video_command", "fetch the videos that nodes recorded beside a log"),
     "landmarks": Subcommand("rhot_app.recording.landmark_command", "make a raw log of landmark tables of a bare hand"),
+    "bare-hand": Subcommand("rhot_app.export.bare_hand_command", "track a hand without markers in recorded videos"),
     "recover": Subcommand("rhot_app.recording.raw_log", "write a damaged log's sound records to a clean one"),
     "export": Subcommand("rhot_app.export.export_command", "write a raw log's hand as a file for other programs"),
     "batch": Subcommand("rhot_app.export.batch_command", "track or export many raw logs"),

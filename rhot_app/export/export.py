@@ -82,7 +82,7 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
     options = options or ExportOptions()
     name = format_of(format_name, out)
     check_options(name, options)
-    _check_place(log, out, again)
+    check_place(log, out, again)
     with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98), smooth=options.smooth) as tracked:
         notes = _write(tracked, name, options, out, lambda: progress(f"writing {out.name}", 0.99))
         if not tracked.tracked:
@@ -102,8 +102,8 @@ def check_options(name: str | None, options: ExportOptions) -> None:
         raise ExportError(f"{name} files are in {chosen.units}, as their readers expect; leave --units out.")
 
 
-def _check_place(log: Path, out: Path, again: bool) -> None:
-    """Refuse before anything is tracked."""
+def check_place(log: Path, out: Path, again: bool) -> None:
+    """Refuse before anything of a recording is tracked what cannot be written. Raises ExportError."""
     if out.absolute() == log.absolute() or (out.exists() and log.exists() and out.samefile(log)):
         raise ExportError(f"{out} is the recording itself, which is never written over; choose another --out.")
     if out.parent.exists() and not out.parent.is_dir():
@@ -117,11 +117,11 @@ def _check_place(log: Path, out: Path, again: bool) -> None:
 
 
 def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, ready: Callable[[], None]) -> list[str]:
-    with _whole_file(out, ready) as path:
+    with whole_file(out, ready) as path:
         writer: Writer | None = None
         try:
             for plan, states in _prepared(tracked, name, options, path):
-                writer = writer or _writer(name, plan)
+                writer = writer or make_writer(name, plan)
                 writer.add(in_frame(states, options.frame))
             assert writer is not None  # else there were no states, and that is an error
             writer.finish()
@@ -165,14 +165,15 @@ def _ended(blocks: Iterator[HandStates]) -> Iterator[HandStates | None]:
     yield None
 
 
-def _writer(name: str, plan: Plan) -> Writer:
+def make_writer(name: str, plan: Plan) -> Writer:
+    """The writer of a format. Raises ExportError when its package is missing."""
     module, _, kind = FORMATS[name].writer.partition(":")
     made: Writer = getattr(importlib.import_module(module), kind)(plan)
     return made
 
 
 @contextlib.contextmanager
-def _whole_file(out: Path, ready: Callable[[], None]) -> Iterator[Path]:
+def whole_file(out: Path, ready: Callable[[], None]) -> Iterator[Path]:
     """A hidden file that becomes `out` when the block ends, or vanishes when it fails, or when `ready` raises, which is
     asked last. Raises ExportError where the disk refuses."""
     path: Path | None = None

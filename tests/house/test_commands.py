@@ -23,6 +23,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),
     "rhot recover": ("LOG", "--out", "--rig"),
     "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json"),
+    "rhot bare-hand": ("--rig", "--video", "--background", "--background-seconds", "--fps", "--offset-s",
+                       "--unknown-size", "--out", "--overlay", "--again", "--json"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",
                     "--smooth", "--again"),
     "rhot batch": ("LOG", "--do", "--out", "--workers", "--scheduler", "--again", "--format", "--rig", "--tracker"),

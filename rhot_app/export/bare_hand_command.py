@@ -1,0 +1,128 @@
+"""``rhot bare-hand``: the hand without markers in recorded videos, as a table and as pictures of what was found."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rhot_app.project import Rig
+    from rhot_app.recording.frame_sets import CameraVideo
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot bare-hand``."""
+    parser.add_argument("--rig", type=Path, required=True, metavar="FILE",
+                        help="the calibrated rig, with the hand's side")
+    parser.add_argument("--video", action="append", required=True, metavar="NAME=FILE",
+                        help="a camera of the rig and its video; once for each camera, also for one alone")
+    background = parser.add_mutually_exclusive_group()
+    background.add_argument("--background", action="append", default=[], metavar="NAME=FILE",
+                            help="a video of the same scene without a hand; once for each camera")
+    background.add_argument("--background-seconds", default=None, metavar="S",
+                            help="the videos show no hand for so long at their beginning (default: the background is "
+                                 "not known, the hand is found by the colour of skin)")
+    parser.add_argument("--fps", type=float, default=None, metavar="N",
+                        help="frames per second of ordinary videos, instead of what the files say")
+    parser.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
+                        help="seconds to add to a camera's times, where the videos did not begin together")
+    parser.add_argument("--unknown-size", action="store_true", help="estimate the hand's size, too")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the states as .csv, .parquet or .npz")
+    parser.add_argument("--overlay", type=Path, metavar="PLACE",
+                        help="draw what was found: a film (.avi, .mp4), or a new folder for PNG files")
+    parser.add_argument("--again", action="store_true", help="write over files that exist")
+    parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Track, and say what came of it. Raises RecordingError, ExportError and RigError."""
+    import msgspec
+
+    from rhot_app.errors import RecordingError
+    from rhot_app.export.bare_hand import learn_backgrounds, track_videos
+    from rhot_app.progress import ProgressLine
+    from rhot_app.project import load_rig
+    from rhot_app.recording.frame_sets import FPS, checked_seconds, on_one_clock
+    from rhot_node.compiled import announce_compilation
+
+    if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
+        raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
+    rig = load_rig(args.rig)
+    videos = open_all(rig, named(args.video, "--video", rig), args.fps)
+    rig = msgspec.structs.replace(rig, nodes=tuple(node for video in videos for node in rig.nodes
+                                                   if node.name == video.camera), depth=type(rig.depth)())
+    offsets = {name: checked_seconds(text, f"--offset-s {name}")
+               for name, text in named(args.offset_s, "--offset-s", rig).items()}
+    videos = on_one_clock(videos, offsets)
+    foreground, empty_s = None, 0.0
+    if args.background:
+        empty = open_all(rig, named(args.background, "--background", rig), args.fps)
+        if len(empty) < len(videos):
+            missing = next(node.name for node in rig.nodes if node.name not in {video.camera for video in empty})
+            raise RecordingError(f"--background: camera {missing} has none; give one for every camera.")
+        foreground = learn_backgrounds(empty)
+    elif args.background_seconds is not None:
+        empty_s = checked_seconds(args.background_seconds, "--background-seconds")
+        foreground = learn_backgrounds(videos, empty_s)
+    announce_compilation()
+    line = ProgressLine("tracking")
+    summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s, out=args.out,
+                           pictures=args.overlay, again=args.again, progress=line.report)
+    line.finish()
+    document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay)}
+    print(json.dumps(document) if args.json else "\n".join(sentences(document)))
+    return 0
+
+
+def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
+    """What an option says of each camera, as NAME=VALUE. Raises RecordingError."""
+    from rhot_app.errors import RecordingError
+
+    names = [node.name for node in rig.nodes]
+    found: dict[str, str] = {}
+    for text in given:
+        name = max((name for name in names if text.startswith(f"{name}=")), key=len, default=text.partition("=")[0])
+        value = text[len(name) + 1:]
+        if not value:
+            raise RecordingError(f"{option} {text}: give a camera and its value, as in {option} {names[0]}=...")
+        if name not in names:
+            raise RecordingError(f"{option} {text}: there is no camera {name!r} here; there are {', '.join(names)}.")
+        if name in found:
+            raise RecordingError(f"{option} {text}: camera {name} is named twice.")
+        found[name] = value
+    return found
+
+
+def open_all(rig: Rig, paths: dict[str, str], fps: float | None) -> list[CameraVideo]:
+    """The videos of cameras, in the rig's order. Raises RecordingError."""
+    from rhot_app.errors import RecordingError
+    from rhot_app.recording.frame_sets import open_video
+
+    files = [Path(path).resolve() for path in paths.values()]
+    doubled = next((path for path in files if files.count(path) > 1), None)
+    if doubled is not None:
+        raise RecordingError(f"{doubled}: it is given for two cameras; each has its own video.")
+    return [open_video(node, Path(paths[node.name]), fps) for node in rig.nodes if node.name in paths]
+
+
+def sentences(document: dict[str, Any]) -> list[str]:
+    """The summary for a person."""
+    count, tracked = document["frame_sets"], document["tracked"]
+    out = [f"{count} frame sets, {document['frames_left_out']} frames outside the time that all videos show."]
+    if not tracked:
+        out.append("No hand was found. Is the rig's hand of the right side, and the background known?")
+    else:
+        times = document["starts"]
+        out.append(f"A hand in {100 * tracked:.0f} % of them; found {times} time{'' if times == 1 else 's'}.")
+    if document["rate_hz"] is not None:
+        out.append(f"Rate: {document['rate_hz']:.1f} Hz; a frame set took {document['step_p50_ms']:.0f} ms (median), "
+                   f"{document['step_p99_ms']:.0f} ms (99 %).")
+    if document["lost_s"] and tracked:
+        intervals = ", ".join(f"{begin:.2f} to {end:.2f}" for begin, end in document["lost_s"] if not math.isnan(end))
+        out.append(f"No hand at {intervals} s.")
+    out += [f"Written: {document[key]}" for key in ("out", "overlay") if document[key]]
+    return out

@@ -1,0 +1,272 @@
+"""Recorded videos of several cameras as frame sets: a picture of each camera near one instant, with its own time.
+
+Ordinary videos have the time of a frame by its number. The nodes' own recordings carry a time for every frame, which
+the log beside them takes to the master's clock. Bytes are decoded as they are asked for; no video is kept in memory.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.errors import RecordingError, note_loss
+from rhot_app.project import Intrinsics, Rig, RigNode
+from rhot_app.recording.raw_log import LogReader
+from rhot_app.recording.video import video_path
+from rhot_app.sources.clock import ClockEstimate
+from rhot_app.sources.replay import LogValidator
+from rhot_node.errors import VideoError
+from rhot_node.files import open_input, require_file, why
+from rhot_node.video.avi import Stamp, pictures_of, read_stamps
+
+Image = NDArray[np.uint8]
+Times = NDArray[np.int64]
+
+FPS = 1.0, 1000.0
+"""frames/s that a video can have; what a file says beyond them is not a rate but missing."""
+
+_CLOCK_EVERY_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraVideo:
+    """One camera's video. `times_ns` (N,): mid-exposure of the middle row of every frame. `stamped`: the node wrote
+    these times, by its own clock until `on_master_clock`; else they are frame number / frame rate."""
+
+    camera: str
+    path: Path
+    lens: Intrinsics
+    times_ns: Times
+    stamped: bool
+
+    @property
+    def period_ns(self) -> int:
+        """Median time from frame to frame."""
+        return int(np.median(np.diff(self.times_ns))) if len(self.times_ns) > 1 else round(1e9 / FPS[0])
+
+    def frames(self, wanted: NDArray[np.bool_] | None = None) -> Iterator[tuple[int, Image]]:
+        """(time ns, picture (H, W, 3) RGB) of every frame, or of those that are `wanted` (N,). Raises RecordingError
+        where a frame has another size; a video that ends too early is noted as a loss."""
+        chosen = np.ones(len(self.times_ns), np.bool_) if wanted is None else wanted
+        decode = self._stamped_pictures if self.stamped else self._pictures
+        read = 0
+        for k, picture in decode(chosen):
+            read = k + 1
+            if picture is not None:
+                _check_size(self.path, self.camera, (picture.shape[1], picture.shape[0]), self.lens)
+                yield int(self.times_ns[k]), np.ascontiguousarray(picture[..., ::-1])
+        missing = len(self.times_ns) - read
+        if missing * self.period_ns > 1_000_000_000:  # containers may miscount by a frame or a few
+            note_loss(str(self.path), f"{self.path}: {missing} of its {len(self.times_ns)} frames cannot be read; is "
+                                      "the file complete?")
+
+    def _pictures(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
+        with _opened(self.path) as capture:
+            for k, keep in enumerate(chosen):
+                if not capture.grab():
+                    return
+                picture = capture.retrieve()[1] if keep else None
+                yield k, None if picture is None else np.asarray(picture, np.uint8)
+
+    def _stamped_pictures(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
+        with open_input(self.path) as file:
+            for k, stored in enumerate(pictures_of(file)):
+                if k >= len(chosen):
+                    return
+                picture = None
+                if chosen[k]:
+                    file.seek(stored.offset)
+                    picture = cv2.imdecode(np.frombuffer(file.read(stored.size), np.uint8), cv2.IMREAD_COLOR)
+                yield k, None if picture is None else np.asarray(picture, np.uint8)
+
+    def some(self, wanted: NDArray[np.bool_], most: int) -> list[Image]:
+        """At most `most` of the pictures `wanted` (N,), evenly spread."""
+        places = np.flatnonzero(wanted)
+        kept = np.zeros(len(wanted), np.bool_)
+        if len(places):
+            kept[places[np.linspace(0, len(places) - 1, most).round().astype(int)]] = True
+        return [picture for _, picture in self.frames(kept)]
+
+
+def open_video(node: RigNode, path: Path, fps: float | None = None) -> CameraVideo:
+    """The video of a camera of the rig. `fps`: of an ordinary video, instead of the rate that its file says.
+
+    Raises RecordingError: no video, a picture of another size than the lens's, or no frame rate.
+    """
+    try:
+        require_file(path)
+        stamps = read_stamps(path) if path.suffix.lower() == ".avi" else ()
+    except VideoError:
+        stamps = ()  # an ordinary AVI file
+    except FileNotFoundError as exc:
+        raise RecordingError(f"{path}: no such file.") from exc
+    except (OSError, ValueError) as exc:
+        raise RecordingError(f"{path}: cannot be read ({why(exc)}).") from exc
+    with _opened(path) as capture:
+        read, picture = capture.read()
+        if not read:
+            raise RecordingError(f"{path}: no frame of it can be decoded. Is it a video, and complete?")
+        _check_size(path, node.name, (picture.shape[1], picture.shape[0]), node.intrinsics)
+        count, said = int(capture.get(cv2.CAP_PROP_FRAME_COUNT)), float(capture.get(cv2.CAP_PROP_FPS))
+    if stamps:
+        if fps is not None:
+            raise RecordingError(f"{path}: a node recorded it with the time of every frame; leave --fps out.")
+        return CameraVideo(node.name, path, node.intrinsics, _middle_row_times(stamps, node), True)
+    rate = said if fps is None else fps
+    if not FPS[0] <= rate <= FPS[1]:
+        raise RecordingError(f"{path}: it says no frame rate; give it with --fps.")
+    if count < 1:
+        raise RecordingError(f"{path}: it does not say how many frames it has. Write it anew with a video program.")
+    times = np.round(1e9 / rate * np.arange(count)).astype(np.int64)
+    return CameraVideo(node.name, path, node.intrinsics, times, False)
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
+    """A decoder of the file. What is no video it cannot open; it then reads nothing."""
+    capture = cv2.VideoCapture(str(path))
+    try:
+        yield capture
+    finally:
+        capture.release()
+
+
+def _check_size(path: Path, camera: str, size: tuple[int, int], lens: Intrinsics) -> None:
+    if size != (lens.width, lens.height):
+        raise RecordingError(f"{path}: its pictures are {size[0]} x {size[1]} px, but the lens of camera {camera} "
+                             f"was calibrated at {lens.width} x {lens.height} px. Record at that size, or calibrate at "
+                             "this one.")
+
+
+def _middle_row_times(stamps: Sequence[Stamp], node: RigNode) -> Times:
+    """(N,) ns, node clock, with the rig's calibrated correction of the camera."""
+    correction = round(1e9 * node.time_offset_s)
+    half = 0.5 * (node.intrinsics.height - 1)
+    return np.array([one.t_node_ns + round(half * one.row_time_ns) + correction for one in stamps], np.int64)
+
+
+# -- One clock for all ------------------------------------------------------------------------------------------------
+
+def on_one_clock(videos: Sequence[CameraVideo], offsets_s: Mapping[str, float]) -> list[CameraVideo]:
+    """The videos with all times on one clock: the nodes' recordings by the log beside them, all others as their files
+    begin; then `offsets_s` by camera is added.
+
+    Raises RecordingError: nodes' recordings without log, or videos that do not overlap.
+    """
+    several = len(videos) > 1
+    timed = [on_master_clock(video, needed=several and video.camera not in offsets_s) if video.stamped else video
+             for video in videos]
+    timed = [replace(video, times_ns=video.times_ns + round(1e9 * offsets_s.get(video.camera, 0.0)))
+             for video in timed]
+    first, last = overlap(timed)
+    if first > last:
+        zero = min(int(video.times_ns[0]) for video in timed)
+        covers = "; ".join(f"{video.camera} has {1e-9 * (int(video.times_ns[0]) - zero):.2f} to "
+                           f"{1e-9 * (int(video.times_ns[-1]) - zero):.2f} s" for video in timed)
+        raise RecordingError(f"the videos show no common time: {covers}. Are they of one recording? --offset-s moves a "
+                             "video in time.")
+    return timed
+
+
+def overlap(videos: Sequence[CameraVideo]) -> tuple[int, int]:
+    """The first and the last instant, ns, at which all videos have frames, to half a frame."""
+    half = min(video.period_ns for video in videos) // 2
+    return (max(int(video.times_ns[0]) for video in videos) - half,
+            min(int(video.times_ns[-1]) for video in videos) + half)
+
+
+def log_of(video: CameraVideo) -> Path:
+    """The log that a node's recording was made beside."""
+    return video.path.with_name(f"{video.path.stem.rpartition('.')[0] or video.path.stem}.rhotlog")
+
+
+def on_master_clock(video: CameraVideo, *, needed: bool) -> CameraVideo:
+    """A node's recording with the master's times, by the log beside it; unchanged without log, unless it is `needed`.
+    Raises RecordingError."""
+    log = log_of(video)
+    if not log.exists():
+        if not needed:
+            return video
+        raise RecordingError(f"{video.path}: its times are of the node's own clock, and the log {log.name} that "
+                             f"compares the clocks is not beside it. Put it there, or give "
+                             f"--offset-s {video.camera}=S.")
+    with contextlib.closing(LogReader(log)) as reader:
+        node = next((node for node in reader.rig.nodes if video_path(log, node.name).name == video.path.name), None)
+        clocks = [] if node is None else _clock_estimates(reader, reader.rig, node.node_id)
+    if not clocks:
+        raise RecordingError(f"{log}: it has no clock records of the node that recorded {video.path.name}. Is it the "
+                             f"log of this video? Else move it away and give --offset-s {video.camera}=S.")
+    begins = np.array([begin for begin, _ in clocks])
+    places = np.clip(np.searchsorted(begins, video.times_ns, side="right") - 1, 0, None)
+    times = [clocks[k][1].to_master_ns(int(t)) for k, t in zip(places, video.times_ns, strict=True)]
+    return replace(video, times_ns=np.array(times, np.int64))
+
+
+def _clock_estimates(reader: LogReader, rig: Rig, node_id: int) -> list[tuple[int, ClockEstimate]]:
+    """(node time from which it holds, estimate) of a node's clock, about once a second of the log."""
+    validator, found, next_ns = LogValidator(rig), [], 0
+    link = next(link for link in validator.links if link.node.node_id == node_id)
+    for record in reader:
+        validator.feed(record)
+        estimate = link.clock.estimate_at(record.t_master_ns) if record.t_master_ns >= next_ns else None
+        if estimate is not None:
+            found.append((record.t_master_ns + round(estimate.offset_ns), estimate))
+            next_ns = record.t_master_ns + _CLOCK_EVERY_NS
+    return found
+
+
+# -- Frame sets -------------------------------------------------------------------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class FrameSet:
+    """A picture (H, W, 3) RGB of each camera, None where it has none, and their times (C,) ns."""
+
+    images: tuple[Image | None, ...]
+    t_ns: tuple[int, ...]
+
+    @property
+    def first_ns(self) -> int:
+        """Of its earliest picture."""
+        return min(t for t, image in zip(self.t_ns, self.images, strict=True) if image is not None)
+
+
+def frame_sets(videos: Sequence[CameraVideo]) -> Iterator[FrameSet]:
+    """The frames of all videos while all have some, in the order of time. Pictures within half a frame of the quickest
+    camera make a set; every picture is in one set."""
+    half = min(video.period_ns for video in videos) // 2
+    first, last = overlap(videos)
+    streams = [video.frames((video.times_ns >= first) & (video.times_ns <= last)) for video in videos]
+    heads = [next(stream, None) for stream in streams]
+    while waiting := [head[0] for head in heads if head is not None]:
+        begin = min(waiting)
+        images: list[Image | None] = [None] * len(videos)
+        times = [begin] * len(videos)
+        for c, head in enumerate(heads):
+            if head is not None and head[0] <= begin + half:
+                times[c], images[c] = head
+                heads[c] = next(streams[c], None)
+        yield FrameSet(tuple(images), tuple(times))
+
+
+def frames_left_out(videos: Sequence[CameraVideo]) -> int:
+    """How many frames lie outside the time that all videos show."""
+    first, last = overlap(videos)
+    return sum(int(np.sum((video.times_ns < first) | (video.times_ns > last))) for video in videos)
+
+
+def checked_seconds(text: str, option: str) -> float:
+    """A number of seconds of the command line. Raises RecordingError."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise RecordingError(f"{option} {text}: {text!r} is no number of seconds.")
+    return value

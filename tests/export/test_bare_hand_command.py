@@ -1,0 +1,221 @@
+"""The bare hand in recorded videos: tables that are read back, films, mistakes, and the nodes' own recordings."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rhot_app.__main__ import main
+from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.export.bare_hand import lost_intervals
+from rhot_app.hand.skeleton import JOINTS
+from rhot_app.project import Rig, save_rig
+from rhot_app.recording.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
+from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
+from rhot_node.detect.image import from_bgr
+from rhot_node.video.avi import Stamp, append_picture, begin_video, encode_picture, finish_video
+
+FPS = 15.0
+EMPTY = 6
+"""Frames at the beginning without a hand."""
+
+DEPTH_M = 0.04
+"""Two pixels of disparity at 0.6 m, of cameras 75 mm apart with pictures 320 px wide."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A filmed hand: the rig's file, a video for each camera, and what was filmed."""
+
+    rig: Path
+    videos: dict[str, Path]
+    frames: list[BareHandFrame]
+
+    def arguments(self, *more: str) -> list[str]:
+        """Of ``rhot bare-hand``."""
+        given = [word for name, path in self.videos.items() for word in ("--video", f"{name}={path}")]
+        return ["bare-hand", "--rig", str(self.rig), *given, *more]
+
+
+def write_video(path: Path, pictures: Sequence[NDArray[np.uint8]], fps: float = FPS) -> Path:
+    """An ordinary motion JPEG film of pictures (H, W, 3) RGB."""
+    size = pictures[0].shape[1], pictures[0].shape[0]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), fps, size)
+    for picture in pictures:
+        writer.write(np.ascontiguousarray(picture[..., ::-1]))
+    writer.release()
+    return path
+
+
+def write_node_video(path: Path, pictures: Sequence[NDArray[np.uint8]], times_ns: Sequence[int]) -> Path:
+    """A film as a node records it."""
+    with path.open("w+b") as file:
+        begin_video(file, pictures[0].shape[1], pictures[0].shape[0])
+        for number, (picture, t_ns) in enumerate(zip(pictures, times_ns, strict=True)):
+            image = from_bgr(np.ascontiguousarray(picture[..., ::-1]))
+            append_picture(file, encode_picture(image, Stamp(number, t_ns, 4_000_000, 0)))
+        finish_video(file)
+    return path
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    folder = tmp_path_factory.mktemp("recorded")
+    rig = bare_hand_rig(width=320)
+    options = BareHandOptions(forearm=False)
+    there = list(bare_hand_frames(rig, "rest", 10 / FPS, FPS, 1, options))
+    away = list(bare_hand_frames(rig, "rest", EMPTY / FPS, FPS, 1, BareHandOptions(forearm=False, enters_after_s=9.0)))
+    frames = away + there
+    save_rig(folder / "rig.json", rig)
+    videos = {node.name: write_video(folder / f"{node.name}.avi", [frame.images[c] for frame in frames])
+              for c, node in enumerate(rig.nodes)}
+    return Recorded(folder / "rig.json", videos, frames)
+
+
+def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path: Path,
+                                                     monkeypatch: pytest.MonkeyPatch,
+                                                     capsys: pytest.CaptureFixture[str]) -> None:
+    def find(tracker: BareHandTracker, _: object, t_ns: int) -> bool:
+        tracker.start(recorded.frames[round(1e-9 * t_ns * FPS)].truth.pose, t_ns)
+        return True
+
+    monkeypatch.setattr(BareHandTracker, "find", find)  # small pictures are enough to follow a hand, not to find it
+    out, film = tmp_path / "hand.csv", tmp_path / "hand.avi"
+    code = main(recorded.arguments("--background-seconds", str((EMPTY - 0.5) / FPS), "--out", str(out), "--overlay",
+                                   str(film), "--json"))
+    said = json.loads(capsys.readouterr().out)
+    assert code == 0
+    with out.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == said["frame_sets"] == len(recorded.frames)
+    assert [row["condition"] for row in rows[:EMPTY]] == ["SEARCHING"] * EMPTY
+    assert not any(row["joint_wrist_x_mm"] for row in rows[:EMPTY]), "no numbers where there is no hand"
+    np.testing.assert_allclose([float(row["time_s"]) for row in rows], np.arange(len(rows)) / FPS, atol=1e-6)
+    tracked = [row["condition"] in ("TRACKING", "PARTIAL") for row in rows]
+    assert said["tracked"] == pytest.approx(np.mean(tracked)) and any(tracked)
+    assert said["starts"] >= 1 and said["lost_s"][0][0] == 0.0
+    for row, frame in [(rows[k], recorded.frames[k]) for k in np.flatnonzero(tracked)[:4]]:  # before it drifts
+        middle = 1e-3 * np.array([float(row[f"joint_middle_mcp_{axis}_mm"]) for axis in "xyz"])
+        assert np.linalg.norm(middle - frame.truth.joints[JOINTS.index("middle_mcp")]) < DEPTH_M
+    capture = cv2.VideoCapture(str(film))
+    read, picture = capture.read()
+    assert read and picture.shape == (240, 640, 3)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["hand.avi", "hand.csv"], "nothing else is left"
+
+
+def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name, path = next(iter(recorded.videos.items()))
+    empty = write_video(tmp_path / "empty.avi", [frame.images[0] for frame in recorded.frames[:EMPTY]])
+    assert main(["bare-hand", "--rig", str(recorded.rig), "--video", f"{name}={empty}", "--background",
+                 f"{name}={path}"]) == 0
+    assert "No hand was found" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("more", "says"), [
+    (("--video", "top=x.avi"), "no camera 'top'"), (("--video", "left"), "give a camera and its value"),
+    (("--fps", "0"), "from 1 to 1000"), (("--offset-s", "left=soon"), "no number of seconds"),
+    (("--offset-s", "right=100"), "no common time"), (("--out", "hand.bvh"), ".csv, .parquet or .npz"),
+    (("--background-seconds", "0.01"), "two pictures without a hand"),
+    (("--overlay", "nowhere/pictures"), "does not exist"),
+    (("--out", "nowhere/hand.csv"), "does not exist")])
+def test_mistakes_have_a_sentence(recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                  capsys: pytest.CaptureFixture[str], more: tuple[str, ...], says: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(recorded.arguments(*more)) == 2
+    assert says in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("content", "says"), [(None, "no such file"), (b"no video", "Is it a video"),
+                                               ("small", "160 x 120 px, but the lens")])
+def test_videos_that_cannot_be_used_are_refused(recorded: Recorded, tmp_path: Path, content: bytes | str | None,
+                                                says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "other.avi"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content == "small":
+        write_video(path, [frame.images[0][::2, ::2] for frame in recorded.frames[:2]])
+    assert main(["bare-hand", "--rig", str(recorded.rig), "--video", f"left={path}"]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_one_file_is_not_two_cameras(recorded: Recorded, capsys: pytest.CaptureFixture[str]) -> None:
+    path = recorded.videos["left"]
+    assert main(["bare-hand", "--rig", str(recorded.rig), "--video", f"left={path}", "--video", f"right={path}"]) == 2
+    assert "two cameras" in capsys.readouterr().err
+
+
+def test_an_existing_table_stays(recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "hand.csv"
+    out.write_text("mine")
+    assert main(recorded.arguments("--out", str(out))) == 2
+    assert "--again" in capsys.readouterr().err and out.read_text() == "mine"
+
+
+def test_an_interrupt_leaves_nothing(recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rhot_app.export import bare_hand
+
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(bare_hand.BareHandRun, "step", stopped)
+    code = main(recorded.arguments("--out", str(tmp_path / "hand.csv"), "--overlay", str(tmp_path / "pictures")))
+    assert code == 130 and not list(tmp_path.iterdir())
+
+
+# -- Frame sets -------------------------------------------------------------------------------------------------------
+
+def shades(count: int, rig: Rig) -> list[NDArray[np.uint8]]:
+    """Pictures that say their number."""
+    lens = rig.nodes[0].intrinsics
+    return [np.full((lens.height, lens.width, 3), 8 * k, np.uint8) for k in range(count)]
+
+
+def test_frames_of_unequal_rates_go_to_sets_once(tmp_path: Path) -> None:
+    rig = bare_hand_rig(width=64)
+    paths = [write_video(tmp_path / f"{fps}.avi", shades(fps, rig), fps) for fps in (20, 10)]
+    videos = on_one_clock([open_video(node, path) for node, path in zip(rig.nodes, paths, strict=True)], {"right": 0.3})
+    sets = list(frame_sets(videos))
+    assert frames_left_out(videos) == 6 + 3  # the left camera's first 0.3 s, the right one's last
+    assert [one.images[1] is not None for one in sets] == [k % 2 == 0 for k in range(len(sets))]
+    first = sets[0]
+    assert first.first_ns == 300_000_000 and abs(float(np.mean(first.images[0])) - 48.0) < 3.0  # its sixth frame
+    assert all(one.images[0] is not None for one in sets)
+
+
+def test_a_rate_on_the_command_line_is_obeyed(tmp_path: Path) -> None:
+    rig = bare_hand_rig(width=64)
+    video = open_video(rig.nodes[0], write_video(tmp_path / "a.avi", shades(5, rig), 20.0), 50.0)
+    np.testing.assert_array_equal(np.diff(video.times_ns), 20_000_000)
+
+
+def test_a_recording_of_a_node_has_its_own_times(tmp_path: Path) -> None:
+    rig, times = bare_hand_rig(width=64), [5_000_000_000, 5_040_000_000, 5_090_000_000]
+    path = write_node_video(tmp_path / "r.left.avi", shades(3, rig), times)
+    (video,) = on_one_clock([open_video(rig.nodes[0], path)], {})
+    read = list(video.frames())
+    assert [t for t, _ in read] == times
+    assert [round(float(picture.mean()) / 8) for _, picture in read] == [0, 1, 2]
+
+
+def test_recordings_of_two_nodes_need_their_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = bare_hand_rig(width=64)
+    save_rig(tmp_path / "rig.json", rig)
+    paths = [write_node_video(tmp_path / f"r.{node.name}.avi", shades(3, rig), [10 ** (9 + c) + k for k in (0, 50, 90)])
+             for c, node in enumerate(rig.nodes)]
+    assert main(["bare-hand", "--rig", str(tmp_path / "rig.json"), "--video", f"left={paths[0]}", "--video",
+                 f"right={paths[1]}"]) == 2
+    assert "r.rhotlog" in capsys.readouterr().err
+
+
+def test_lost_intervals_end_when_the_hand_is_there_again() -> None:
+    flags = [False, True, True, False, False, True, False]
+    assert lost_intervals([(k * 10**9, flag) for k, flag in enumerate(flags, 5)]) == ((0, 1), (3, 5), (6, 6))
