@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -16,12 +17,16 @@ from numpy.typing import NDArray
 from rhot_app.__main__ import main
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.export.bare_hand import lost_intervals
+from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.project import Rig, save_rig
+from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, save_rig
 from rhot_app.recording.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
+from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
 from rhot_node.detect.image import from_bgr
 from rhot_node.video.avi import Stamp, append_picture, begin_video, encode_picture, finish_video
+from rhot_node.wire.codec import encode
+from rhot_node.wire.messages import ClockReply, ClockRequest, NodeState, Start, StartEntry
 
 FPS = 15.0
 EMPTY = 6
@@ -216,6 +221,73 @@ def test_recordings_of_two_nodes_need_their_log(tmp_path: Path, capsys: pytest.C
     assert "r.rhotlog" in capsys.readouterr().err
 
 
+def test_a_log_takes_recordings_to_the_masters_clock(tmp_path: Path) -> None:
+    rig, begin, ahead = bare_hand_rig(width=64), 10**12, (5 * 10**9, -2 * 10**9)
+    records = [Record(RecordKind.START, 0, begin, encode(Start(7, 1, tuple(
+        StartEntry(node.node_id, 5000 + c, 0) for c, node in enumerate(rig.nodes)))))]
+    for number in range(30):
+        t_ns = begin + number * 10**8
+        for node, offset in zip(rig.nodes, ahead, strict=True):
+            request = ClockRequest(node.node_id, 7, number + 1, t_ns)
+            read_ns = t_ns + 100_000 + offset
+            reply = ClockReply(node.node_id, 7, number + 1, t_ns, read_ns, read_ns, 1, NodeState.STREAMING)
+            records += [Record(RecordKind.CLOCK_REQUEST, node.node_id, t_ns, encode(request)),
+                        Record(RecordKind.CLOCK_REPLY, node.node_id, t_ns + 200_000, encode(reply))]
+    (tmp_path / "r.rhotlog").write_bytes(encode_header(rig, {}) + b"".join(map(encode_record, records)))
+    times = [begin + 10**9 + k * 40_000_000 for k in range(4)]
+    videos = [open_video(node, write_node_video(tmp_path / f"r.{node.name}.avi", shades(4, rig),
+                                                [t + offset for t in times]))
+              for node, offset in zip(rig.nodes, ahead, strict=True)]
+    for video in on_one_clock(videos, {}):
+        np.testing.assert_allclose(video.times_ns, times, rtol=0.0, atol=100_000)
+
+
 def test_lost_intervals_end_when_the_hand_is_there_again() -> None:
     flags = [False, True, True, False, False, True, False]
     assert lost_intervals([(k * 10**9, flag) for k, flag in enumerate(flags, 5)]) == ((0, 1), (3, 5), (6, 6))
+
+
+# -- A real hand ------------------------------------------------------------------------------------------------------
+
+FOLDER = Path(__file__).parents[3] / "shared" / "data" / "bare_hand_stereo"
+SQUARE_M = 0.025
+"""The unit of the calibration is a chessboard square of unknown size."""
+
+
+def numbers(path: Path) -> list[list[float]]:
+    """Rows of numbers of a calibration file; a comment ends them."""
+    lines = path.read_text().partition("#")[0].splitlines()
+    return [[float(word) for word in line.split()] for line in lines if line.strip() and not line[0].isalpha()]
+
+
+def real_rig() -> Rig:
+    """The rig of the real videos, with the mean right hand."""
+    nodes = []
+    for c in range(2):
+        lens, place = numbers(FOLDER / f"c{c}.dat"), numbers(FOLDER / f"rot_trans_c{c}.dat")
+        left, _, right = np.linalg.svd(np.array(place[:3]))
+        rotation, shift = left @ right, SQUARE_M * np.array(place[3:6]).ravel()
+        w, x, y, z = quaternion_from_rotation(rotation.T).tolist()
+        tx, ty, tz = (-rotation.T @ shift).tolist()
+        k1, k2, p1, p2, k3 = lens[3]
+        nodes.append(RigNode(c + 1, f"c{c}", Intrinsics(720, 720, lens[0][0], lens[1][1], lens[0][2], lens[1][2],
+                                                        (k1, k2, p1, p2, k3)), CameraPose((w, x, y, z), (tx, ty, tz))))
+    return msgspec.structs.replace(bare_hand_rig(), nodes=tuple(nodes), calibration=None)
+
+
+@pytest.mark.skipif(not FOLDER.exists(), reason="../shared/data/bare_hand_stereo is not there")
+def test_real_videos_run_and_states_without_a_hand_have_no_numbers(tmp_path: Path,
+                                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    save_rig(tmp_path / "rig.json", real_rig())
+    arguments = ["bare-hand", "--rig", str(tmp_path / "rig.json"), "--unknown-size", "--json", "--out",
+                 str(tmp_path / "hand.csv"), "--overlay", str(tmp_path / "pictures")]
+    for c in range(2):
+        capture = cv2.VideoCapture(str(FOLDER / f"cam{c}_first120.mp4"))
+        pictures = [np.ascontiguousarray(capture.read()[1][..., ::-1]) for _ in range(20)][14:]
+        arguments += ["--video", f"c{c}={write_video(tmp_path / f'c{c}.avi', pictures, 30.0)}"]
+    assert main(arguments) == 0
+    assert json.loads(capsys.readouterr().out)["frame_sets"] == 6
+    with (tmp_path / "hand.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            assert (row["condition"] in ("TRACKING", "PARTIAL")) == bool(row["joint_wrist_x_mm"])
+    assert len(list((tmp_path / "pictures").iterdir())) == 6
