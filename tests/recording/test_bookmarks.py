@@ -70,7 +70,7 @@ def test_a_bookmark_of_another_program_reaches_no_terminal_with_control_characte
 
 
 def test_records_of_unknown_and_reserved_kinds_are_skipped_without_being_losses(tmp_path: Path) -> None:
-    foreign = [bytes([kind]) + encode_record(DATAGRAM)[1:-4] for kind in (8, 9, 200)]
+    foreign = [bytes([kind]) + encode_record(DATAGRAM)[1:-4] for kind in (9, 200, 201)]
     path = tmp_path / "a.log"
     with path.open("wb") as file:
         file.write(encode_header(synthetic_rig(), {}))
