@@ -93,8 +93,8 @@ def judge_depth(readings: Sequence[DistanceReading], rig: Rig) -> Line:
         return not_measured("depth", DEPTH, f"an error of {SHOWS_PERCENT:g} % would not show. {measured}", _MEASURE,
                             tuple(figures), curves)
     if scale.holds(0.0):
-        return Line("depth", DEPTH, "agrees", f"{measured} 0 lies inside. {_offset(zero)}", figures=tuple(figures),
-                    curves=curves)
+        return Line("depth", DEPTH, "agrees", f"{measured} The interval holds 0. {_offset(zero)}".strip(),
+                    figures=tuple(figures), curves=curves)
     angle = bend.cost < line.cost and not bend.low(1) <= 0.0 <= bend.high(1)
     cause = ("The error grows with the square of the distance: the angle between the cameras is not what the rig file "
              "says." if angle else f"All distances are {_too(scale.value)} by one factor: the baseline (or the board's "
@@ -214,9 +214,9 @@ def judge_rod(recording: Recording, markers: tuple[str, str], length_m: float, r
         if error.half_width > SHOWS_PERCENT:
             return not_measured("rod", ROD, f"an error of {SHOWS_PERCENT:g} % would not show. {measured}",
                                 f"Take a longer rod. {_SWEEP}", tuple(figures), curves)
-        how = (", along the view and across it." if len(asked) > 1 else
-               ". The rod was hardly turned, so a wrong focal length would not show.")
-        return Line("rod", ROD, "agrees", f"{measured} 0 lies inside{how}", figures=tuple(figures), curves=curves)
+        how = ("The intervals hold 0, along the view and across it, too." if len(asked) > 1 else
+               "The interval holds 0. The rod was hardly turned, so a wrong focal length would not show.")
+        return Line("rod", ROD, "agrees", f"{measured} {how}", figures=tuple(figures), curves=curves)
     cause, remedy = _why(error, across, away, off, depth, rig)
     return Line("rod", ROD, "differs", measured, cause, remedy, tuple(figures), curves)
 

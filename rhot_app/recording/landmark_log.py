@@ -65,7 +65,9 @@ def read_landmark_table(path: Path, fps: float | None) -> LandmarkTable:
             rows = csv.DictReader(file)
             names = rows.fieldnames or []
             return _parse(path, list(names), list(rows), fps)
-    except (OSError, UnicodeDecodeError, csv.Error) as exc:
+    except OSError as exc:
+        raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
+    except (UnicodeDecodeError, csv.Error) as exc:
         raise RecordingError(f"{path}: cannot be read as a landmark table ({exc}). Give a CSV file with the columns "
                              "of docs/landmarks.md.") from exc
 
@@ -120,8 +122,8 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable], ti
     the file cannot be written.
     """
     if len(tables) != len(rig.nodes):
-        raise RecordingError(f"{len(tables)} landmark tables, but rig {rig.name!r} has {len(rig.nodes)} cameras; give "
-                             "one table for each, in the rig's order.")
+        raise RecordingError(f"rig {rig.name!r} has {len(rig.nodes)} cameras, but the landmark tables are "
+                             f"{len(tables)}. Give one table for each, in the rig's order.")
     order, first_s = landmark_order(rig), min(table.times_s[0] for table in tables)
     bound_ns = round(1e9 * time_bound_s)
     begin_ns = _BEGIN_NS + 10 * _EXCHANGE_NS

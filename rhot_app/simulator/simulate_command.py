@@ -112,7 +112,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "each place where it is held still")
     parser.add_argument("--points", type=float, nargs="?", const=POINT_SIGMA_PX, default=None, metavar="PX",
                         help="no pictures: a raw log (DIR/points.log) of every marker's position in both, with a noise "
-                             f"of PX (default {POINT_SIGMA_PX:g}); nothing hides anything")
+                             f"of PX (default {POINT_SIGMA_PX:g}); nothing hides anything, and no cube's tags")
     parser.add_argument("--depth-table", default=None, metavar="CM,CM,...",
                         help="no pictures: a table (DIR/table.csv) of disparities of a marker held at these distances")
     parser.add_argument("--hide", action="append", default=[], metavar="ID",

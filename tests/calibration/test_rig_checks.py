@@ -29,6 +29,7 @@ from rhot_app.project import (
     with_tracker,
 )
 from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
 
 LENS = Intrinsics(640, 480, 533.0, 533.5, 341.0, 235.0, (-0.28, 0.09, 0.001, 0.0, 0.0))
 
@@ -151,6 +152,8 @@ def test_markers_hand_filters_and_ports_are_looked_at(rig: Rig) -> None:
     twin = change(rig.markers.markers[2], chroma=index.chroma)
     markers = change(rig.markers, markers=(*rig.markers.markers[:2], twin, *rig.markers.markers[3:]))
     assert "colours" in check_rig(change(rig, markers=markers)).verdict.codes  # type: ignore[arg-type]
+    landmarks = load_markers(resource_path("markers", "landmarks21.json"))  # their colours are for the screen
+    assert "colours" not in check_rig(change(rig, markers=landmarks)).verdict.codes  # type: ignore[arg-type]
     thumb = change(rig.hand.fingers["thumb"], bones_mm=(4.6, 3.2, 2.7), marker_mm=1.0)  # centimetres
     hand = check_rig(change(rig, hand=change(rig.hand, fingers={**rig.hand.fingers, "thumb": thumb})))  # type: ignore[arg-type]
     assert not hand.verdict.acceptable

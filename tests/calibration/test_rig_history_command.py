@@ -53,6 +53,12 @@ def test_a_missing_rig_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "no such file" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", ["check", "history"])
+def test_no_rig_at_all_is_asked_for_by_its_option(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command]) == 2
+    assert "--rig FILE is missing" in capsys.readouterr().err
+
+
 def test_a_rig_that_was_lost_is_brought_back(path: Path) -> None:
     path.unlink()
     assert main(["history", "--rig", str(path), "--restore", "1"]) == 0

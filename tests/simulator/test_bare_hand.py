@@ -268,5 +268,8 @@ def test_the_command_line_asks_for_a_bare_hand() -> None:
     add_scene_arguments(parser)
     add_show_arguments(parser)
     assert show_of(parser.parse_args(["--bare", "--tone", "7", "--motion", "wave"])) == BareHandShow("wave", tone=7.0)
-    with pytest.raises(SimulatorError, match="cannot be shown"):
-        show_of(parser.parse_args(["--bare", "--tone", "70"]))
+    for arguments, says in ((["--bare", "--tone", "70"], r"--tone: expected a number <= 10"),
+                            (["--bare", "--cube"], "no cube"), (["--sleeve"], "give --bare"),
+                            (["--cube", "--show", "board"], "--cube is of a hand")):
+        with pytest.raises(SimulatorError, match=says):
+            show_of(parser.parse_args(arguments))

@@ -71,6 +71,6 @@ def test_table_of_distances_follows_the_law_of_depth(tmp_path: Path) -> None:
 
 
 def test_a_board_wears_no_markers(tmp_path: Path) -> None:
-    with pytest.raises(SimulatorError, match="wears no markers"):
+    with pytest.raises(SimulatorError, match="there are no markers on it"):
         write_points(make_shot(scene("rhot6"), BoardShow(), 1.0), tmp_path / "take", PointNoise())
     assert list(tmp_path.iterdir()) == []

@@ -259,9 +259,10 @@ _FREE_PORTS = 1024
 
 
 def marker_findings(rig: Rig) -> list[Finding]:
-    """Pairs of markers whose hues lie so near that each one's range reaches the other's middle."""
-    close = []
-    for a, b in combinations(rig.markers.markers, 2):
+    """Pairs of markers whose hues lie so near that each one's range reaches the other's middle. The colours of
+    landmarks are for the screen only."""
+    close, painted = [], [marker for marker in rig.markers.markers if marker.shape != "landmark"]
+    for a, b in combinations(painted, 2):
         apart = abs((np.degrees(a.chroma.hue_rad - b.chroma.hue_rad) + 180.0) % 360.0 - 180.0)
         if apart < max(a.chroma.hue_tolerance_deg, b.chroma.hue_tolerance_deg):
             close.append(f"{a.id} and {b.id} ({apart:.0f} degrees of hue)")

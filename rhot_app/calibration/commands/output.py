@@ -22,13 +22,17 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
 
 def add_rig_argument(parser: argparse.ArgumentParser) -> None:
     """``--rig FILE``; scripts from before it may give the file alone."""
-    given = parser.add_mutually_exclusive_group(required=True)
+    given = parser.add_mutually_exclusive_group()
     given.add_argument("--rig", type=Path, metavar="FILE", help="the rig file")
     given.add_argument("file", type=Path, nargs="?", help=argparse.SUPPRESS)
 
 
 def rig_of(args: argparse.Namespace) -> Path:
-    """The rig file of `add_rig_argument`."""
+    """The rig file of `add_rig_argument`. Raises RigError without one."""
+    from rhot_app.errors import RigError
+
+    if args.rig is None and args.file is None:
+        raise RigError("--rig FILE is missing: it names the rig file.")
     return Path(args.rig or args.file)
 
 

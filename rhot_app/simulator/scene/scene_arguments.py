@@ -10,6 +10,9 @@ from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, SQUARE_MM
 if TYPE_CHECKING:
     from rhot_app.simulator.scene.scene_description import Show
 
+_OPTION_OF = {"tone": "--tone", "length_mm": "--ruler-mm", "square_mm": "--square-mm", "marker_mm": "--marker-mm",
+              "distance_m": "--distance"}
+
 
 def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     """What is shown, besides the hand's ``--motion``."""
@@ -48,6 +51,12 @@ def show_of(args: argparse.Namespace) -> Show:
     from rhot_app.errors import SimulatorError
     from rhot_app.simulator.scene.scene_description import Show
 
+    if args.show != "hand" and (args.bare or args.cube):
+        raise SimulatorError(f"--{'bare' if args.bare else 'cube'} is of a hand: leave out --show {args.show}, or it.")
+    if args.bare and args.cube:
+        raise SimulatorError("a bare hand holds no cube: leave out --bare or --cube.")
+    if not args.bare and (args.tone is not None or args.sleeve):
+        raise SimulatorError(f"--{'sleeve' if args.sleeve else 'tone'} is of a bare hand: give --bare, too.")
     fields: dict[str, object] = {"show": args.show}
     if args.show == "hand" and args.bare:
         fields |= {"show": "bare_hand", "motion": args.motion, "tone": args.tone, "sleeve": args.sleeve}
@@ -68,4 +77,12 @@ def show_of(args: argparse.Namespace) -> Show:
     try:
         return msgspec.convert(fields, Show)
     except msgspec.ValidationError as exc:
-        raise SimulatorError(f"this cannot be shown: {exc}") from exc
+        raise SimulatorError(_objection(str(exc))) from exc
+
+
+def _objection(problem: str) -> str:
+    """What msgspec says of a field, said of the option that chose it."""
+    what, _, place = problem.partition(" - at ")
+    option = _OPTION_OF.get(place.strip("`").removeprefix("$."))
+    what = what.replace("Expected `float`", "expected a number")
+    return f"this cannot be shown: {problem}" if option is None else f"{option}: {what}."

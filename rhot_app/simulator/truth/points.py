@@ -82,7 +82,8 @@ def write_points(shot: Shot, folder: Path, noise: PointNoise, progress: Progress
     Raises SimulatorError, also when what is shown wears no markers.
     """
     if isinstance(shot.scene_object.thing, Sheet | BareHand):
-        raise SimulatorError(f"a {shot.scene_object.name} wears no markers; show a hand or a marker.")
+        raise SimulatorError(f"{shot.scene_object.name}: there are no markers on it. Show a hand that wears some, "
+                             "or a marker.")
     with new_folder(folder) as work:
         save_shot(shot, work)
         rig = load_rig(work / RIG_NAME)

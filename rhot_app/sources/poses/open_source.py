@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rhot_app.errors import SourceError
 from rhot_app.sources.poses.line_inputs import LIBSURVIVE, ProgramLines, TcpLines, UdpLines, command_of, endpoint_of
 from rhot_app.sources.poses.lines import LinePoses
 from rhot_app.sources.poses.source import FilePoses, PoseSource
@@ -30,4 +31,6 @@ def open_source(name: str, tracker: str = "") -> PoseSource:
         return LinePoses(TcpLines(*endpoint_of(rest, LOOPBACK)), tracker)
     if colon and kind == "udp":
         return LinePoses(UdpLines(*endpoint_of(rest, LOOPBACK)), tracker)
+    if tracker:
+        raise SourceError(f"{name}: a CSV file holds one tracker, without its name. Leave --tracker out.")
     return FilePoses(Path(name))

@@ -24,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="openvr, libsurvive, run:PROGRAM, tcp:HOST:PORT, udp:PORT, or a CSV file")
     parser.add_argument("--tracker", default="", metavar="NAME",
                         help="the tracker's serial number or role (default: the only one)")
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="N", help="how long to listen (default: 20)")
+    parser.add_argument("--seconds", type=float, default=20.0, metavar="N",
+                        help="how long to listen (default: 20); a CSV file is read whole")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the tracked poses as CSV")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
 

@@ -195,6 +195,11 @@ def test_a_source_that_cannot_be_opened_says_why(name: str, says: str) -> None:
         open_source(name)
 
 
+def test_a_file_has_no_trackers_to_choose_from() -> None:
+    with pytest.raises(SourceError, match="Leave --tracker out"):
+        open_source("recording.csv", "LHR-1A2B3C4D")
+
+
 def rhot(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", "rhot_app", "poses", *arguments], capture_output=True, text=True,
                           check=False, env={**os.environ, "PYTHONPATH": str(ROOT)})
