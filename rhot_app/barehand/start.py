@@ -26,7 +26,7 @@ from rhot_node.detect.foreground import Foreground, foreground_map
 Array = NDArray[np.float64]
 
 STEP = 8
-"""px: every so many-th pixel is looked at."""
+"""px: spacing of the pixels of the foreground map."""
 
 ROTATIONS = 400
 """Rotations tried at a candidate: 25 degrees apart."""

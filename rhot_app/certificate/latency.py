@@ -70,7 +70,7 @@ LONGEST_S = 0.5
 """Delays are sought up to here."""
 
 SCREEN_S = (0.0, 0.1)
-"""A screen shows between nothing and this later than it is told: 60 Hz monitors take 10 to 50 ms, televisions up to
+"""A screen shows between nothing and this later than it is ordered: 60 Hz monitors take 10 to 50 ms, televisions up to
 100 ms. A picture that is stamped before the light or later than that has a wrong time."""
 
 _SPREADS_S = np.geomspace(1e-4, 1e-2, 9)

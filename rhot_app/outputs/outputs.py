@@ -15,7 +15,8 @@ from rhot_app.tracking.state import HandState
 from rhot_node.errors import PluginError
 from rhot_node.plugins import about_plugin, load_plugin, plugin_names
 
-# -- Outputs from other packages: entry points of the group ``rhot.outputs`` (docs/plugins.md) -------------------------
+# -- outputs from other packages ---------------------------------------------------------------------------------------
+# Entry points of the group ``rhot.outputs`` (docs/plugins.md).
 
 GROUP: Final = "rhot.outputs"
 """An entry point names a callable that makes a `Sink` of an `OutputSettings`."""
@@ -64,7 +65,7 @@ class _BrokenSink:
         """Nothing to release."""
 
 
-# -- All outputs of a rig: made, changed and asked together ------------------------------------------------------------
+# -- the outputs of a rig ----------------------------------------------------------------------------------------------
 
 MakeSink = Callable[[OutputSettings], Sink]
 
