@@ -160,10 +160,10 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
                 along, dot, square = 0.0, 0.0, 0.0
                 for i in range(3):
                     line = c1[i] + r1 * n[i] - c0[i] - r0 * n[i]
-                    sight = 0.5 * (c0[i] + c1[i]) - o[i]
+                    ray = 0.5 * (c0[i] + c1[i]) - o[i]
                     along += line * line
-                    dot += line * sight
-                    square += sight * sight
+                    dot += line * ray
+                    square += ray * ray
                 number = max(int(math.sqrt(max(along - dot * dot / square, 0.0)) / step_m + 0.5), 1)
             else:
                 if not surface.open_ends[k, kind - 2]:

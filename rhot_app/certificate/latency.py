@@ -60,7 +60,7 @@ def judge_timing(latencies: Array) -> Line:
     return Line("timing", TIMING, "agrees", f"{measured} {beside}", figures=tuple(figures), curves=curves)
 
 
-# -- the flashing patch ------------------------------------------------------------------------------------------------
+# -- line 5: end-to-end latency ----------------------------------------------------------------------------------------
 
 DWELL_S = (0.15, 0.45)
 """How long the patch stays as it is: longer than the slowest rig takes (three frames at 30 Hz and a screen), and as

@@ -74,7 +74,7 @@ def _pixel_sd(recording: Recording, marker: int, axis: int) -> Interval:
                   for camera in range(recording.camera_count)])
 
 
-# -- line 6: which way is up, and that left is left --------------------------------------------------------------------
+# -- line 6: upright and not mirrored ----------------------------------------------------------------------------------
 
 UPRIGHT, HANDEDNESS = "Upright", "Not mirrored"
 

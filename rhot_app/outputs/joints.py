@@ -115,7 +115,7 @@ class JointConverter:
             position, turn = _turned(self._upright, position), _product(self._upright, turn)
         return ObjectSample(one.name, one.validity.value, position, _xyzw(turn), one.distances, one.contacts)
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         """Compile what the conversion needs, before the first state."""
         for hand in self._hands:
             hand.openxr(neutral_pose(), 1.0)

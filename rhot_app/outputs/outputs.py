@@ -126,7 +126,7 @@ class Outputs:
         made = {settings: Output(settings, make_sink(settings), converter)
                 for settings in wanted if settings not in kept}
         if any(settings.joints == "openxr" for settings in made):
-            converter.rehearse()
+            converter.warm_up()
         for output in self._running:  # ports of those that go are free for those that come
             if output.settings not in kept:
                 output.stop()

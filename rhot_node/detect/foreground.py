@@ -30,6 +30,8 @@ SKIN_CB, SKIN_CR = (77, 127), (133, 173)
 UNUSUAL = 0.02
 """Probability that a pixel shows what the learnt colours do not: highlights, shadows, new things."""
 
+_BIN = 256 // BINS  # values of a channel in one bin
+_INVERSE_ROOT_2PI = 0.3989423
 _FOREIGN = 4.0  # standard deviations of the background
 _OPEN_PX, _LEAST_PIXELS = 3, 400  # smaller patches of skin are none
 _LEAST_SD = 2.0  # of 255: quantisation and compression, below which no background is known
@@ -111,7 +113,7 @@ def learn_skin(image: Image, model: Foreground | None = None) -> Foreground:
 
 
 def _density(pixels: Image) -> Array32:
-    index = (pixels // (256 // BINS)).astype(np.int64)
+    index = (pixels // _BIN).astype(np.int64)
     counts = np.bincount((index[:, 0] * BINS + index[:, 1]) * BINS + index[:, 2], minlength=BINS**3)
     cube = counts.reshape(BINS, BINS, BINS).astype(np.float32)
     for axis in range(3):  # smoothed over neighbouring bins
@@ -126,14 +128,14 @@ def _density(pixels: Image) -> Array32:
 def foreground_at(image, row, column, hand, rest, mean, sd):
     """Probability that a pixel shows the hand."""
     r, g, b = image[row, column, 0], image[row, column, 1], image[row, column, 2]
-    index = (np.int64(r) // 8 * 32 + np.int64(g) // 8) * 32 + np.int64(b) // 8
+    index = (np.int64(r) // _BIN * BINS + np.int64(g) // _BIN) * BINS + np.int64(b) // _BIN
     ours, theirs = hand[index], rest[index]
     if mean.shape[0]:
         squared, density = 0.0, 1.0
         for k in range(3):
             z = (image[row, column, k] - mean[row, column, k]) / sd[row, column, k]
             squared += z * z
-            density *= 0.3989423 / sd[row, column, k]
+            density *= _INVERSE_ROOT_2PI / sd[row, column, k]
         theirs = (1.0 - UNUSUAL) * density * np.exp(-0.5 * squared) + UNUSUAL * theirs
     return ours / (ours + theirs)
 
