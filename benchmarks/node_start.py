@@ -23,7 +23,7 @@ from rhot_node.capture.yuv import YuvWriter
 from rhot_node.config import CameraSettings, NodeSettings, save_settings
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.warm_up import rehearsal_image
+from rhot_node.warm_up import warm_up_image
 
 SIZE = (640, 480)
 FPS = 40
@@ -54,7 +54,7 @@ class Start:
 def make_node(folder: Path) -> list[str]:
     """Settings and a recording of six discs in `folder`; returns the node's arguments."""
     markers = load_markers(resource_path("markers", "rhot6.json"))
-    image = rehearsal_image(markers, SIZE)
+    image = warm_up_image(markers, SIZE)
     frame = np.concatenate([image.y.ravel(), image.u.ravel(), image.v.ravel()])
     with YuvWriter(folder / "frames", *SIZE, 4_000_000, 20_000) as writer:
         for k in range(FRAMES):

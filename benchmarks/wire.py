@@ -18,7 +18,7 @@ import numpy as np
 from rhot_node.detect.fast import FastDetector
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.warm_up import rehearsal_image, warm_up
+from rhot_node.warm_up import warm_up, warm_up_image
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import MarkerObservation, Observations
 from rhot_node.wire.text import format_text, parse_text
@@ -69,7 +69,7 @@ def main() -> int:
                "text, parse": median_us(lambda: parse_text(text, 6), options.rounds)}}
     detector = FastDetector(MARKERS)
     warm_up(detector, MARKERS, SIZE)
-    image = rehearsal_image(MARKERS, SIZE)
+    image = warm_up_image(MARKERS, SIZE)
     before = resident_mb()
     for _ in range(2000):
         detector.detect(image)

@@ -21,7 +21,7 @@ from rhot_app.calibration.filters.tuning import OFF, Footage, simulate
 from rhot_app.calibration.hand.bundle_model import POSE, Poses, linearise
 from rhot_app.calibration.hand.marker_places import PALM, MarkerPlace
 from rhot_app.calibration.hand.shape import HandUnknowns
-from rhot_app.engine.pipeline import warm_up as rehearse_tracker
+from rhot_app.engine.pipeline import warm_up as warm_up_tracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import ANGLES
@@ -35,18 +35,18 @@ from rhot_node.compiled import mark_complete
 from rhot_node.detect.fast import FastDetector
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.warm_up import warm_up as rehearse_detector
+from rhot_node.warm_up import warm_up as warm_up_detector
 
 
 def warm_detector(rig: Rig) -> None:
     """Compile what a node does with a frame."""
     camera = rig.nodes[0].intrinsics
-    rehearse_detector(FastDetector(rig.markers), rig.markers, (camera.width, camera.height))
+    warm_up_detector(FastDetector(rig.markers), rig.markers, (camera.width, camera.height))
 
 
 def warm_tracker(rig: Rig) -> None:
     """Compile what the engine does with observations."""
-    rehearse_tracker(make_tracker(rig), rig)
+    warm_up_tracker(make_tracker(rig), rig)
 
 
 def warm_estimator(rig: Rig) -> None:
@@ -55,7 +55,7 @@ def warm_estimator(rig: Rig) -> None:
     for markers in ("rhot6", "rhot8"):
         chosen = msgspec.structs.replace(rig, markers=load_markers(resource_path("markers", f"{markers}.json")),
                                          tracker=TrackerSettings(kind="estimator", float_scale=True))
-        rehearse_tracker(make_tracker(chosen), chosen)
+        warm_up_tracker(make_tracker(chosen), chosen)
 
 
 def warm_twin(_rig: Rig) -> None:
@@ -89,7 +89,7 @@ def warm_calibrations(rig: Rig) -> None:
 
 def warm_outputs(rig: Rig) -> None:
     """Compile what turns a hand into the joints of other programs."""
-    JointConverter(rig).rehearse()
+    JointConverter(rig).warm_up()
 
 
 STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker,

@@ -197,7 +197,7 @@ def _invite(settings: NodeSettings, offers: OfferFile) -> None:
 
 
 def make_detector(settings: NodeSettings) -> Detector:
-    """The detector that the settings name, no plug-in, compiled and rehearsed."""
+    """The detector that the settings name, no plug-in, compiled and warmed up."""
     from rhot_node.warm_up import warm_up
     detector: Detector
     if settings.detector == "reference":

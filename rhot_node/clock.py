@@ -33,7 +33,7 @@ class NodeClock:
         return self.origin_ns + round(elapsed)
 
 
-# -- When the kernel received a datagram, on this machine's monotonic clock --------------------------------------------
+# -- kernel receive time -----------------------------------------------------------------------------------------------
 # The kernel stamps with the wall clock (SO_TIMESTAMPNS). It is brought to the monotonic clock by their difference
 # measured right after the read; when the wall clock was set in between, the stamp is not used.
 

@@ -55,7 +55,8 @@ def connect_with(sock: zmq.Socket[bytes], own: KeyPair, server_key: str) -> None
     sock.curve_serverkey = z85.encode(bytes.fromhex(server_key))
 
 
-# -- Files that hold secrets: created with mode 0600, never wider for a moment, and not read when anybody else ---------
+# -- files of secrets --------------------------------------------------------------------------------------------------
+# Created with mode 0600, and not read when anybody else may read them.
 
 def read_private(path: Path) -> bytes | None:
     """The bytes of `path`; None when there is no such file.
@@ -125,7 +126,7 @@ def remove_private(path: Path) -> bool:
     return True
 
 
-# -- Whom a node trusts: its own key pair and the masters it is paired with, in one file of mode 0600 beside -----------
+# -- key pair and paired masters ---------------------------------------------------------------------------------------
 # `rhot-node unpair` removes the file; a running node notices, draws a new pair and forgets every master.
 
 log = logging.getLogger(__name__)

@@ -54,8 +54,9 @@ def _points(group: str) -> tuple[EntryPoint, ...]:
                           "tell which is broken.") from exc
 
 
-# -- Detectors from other packages: ``"detector": "plug:NAME"`` in a node's settings takes what the entry --------------
-# ``rhot.detectors`` makes: a callable ``(markers) -> Detector`` (docs/plugins.md).
+# -- detectors from other packages -------------------------------------------------------------------------------------
+# ``"detector": "plug:NAME"`` in a node's settings takes what the entry point NAME of the group ``rhot.detectors``
+# makes: a callable ``(markers) -> Detector`` (docs/plugins.md).
 
 log = logging.getLogger(__name__)
 

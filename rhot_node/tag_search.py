@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 U32_MAX = 2**32 - 1
-REHEARSED_PX = 96  # side of the tag that compiles what refines corners
+WARM_UP_PX = 96  # side of the tag that compiles what refines corners
 
 
 class FiducialSender(Protocol):
@@ -141,7 +141,7 @@ class TagSearch:
             from rhot_node.detect.tags import TagDetector
             self._made_for, self._detector = dictionaries, TagDetector(dictionaries) if dictionaries else None
             if self._detector is not None:
-                self._detector.detect(rehearsal_picture(dictionaries[0]))
+                self._detector.detect(warm_up_picture(dictionaries[0]))
         return self._detector
 
     def _search(self, waiting: _Waiting) -> None:
@@ -167,9 +167,9 @@ class TagSearch:
             self.not_sent += 1
 
 
-def rehearsal_picture(dictionary: str) -> NDArray[np.uint8]:
+def warm_up_picture(dictionary: str) -> NDArray[np.uint8]:
     """(H, W) tag 0 of a dictionary on white paper."""
     import cv2
     number = FAMILIES.index(dictionary)
-    tag = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(number), 0, REHEARSED_PX)
-    return np.pad(np.asarray(tag, np.uint8), REHEARSED_PX // 4, constant_values=255)
+    tag = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(number), 0, WARM_UP_PX)
+    return np.pad(np.asarray(tag, np.uint8), WARM_UP_PX // 4, constant_values=255)

@@ -1,4 +1,4 @@
-"""A detector's rehearsal: everything is compiled and cached before the first real frame."""
+"""Warms a detector up: everything is compiled and cached before the first real frame."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def warm_up(detector: Detector, markers: MarkerSet, size: tuple[int, int]) -> No
     width, height = size
     grey = np.full((height // 2, width // 2), 128, dtype=np.uint8)
     detector.detect(YuvImage(np.full((height, width), 128, dtype=np.uint8), grey, grey))
-    image = rehearsal_image(markers, size)
+    image = warm_up_image(markers, size)
     for _ in range(FRAMES):
         detector.detect(image)
     detector.reset()
 
 
-def rehearsal_image(markers: MarkerSet, size: tuple[int, int]) -> YuvImage:
+def warm_up_image(markers: MarkerSet, size: tuple[int, int]) -> YuvImage:
     """Mid-grey with the markers' discs on a grid."""
     width, height = size
     luma = np.full((height, width), 128, dtype=np.uint8)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, follow
 from rhot_app.barehand.surface import PALM, SHAPE, Surface
 from rhot_app.estimation.residual import UNIT, Rows
-from rhot_app.tracking.hand_process import ANGLES, BIAS, LIMIT_SD_RAD, MOTION, POSE
+from rhot_app.hand.limits import LIMIT_SD_RAD
+from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]
@@ -102,7 +103,7 @@ class ContourFrame:
         return found, error
 
     def linearise(self, state: Array) -> Rows:
-        """COLUMNS rows that say what all slices say together, and one that holds the rest of their cost."""
+        """COLUMNS rows with the information of all slices, and one with the rest of their cost."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         p, e = self.points, self.edges
         information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
@@ -189,7 +190,7 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
 @njit(cache=True)
 def _gather(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, scale, pixel, normal, count,
             offsets, sds, inside, outside, expected_sd, clutter, information, pull, seen):
-    """Add what the slices say to `information` (COLUMNS, COLUMNS) and `pull` (COLUMNS,); returns their cost."""
+    """Add the slices' information to `information` (COLUMNS, COLUMNS) and `pull` (COLUMNS,); returns their cost."""
     slices = capsule.shape[0]
     offset, rows, widths = np.zeros(slices), np.zeros((slices, COLUMNS)), np.zeros(slices)
     good, found = np.zeros(slices, np.bool_), np.empty(offsets.shape[1])

@@ -23,10 +23,10 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 STEP_M = 4e-3
-"""m: contour points stand this far apart; skin's creases and nails are as long, so nearer ones tell the same."""
+"""m: spacing of contour points; skin's creases and nails are as long, so nearer ones are correlated."""
 
 BESIDE_M = 1e-3
-"""m: a contour is looked at so far outside of the capsule, for what is behind it."""
+"""m: distance outside of the capsule at which a ray tests what is behind a contour."""
 
 JUMP_M = 6e-3
 """m: a smaller step in depth is none: flesh fills it."""
@@ -38,7 +38,7 @@ SILHOUETTE, INNER = 0, 1
 """What is behind a contour: not the hand, or another part of it."""
 
 COLUMNS = POSE + SHAPE
-NEAREST_M = 0.02  # nothing is seen before the camera's housing
+NEAREST_M = 0.02  # nothing is nearer than the camera's housing
 _MOST = 1500
 _MARGIN_PX = 3.0
 
@@ -160,10 +160,10 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
                 along, dot, square = 0.0, 0.0, 0.0
                 for i in range(3):
                     line = c1[i] + r1 * n[i] - c0[i] - r0 * n[i]
-                    sight = 0.5 * (c0[i] + c1[i]) - o[i]
+                    ray = 0.5 * (c0[i] + c1[i]) - o[i]
                     along += line * line
-                    dot += line * sight
-                    square += sight * sight
+                    dot += line * ray
+                    square += ray * ray
                 number = max(int(math.sqrt(max(along - dot * dot / square, 0.0)) / step_m + 0.5), 1)
             else:
                 if not surface.open_ends[k, kind - 2]:

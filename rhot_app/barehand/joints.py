@@ -12,8 +12,10 @@ from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
 from rhot_app.tracking.state import Knowledge
 
 
-def know(sd: float, shown: bool, measured: float, inferred: float) -> int:
-    if sd <= measured and shown:
+def knowledge_of(sd: float, observed: bool, measured: float, inferred: float) -> int:
+    """MEASURED for an observed value with a standard deviation of `measured` or less, INFERRED up to `inferred`, else
+    GUESSED."""
+    if sd <= measured and observed:
         return int(Knowledge.MEASURED)
     return int(Knowledge.INFERRED if sd <= inferred else Knowledge.GUESSED)
 

@@ -26,7 +26,7 @@ from rhot_node.detect.foreground import Foreground, foreground_map
 Array = NDArray[np.float64]
 
 STEP = 8
-"""px: every so many-th pixel is looked at."""
+"""px: spacing of the pixels of the foreground map."""
 
 ROTATIONS = 400
 """Rotations tried at a candidate: 25 degrees apart."""
@@ -123,7 +123,7 @@ def _shapes(model: HandModel) -> list[Array]:
 
 
 def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraModel], breadth: float) -> list[Array]:
-    """(3,) m places of palms: where thick foreground of two cameras meets, or of one at the distance its size tells."""
+    """(3,) m places of palms: where thick foreground of two cameras meets, or of one at the distance by its size."""
     peaks = [_thick(one) for one in maps]
     found: list[tuple[float, Array]] = []
     for a in range(len(maps)):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contour_residual import GROUPS, ContourFrame, JointLimits, slices_of
 from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
-from rhot_app.barehand.joints import know, place_joints
+from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search, silhouettes
 from rhot_app.barehand.start import STEP, Found, find_hand
 from rhot_app.barehand.surface import PALM, SHAPE, surface_of
@@ -75,7 +75,7 @@ SIZE_S = 1e3
 DRAWS = 100, 4, 10
 """Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
 
-SURELY = 5.0
+RELOCATION_LOG_ODDS = 5.0
 """Log odds by which a pose that was searched for must be better than the predicted one: 150 to 1."""
 
 LEAST_SUPPORT = 0.77
@@ -172,7 +172,8 @@ class BareHandTracker:
         begun = time.perf_counter()
         order = sorted((t, c) for c, (t, image) in enumerate(zip(t_ns, images, strict=True)) if image is not None)
         if not self.tracking:
-            raise TrackingError("the bare hand has no start; give one by start(pose), or find one by find_hand(images)")
+            raise TrackingError("the bare hand has no start; give one by start(pose, t_ns), or find one by "
+                                "find(images, t_ns)")
         while order:
             t = order[0][0]
             group = [c for u, c in order if 1e-9 * (u - t) < SAME_TIME_S]
@@ -242,9 +243,12 @@ class BareHandTracker:
         return float((parts[:, 0] - parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
 
     def _relocate(self, seen: Silhouettes, prediction: tuple[Array, Array], dt_s: float) -> Array | None:
-        """A state that covers the foreground, where the prediction does so worse than the hand did of late or is too
-        uncertain to tell fingers apart, or where a finger's contour was not found; None where none is surely better.
-        Such a state, or such a finger, widens the prediction by how far hands go in `dt_s`."""
+        """A state that covers the foreground better than the prediction by RELOCATION_LOG_ODDS, or None.
+
+        It is searched for where the prediction covers the foreground worse than the hand did of late, where it is too
+        uncertain to tell fingers apart, or where a finger's contour was not found. Such a state, or such a finger,
+        widens the prediction by how far hands go in `dt_s`.
+        """
         state, covariance = prediction
         depth = self.poses[0][2] @ np.array([*state[[3, 7, 11]], 1.0])
         wide = np.sqrt(np.trace(covariance[:3, :3]) / 3.0) * self.cameras[0].intrinsics[0] / depth
@@ -253,7 +257,7 @@ class BareHandTracker:
             return None
         pace = FASTEST / np.sqrt(3.0) * dt_s
         spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
-        best: tuple[float, Array | None] = self._score(seen, state) / CORRELATED + SURELY, None
+        best: tuple[float, Array | None] = self._score(seen, state) / CORRELATED + RELOCATION_LOG_ODDS, None
         for begin in (state, self.filter.newest.state):
             world = np.eye(4)
             world[:3] = begin[:ANGLES].reshape(3, 4)
@@ -303,13 +307,13 @@ class BareHandTracker:
                           ]).reshape(GROUPS) if any(f is not None for f in self.frames) else np.zeros(GROUPS)
         joint_sd = np.sqrt(np.trace(covariances, axis1=1, axis2=2))
         joints, angles = np.empty(21, np.uint8), np.empty(21, np.uint8)
-        joints[0] = know(joint_sd[0], shown[PALM] >= 2, MEASURED_M, INFERRED_M)
+        joints[0] = knowledge_of(joint_sd[0], shown[PALM] >= 2, MEASURED_M, INFERRED_M)
         for finger in range(5):
             seen = shown[finger] >= 2
             for k in range(JOINT_SLICES[finger].start, JOINT_SLICES[finger].stop):
-                joints[k] = know(joint_sd[k], seen, MEASURED_M, INFERRED_M)
+                joints[k] = knowledge_of(joint_sd[k], seen, MEASURED_M, INFERRED_M)
             for k in range(ANGLE_SLICES[finger].start, ANGLE_SLICES[finger].stop):
-                angles[k] = know(deviation[6 + k], seen, MEASURED_RAD, INFERRED_RAD)
+                angles[k] = knowledge_of(deviation[6 + k], seen, MEASURED_RAD, INFERRED_RAD)
         turn_sd = float(np.sqrt(np.trace(covariance[3:6, 3:6])))
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
@@ -324,7 +328,7 @@ class BareHandTracker:
             camera_pixels=np.empty((cameras, 0, 2)), camera_flags=np.empty((cameras, 0), np.uint16),
             joint_positions=points[:21], joint_knowledge=joints, fingertip_positions=points[21:],
             angles=state[ANGLES:VELOCITY].copy(), angle_knowledge=angles, world_from_palm=world,
-            palm_knowledge=Knowledge(know(turn_sd, shown[PALM] >= 2, MEASURED_RAD, INFERRED_RAD)),
+            palm_knowledge=Knowledge(knowledge_of(turn_sd, shown[PALM] >= 2, MEASURED_RAD, INFERRED_RAD)),
             epipolar_error_px=np.empty(0),
             **UNESTIMATED | {
                 "joint_covariances": covariances[:21], "fingertip_covariances": covariances[21:],

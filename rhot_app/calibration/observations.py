@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-# -- Rolling-shutter time: every row of an image is exposed a little later than the one above it -----------------------
+# -- rolling-shutter time ----------------------------------------------------------------------------------------------
 
 def row_times_ns(t_row0_ns: int, row_time_ns: int, rows: NDArray[np.float64]) -> NDArray[np.int64]:
     """Mid-exposure times of image rows (...,) px, ns on the clock of `t_row0_ns`: t_row0 + y * row_time.
@@ -22,7 +22,7 @@ def row_times_ns(t_row0_ns: int, row_time_ns: int, rows: NDArray[np.float64]) ->
     return np.asarray(t_row0_ns + np.rint(offsets).astype(np.int64), dtype=np.int64)
 
 
-# -- What the cameras saw over some seconds, as plain arrays: the input of every calibration from a moving hand --------
+# -- observations as arrays --------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""The whole certificate of a rig, from a folder of recordings. What is missing is said to be missing."""
+"""The certificate of a rig, from a folder of recordings. A missing step gives a line "not measured"."""
 
 from __future__ import annotations
 

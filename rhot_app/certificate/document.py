@@ -115,7 +115,7 @@ def read_certificate(path: Path) -> Certificate:
     return read_document(path, Certificate, format_name=FORMAT, version=VERSION, error=CertificateError)
 
 
-# -- two certificates --------------------------------------------------------------------------------------------------
+# -- comparison --------------------------------------------------------------------------------------------------------
 
 class Difference(msgspec.Struct, frozen=True):
     """A figure of both certificates. `changed`: the 95 % interval of the difference leaves out 0."""

@@ -2,7 +2,7 @@
 
 N correlated samples say as much as fewer independent ones (Priestley 1981, 5.3.2). The autocorrelation is summed up to
 where pairs of it are no longer positive (Geyer 1992). That sum is itself an estimate; one standard deviation of it
-(Madras and Sokal 1988) is taken off the number, so that short records are not believed too much.
+(Madras and Sokal 1988) is taken off the number, so that the intervals of short records are not too narrow.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _ROUNDING = 1e-12
 """Relative: what differs by less is one number that was added up."""
 
 LEAST = 8
-"""Samples without which nothing is said: a correlation of fewer is noise."""
+"""Samples without which there is no interval: a correlation of fewer is noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +79,8 @@ def effective_size(samples: Array, *, squares: bool = False) -> float:
     taken = 1.0 / max(count / (1.0 + 2.0 * float(np.sum(_positive(correlation)))), 1.0)  # by the samples' own mean
     kept = _positive((correlation + taken) / (1.0 + taken))
     total = float(np.sum(kept * kept)) if squares else float(np.sum(kept))
-    doubt = math.sqrt(2.0 * (2.0 * len(kept) + 1.0) / count)
-    return float(np.clip(count / ((1.0 + 2.0 * total) * (1.0 + doubt)), 1.0, count))
+    relative_sd = math.sqrt(2.0 * (2.0 * len(kept) + 1.0) / count)
+    return float(np.clip(count / ((1.0 + 2.0 * total) * (1.0 + relative_sd)), 1.0, count))
 
 
 def _positive(correlation: Array) -> Array:
@@ -110,7 +110,7 @@ def sd_of(series: Sequence[Array]) -> Interval:
         if len(known) < LEAST:
             continue
         of_mean = max(effective_size(known), 2.0)
-        variance = float(known.var()) / (1.0 - 1.0 / of_mean)  # what the mean took with it
+        variance = float(known.var()) / (1.0 - 1.0 / of_mean)  # about the true mean, not that of the samples
         mine = max(effective_size(known, squares=True) - 1.0, 1.0)
         total, freedom = total + mine * variance, freedom + mine
     if freedom == 0.0:

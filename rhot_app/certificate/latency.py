@@ -60,7 +60,7 @@ def judge_timing(latencies: Array) -> Line:
     return Line("timing", TIMING, "agrees", f"{measured} {beside}", figures=tuple(figures), curves=curves)
 
 
-# -- the flashing patch ------------------------------------------------------------------------------------------------
+# -- line 5: end-to-end latency ----------------------------------------------------------------------------------------
 
 DWELL_S = (0.15, 0.45)
 """How long the patch stays as it is: longer than the slowest rig takes (three frames at 30 Hz and a screen), and as
@@ -70,7 +70,7 @@ LONGEST_S = 0.5
 """Delays are sought up to here."""
 
 SCREEN_S = (0.0, 0.1)
-"""A screen shows between nothing and this later than it is told: 60 Hz monitors take 10 to 50 ms, televisions up to
+"""A screen shows between nothing and this later than it is ordered: 60 Hz monitors take 10 to 50 ms, televisions up to
 100 ms. A picture that is stamped before the light or later than that has a wrong time."""
 
 _SPREADS_S = np.geomspace(1e-4, 1e-2, 9)

@@ -176,7 +176,7 @@ def _spread_of(residuals: Array, taken: int) -> tuple[float, float, float]:
     return math.sqrt(total / freedom), math.sqrt(total / low), math.sqrt(total / high)
 
 
-# -- line 4 ------------------------------------------------------------------------------------------------------------
+# -- line 4: rod of known length ---------------------------------------------------------------------------------------
 
 def judge_rod(recording: Recording, markers: tuple[str, str], length_m: float, rig: Rig) -> Line:
     """The rod's length wherever and however it is held. `length_m` was read off a ruler."""

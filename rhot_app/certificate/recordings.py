@@ -73,7 +73,7 @@ class RodStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class FlashStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A patch of a screen that shows and hides the colour of `marker`. `edges`: master monotonic time, ns, at which the
-    screen was told, and whether the patch is lit from then on."""
+    screen was ordered to change, and whether the patch is lit from then on."""
 
     log: LogName
     marker: MarkerName

@@ -118,7 +118,7 @@ def _reseeded(scene: Scene, number: int) -> Scene:
     return replace(scene, seed=scene.seed + 10_000 * (number + 1))
 
 
-# -- things to show ----------------------------------------------------------------------------------------------------
+# -- scene objects -----------------------------------------------------------------------------------------------------
 
 def half_height(scene: Scene) -> float:
     """m: from the middle of the picture to its border, at the nearest that the rod comes."""
@@ -205,7 +205,7 @@ class _Flashing:
         return poses, angles
 
 
-# -- from a shot to a log ----------------------------------------------------------------------------------------------
+# -- raw logs of shots -------------------------------------------------------------------------------------------------
 
 def _record(shot: Shot, path: Path, screen: _Screen | None, *, sketched: bool) -> None:
     rig = simulated_rig(shot.scene)

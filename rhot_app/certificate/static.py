@@ -1,4 +1,4 @@
-"""Line 1, static jitter (RHOT figure 7.7): how much a marker that does not move is seen to move."""
+"""Lines 1 and 6: static jitter (RHOT figure 7.7), and whether the rig is upright and not mirrored."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _pixel_sd(recording: Recording, marker: int, axis: int) -> Interval:
                   for camera in range(recording.camera_count)])
 
 
-# -- line 6: which way is up, and that left is left --------------------------------------------------------------------
+# -- line 6: upright and not mirrored ----------------------------------------------------------------------------------
 
 UPRIGHT, HANDEDNESS = "Upright", "Not mirrored"
 
@@ -132,9 +132,9 @@ def judge_handedness(recording: Recording, facing: str | None, rig: Rig) -> Line
                             "Use a marker set with these three.")
     wrist, index, little = (recording.positions[:, roles[role]] for role in wanted)
     normal = np.cross(index - wrist, little - wrist)
-    sight = wrist - axes_of(rig).centre
+    line_of_sight = wrist - axes_of(rig).centre
     lengths = np.linalg.norm(index - wrist, axis=1) * np.linalg.norm(little - wrist, axis=1)
-    sine = np.einsum("ti,ti->t", normal, sight) / (lengths * np.linalg.norm(sight, axis=1))
+    sine = np.einsum("ti,ti->t", normal, line_of_sight) / (lengths * np.linalg.norm(line_of_sight, axis=1))
     # With the right palm towards the cameras the thumb points right in the picture: the turn from the index to the
     # little finger about the wrist is against the line of sight.
     seen = mean_of(sine * (-1.0 if (rig.hand.side == "right") == (facing == "palm") else 1.0))

@@ -106,7 +106,7 @@ class NodeMeter:
                        0 if self.receiver is None else self.receiver.skipped)
 
 
-# -- What nodes say of their machines - heat, supply voltage, memory - as advice to the operator. Pure -----------------
+# -- advice on the nodes' machines -------------------------------------------------------------------------------------
 # A node's answer is another program's: whatever is not as docs/node.md describes it is passed over.
 
 SENTENCE_MAX = 300  # characters

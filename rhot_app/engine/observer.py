@@ -120,7 +120,8 @@ def condition_of(state: HandState) -> Condition:
     return Condition.PARTIAL if both & {Condition.TRACKING, Condition.PARTIAL} else Condition.LOST
 
 
-# -- feeds the health monitor from a running pipeline, outside the frames' own thread, and words what it finds ---------
+# -- feeding the health monitor ----------------------------------------------------------------------------------------
+# Outside the frames' own thread.
 
 LOOK_NS = 95_000_000  # the status comes every 100 ms
 JUDGE_NS = 2_000_000_000

@@ -150,7 +150,7 @@ class Pipeline:
         self.last_state = state
 
 
-# -- rates and latencies over the last seconds, written for every state and read a few times a second ------------------
+# -- rates and latencies -----------------------------------------------------------------------------------------------
 
 WINDOW = 600
 """States over which latency is summarised: five seconds at 120 Hz."""
@@ -207,7 +207,8 @@ class LatencyMeter:
         self._values[:] = np.nan
 
 
-# -- Compiles and warms the tracker before the first frame comes, with synthetic frames of the rig's own ---------------
+# -- compilation before the first frame --------------------------------------------------------------------------------
+# With synthetic frames of the rig's own markers.
 
 FRAMES = 24
 _PERIOD_NS = 8_333_333

@@ -143,7 +143,7 @@ class _Span:
             yield record
 
 
-# -- A raw log smoothed before it is replayed: a tracker that gives the states of the log's frames as they -------------
+# -- replay of a smoothed log ------------------------------------------------------------------------------------------
 
 _RECORD_BYTES = 21  # around a record's data (docs/log.md)
 

@@ -89,7 +89,7 @@ class Preview:
     jpeg: bytes
 
 
-# -- What the engine publishes <-> msgpack bytes. No sockets here ------------------------------------------------------
+# -- encoding in msgpack -----------------------------------------------------------------------------------------------
 # Dataclasses travel as maps by field name; a numpy array as the map ``{d: dtype, s: shape, b: raw bytes}``.
 
 TOPIC_STATE = b"state"

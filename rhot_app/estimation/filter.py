@@ -173,7 +173,7 @@ def _reduce(covariance: Array, cross: Array, root: Array) -> Array:
     return out
 
 
-# -- A Rauch-Tung-Striebel smoother on a manifold, for recordings (Rauch, Tung and Striebel 1965) ----------------------
+# -- Rauch-Tung-Striebel smoother (Rauch, Tung and Striebel 1965) ------------------------------------------------------
 # It runs back over the knots of a filter, so that every estimate uses the observations after it as well. Knots are
 # smoothed in chunks that overlap, which bounds the memory.
 
@@ -219,8 +219,8 @@ def smooth(filtered: Sequence[Estimate], count: int | None = None) -> list[Estim
 def _step_back(here: Estimate, after: Estimate, state: Array, covariance: Array) -> tuple[Array, Array]:
     """Smoothed state and covariance at `here`; `state` and `covariance` are those at `after`.
 
-    A later estimate says nothing of what a prediction does not carry on; a linearised gain would correct it all the
-    same. The covariance is in Joseph's form, for a gain that is not the best one.
+    A later estimate holds no information on what a prediction resets, but a linearised gain would correct it all the
+    same. So the gain is projected onto the rest, and the covariance is in Joseph's form, for any gain.
     """
     process, dt_s = here.process, after.t_s - here.t_s
     if dt_s <= 0.0:  # two frames of one instant: the same state
@@ -229,7 +229,7 @@ def _step_back(here: Estimate, after: Estimate, state: Array, covariance: Array)
     move = process.transition(here.state, dt_s)
     noise = predicted_covariance - move @ here.covariance @ move.T
     step = process.difference(state, predicted)
-    gain = process.remembered(here.state) @ _divide(here.covariance @ move.T, predicted_covariance)
+    gain = process.observable_projection(here.state) @ _divide(here.covariance @ move.T, predicted_covariance)
     left = np.eye(process.size) - gain @ move
     smoothed = left @ here.covariance @ left.T + gain @ (noise + covariance) @ gain.T
     return process.retract(here.state, gain @ step), 0.5 * (smoothed + smoothed.T)
@@ -238,7 +238,7 @@ def _step_back(here: Estimate, after: Estimate, state: Array, covariance: Array)
 def _divide(cross: Array, covariance: Array) -> Array:
     """`cross` (n, m) times the inverse of `covariance` (m, m), whose numbers are first scaled to variances of 1."""
     variances = np.diag(covariance)
-    scale = np.sqrt(np.where(variances > 0.0, variances, np.inf))  # a number without a variance tells nothing
+    scale = np.sqrt(np.where(variances > 0.0, variances, np.inf))  # a number without variance has no correlation
     correlation = covariance / scale[:, None] / scale
     correlation[np.diag_indices_from(correlation)] += JITTER
     try:

@@ -102,8 +102,9 @@ class Process(Protocol):
         """(n, n) Jacobian of `predict`'s state by `state`."""
         ...
 
-    def remembered(self, state: Array) -> Array:
-        """(n, n) the part of a deviation from `state` that `predict` carries on: a projection, or 1."""
+    def observable_projection(self, state: Array) -> Array:
+        """(n, n) projection of a deviation from `state` onto the part that `predict` propagates: 1, unless `predict`
+        resets a null space."""
         ...
 
 

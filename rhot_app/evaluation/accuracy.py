@@ -17,7 +17,7 @@ from rhot_app.project import Rig
 from rhot_app.simulator.truth.truth import Truth
 from rhot_app.tracking.state import Knowledge
 
-# -- How far a track is from the truth, state by state, at the states' own times and without any alignment -------------
+# -- errors of states --------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -92,7 +92,7 @@ def _palm(found: Array, true: Array) -> Array:
     return out
 
 
-# -- Whether a tracker's covariances are true: normalised estimation error squared (NEES) over seeds, and --------------
+# -- consistency: normalised estimation error squared (NEES) -----------------------------------------------------------
 # A state's error e with covariance P gives e' P^-1 e, which for an honest tracker follows chi-squared with as many
 # degrees of freedom d as e has numbers (Bar-Shalom, Li, Kirubarajan 2001, 5.4). Errors of one run are correlated in
 # time, so runs with different seeds are what is averaged: at every instant the mean of S seeds times S follows
@@ -202,7 +202,8 @@ def band(seeds: int, degrees: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-# -- Figures of one track against the truth, and of several runs together. Keys end in their unit ----------------------
+# -- figures of runs ---------------------------------------------------------------------------------------------------
+# Keys end in their unit.
 
 Figures = dict[str, float | None]
 

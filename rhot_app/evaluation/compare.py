@@ -127,7 +127,7 @@ def as_fields(comparison: Comparison) -> dict[str, object]:
                                  for name in names} for motion in comparison.motions()}}
 
 
-# -- The table of `rhot evaluate --compare`: trackers side by side, and the last one's figure as a part of the ---------
+# -- comparison table --------------------------------------------------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
 class Column:
@@ -272,7 +272,7 @@ def _has_ratio(column: Column, trackers: Sequence[object]) -> bool:
     return column.compared and len(trackers) > 1
 
 
-# -- What `benchmarks/trackers.py` prints of a trial: what was tried, a line per tracker, and what the columns ---------
+# -- output of `benchmarks/trackers.py` --------------------------------------------------------------------------------
 
 Results = dict[str, Figures]
 """Figures of each tracker."""

@@ -107,7 +107,7 @@ def _collect(client: EngineClient, t0_ns: int, seconds: float, progress: Progres
     return tuple(state for state in states if t0_ns <= state.t_master_ns <= end_ns)
 
 
-# -- What `rhot evaluate` says: figures as one JSON object or as a table for people ------------------------------------
+# -- printed report ----------------------------------------------------------------------------------------------------
 
 SETTLE_S = 1.0
 """What happens before this scene time is not judged."""
@@ -165,7 +165,7 @@ def _cell(value: float | None, form: str) -> str:
     return "-" if value is None else form.format(value)
 
 
-# -- Film, play, score: an evaluation from a scene to its figures, for the command and for benchmarks ------------------
+# -- evaluation of a scene ---------------------------------------------------------------------------------------------
 
 Detector = Literal["fast", "reference"]
 

@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.replay_summary import replay_states
 from rhot_app.errors import SimulatorError
-from rhot_app.evaluation import fault_injection as alter
+from rhot_app.evaluation import fault_injection
 from rhot_app.evaluation.accuracy import Deviations, Figures, WornMarkers, axes_within, deviations, distances, worn_by
 from rhot_app.evaluation.data_sets import DataSet
 from rhot_app.evaluation.run import SETTLE_S
@@ -50,8 +50,8 @@ def one_camera_blind(take: DataSet, rig: Rig, tracker: Tracker | None = None, *,
     `says_so` False: while its node is silent."""
     node = rig.nodes[0].node_id
     begin = blind_from(take)
-    records = (alter.changed(take.records(), alter.blind(node, begin, begin + BLIND_S)) if says_so
-               else alter.silent(take.records(), node, begin, begin + BLIND_S))
+    records = (fault_injection.changed(take.records(), fault_injection.blind(node, begin, begin + BLIND_S)) if says_so
+               else fault_injection.silent(take.records(), node, begin, begin + BLIND_S))
     track, end = tracked(records, rig, tracker), begin + BLIND_S
     during = track.where((track.times_s >= begin) & (track.times_s < end))
     off = _off(during, take).tips
@@ -71,17 +71,17 @@ def blind_from(take: DataSet) -> float:
 
 
 def markers_hidden(take: DataSet, rig: Rig, tracker: Tracker | None = None, *, share: float,
-                   together: bool, lasting_s: tuple[float, float] = alter.EPISODE_S) -> Figures:
+                   together: bool, lasting_s: tuple[float, float] = fault_injection.EPISODE_S) -> Figures:
     """Fingertips of every state when each marker is hidden for a share of the time, for `lasting_s` at a time."""
-    change = alter.hidden(share, take.seconds, [node.node_id for node in rig.nodes], len(rig.markers.markers),
+    change = fault_injection.hidden(share, take.seconds, [node.node_id for node in rig.nodes], len(rig.markers.markers),
                           _seed(take), together=together, lasting_s=lasting_s)
-    return _all_states(take, rig, alter.changed(take.records(), change), tracker)
+    return _all_states(take, rig, fault_injection.changed(take.records(), change), tracker)
 
 
 def names_mixed_up(take: DataSet, rig: Rig, *, pair: tuple[int, int], share: float) -> Figures:
     """Fingertips and swaps when nodes take one marker for another for a share of the time."""
-    change = alter.mixed_up(pair, share, take.seconds, [node.node_id for node in rig.nodes], _seed(take))
-    return _all_states(take, rig, alter.changed(take.records(), change))
+    change = fault_injection.mixed_up(pair, share, take.seconds, [node.node_id for node in rig.nodes], _seed(take))
+    return _all_states(take, rig, fault_injection.changed(take.records(), change))
 
 
 def plain(take: DataSet, rig: Rig) -> Figures:
@@ -94,8 +94,8 @@ def wrist_alone(take: DataSet, rig: Rig) -> Figures:
     """What is said of the palm's turn when only the wrist's marker is left, three seconds into the take, and what is
     true: rms over the states."""
     wrist = [marker.role for marker in rig.markers.markers].index(WRIST_ROLE)
-    records = alter.changed(take.records(), lambda t_s, _, seen: seen if t_s < WRIST_ALONE_S else [
-        marker if marker.index == wrist else alter.lost(marker.index) for marker in seen])
+    records = fault_injection.changed(take.records(), lambda t_s, _, seen: seen if t_s < WRIST_ALONE_S else [
+        marker if marker.index == wrist else fault_injection.lost(marker.index) for marker in seen])
     track = tracked(records, rig)
     track = track.where(track.times_s >= WRIST_ALONE_S + SETTLE_S)
     turn = distances(_off(track, take).palm[:, 3:])
@@ -142,8 +142,8 @@ def starting(take: DataSet, rig: Rig, starts_s: Sequence[float]) -> list[float |
     """For each scene time at which datagrams begin to come: time until every visible fingertip is within 5 mm, s."""
     found = []
     for start_s in starts_s:
-        records = alter.begun_at(take.records(), start_s)
-        first_s = min(alter.arrival_s(record) for record in records if record.kind is RecordKind.DATAGRAM)
+        records = fault_injection.begun_at(take.records(), start_s)
+        first_s = min(fault_injection.arrival_s(record) for record in records if record.kind is RecordKind.DATAGRAM)
         try:
             found.append(found_after(tracked(records, rig), take.truth, worn_by(rig), first_s))
         except SimulatorError:  # no state at all
@@ -158,7 +158,7 @@ def computing(take: DataSet, rig: Rig, minutes: float) -> Figures:
     tracker = make_tracker(rig)
     warm_up(tracker, rig)
     first = _Lap(records)
-    timed = Timed(first.watch(alter.prolonged(records, laps)))
+    timed = Timed(first.watch(fault_injection.prolonged(records, laps)))
     for _ in replay_states(timed, LogValidator(rig), tracker):
         pass
     by_clock, of_processor = 1e6 * np.array(timed.compute_s), 1e6 * np.array(timed.cpu_s)

@@ -14,7 +14,7 @@ from rhot_app.errors import ExportError
 from rhot_app.export.states import HandStates
 from rhot_app.project import Rig
 
-# -- The frame of positions: the rig frame or the wrist's own, along the axes that a format's readers expect -----------
+# -- frame of positions ------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def _relative(world_from_palm: Array, positions: Array) -> Array:
     return np.asarray((positions - origin) @ rotation)
 
 
-# -- What is asked of an export, and what every writer of a format gets and does ---------------------------------------
+# -- export request ----------------------------------------------------------------------------------------------------
 
 Units = Literal["mm", "m"]
 Tracker = Literal["classic", "estimator"]

@@ -155,7 +155,7 @@ class CameraModel:
         return np.asarray(undistort_points(np.ascontiguousarray(np.atleast_2d(pixels)), self.intrinsics))
 
 
-# -- Where the silhouette of a marker with a body lies in the image: not where its centre projects ---------------------
+# -- centre of the silhouette of a marker with a body ------------------------------------------------------------------
 # A sphere of radius r whose centre stands at the angle phi from the optical axis, at distance D, is seen between
 # tan(phi - alpha) and tan(phi + alpha) with sin(alpha) = r / D. The middle of the two is
 #

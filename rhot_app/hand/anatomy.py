@@ -16,7 +16,7 @@ from rhot_app.errors import RigError
 from rhot_app.hand.skeleton import ANGLES, FINGERS
 from rhot_node.files import PRINTABLE, read_document, write_document
 
-# -- Angles that follow others, as hand files and articulated objects write them, and the thesis's for a hand ----------
+# -- coupled angles ----------------------------------------------------------------------------------------------------
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 Degrees = Annotated[float, Meta(ge=-360, le=360)]
@@ -57,7 +57,7 @@ def coupling_complaints(couplings: Sequence[Coupling], angles: Collection[str]) 
             yield f'angle "{coupling.angle}" is coupled twice'
 
 
-# -- The anatomy of one hand: bone lengths, radii, joint limits, marker places. File format ``rhot-hand`` --------------
+# -- the file ``rhot-hand`` --------------------------------------------------------------------------------------------
 
 FORMAT: Final = "rhot-hand"
 VERSION: Final = 1

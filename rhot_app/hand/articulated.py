@@ -1,4 +1,4 @@
-"""Any open articulated object as a file of Denavit-Hartenberg frames. Format ``rhot-articulated`` (docs/hand.md).
+"""Articulated objects as files of Denavit-Hartenberg frames, format ``rhot-articulated`` (docs/hand.md); a hand as one.
 
 The file is Rehg's table (1995, Table 2.1 and appendix A) with names: a root with a spatial transform (quaternion and
 translation), frames that each hang on an earlier one, and the angle that turns a frame. Millimetres and degrees in the
@@ -208,7 +208,7 @@ def _tree_complaints(document: Articulated) -> Iterator[str]:
             yield f'{what}: "{max(names, key=names.count)}" occurs twice'
 
 
-# -- A hand's anatomy written out as an articulated object: the same rows, angles and points, each with its ------------
+# -- a hand as an articulated object -----------------------------------------------------------------------------------
 
 PALM = "palm"
 

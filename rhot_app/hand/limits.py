@@ -1,7 +1,7 @@
 """Joint limits, and how the joints of a relaxed human hand move together.
 
-The natural pose is a Gaussian over the 21 angles: what to believe of a joint that no marker shows. Its couplings are
-soft, because people can break all of them; the standard deviations say how readily.
+The natural pose is a Gaussian prior on the 21 angles, for joints that no marker observes. Its couplings are soft,
+because people can break all of them; the standard deviations say how readily.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 
 MCP_PER_PIP = 0.7
 """Flexion of the MCP joint per flexion of the PIP joint when a hand closes around something (Santello 1998)."""
+
+LIMIT_SD_RAD = math.radians(0.5)
+"""rad: how far joints go beyond their passive limits."""
 
 
 class NaturalPose(NamedTuple):

@@ -1,4 +1,4 @@
-"""The hand model: an anatomy compiled to a Denavit-Hartenberg table and the arrays that the solvers need."""
+"""The hand model: an anatomy compiled to a Denavit-Hartenberg table and arrays, and its variants of fewer freedoms."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _thumb_rows(first: int, angle: int, finger: FingerAnatomy, turn: float) -> t
             DhRow(first + 3, a=distal, angle=angle + 4)], [first + 1, first + 3, first + 4]
 
 
-# -- Variants of the hand with fewer degrees of freedom, and the joint limits by which they are held -------------------
+# -- variants with fewer degrees of freedom ----------------------------------------------------------------------------
 # A variant is a linear map from its coordinates q to the 21 angles, angles = mean + basis q, so every solver has it for
 # the price of one product: its Jacobian is the full one times the basis. Each angle follows one coordinate or none,
 # which turns a box of angle limits into a box of coordinates.

@@ -1,4 +1,4 @@
-"""Where on the hand a marker sits, by its role: the place rides on one row of the hand's kinematic table.
+"""Where on the hand a marker sits, by its role: fixed to one row of the hand's kinematic table.
 
 Roles: the five ``<finger>_tip`` (the last segment, painted as the marker's `patch` says), ``wrist`` (a band),
 ``palm_<finger>`` (a painted knuckle, which moves with the palm), ``<finger>_<bone>`` for the inner bones (a ball
@@ -23,7 +23,7 @@ from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, BONES, FINGERS, JOINTS, TIP_ROLES, WRIST_ROLE
 from rhot_node.markers import FLAT_PATCHES, Marker, MarkerSet, Patch
 
-# -- The painted part of a fingertip: its extent on the last segment's surface, and its middle -------------------------
+# -- painted part of a fingertip ---------------------------------------------------------------------------------------
 # The last segment is a capsule (`rhot_app.hand.shape`). A point of its surface has three coordinates in the frame of
 # the bone's end: `along` the bone (0 at the end of the tip, negative towards the joint), `across` (positive towards
 # the thumb's side of a right hand) and `up`, out of the back of the finger.
@@ -123,7 +123,7 @@ def gap_middle(marker: Marker, mirror: float) -> float:
             "ulnar": -0.5 * math.pi * mirror}[marker.gap_side]
 
 
-# -- Where on the hand a marker sits, by its role: the place rides on one row of the hand's kinematic table ------------
+# -- position of a marker by its role ----------------------------------------------------------------------------------
 
 KNUCKLE_ROLES = tuple(f"palm_{finger}" for finger in FINGERS)
 INNER_ROLES = tuple(f"{finger}_{bone}" for finger, bones in zip(FINGERS, BONES, strict=True) for bone in bones[:2])

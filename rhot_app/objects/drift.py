@@ -1,4 +1,4 @@
-"""Says when an alignment is stale: a chi-squared test of the innovations of the last seconds."""
+"""Detects a stale alignment: a chi-squared test of the innovations of the last seconds."""
 
 from __future__ import annotations
 

@@ -113,8 +113,8 @@ class ObjectProcess:
         move[3:6, 9:12] = dt_s * left
         return move
 
-    def remembered(self, state: Array) -> Array:
-        """(12, 12): everything is carried on."""
+    def observable_projection(self, state: Array) -> Array:
+        """(12, 12): everything is propagated."""
         return np.eye(SIZE)
 
 

@@ -197,8 +197,8 @@ def reversed_state(points: ObjectPoints, cameras: CameraArrays, view: ObjectView
     world_from_object, seen = pose_of(state), points.points[view.rows]
     middle = seen.mean(axis=0)
     normal = np.linalg.svd(seen - middle)[2][2]
-    sight = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - cameras.centres[view.camera]
-    half_turns = [2.0 * np.outer(axis, axis) / (axis @ axis) - np.eye(3) for axis in (sight, normal)]
+    line_of_sight = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - cameras.centres[view.camera]
+    half_turns = [2.0 * np.outer(axis, axis) / (axis @ axis) - np.eye(3) for axis in (line_of_sight, normal)]
     rotation = half_turns[0] @ world_from_object[:3, :3] @ half_turns[1]
     translation = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - rotation @ middle
     out = state_of(rigid(rotation, translation))

@@ -246,7 +246,7 @@ class Track:
             return False
         for hypothesis in rejecting:
             hypothesis.log_weight -= 0.5 * (least + REJECTION)
-        for hypothesis in younger:  # the frame tells nothing of it
+        for hypothesis in younger:  # the frame holds no information on it
             hypothesis.log_weight -= 0.5 * least
         self._hypotheses = kept + rejecting + younger
         self._normalise()
@@ -263,7 +263,7 @@ class Track:
         return [_Hypothesis(second, first.log_weight + log_mass(pair[1]) - log_mass(pair[0]))]
 
     def _normalise(self) -> None:
-        """Let the weights sum to 1, order by them, and forget what is too improbable."""
+        """Normalise the weights to a sum of 1, order by them, and drop what is too improbable."""
         logs = np.array([hypothesis.log_weight for hypothesis in self._hypotheses])
         logs -= logs.max() + math.log(np.exp(logs - logs.max()).sum())
         for hypothesis, log_weight in zip(self._hypotheses, logs, strict=True):

@@ -115,7 +115,7 @@ class JointConverter:
             position, turn = _turned(self._upright, position), _product(self._upright, turn)
         return ObjectSample(one.name, one.validity.value, position, _xyzw(turn), one.distances, one.contacts)
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         """Compile what the conversion needs, before the first state."""
         for hand in self._hands:
             hand.openxr(neutral_pose(), 1.0)
@@ -170,7 +170,7 @@ def _product(a: Array, b: Array) -> Array:
                      a[0] * y - a[1] * z + a[2] * w + a[3] * x, a[0] * z + a[1] * y - a[2] * x + a[3] * w], axis=-1)
 
 
-# -- A sample as a JSON object, the message of WebSocket, Zenoh and the web view. docs/outputs.md lists the ------------
+# -- a sample as JSON --------------------------------------------------------------------------------------------------
 
 _DIGITS = 6  # micrometres, and as fine for quaternions
 

@@ -15,7 +15,8 @@ from rhot_app.tracking.state import HandState
 from rhot_node.errors import PluginError
 from rhot_node.plugins import about_plugin, load_plugin, plugin_names
 
-# -- Outputs from other packages: entry points of the group ``rhot.outputs`` (docs/plugins.md) -------------------------
+# -- outputs from other packages ---------------------------------------------------------------------------------------
+# Entry points of the group ``rhot.outputs`` (docs/plugins.md).
 
 GROUP: Final = "rhot.outputs"
 """An entry point names a callable that makes a `Sink` of an `OutputSettings`."""
@@ -64,7 +65,7 @@ class _BrokenSink:
         """Nothing to release."""
 
 
-# -- All outputs of a rig: made, changed and asked together ------------------------------------------------------------
+# -- the outputs of a rig ----------------------------------------------------------------------------------------------
 
 MakeSink = Callable[[OutputSettings], Sink]
 
@@ -125,7 +126,7 @@ class Outputs:
         made = {settings: Output(settings, make_sink(settings), converter)
                 for settings in wanted if settings not in kept}
         if any(settings.joints == "openxr" for settings in made):
-            converter.rehearse()
+            converter.warm_up()
         for output in self._running:  # ports of those that go are free for those that come
             if output.settings not in kept:
                 output.stop()

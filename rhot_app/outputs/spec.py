@@ -104,7 +104,7 @@ def _rate(value: str, text: str) -> float:
     return rate
 
 
-# -- The status of outputs that an engine publishes; apart, because clients load neither sinks nor the hand ------------
+# -- published status --------------------------------------------------------------------------------------------------
 
 SECRET_VARIABLE: Final = "RHOT_WEB_SECRET"
 """Environment variable in which the engine keeps the secret of all its web views, so that a page that is open finds

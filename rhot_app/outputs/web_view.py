@@ -108,7 +108,7 @@ def _names(host: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*addresses, socket.gethostname(), "localhost")))
 
 
-# -- the web view's own certificate, which no authority has signed -----------------------------------------------------
+# -- self-signed certificate -------------------------------------------------------------------------------------------
 
 DAYS: Final = 397  # browsers believe none that is longer (CA/Browser Forum, baseline requirements 6.3.2)
 _DAY_S: Final = 86400

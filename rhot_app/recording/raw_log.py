@@ -308,7 +308,7 @@ def _why_no_header(file: BinaryIO, path: Path) -> str:
             "with the rig that it was recorded with.")
 
 
-# -- ``rhot recover``: a damaged log's sound records as a clean log ----------------------------------------------------
+# -- the command ``rhot recover`` --------------------------------------------------------------------------------------
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot recover``."""

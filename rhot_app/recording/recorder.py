@@ -19,7 +19,7 @@ from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import PAYLOAD_MAX, Record, RecordKind, encode_header, encode_record
 
-# -- How long the disk lasts at the rate at which a log grows, so that the person is told before it is full ------------
+# -- remaining disk time -----------------------------------------------------------------------------------------------
 
 WINDOW_S = 10.0
 """The rate is that of the last seconds: nodes may be started and stopped while a log is written."""
@@ -57,7 +57,7 @@ class DiskWatch:
         self.seconds_left = left * (now_s - begun_s) / (size - before) if size > before else math.inf
 
 
-# -- Writes the raw log in a thread of its own, so that a slow disk never delays a sample ------------------------------
+# -- the writing thread ------------------------------------------------------------------------------------------------
 
 QUEUE_LIMIT = 65_536
 """Records that may wait for the disk: six seconds of a 10,000 datagrams/s flood."""

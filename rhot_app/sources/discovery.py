@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from zeroconf import ServiceStateChange, Zeroconf
 
 
-# -- Asks by UDP which nodes are there: a broadcast into every network of this computer, and their answers -------------
+# -- discovery by broadcast --------------------------------------------------------------------------------------------
 # Anybody can answer anything. What comes back is good for showing and for trying an address, nothing else.
 
 BROADCAST_PORT = 47799
@@ -110,7 +110,7 @@ def _presence(here: Here) -> Presence:
                     here.pairing_port, here.trust)
 
 
-# -- Looks for nodes that announce themselves by zeroconf --------------------------------------------------------------
+# -- discovery by zeroconf ---------------------------------------------------------------------------------------------
 
 _RESOLVE_MS = 1000  # for what a service did not tell at once
 
@@ -160,7 +160,7 @@ class ZeroconfBrowser:
                 self._found(Sighting(presence, address))
 
 
-# -- Which nodes are there: asked by broadcast and by zeroconf at once, put together, with what cannot be --------------
+# -- both together -----------------------------------------------------------------------------------------------------
 
 SECONDS = 2.5
 """Zeroconf may take more than a second; a broadcast is answered within milliseconds."""

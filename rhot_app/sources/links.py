@@ -252,7 +252,8 @@ class NodeLinks:
             self._ending.wait(_RESOLVE_S if not found else 10 * _RESOLVE_S)
 
 
-# -- Live nodes: a port and a thread for each, one more for clocks, start and stop -------------------------------------
+# -- live nodes --------------------------------------------------------------------------------------------------------
+# A port and a thread for each, one more for clocks, start and stop.
 
 class UdpNodes:
     """`ObservationSource` of the rig's nodes. Receives as soon as it is made; admits frames once started."""

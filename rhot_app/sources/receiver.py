@@ -15,7 +15,7 @@ from rhot_app.sources.validation import DatagramValidator, Verified
 from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
 
-# -- Precedence for the threads between a datagram and its state: of the system's scheduler, and of the ----------------
+# -- thread priority ---------------------------------------------------------------------------------------------------
 
 _PRIORITY = 1  # the lowest of the real-time ones: above every ordinary program, below all of the system's own
 
@@ -46,7 +46,7 @@ def hurry_this_thread() -> None:
         os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(_PRIORITY))
 
 
-# -- One node's data socket and the thread that drains it through the node's door --------------------------------------
+# -- receiving thread --------------------------------------------------------------------------------------------------
 
 RECEIVE_BUFFER = 4 << 20
 """Bytes asked of the kernel: half a second of a 10,000 datagrams/s flood (each costs the kernel ~800 bytes)."""

@@ -10,7 +10,7 @@ from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver
 
-# -- What a recorder must offer to the sources: they hand it every datagram, as it came or went ------------------------
+# -- record sink -------------------------------------------------------------------------------------------------------
 
 class RecordSink(Protocol):
     """Takes records. Must return at once and never raise: it is called between a sample and its state."""
@@ -20,7 +20,7 @@ class RecordSink(Protocol):
         ...
 
 
-# -- Where frames come from: live nodes or a log, the same to the engine -----------------------------------------------
+# -- frame source ------------------------------------------------------------------------------------------------------
 
 class ObservationSource(Protocol):
     """Delivers verified frames of all cameras of a rig from threads of its own."""

@@ -22,7 +22,7 @@ from rhot_node.wire.messages import Fiducials, MarkerFlag, Message, Observations
 from rhot_node.wire.sequence import SequenceWindow, Verdict
 from rhot_node.wire.text import parse_text
 
-# -- Which datagrams of a node are taken: anybody's, the holder's of one key, nobody's yet, or what a log holds --------
+# -- authentication ----------------------------------------------------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
 class Authentication:
@@ -49,7 +49,7 @@ NOBODY_YET = Authentication(_refuse, lambda data: False)
 RECORDED = Authentication(decode_verified, lambda data: True)
 
 
-# -- The door of one node: every datagram, live or from a log, is verified here and counted, or becomes ----------------
+# -- datagram validator ------------------------------------------------------------------------------------------------
 
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""
@@ -209,7 +209,7 @@ class DatagramValidator:
             qualities=qualities[:count], flags=flags[:count], further=further)
 
 
-# -- the thesis's text datagrams (RHOT 6.4) as observations ------------------------------------------------------------
+# -- text datagrams (RHOT 6.4) -----------------------------------------------------------------------------------------
 
 VARIANCE_PX2 = 1.0
 """Assumed variance of a text centroid per axis: the thesis measured 2-5 px peak deviation (RHOT figure 7.7)."""

@@ -104,12 +104,12 @@ class ClassicTracker:
         return t_s
 
     def _locate(self, t_s: float, paired: Paired, clock: _Stopwatch) -> Sheet:
-        """Raw positions decide what to believe; believed pixels are filtered and located again."""
+        """Raw positions decide which markers are accepted; their pixels are filtered and located again."""
         rig, shapes = self._rig, self._shapes()
         markers = Sheet(len(rig.cameras), len(rig.marker_ids))
         locate.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
                           rig.cameras, rig.focal, shapes, rig.law, rig.reach, self._memory, self._confirmed,
-                          markers.used, markers.doubtful, markers.believed, markers.restarted, markers.raw,
+                          markers.used, markers.doubtful, markers.accepted, markers.restarted, markers.raw,
                           markers.covariances, markers.errors)
         clock.lap("triangulate")
         if not self._filtering:
@@ -124,7 +124,7 @@ class ClassicTracker:
                                shapes, rig.law, markers.positions)
         clock.lap("triangulate")
         locate.filter_positions(t_s, markers.positions, position.parameters, position.state, position.gap_s,
-                                markers.believed)
+                                markers.accepted)
         clock.lap("filter")
         return markers
 
@@ -141,7 +141,7 @@ class ClassicTracker:
         rig = self._rig
         wrist, tips, tip_knowledge = np.empty(3), np.empty((5, 3)), np.empty(5, np.uint8)
         measured, wrist_knowledge = locate.conclude(
-            t_s, self._memory, markers.believed, markers.doubtful, self._anchors, markers.positions,
+            t_s, self._memory, markers.accepted, markers.doubtful, self._anchors, markers.positions,
             markers.covariances, markers.knowledge, rig.wrist, rig.tips, wrist, tips, tip_knowledge)
         if measured:
             self._measured_s = t_s

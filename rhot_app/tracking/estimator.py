@@ -1,7 +1,7 @@
 """The estimator: one hand from every marker that any camera sees, each at its own time.
 
 Rehg's idea (1995, chapter 2): one kinematic model, every observation a residual on it. Cameras need no synchronisation,
-a marker that one camera sees counts, and what no marker shows is known as well as the natural pose tells. Here are
+a marker that one camera sees counts, and what no marker observes follows the pose prior. Here are
 association, loss and re-acquisition; the estimation itself is in `rhot_app.estimation`.
 """
 

@@ -81,7 +81,7 @@ class _Hand:
         if not state.tracked or np.isnan(state.velocity[0]):
             return later
         numbers = np.concatenate([state.world_from_palm[:3].ravel(), state.angles, state.velocity, state.acceleration])
-        strayed, numbers = self._process.strayed(numbers, dt_s), self._process.advance(numbers, dt_s)
+        noise_sd, numbers = self._process.process_noise_sd(numbers, dt_s), self._process.advance(numbers, dt_s)
         world, angles = np.eye(4), np.clip(numbers[ANGLES:VELOCITY], *self._limits.T)
         world[:3] = numbers[:ANGLES].reshape(3, 4)
         table, points = scaled_table(self._table, state.hand_scale), np.empty((len(self._table.point_row), 3))
@@ -89,11 +89,11 @@ class _Hand:
         columns = self.columns if len(state.marker_ids) > len(self.columns) else np.arange(len(self.columns))
         positions, covariances = state.marker_positions.copy(), state.marker_covariances.copy()
         way_m = (dt_s * state.joint_velocity_sd + 0.5 * dt_s**2 * state.joint_acceleration_sd
-                 + math.sqrt(3.0) * strayed[0])  # the palm's; fast fingers may add some millimetres
+                 + math.sqrt(3.0) * noise_sd[0])  # the palm's; fast fingers may add some millimetres
         positions[columns] = points[26:]
         covariances[columns] = _grown(covariances[columns], way_m[self._joints])
         pose_sd = np.sqrt(np.concatenate([np.diag(state.palm_covariance), state.angle_sd**2]))
-        way = dt_s * state.velocity_sd + 0.5 * dt_s**2 * state.acceleration_sd + strayed
+        way = dt_s * state.velocity_sd + 0.5 * dt_s**2 * state.acceleration_sd + noise_sd
         growth = 1.0 + way / np.maximum(pose_sd, 1e-12)
         return replace(
             later, world_from_palm=world, angles=angles, velocity=numbers[VELOCITY:ACCELERATION],

@@ -4,9 +4,8 @@ Angles are a Matérn 5/2 process about the natural pose, with its covariance. Th
 without a preferred place. Paint biases are a first-order process. The rates of the processes follow the hand: the
 faster it is estimated to move, the shorter is the correlation time.
 
-The past is remembered by the places of the markers only. What these leave open of the pose, of its velocity and of its
-acceleration is drawn anew from the pose prior before every prediction. A filter that linearises anew with every frame
-would otherwise believe to know it (Huang, Mourikis and Roumeliotis 2010).
+Before every prediction, the part of pose, velocity and acceleration that the markers do not observe is reset to the
+pose prior (`null_space`).
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from numpy.typing import NDArray
 from rhot_app.barehand.landmarks import LASTING_S
 from rhot_app.estimation.gauss_markov import integrated, integrated_noise, matern52, matern52_noise
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, move, rotation_vector
-from rhot_app.hand.skeleton import ANGLE_SLICES
+from rhot_app.hand.kinematics import move, rotation_vector
 from rhot_app.tracking.marker_model import MarkerModel
+from rhot_app.tracking.null_space import most_probable_pose
 
 Array = NDArray[np.float64]
 
@@ -36,9 +35,6 @@ WORLD, ANGLES, VELOCITY, ACCELERATION, BIAS = 0, 12, 33, 60, 87
 """Where a state's numbers begin: world_from_palm (3, 4), angles (21,), velocity (27,), acceleration (27,), and the
 paint biases (M, 3) m along the world's axes."""
 
-REMEMBERED_M = 0.3e-3
-"""m: how well a marker's place is remembered; paint is not known better (`marker_model.PAINT_SD_M`)."""
-
 PALM_SPREAD = np.array([0.055, 0.25])
 """m and rad: how far a palm moves and turns within one correlation time, twice as fast as the recorded ones
 (`python benchmarks/process_prior.py`)."""
@@ -50,20 +46,13 @@ the fastest one."""
 BIAS_S = 1.0
 """s: correlation time of the paint biases: hands turn so that other paint shows."""
 
-LIMIT_SD_RAD = math.radians(0.5)
-"""rad: how far joints go beyond their passive limits."""
-
-_PALM_INFORMATION = 0.1  # 1/m^2 and 1/rad^2: the prior says nothing of the palm, which may be metres away
-_STEPS, _TRIAL_STEPS = 2, 6  # of Gauss-Newton, and from another bend
-_SURELY = 2.0  # of -2 log probability: another bend is taken that is e times as probable
-_FIRST_ANGLE = np.array([angles.start for angles in ANGLE_SLICES] + [21])
 _GROUPS = np.array([0] * 3 + [1] * 3 + [2] * 21)
 
 
 class HandProcess:
     """Implements `estimation.residual.Process`; M markers.
 
-    `dh` has a point for each marker; of a hand without points the whole pose is remembered. `limits` (21, 2) rad.
+    `dh` has a point for each marker; without points there is no null-space reset. `limits` (21, 2) rad.
     `mean` (21,) rad and `covariance` (21, 21) of the natural pose. `spread` (2,): standard deviations of the palm's
     translation, m, and rotation, rad, over one correlation time.
     `slowest` (3,) and `fastest` 1/s: limits of the rates of translation, rotation and angles. `bias` (M, 3, 3) m^2:
@@ -87,7 +76,8 @@ class HandProcess:
 
     @classmethod
     def of(cls, markers: MarkerModel) -> HandProcess:
-        """The process of recorded hands, of a hand that wears these markers; paint biases are 0 until `set_bias`."""
+        """The process of a hand with these markers, with the rates of recorded hands; paint biases are 0 until
+        `set_bias`."""
         covariance = np.asarray(np.linalg.inv(markers.natural.information), dtype=np.float64)
         return cls(markers.dh, markers.limits, markers.natural.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
                    np.zeros((len(markers.finger), 3, 3)), np.where(markers.landmark, LASTING_S, BIAS_S))
@@ -99,8 +89,8 @@ class HandProcess:
             self.stationary[MOTION + 3 * m:MOTION + 3 * m + 3, MOTION + 3 * m:MOTION + 3 * m + 3] = bias[m]
 
     def start(self, world: Array, angles: Array, place_sd: tuple[float, float]) -> tuple[Array, Array]:
-        """State and covariance of a hand at `world` (4, 4), `angles` (21,) of which nothing else is known; `place_sd`
-        of translation, m, and rotation, rad."""
+        """State and covariance of a hand at `world` (4, 4) with `angles` (21,), everything else as the stationary
+        process has it. `place_sd`: standard deviations of translation, m, and rotation, rad."""
         state = np.zeros(BIAS + len(self.stationary) - MOTION)
         state[:ANGLES], state[ANGLES:VELOCITY] = world[:3].ravel(), angles
         covariance = self.stationary.copy()
@@ -130,8 +120,9 @@ class HandProcess:
         state, covariance = state.copy(), covariance.copy()
         if dt_s > 0.0:
             if self._marked:
-                kept, drawn = _redraw(state, self.dh, self._limits, self.mean, self._information)
-                _draw(covariance, kept, drawn, self.rates(state)[2])
+                projection, null_covariance = _reset_null_space(state, self.dh, self._limits, self.mean,
+                                                                self._information)
+                _reset_covariance(covariance, projection, null_covariance, self.rates(state)[2])
             _predict(state, covariance, dt_s, self.mean, self._angles, self._information, self._spread,
                      self._slowest, self._fastest, self._bias, self._bias_s)
         return state, covariance
@@ -141,28 +132,28 @@ class HandProcess:
         out, after = np.eye(self.size), state.copy()
         if dt_s > 0.0:
             if self._marked:
-                _map_rows(_redraw(after, self.dh, self._limits, self.mean, self._information)[0], out)
+                _project(_reset_null_space(after, self.dh, self._limits, self.mean, self._information)[0], out)
             _transition(after, out, dt_s, self.mean, self._information, self._spread, self._slowest, self._fastest,
                         self._bias_s)
         return out
 
-    def remembered(self, state: Array) -> Array:
-        """See `Process`: what moves markers."""
+    def observable_projection(self, state: Array) -> Array:
+        """See `Process`: the part that moves markers."""
         out = np.eye(self.size)
         if self._marked:
-            _map_rows(_redraw(state.copy(), self.dh, self._limits, self.mean, self._information)[0], out)
+            _project(_reset_null_space(state.copy(), self.dh, self._limits, self.mean, self._information)[0], out)
         return out
 
     def advance(self, state: Array, dt_s: float) -> Array:
-        """Where a state goes in `dt_s` by itself; its paint biases may be left out."""
+        """The mean of `state` after `dt_s`, without a null-space reset; its paint biases may be left out."""
         after = state.copy()
         if dt_s > 0.0:
             _transition(after, np.empty((self.size, 0)), dt_s, self.mean, self._information, self._spread,
                         self._slowest, self._fastest, self._bias_s)
         return after
 
-    def strayed(self, state: Array, dt_s: float) -> Array:
-        """(27,) m and rad: standard deviation of where the process noise takes a pose in `dt_s`."""
+    def process_noise_sd(self, state: Array, dt_s: float) -> Array:
+        """(27,) m and rad: standard deviation that the process noise adds to a pose in `dt_s`."""
         noise, rate, out = np.empty((3, 3)), self.rates(state), np.empty(POSE)
         for group, own in enumerate((slice(0, 3), slice(3, 6))):
             integrated_noise(rate[group], dt_s, noise)
@@ -172,7 +163,7 @@ class HandProcess:
         return out
 
     def rates(self, state: Array) -> Array:
-        """(3,) 1/s: of translation, rotation and angles, of a hand that moves so."""
+        """(3,) 1/s: rates of translation, rotation and angles at the velocity and acceleration of `state`."""
         out = np.empty(3)
         _rates(state, self._information, self._spread, self._slowest, self._fastest, out)
         return out
@@ -194,10 +185,10 @@ def _retract(state, step):
 @njit(cache=True)
 def _difference(state, origin):
     out = np.empty(state.shape[0] - BIAS + MOTION)
-    to, begin = state[:ANGLES].reshape(3, 4), origin[:ANGLES].reshape(3, 4)
+    to, start = state[:ANGLES].reshape(3, 4), origin[:ANGLES].reshape(3, 4)
     for i in range(3):
-        out[i] = to[i, 3] - begin[i, 3]
-    out[3], out[4], out[5] = rotation_vector(to, begin)
+        out[i] = to[i, 3] - start[i, 3]
+    out[3], out[4], out[5] = rotation_vector(to, start)
     for i in range(21):
         out[6 + i] = state[ANGLES + i] - origin[ANGLES + i]
     for i in range(POSE, out.shape[0]):
@@ -232,7 +223,7 @@ def _predict(state, covariance, dt, mean, pose_covariance, information, spread, 
         _rates(state, information, spread, slowest, fastest, rate)
         step = min(left, 0.5 / rate.max())
         left -= step if left - step > 1e-9 else left
-        _carry(state, mean, rate, step, blocks, turn)
+        _propagate(state, mean, rate, step, blocks, turn)
         _apply(blocks, turn, covariance)
         _transpose(covariance)
         _apply(blocks, turn, covariance)
@@ -247,7 +238,7 @@ def _predict(state, covariance, dt, mean, pose_covariance, information, spread, 
                 for i in range(21):
                     for j in range(21):
                         covariance[POSE * a + 6 + i, POSE * b + 6 + j] += noise[2, a, b] * pose_covariance[i, j]
-    _forget_bias(state, covariance, np.repeat(np.exp(-dt / bias_s), 3), bias)
+    _decay_bias(state, covariance, np.repeat(np.exp(-dt / bias_s), 3), bias)
 
 
 @njit(cache=True)
@@ -259,14 +250,14 @@ def _transition(state, out, dt, mean, information, spread, slowest, fastest, bia
         _rates(state, information, spread, slowest, fastest, rate)
         step = min(left, 0.5 / rate.max())
         left -= step if left - step > 1e-9 else left
-        _carry(state, mean, rate, step, blocks, turn)
+        _propagate(state, mean, rate, step, blocks, turn)
         _apply(blocks, turn, out)
     for i in range(3 * bias_s.shape[0]):
         out[MOTION + i] *= math.exp(-dt / bias_s[i // 3])
 
 
 @njit(cache=True)
-def _carry(state, mean, rate, dt, blocks, turn):
+def _propagate(state, mean, rate, dt, blocks, turn):
     """Move `state`; fill `blocks` (3, 3, 3), the transition of each group, and `turn` (3, 3), the palm's rotation."""
     integrated(rate[0], dt, blocks[0])
     integrated(rate[1], dt, blocks[1])
@@ -315,126 +306,51 @@ def _transpose(matrix):
 
 
 @njit(cache=True)
-def _forget_bias(state, covariance, kept, bias):
+def _decay_bias(state, covariance, decay, bias):
     size = covariance.shape[0]
     for i in range(MOTION, size):
-        state[BIAS - MOTION + i] *= kept[i - MOTION]
+        state[BIAS - MOTION + i] *= decay[i - MOTION]
         for j in range(size):
-            covariance[i, j] *= kept[i - MOTION]
-            covariance[j, i] *= kept[i - MOTION]
+            covariance[i, j] *= decay[i - MOTION]
+            covariance[j, i] *= decay[i - MOTION]
     for m in range(bias.shape[0]):
         for i in range(3):
             for j in range(3):
-                covariance[MOTION + 3 * m + i, MOTION + 3 * m + j] += (1.0 - kept[3 * m]**2) * bias[m, i, j]
+                covariance[MOTION + 3 * m + i, MOTION + 3 * m + j] += (1.0 - decay[3 * m]**2) * bias[m, i, j]
 
 
 @njit(cache=True)
-def _redraw(state, dh, limits, mean, information):
-    """Draw what the markers leave open anew: move `state` to the pose that is most probable by the pose prior and by
-    the markers' places.
-
-    A finger at its limits may be bent the other way: a thumb has two modes. The descent is tried from its natural bend
-    too, and the more probable pose taken. Returns the share (27, 27) of a deviation that is kept, and the covariance
-    (27, 27) of what is drawn.
-    """
+def _reset_null_space(state, dh, limits, mean, information):
+    """Move `state` to the pose that is most probable by the markers' places and the pose prior. Returns
+    `most_probable_pose`'s projection and null-space covariance."""
     world, angles = np.eye(4), state[ANGLES:VELOCITY].copy()
     world[:3] = state[:ANGLES].reshape(3, 4)
-    places, first = np.empty((dh.point_row.shape[0], 3)), np.empty((3 * dh.point_row.shape[0], POSE))
-    _place_markers(dh, world, angles, places, first)
-    inverse, prior, rows, cost = _descend(dh, limits, mean, information, places, world, angles, _STEPS)
-    for finger in range(5):
-        own = slice(_FIRST_ANGLE[finger], _FIRST_ANGLE[finger + 1])
-        if np.all(angles[own] >= limits[own, 0]) and np.all(angles[own] <= limits[own, 1]):
-            continue
-        other_world, other = world.copy(), angles.copy()
-        other[own] = mean[own]
-        found = _descend(dh, limits, mean, information, places, other_world, other, _TRIAL_STEPS)
-        if found[3] < cost - _SURELY:
-            inverse, prior, rows, cost = found
-            world, angles = other_world, other
+    world, angles, projection, null_covariance = most_probable_pose(dh, limits, mean, information, world, angles)
     state[:ANGLES], state[ANGLES:VELOCITY] = world[:3].copy().reshape(12), angles
-    kept = np.dot(inverse, np.dot(rows.T, first))
-    state[VELOCITY:ACCELERATION] = np.dot(kept, state[VELOCITY:ACCELERATION])
-    state[ACCELERATION:BIAS] = np.dot(kept, state[ACCELERATION:BIAS])
-    return kept, np.dot(inverse, np.dot(prior, inverse))
+    state[VELOCITY:ACCELERATION] = np.dot(projection, state[VELOCITY:ACCELERATION])
+    state[ACCELERATION:BIAS] = np.dot(projection, state[ACCELERATION:BIAS])
+    return projection, null_covariance
 
 
 @njit(cache=True)
-def _place_markers(dh, world, angles, points, rows):
-    """Fill `points` (M, 3) m and their Jacobian, in the standard deviations with which places are remembered."""
-    frames, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((points.shape[0], 3, POSE))
-    forward_arrays(dh, world, angles, frames, points)
-    jacobian_arrays(dh, world, frames, points, jacobian)
-    rows[:] = jacobian.reshape(rows.shape) / REMEMBERED_M
-
-
-@njit(cache=True)
-def _descend(dh, limits, mean, information, places, world, angles, steps):
-    """Move `world` and `angles` by Gauss-Newton steps to the most probable pose. An angle that would go beyond its
-    limit is drawn to the limit as well.
-
-    Returns the inverse of the information (27, 27), the part of it that is the prior's, the Jacobian of the markers,
-    and -2 log probability, up to a constant.
-    """
-    count = dh.point_row.shape[0]
-    frames, points, rows = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((3 * count, POSE))
-    moved, inverse, prior = np.empty((4, 4)), np.eye(POSE), np.eye(POSE)
-    pull, target = np.empty(21), np.empty(21)
-    for _ in range(steps):
-        _place_markers(dh, world, angles, points, rows)
-        memory = np.dot(rows.T, rows)
-        prior[:] = _PALM_INFORMATION * np.eye(POSE)
-        prior[6:, 6:] = information
-        inverse = np.ascontiguousarray(np.linalg.inv(memory + prior))
-        slope = _slope(rows, places, points, information, mean, angles)
-        after = angles + np.dot(inverse, slope)[6:]
-        pull[:] = 0.0
-        for i in range(21):
-            if after[i] < limits[i, 0] or after[i] > limits[i, 1]:
-                pull[i] = 1.0 / LIMIT_SD_RAD**2
-                target[i] = limits[i, 0] if after[i] < limits[i, 0] else limits[i, 1]
-                prior[6 + i, 6 + i] += pull[i]
-        if pull.max() > 0.0:
-            inverse = np.ascontiguousarray(np.linalg.inv(memory + prior))
-        slope = _slope(rows, places, points, information, mean, angles)
-        for i in range(21):
-            if pull[i] > 0.0:
-                slope[6 + i] += pull[i] * (target[i] - angles[i])
-        move(world, angles, np.dot(inverse, slope), moved, angles)
-        world[:] = moved
-        forward_arrays(dh, world, angles, frames, points)
-    away, cost = mean - angles, np.sum(((places - points) / REMEMBERED_M) ** 2)
-    for i in range(21):
-        cost += (max(angles[i] - limits[i, 1], limits[i, 0] - angles[i], 0.0) / LIMIT_SD_RAD) ** 2
-    return inverse, prior, rows, cost + np.dot(away, np.dot(information, away))
-
-
-@njit(cache=True)
-def _slope(rows, places, points, information, mean, angles):
-    """(27,) what draws a pose to the markers' places and to the natural pose."""
-    slope = np.dot(rows.T, (places - points).ravel() / REMEMBERED_M)
-    slope[6:] += np.dot(information, mean - angles)
-    return slope
-
-
-@njit(cache=True)
-def _draw(covariance, kept, drawn, rate):
-    """The covariance after a draw, whose velocity and acceleration are those of a Matérn 5/2 process."""
-    _map_rows(kept, covariance)
+def _reset_covariance(covariance, projection, null_covariance, rate):
+    """The covariance after a null-space reset. In the null space, pose, velocity and acceleration are those of a
+    stationary Matérn 5/2 process."""
+    _project(projection, covariance)
     _transpose(covariance)
-    _map_rows(kept, covariance)
+    _project(projection, covariance)
     square = rate * rate
     for i in range(POSE):
         for j in range(POSE):
-            covariance[i, j] += drawn[i, j]
-            covariance[POSE + i, POSE + j] += square / 3.0 * drawn[i, j]
-            covariance[2 * POSE + i, 2 * POSE + j] += square * square * drawn[i, j]
-            covariance[i, 2 * POSE + j] -= square / 3.0 * drawn[i, j]
-            covariance[2 * POSE + i, j] -= square / 3.0 * drawn[i, j]
+            covariance[i, j] += null_covariance[i, j]
+            covariance[POSE + i, POSE + j] += square / 3.0 * null_covariance[i, j]
+            covariance[2 * POSE + i, 2 * POSE + j] += square * square * null_covariance[i, j]
+            covariance[i, 2 * POSE + j] -= square / 3.0 * null_covariance[i, j]
+            covariance[2 * POSE + i, j] -= square / 3.0 * null_covariance[i, j]
 
 
 @njit(cache=True)
-def _map_rows(kept, matrix):
-    """Multiply pose, velocity and acceleration of `matrix` (n, C) by `kept` from the left."""
+def _project(projection, matrix):
+    """Multiply pose, velocity and acceleration of `matrix` (n, C) by `projection` (27, 27) from the left."""
     for first in range(0, MOTION, POSE):
-        matrix[first:first + POSE] = np.dot(kept, matrix[first:first + POSE])
+        matrix[first:first + POSE] = np.dot(projection, matrix[first:first + POSE])

@@ -1,9 +1,9 @@
 """How large the hand is: learnt slowly, from many of its shapes, beside the filter.
 
-One frame hardly shows a hand's size, and a filter that takes every frame for new evidence soon believes to know it. So
-shapes of the hand are kept that differ from each other, each as all its markers were located at one instant; for each
-of them the evidence for a grid of sizes is worked out once, one size per datagram; and all shapes together are the
-evidence for the one size that they share. They are of one person, whose habits are not the natural pose's and who often
+One frame hardly shows a hand's size, and a filter that takes every frame for new evidence soon becomes overconfident.
+So shapes of the hand are kept that differ from each other, each as all its markers were located at one instant. For
+each of them the evidence for a grid of sizes is worked out once, one size per datagram. All shapes together are the
+evidence for the one size that they share. They are of one person, whose mean pose is not the prior's and who often
 repeats a movement, so they count for less than as many independent ones.
 """
 

@@ -80,8 +80,8 @@ def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array,
     `pixels` (C, M, 2) raw px with `covariances` (C, M, 2, 2); `used` (C, M) which count; `intrinsics` (C, 9),
     `cameras` (C, 3, 4), `focal` (C, 2), `shapes` (M, 3, 3) as in `RigArrays`. Fills `positions` (M, 3) m,
     `position_covariances` (M, 3, 3) m^2 and `errors` (M,) px rms. A marker that cannot be located, or whose rays miss
-    each other by more than the gate, has NaN positions; in the second case its error is told. With three cameras or
-    more the one view whose removal leaves the smallest error is given up first, and cleared in `used`.
+    each other by more than the gate, has NaN positions; in the second case its error is still filled. With three
+    cameras or more the one view whose removal leaves the smallest error is given up first, and cleared in `used`.
     """
     count = pixels.shape[0]
     rays, ray_covariances = np.empty((count, 2)), np.empty((count, 2, 2))
@@ -122,7 +122,7 @@ def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array,
         used[:, m] = views
 
 
-# -- The tracker's steps on one instant's markers, several at a time in compiled code ----------------------------------
+# -- compiled stages of the classic tracker ----------------------------------------------------------------------------
 # Between two frames of a live camera the interpreter's own code and data leave the processor's caches, so that a line
 # of Python costs some microseconds. Each function here is one stage of a state, without a line in between.
 
@@ -136,7 +136,7 @@ class Sheet:
 
     def __init__(self, cameras: int, markers: int) -> None:
         self.used = np.empty((cameras, markers), np.bool_)
-        self.doubtful, self.believed, self.restarted = np.empty((3, markers), np.bool_)
+        self.doubtful, self.accepted, self.restarted = np.empty((3, markers), np.bool_)
         self.raw = np.empty((markers, 3))
         self.positions = np.empty((markers, 3))
         self.covariances = np.empty((markers, 3, 3))
@@ -157,17 +157,17 @@ def turn_band(world_from_palm: Array, half_axes: Array, shape: Array) -> None:
 @njit(cache=True)
 def locate_raw(t_s: float, flags: NDArray[np.int64], live: Mask, pixels: Array, covariances: Array, intrinsics: Array,
                cameras: Array, focal: Array, shapes: Array, law: Array, reach: Array, memory: Array, confirmed: Mask,
-               used: Mask, doubtful: Mask, believed: Mask, restarted: Mask, raw: Array, raw_covariances: Array,
+               used: Mask, doubtful: Mask, accepted: Mask, restarted: Mask, raw: Array, raw_covariances: Array,
                errors: Array) -> None:
     """Unfiltered positions decide what to believe. Arrays as in `locate`, `estimate` and `trust`."""
     choose_views(flags, live, used, doubtful)
     _locate_markers(pixels, covariances, used, intrinsics, cameras, focal, shapes, law, raw, raw_covariances, errors)
-    trust.judge(t_s, raw, raw_covariances, memory, believed, restarted)
-    trust.keep_within_reach(raw, raw_covariances, reach, memory, believed, restarted, confirmed)
-    trust.confirm(raw, raw_covariances, memory, believed, doubtful, restarted, reach, confirmed)
+    trust.judge(t_s, raw, raw_covariances, memory, accepted, restarted)
+    trust.keep_within_reach(raw, raw_covariances, reach, memory, accepted, restarted, confirmed)
+    trust.confirm(raw, raw_covariances, memory, accepted, doubtful, restarted, reach, confirmed)
     for m in range(raw.shape[0]):
         doubtful[m] |= errors[m] > DOUBT_PX or not confirmed[m]
-        if not believed[m]:
+        if not accepted[m]:
             raw[m] = math.nan
             used[:, m] = False
 
@@ -214,16 +214,16 @@ def locate_filtered(pixels: Array, covariances: Array, used: Mask, intrinsics: A
 
 @njit(cache=True)
 def filter_positions(t_s: float, positions: Array, parameters: Array, state: Array, gap_s: float,
-                     believed: Mask) -> None:
-    """Filter `positions` (M, 3) in place; what has none is not `believed` (M,)."""
+                     accepted: Mask) -> None:
+    """Filter `positions` (M, 3) in place; what has none is not `accepted` (M,)."""
     flat = positions.reshape(-1)
     one_euro.step(t_s, flat, parameters, state, gap_s, flat)
     for m in range(positions.shape[0]):
-        believed[m] = believed[m] and not math.isnan(positions[m, 0] + positions[m, 1] + positions[m, 2])
+        accepted[m] = accepted[m] and not math.isnan(positions[m, 0] + positions[m, 1] + positions[m, 2])
 
 
 @njit(cache=True)
-def conclude(t_s: float, memory: Array, believed: Mask, doubtful: Mask, anchors: Array, positions: Array,
+def conclude(t_s: float, memory: Array, accepted: Mask, doubtful: Mask, anchors: Array, positions: Array,
              covariances: Array, knowledge: Codes, wrist_marker: int, tip_markers: NDArray[np.int64], wrist: Array,
              tips: Array, tip_knowledge: Codes) -> tuple[int, int]:
     """Say where the markers out of sight should be, how each is known (M,), and what that says of the hand.
@@ -233,12 +233,12 @@ def conclude(t_s: float, memory: Array, believed: Mask, doubtful: Mask, anchors:
     the wrist's knowledge.
     """
     for m in range(positions.shape[0]):
-        if believed[m]:
+        if accepted[m]:
             anchors[m] = positions[m]
-    trust.predict(t_s, memory, believed, anchors, positions, covariances)
+    trust.predict(t_s, memory, accepted, anchors, positions, covariances)
     measured = 0
     for m in range(positions.shape[0]):
-        if believed[m] and not doubtful[m]:
+        if accepted[m] and not doubtful[m]:
             knowledge[m] = _MEASURED
             measured += 1
         elif math.isfinite(positions[m, 0] + positions[m, 1] + positions[m, 2]):

@@ -1,4 +1,4 @@
-"""What pairs of cameras observe of markers at one instant, kept within bounds, and its epipolar errors."""
+"""Observations of markers by pairs of cameras at one instant, a store of bounded size, and their epipolar errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ POSE = 6
 """Numbers of a camera's correction: turn rad, shift m."""
 
 HISTORY_S = 300.0
-"""Older observations are left out: in five minutes a warm camera drifts by as much as they tell."""
+"""Older observations are left out: in five minutes a warm camera drifts by as much as they determine."""
 
 CAPACITY = 3000
 """Observations: six markers twice a second, for four minutes."""
@@ -79,8 +79,8 @@ class PairStore:
         if t_s[oldest] < t_s.max() - HISTORY_S:
             return oldest
         _, where, counts = np.unique(voxel, return_inverse=True, return_counts=True)
-        crowd = np.flatnonzero(where == np.argmax(counts))
-        return int(crowd[np.argmin(t_s[crowd])])
+        fullest = np.flatnonzero(where == np.argmax(counts))
+        return int(fullest[np.argmin(t_s[fullest])])
 
 
 @dataclass(frozen=True, slots=True)

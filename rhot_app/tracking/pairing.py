@@ -18,7 +18,9 @@ from rhot_app.tracking import tracks
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
-# -- The clockwork of pairing: which frames count, which cameras are live, and the newest instant all of them ----------
+Array = NDArray[np.float64]
+
+# -- compiled bookkeeping of frames ------------------------------------------------------------------------------------
 # Arrays: `frames` (C, 8) int64, times of each camera's row 0 in its newest frames, ns, ascending; `book` (C, 4) int64,
 # its columns COUNT, RECEIVED, STALE and NEW; `newest` (C, M) the markers' own times in the newest frame, -1 where lost.
 
@@ -122,9 +124,8 @@ def newest_instant(frames: Times, book: Times, newest: Times, live: Mask) -> tup
     return instant, period, all_new
 
 
-# -- Brings cameras that are not synchronised to one instant: decides when a state is due, and for which time ----------
+# -- pairing of unsynchronised cameras ---------------------------------------------------------------------------------
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.uint16]
 
 _NEW_TIMELINE_NS = 1_000_000_000

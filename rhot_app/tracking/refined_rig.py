@@ -1,4 +1,4 @@
-"""What a refinement of the cameras is and means: sentences, a verdict, the rig that it gives, figures of both."""
+"""The result of a refinement of the cameras: advice, a verdict, the refined rig, and figures of both."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ REASON = "refined calibration"
 """Of the change in a rig's history."""
 
 NOTABLE = 3.0
-"""Standard deviations from which a turn or a shift is told."""
+"""Standard deviations from which a turn or a shift is reported."""
 
 MOVE_MORE = ("Move the hand through the whole of both pictures, near and far, for two minutes; or put the cameras "
              "together again with a board.")
@@ -67,7 +67,7 @@ class CameraCorrection:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """What the movement did not determine: axes of the turn, "the direction of the baseline"."""
+        """What the movement did not determine: axes of the turn ("x", "y", "z"), and "baseline" for its direction."""
         names = [name for name, sd in zip(("x", "y", "z"), self.turn_sd, strict=True) if sd > DETERMINED_RAD]
         across = np.eye(3) - np.outer(self.along, self.along)
         worst = math.sqrt(float(np.linalg.eigvalsh(across @ self.covariance[3:, 3:] @ across).max()))
@@ -83,7 +83,7 @@ def _length(vector: Array, covariance: Array) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refinement:
-    """What the last minutes say of the cameras.
+    """The refined poses of the cameras by the observations of the last minutes.
 
     `poses` (C, 4, 4) world_from_camera, refined; `chi_squared`, `freedom` and `probability` test that the stored
     calibration still holds. `knocked_s`: s before the newest observation at which a camera was knocked most probably,
@@ -153,7 +153,7 @@ def _with_sd(value: float, sd: float) -> str:
 
 
 def stale_sentence(rig: Rig, found: Refinement) -> str:
-    """What the operator is told when the stored calibration no longer holds; empty while it does."""
+    """The advice when the stored calibration no longer holds; empty while it does."""
     if found.holds:
         return ""
     what = "; ".join(correction_sentence(camera, rig.nodes[0].name) for camera in _notable(found))

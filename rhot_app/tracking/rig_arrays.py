@@ -18,7 +18,8 @@ from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
 from rhot_app.project import OTHER_HAND, FilterSettings, OneEuroSettings, Rig
 from rhot_node.markers import FLAT_PATCHES, Marker
 
-# -- Markers of two uncalibrated cameras: distance from disparity, the rest from the view angle (RHOT 6.5.2 ------------
+# -- positions without calibration (RHOT 6.5.2) ------------------------------------------------------------------------
+# Distance from disparity, the rest from the view angle.
 # For users without a board. The cameras are taken as equal and parallel; what they are not makes the distances wrong by
 # some percent everywhere, which the covariances say. Lenses, poses and the markers' bodies are not looked at, and rows
 # that disagree are no outlier: nobody aligned the cameras.
@@ -91,7 +92,7 @@ def locate_by_disparity(pixels: Array, covariances: Array, used: Mask, law: Arra
                 position_covariances[m, i, j] = total
 
 
-# -- The rig compiled to the arrays that the tracker's inner loops work on ---------------------------------------------
+# -- the rig as arrays -------------------------------------------------------------------------------------------------
 
 _ROUND = ("sphere", "capsule", "band")
 

@@ -1,4 +1,4 @@
-"""The tracked objects of a rig beside its hand: fed with fiducial tags and with colour markers, told with the hand.
+"""The tracked objects of a rig beside its hand: fed with fiducial tags and colour markers, published with the hand.
 
 A state's objects are those at the hand's instant, by everything that has come until then.
 """
@@ -78,7 +78,7 @@ class RigObjects:
         """The objects at master time `t_ns`, without contacts."""
         return self._tracker.states(t_ns)
 
-    def told_with(self, state: HandState, objects: list[ObjectState]) -> HandState:
+    def with_objects(self, state: HandState, objects: list[ObjectState]) -> HandState:
         """The state with the objects and each hand's contacts."""
         other = state.other
         if other is not None and len(self._contacts) > 1:
@@ -149,7 +149,7 @@ class WithObjects:
         if state is None:
             return None
         objects = self._objects.states(state.t_master_ns)
-        return self._objects.told_with(self._markers.completed(state, objects), objects)
+        return self._objects.with_objects(self._markers.completed(state, objects), objects)
 
 
 class MarkersBeside:
@@ -200,10 +200,10 @@ class MarkersBeside:
         return replace(state, marker_ids=self._ids, camera_pixels=pixels, camera_flags=flags, **columns)
 
 
-# -- Objects of a recording by all of it: Rauch-Tung-Striebel smoothing of each object's estimates ---------------------
+# -- smoothed objects of a recording -----------------------------------------------------------------------------------
 
 class SmoothedObjects(RigObjects):
-    """Takes the frames of a recording; `states` then tells of an instant by everything, the later frames included."""
+    """Takes the frames of a recording; `states` then smooths: it uses later frames as well."""
 
     def __init__(self, rig: Rig) -> None:
         """Raises RigError as `RigObjects`."""

@@ -38,7 +38,7 @@ from rhot_app.tracking.tracks import DOUBTFUL
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-# -- what the world does -----------------------------------------------------------------------------------------------
+# -- process and noise -------------------------------------------------------------------------------------------------
 
 KNOCK_SD = np.array([math.radians(1.0)] * 3 + [5e-3] * 3)
 """How far a knock turns (rad) and shifts (m) a camera on its mount. More takes the hand out of its picture."""
@@ -63,10 +63,10 @@ BIAS_PX = 0.05
 CALIBRATED_PX = 0.1
 """Epipolar error that a good calibration leaves (`FAIR_ERROR_PX`: 0.1 to 0.3); for rigs that do not record theirs."""
 
-# -- how much is kept --------------------------------------------------------------------------------------------------
+# -- sampling ----------------------------------------------------------------------------------------------------------
 
 EVERY_S = 0.5
-"""Between two samples: centroid biases last about as long, so that denser ones tell little more."""
+"""Between two samples: centroid biases last about as long, so denser ones add little information."""
 
 SEGMENT_S = 10.0
 """Length of a summary, and how finely the moment of a knock is resolved."""
@@ -75,7 +75,7 @@ _BURST = 8  # frames per camera that an interpolation to one instant needs
 _ROUNDS = 5  # of reweighting
 _RELINEARISED = 3
 _SMALL_SQ = math.radians(0.1) ** 2  # a step (rad) after which errors are linear to a hundredth of a pixel
-_ANEW_S = 1.0  # so far back in time begins another timeline
+_RESTART_S = 1.0  # a frame older than the newest by this belongs to another recording
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +113,7 @@ class _Solution:
 
 
 class RigRefiner:
-    """Takes every frame (`take`), and says every few seconds what it makes of them (`step`). One thread.
+    """Takes every frame (`take`) and estimates the refinement every few seconds (`step`). One thread.
 
     A rig of one camera, of cameras in one place, without calibrated depth or without times is not refined: `active` is
     False.
@@ -157,7 +157,7 @@ class RigRefiner:
         if self._epoch_ns is None:
             self._epoch_ns = frame.t_row0_master_ns
         t_s = 1e-9 * (frame.t_row0_master_ns - self._epoch_ns)
-        if t_s < self._now_s - _ANEW_S:
+        if t_s < self._now_s - _RESTART_S:
             self.reset()
             self._epoch_ns, t_s = frame.t_row0_master_ns, 0.0
         self._now_s = max(self._now_s, t_s)
@@ -169,7 +169,7 @@ class RigRefiner:
     # -- from frames to observations -----------------------------------------------------------------------------------
 
     def _sample(self) -> None:
-        """Pair the newest frames and keep what two cameras saw beyond doubt."""
+        """Pair the newest frames and keep the markers that two cameras observed without a doubtful flag."""
         pairing = Pairing(len(self._stored), len(self.rig.markers.ids))
         frames = sorted((frame for each in self._frames for frame in each), key=lambda one: one.t_receive_ns)
         found: list[Paired] = []
@@ -202,20 +202,20 @@ class RigRefiner:
             pixels = paired.covariances[camera, marker] + np.outer(late, late) + EXACT_PX2 * np.eye(2)
             rays[camera], noise[camera] = (x, y), slope @ pixels @ slope.T
         place, covariance = np.empty(3), np.empty((3, 3))
-        seen = used & np.isfinite(rays[:, 0])
-        _, outcome = triangulate(rays, noise, rig.cameras, rig.focal, seen, place, covariance)
+        observed = used & np.isfinite(rays[:, 0])
+        _, outcome = triangulate(rays, noise, rig.cameras, rig.focal, observed, place, covariance)
         if outcome != Outcome.OK:
             return
         centred = np.empty_like(rays)
         point_rays(rays, rig.cameras, rig.shapes[marker], place, centred)
         for i, j in self._pairs:
-            if seen[i] and seen[j]:
+            if observed[i] and observed[j]:
                 self.store.add(t_s, (i, j), marker, centred[[i, j]], noise[[i, j]], place)
 
     # -- from observations to poses ------------------------------------------------------------------------------------
 
     def step(self) -> Refinement | None:
-        """What all observations say; None while there are too few for anything."""
+        """The refinement by all observations; None while there are too few."""
         return self.refine(self.gather())
 
     def gather(self) -> Gathered:
@@ -350,9 +350,9 @@ class RigRefiner:
         scale = np.tile(KNOCK_SD, self._poses // POSE)
         covariance = (found.covariance[:self._poses, :self._poses] + np.diag(self._calibrated)) / np.outer(scale, scale)
         values, vectors = np.linalg.eigh(covariance)
-        known = values < 0.25  # at most half as uncertain as a knock makes them
-        parts = vectors[:, known].T @ (found.state[:self._poses] / scale)
-        return float(np.sum(np.square(parts) / values[known])), int(np.count_nonzero(known))
+        determined = values < 0.25  # at most half as uncertain as a knock makes them
+        parts = vectors[:, determined].T @ (found.state[:self._poses] / scale)
+        return float(np.sum(np.square(parts) / values[determined])), int(np.count_nonzero(determined))
 
 
 def _rms(ways: Array) -> float:

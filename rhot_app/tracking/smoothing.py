@@ -1,7 +1,7 @@
 """States of a recording that use what comes after each instant as well: the estimator, then a pass back over its knots.
 
-There is one state for every frame, at the frame's own time, in the order of time. A hand that is lost ends a segment;
-nothing of one segment tells of another.
+There is one state for every frame, at the frame's own time, in the order of time. A hand that is lost ends a segment.
+Segments are smoothed independently.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class RecordingEstimator(Estimator):
         out = states.describe(instant.t_ns + later_ns, state, covariance, 0, instant.observations, begun)
         return replace(out, marker_raw_positions=own.marker_raw_positions, epipolar_error_px=own.epipolar_error_px)
 
-    # -- what the estimator does -----------------------------------------------------------------------------------
+    # -- observing the estimator ---------------------------------------------------------------------------------------
 
     def _resize(self, log_scale: float, variance: float) -> None:
         super()._resize(log_scale, variance)
@@ -154,7 +154,7 @@ class RecordingEstimator(Estimator):
             self._smooth(before[0])
         self._buffered = knots
 
-    # -- what is final ---------------------------------------------------------------------------------------------
+    # -- smoothed states -----------------------------------------------------------------------------------------------
 
     def _smooth(self, knot: Knot) -> None:
         """Take a knot that no late frame can change any more."""
@@ -272,7 +272,7 @@ class SmoothedTracker:
             found = replace(state, sequence=self._sequence, other=other)
             if self._objects is not None:
                 objects = self._objects.states(state.t_master_ns)
-                found = self._objects.told_with(self._markers.completed(found, objects), objects)
+                found = self._objects.with_objects(self._markers.completed(found, objects), objects)
             yield found
             self._sequence += 1
 

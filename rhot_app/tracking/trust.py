@@ -19,7 +19,7 @@ ACCELERATION_LIMIT = 120.0
 
 JUMP_FLOOR_M = 0.02
 CONFIRMATIONS = 3
-"""A jump is believed when the marker stays at the new place for this many states."""
+"""A jump is accepted when the marker stays at the new place for this many states."""
 
 FORGET_S = 0.5
 """After this long any place is as likely as any other."""
@@ -69,15 +69,15 @@ def _distance(a: Array, b: Array) -> float:
 
 
 @njit(cache=True)
-def judge(t_s: float, positions: Array, covariances: Array, memory: Array, believed: Mask, restarted: Mask) -> None:
+def judge(t_s: float, positions: Array, covariances: Array, memory: Array, accepted: Mask, restarted: Mask) -> None:
     """Decide for each located marker whether it can have got there, and remember it if so.
 
-    `positions` (M, 3) m with `covariances` (M, 3, 3), NaN where not located. Fills `believed` (M,), and `restarted`
-    (M,): believed although it did not get there continuously, so filters must start anew.
+    `positions` (M, 3) m with `covariances` (M, 3, 3), NaN where not located. Fills `accepted` (M,), and `restarted`
+    (M,): accepted although it did not get there continuously, so filters must start anew.
     """
     unknown = np.full(3, np.nan)
     for m in range(positions.shape[0]):
-        believed[m] = restarted[m] = False
+        accepted[m] = restarted[m] = False
         position = positions[m]
         if not math.isfinite(position[0] + position[1] + position[2]):
             continue
@@ -110,14 +110,14 @@ def judge(t_s: float, positions: Array, covariances: Array, memory: Array, belie
         row[_X:_X + 3] = position
         row[_JUMP_T] = math.nan
         row[_JUMPS] = 0.0
-        believed[m] = True
+        accepted[m] = True
         restarted[m] = fresh
 
 
 @njit(cache=True)
-def keep_within_reach(positions: Array, covariances: Array, reach: Array, memory: Array, believed: Mask,
+def keep_within_reach(positions: Array, covariances: Array, reach: Array, memory: Array, accepted: Mask,
                       restarted: Mask, confirmed: Mask) -> None:
-    """Reject `believed` markers (M,) that are farther from other ones than the hand's reach allows.
+    """Reject `accepted` markers (M,) that are farther from other ones than the hand's reach allows.
 
     `positions` (M, 3) m with `covariances` (M, 3, 3) m^2; `reach` (M, M) m, the greatest distances. The marker with
     the most contradictions is rejected first. In a tie those are rejected whose track is not `confirmed` (M,) or has
@@ -130,7 +130,7 @@ def keep_within_reach(positions: Array, covariances: Array, reach: Array, memory
         for m in range(count):
             contradictions[m] = 0
             for n in range(count):
-                if believed[m] and believed[n]:
+                if accepted[m] and accepted[n]:
                     contradictions[m] += _beyond_reach(positions, covariances, reach, m, n)
             if contradictions[m] > most:
                 most, any_new = contradictions[m], False
@@ -139,7 +139,7 @@ def keep_within_reach(positions: Array, covariances: Array, reach: Array, memory
             return
         for m in range(count):
             if contradictions[m] == most and not (any_new and confirmed[m] and not restarted[m]):
-                believed[m] = restarted[m] = confirmed[m] = False
+                accepted[m] = restarted[m] = confirmed[m] = False
                 memory[m] = math.nan
 
 
@@ -155,7 +155,7 @@ def _beyond_reach(positions: Array, covariances: Array, reach: Array, m: int, n:
 
 
 @njit(cache=True)
-def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask, doubtful: Mask, restarted: Mask,
+def confirm(positions: Array, covariances: Array, memory: Array, accepted: Mask, doubtful: Mask, restarted: Mask,
             reach: Array, confirmed: Mask) -> None:
     """Update which tracks are `confirmed` (M,) as markers of the hand; `reach` (M, M) m, infinite off the hand.
 
@@ -171,19 +171,19 @@ def confirm(positions: Array, covariances: Array, memory: Array, believed: Mask,
     for m in range(count):
         variance = covariances[m, 0, 0] + covariances[m, 1, 1] + covariances[m, 2, 2]
         doubtful[m] |= not variance < MEASURED_SD_MAX_M**2
-        moved[m] = believed[m] and not doubtful[m] and (
+        moved[m] = accepted[m] and not doubtful[m] and (
             _distance(positions[m], memory[m, _START:_START + 3]) > MOVED_M + _REACH_SIGMAS * math.sqrt(variance))
     for m in range(count):
         on_hand = together = together_moved = 0
         for n in range(count):
             if m != n and math.isfinite(reach[m, n]):
                 on_hand += 1
-                together += believed[n] and not doubtful[n]
+                together += accepted[n] and not doubtful[n]
                 together_moved += moved[n]
         if restarted[m]:
             confirmed[m] = False
         joined = together >= min(_STILL_MARKERS, on_hand) or (moved[m] and together_moved >= _CONFIRMING_MARKERS)
-        if joined and believed[m] and not doubtful[m]:
+        if joined and accepted[m] and not doubtful[m]:
             confirmed[m] = True
 
 

@@ -66,7 +66,7 @@ class EndOfRecording(Exception):  # noqa: N818 - an end, not an error
     """A finite source (file, folder) has no more frames."""
 
 
-# -- Waiting for an instant: how recordings play in real time ----------------------------------------------------------
+# -- pacing of recordings ----------------------------------------------------------------------------------------------
 
 NS_PER_S = 1_000_000_000
 WAKE_UP_NS = 50_000  # the kernel wakes a sleeper 50 to 100 us late (its timer slack); this much is left out

@@ -113,7 +113,7 @@ def mid_exposure_ns(timestamp_ns: int, exposure_ns: int, readout: Readout, marks
     return timestamp_ns + offset_ns + readout.first_row_ns + (half if marks == "exposure" else -half)
 
 
-# -- A node's camera settings as libcamera's controls, with every automatic mode off -----------------------------------
+# -- libcamera controls ------------------------------------------------------------------------------------------------
 
 Limits = Mapping[str, tuple[Any, Any, Any]]
 """Minimum, maximum and default of every control that the camera offers."""

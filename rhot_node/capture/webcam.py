@@ -137,7 +137,8 @@ def _read(capture: Capture) -> Plane | None:
     return np.asarray(image, dtype=np.uint8) if ok and image is not None else None
 
 
-# -- a thread that empties a device whose read blocks, so that a slow reader always gets the newest frame --------------
+# -- reading thread ----------------------------------------------------------------------------------------------------
+# So that a slow reader always gets the newest frame.
 
 @dataclass(frozen=True, slots=True)
 class Grabbed:

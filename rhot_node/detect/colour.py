@@ -76,7 +76,8 @@ def learn_chroma_from_colours(colours: Colours) -> ChromaModel:
     )
 
 
-# -- Colour tables: for every chroma pair (U, V), the number of the marker whose colour it may be ----------------------
+# -- colour tables -----------------------------------------------------------------------------------------------------
+# For every chroma pair (U, V), the number of the marker whose colour it may be.
 
 Table = NDArray[np.uint8]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-# -- The numbers that describe a free outline (`contour`): constants, and the columns of its arrays --------------------
+# -- columns of the arrays ---------------------------------------------------------------------------------------------
 
 NODES = 24
 STEP_RAD = 2.0 * math.pi / NODES
@@ -48,7 +48,7 @@ X, Y, AREA, V_XX, V_XY, V_YY, M_XX, M_XY, M_YY, MISFIT, DENT, LEVEL = range(12)
 FIT_COLUMNS = 12
 
 
-# -- Sort the pixels about an outline: the paint's inside, the surroundings, and those near it (`contour`) -------------
+# -- pixels inside, outside and near an outline ------------------------------------------------------------------------
 
 @njit(**FAST)
 def project(look):

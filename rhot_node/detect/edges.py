@@ -1,7 +1,7 @@
 """Edges along slices: short line segments in an image, each across an expected edge (Rehg 1995, 4.3.1).
 
 The node knows no hands. For every slice it reports all intensity steps along it, with their places, standard
-deviations, signs, and the foreground probability on both sides. What of it is the hand's edge, the master decides.
+deviations, signs, and the foreground probability on both sides. The master decides which one is the hand's edge.
 """
 
 from __future__ import annotations

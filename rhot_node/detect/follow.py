@@ -17,12 +17,11 @@ import numpy as np
 from numba import njit
 
 from rhot_node.detect import contour_pixels as c
-from rhot_node.detect import track as st
 from rhot_node.detect import track as t
 from rhot_node.detect.contour import fit
 from rhot_node.detect.contour_pixels import project
 
-# -- A followed band: from the middle of its straightened outline to the axis that it is painted round -----------------
+# -- axis of a band ----------------------------------------------------------------------------------------------------
 # All coordinates are chroma pixels.
 
 # The wrist band's sag (`position.band_center`): a measured value within so many standard deviations of the last one is
@@ -107,7 +106,7 @@ def sag_of(radius, look):
     return (uu * bv - ub * uv) / (uu * bb - ub * ub)
 
 
-# -- The quick lane: markers in plain view, followed from frame to frame in one call of compiled code ------------------
+# -- tracking of unobstructed markers ----------------------------------------------------------------------------------
 
 AREA_LEAST = 22.0  # px^2: a smaller marker has too little inside
 NOISE_MOST = 0.12  # of the contrast
@@ -298,22 +297,22 @@ def _state(track, fitted, look, noise, mark, precise, out):
     ratio = area / track[t.AREA]
     extent = math.sqrt(6.0 * (fitted[c.M_XX] + fitted[c.M_YY]
                               + math.hypot(fitted[c.M_XX] - fitted[c.M_YY], 2.0 * fitted[c.M_XY])))
-    bias = math.hypot(st.hidden_bias(ratio, max(extent, track[t.EXTENT]), area, st.SHARP), st.smear_bias(look[c.BLUR]))
+    bias = math.hypot(t.hidden_bias(ratio, max(extent, track[t.EXTENT]), area, t.SHARP), t.smear_bias(look[c.BLUR]))
     bias = math.hypot(bias, mark[OFF_AXIS] * extent)
     level = track[t.LEVEL] * fitted[c.LEVEL]
     varied = (look[c.W_U] ** 2 * look[c.C_UU] + 2.0 * look[c.W_U] * look[c.W_V] * look[c.C_UV]
               + look[c.W_V] ** 2 * look[c.C_VV] - (look[c.GAIN] * noise) ** 2)
-    floor = st.OUTLINE_FLOOR_VARIANCE + st.AROUND_VARIANCE * max(varied, 0.0)
+    floor = t.OUTLINE_FLOOR_VARIANCE + t.AROUND_VARIANCE * max(varied, 0.0)
     if not precise:
-        floor += st.SOFT_FLOOR_VARIANCE
+        floor += t.SOFT_FLOOR_VARIANCE
     elif mark[IS_BAND] == 0.0:
         bright = 1.0 / look[c.INSIDE]
-        limb_x, limb_y, limb = st.outline_limb_shift(bright * look[c.SLOPE_X], bright * look[c.SLOPE_Y], area)
+        limb_x, limb_y, limb = t.outline_limb_shift(bright * look[c.SLOPE_X], bright * look[c.SLOPE_Y], area)
         fitted[c.X] -= mark[LIMB_TAKEN] * limb_x
         fitted[c.Y] -= mark[LIMB_TAKEN] * limb_y
         bias = math.hypot(bias, mark[LIMB_LEFT] * limb)
-    st.luma_values(fitted[c.X], fitted[c.Y], area, fitted[c.V_XX], fitted[c.V_XY], fitted[c.V_YY], floor, bias, level,
+    t.luma_values(fitted[c.X], fitted[c.Y], area, fitted[c.V_XX], fitted[c.V_XY], fitted[c.V_YY], floor, bias, level,
                    noise, out)
     if mark[IS_BAND] > 0.0:
-        st.widen_band(look[c.AXIS_X], look[c.AXIS_Y], extent, out)
+        t.widen_band(look[c.AXIS_X], look[c.AXIS_Y], extent, out)
     t.take(track, fitted[c.X], fitted[c.Y], area, extent, level, False)

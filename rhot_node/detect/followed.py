@@ -109,7 +109,7 @@ class Followed:
             yield index, (look[c.PAINT_Y].item(), look[c.PAINT_U].item() - 128.0, look[c.PAINT_V].item() - 128.0)
 
 
-# -- where the quick lane begins ---------------------------------------------------------------------------------------
+# -- start of fast tracking --------------------------------------------------------------------------------------------
 
 START_AWAY, START_RATIO = 0.35, 1.15  # px, area: how well outline and careful measurement agree
 ARC_VARIANCE = 2.0 / 3.0 - (0.25 * math.pi) ** 2  # of sqrt(1 - u^2) over -1..1

@@ -30,13 +30,15 @@ SKIN_CB, SKIN_CR = (77, 127), (133, 173)
 UNUSUAL = 0.02
 """Probability that a pixel shows what the learnt colours do not: highlights, shadows, new things."""
 
+_BIN = 256 // BINS  # values of a channel in one bin
+_INVERSE_ROOT_2PI = 0.3989423
 _FOREIGN = 4.0  # standard deviations of the background
 _OPEN_PX, _LEAST_PIXELS = 3, 400  # smaller patches of skin are none
 _LEAST_SD = 2.0  # of 255: quantisation and compression, below which no background is known
 
 
 class Foreground(NamedTuple):
-    """What is known of hand and background. `hand`, `rest` (BINS^3,) densities of colours; `mean`, `sd` (H, W, 3) of
+    """Densities of hand and background. `hand`, `rest` (BINS^3,) densities of colours; `mean`, `sd` (H, W, 3) of
     the background, empty while it is not learnt."""
 
     hand: Array32
@@ -46,20 +48,20 @@ class Foreground(NamedTuple):
 
     @property
     def informative(self) -> bool:
-        """Whether anything is known."""
+        """Whether it has a background or colours of the hand."""
         return bool(self.mean.size) or float(self.hand.max()) > 1.001 * ANY
 
     @property
     def sentence(self) -> str:
         """What is known, for the operator."""
         background = "The background is learnt" if self.mean.size else "No background is learnt"
-        known = self.hand.max() > 1.001 * ANY
-        colours = "the hand's colours are known" if known else "no colours of the hand are known"
+        learnt = self.hand.max() > 1.001 * ANY
+        colours = "the hand's colours are known" if learnt else "no colours of the hand are known"
         return f"{background}; {colours}."
 
 
 def no_foreground() -> Foreground:
-    """Nothing is known: every pixel has probability 1/2."""
+    """A model without information: every pixel has probability 1/2."""
     flat, empty = np.full(BINS**3, ANY, np.float32), np.empty((0, 0, 3), np.float32)
     return Foreground(flat, flat, empty, empty)
 
@@ -91,13 +93,13 @@ def learn_background(model: Foreground, images: Sequence[Image]) -> Foreground:
 
 
 def learn_colours(model: Foreground, image: Image, hand: Mask, rest: Mask) -> Foreground:
-    """The model with the colours of an image's pixels that surely show the hand (H, W), and surely not."""
+    """The model with the colours of the pixels of `hand` and of `rest`, masks (H, W) of an image."""
     return model._replace(hand=_density(image[hand]), rest=_density(image[rest]))
 
 
 def learn_skin(image: Image, model: Foreground | None = None) -> Foreground:
-    """The model with the colours of one image's skin, told from the rest by its chroma at first. The model that is not
-    given knows nothing; where an image shows no skin the generic colours of skin are taken."""
+    """The model with the colours of one image's skin, which is segmented by its chroma. `model` None: one without
+    background. An image without skin gives the generic colours of skin."""
     model = no_foreground() if model is None else model
     skin = skin_mask(image)
     if model.mean.size:  # skin of which the background has none
@@ -111,10 +113,10 @@ def learn_skin(image: Image, model: Foreground | None = None) -> Foreground:
 
 
 def _density(pixels: Image) -> Array32:
-    index = (pixels // (256 // BINS)).astype(np.int64)
+    index = (pixels // _BIN).astype(np.int64)
     counts = np.bincount((index[:, 0] * BINS + index[:, 1]) * BINS + index[:, 2], minlength=BINS**3)
     cube = counts.reshape(BINS, BINS, BINS).astype(np.float32)
-    for axis in range(3):  # colours near one that was seen
+    for axis in range(3):  # smoothed over neighbouring bins
         padded = np.pad(cube, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
         before, after = np.take(padded, range(BINS), axis), np.take(padded, range(2, BINS + 2), axis)
         cube = (0.5 * cube + 0.25 * (before + after)).astype(np.float32)
@@ -126,14 +128,14 @@ def _density(pixels: Image) -> Array32:
 def foreground_at(image, row, column, hand, rest, mean, sd):
     """Probability that a pixel shows the hand."""
     r, g, b = image[row, column, 0], image[row, column, 1], image[row, column, 2]
-    index = (np.int64(r) // 8 * 32 + np.int64(g) // 8) * 32 + np.int64(b) // 8
+    index = (np.int64(r) // _BIN * BINS + np.int64(g) // _BIN) * BINS + np.int64(b) // _BIN
     ours, theirs = hand[index], rest[index]
     if mean.shape[0]:
         squared, density = 0.0, 1.0
         for k in range(3):
             z = (image[row, column, k] - mean[row, column, k]) / sd[row, column, k]
             squared += z * z
-            density *= 0.3989423 / sd[row, column, k]
+            density *= _INVERSE_ROOT_2PI / sd[row, column, k]
         theirs = (1.0 - UNUSUAL) * density * np.exp(-0.5 * squared) + UNUSUAL * theirs
     return ours / (ours + theirs)
 

@@ -78,7 +78,7 @@ def label_plane(y, u, v, table, luma_limits, out):
             out[row, column] = label_at(y, u, v, row, column, table, luma_limits)
 
 
-# -- In which light is a picture taken, when nothing is known of it? The light in which it shows the most --------------
+# -- illuminant estimation without a prior -----------------------------------------------------------------------------
 
 GUESSES = np.arange(-6, 7) * (WARMTH_MOST / 6.5)
 HUE_SIGMA_DEG = 6.0  # what a guess half a step beside the light leaves

@@ -67,7 +67,7 @@ def to_bgr(image: YuvImage) -> Plane:
     return np.asarray(bgr, dtype=np.uint8)
 
 
-# -- What every detector offers: one image in, the candidates of every marker of its set out ---------------------------
+# -- detector interface ------------------------------------------------------------------------------------------------
 
 class Detector(Protocol):
     """A detector keeps small state between frames (windows, sizes); frames must come in order of time."""

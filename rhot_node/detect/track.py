@@ -14,7 +14,7 @@ from rhot_node.detect import position as p
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import FLAGS, MarkerFlag, MarkerObservation
 
-# -- What is stated about a measured place: its covariance and quality, and where the shade of its limb has ------------
+# -- reported covariance and quality -----------------------------------------------------------------------------------
 # A covariance holds what the picture itself tells: the noise, carried through the estimate; how steeply the paint is
 # shaded, because a round body darkens towards its limb as no slope can follow; how far the edge is smeared by motion;
 # what surrounds the marker; and how far its area is from what was expected.
@@ -135,7 +135,7 @@ def widen_band(axis_x, axis_y, breadth, out):
     out[5] += BAND_ACROSS_VARIANCE + more * axis_x * axis_x
 
 
-# -- The track of one marker: what the last frames say about where it is, how big it is and how it looks ---------------
+# -- track of one marker -----------------------------------------------------------------------------------------------
 
 Row = list[float]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rhot_node.health.machine import Machine, Throttled
 
-# -- One thing that was looked at: its level, what was found, what to do -----------------------------------------------
+# -- result of a check -------------------------------------------------------------------------------------------------
 
 Level = Literal["ok", "warning", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "warning", "error")
@@ -39,7 +39,7 @@ def worst(checks: list[Check]) -> Level:
     return max((check.level for check in checks), key=LEVELS.index, default="ok")
 
 
-# -- What a machine's values mean for a node: one function per thing, from values to a `Check`. Pure but for -----------
+# -- checks of a machine's values --------------------------------------------------------------------------------------
 
 HOT_C = 75.0
 TOO_HOT_C = 80.0  # here the firmware begins to slow the processor down
@@ -154,7 +154,7 @@ def check_network(machine: Machine) -> list[Check]:
     return found
 
 
-# -- What the daemon tells the master of its machine: only what is wrong now, or became wrong a moment ago -------------
+# -- health as reported to the master ----------------------------------------------------------------------------------
 
 LOOK_S = 2.0  # between looks at the machine, however often it is asked
 RECENT_S = 60.0  # a brown-out between two looks is told for so long

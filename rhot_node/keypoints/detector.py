@@ -48,10 +48,8 @@ class KeypointDetector:
                                 "to it.")
         self._network, self._sigma, self._factor = KeypointNetwork(path, card), card.points.sigma, card.region_factor
         self._upright = card.points.upright
-        self._count, self._last, self._colours = len(markers.markers), None, _colours(markers, self._painted)
-
-    _last: Array | None
-    _colours: Detector | None
+        self._count, self._colours = len(markers.markers), _colours(markers, self._painted)
+        self._last: Array | None = None
 
     def reset(self) -> None:
         """See `Detector`."""

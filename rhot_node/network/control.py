@@ -179,7 +179,7 @@ class ControlServer:
         return sock, int(endpoint.rsplit(":", 1)[1])
 
 
-# -- who may open an encrypted connection to a node --------------------------------------------------------------------
+# -- authentication of encrypted connections ---------------------------------------------------------------------------
 
 _ENDPOINT = "inproc://zeromq.zap.01"
 _DOMAIN = b"rhot-node"

@@ -88,9 +88,9 @@ def proves(given: bytes, code: str, who: Literal["master", "node"], transcript: 
     return compare_digest(given, proof(code, who, transcript))
 
 
-# -- The one-time code that a node offers, in a file of mode 0600 beside its settings: valid for 5 minutes and ---------
-# In a file, because the daemon and the command `rhot-node pair` share it, and because a restart must not give new
-# tries.
+# -- one-time code -----------------------------------------------------------------------------------------------------
+# In a file of mode 0600, because the daemon and the command `rhot-node pair` share it, and because a restart must not
+# give new tries.
 
 FORMAT: Final = "rhot-node-pairing"
 VERSION: Final = 1
@@ -171,7 +171,7 @@ class OfferFile:
         write_private(self.path, msgspec.json.format(msgspec.json.encode(offer), indent=2) + b"\n")
 
 
-# -- What a node says to anybody: who it is, and, while it offers a code, pairing. JSON in, JSON out; no ---------------
+# -- requests without authentication -----------------------------------------------------------------------------------
 # Nothing here shows a picture, a setting or a place, and nothing but a proof of the code changes anything.
 
 log = logging.getLogger(__name__)

@@ -36,7 +36,7 @@ class Presence:
                     self.preview_port, self.pairing_port, state, self.trust, self.name)
 
 
-# -- This machine's own IPv4 addresses, with their networks ------------------------------------------------------------
+# -- local IPv4 addresses ----------------------------------------------------------------------------------------------
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +60,7 @@ def is_loopback(address: str) -> bool:
         return False
 
 
-# -- A node as a zeroconf service: how its presence is written into the service's properties, and read from ------------
+# -- zeroconf service --------------------------------------------------------------------------------------------------
 
 SERVICE: Final = "_rhot-node._udp.local."
 

@@ -108,8 +108,9 @@ class Sessions:
             del self._ended[next(iter(self._ended))]
 
 
-# -- The keys of a node's datagrams: drawn anew for every link, given to paired masters over the encrypted -------------
-# stored. A link is one master program that talks to this run of the node.
+# -- datagram keys -----------------------------------------------------------------------------------------------------
+# Drawn anew for every link, given to paired masters over the encrypted channel, and never stored. A link is one master
+# program that talks to this run of the node.
 
 LINKS_MAX = 8
 """Links kept; the one that was silent longest goes first. Each costs a wrong datagram one more verification."""

@@ -14,7 +14,7 @@ from rhot_node.errors import NodeError
 from rhot_node.files import resource_path, write_atomically
 from rhot_node.markers import load_markers
 
-# -- The text of the node's systemd unit. Pure -------------------------------------------------------------------------
+# -- systemd unit ------------------------------------------------------------------------------------------------------
 
 NAME = "rhot-node.service"
 USER = "rhot-node"
@@ -111,7 +111,7 @@ def _quoted(word: str) -> str:
     return f'"{escaped}"'
 
 
-# -- Putting the node's service in place and taking it away again, on a host that is passed in -------------------------
+# -- installation and removal ------------------------------------------------------------------------------------------
 
 SETTINGS = STATE_FOLDER / "node.json"
 UNIT_FOLDER = Path("/etc/systemd/system")

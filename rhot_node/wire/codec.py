@@ -38,7 +38,8 @@ from rhot_node.wire.plausible import (
     expect_zeros,
 )
 
-# -- Authentication tags of datagrams: keyed BLAKE2b, 16 bytes at their end. docs/wire.md, "Tags" ----------------------
+# -- authentication tags -----------------------------------------------------------------------------------------------
+# Keyed BLAKE2b, 16 bytes at the end of a datagram (docs/wire.md, "Tags").
 
 KEY_LENGTH = 32  # bytes
 TAG_LENGTH = 16  # bytes
@@ -68,7 +69,7 @@ class Seal:
         return compare_digest(self.tag(view[:-TAG_LENGTH]), view[-TAG_LENGTH:])
 
 
-# -- Messages to bytes and back, as docs/wire.md lays them out: little-endian, versioned, nothing implausible ----------
+# -- messages ----------------------------------------------------------------------------------------------------------
 
 MAGIC = b"RHOT"
 VERSION = 1

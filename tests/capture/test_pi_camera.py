@@ -23,7 +23,7 @@ from rhot_node.detect.fast import FastDetector
 from rhot_node.errors import CameraError
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.warm_up import rehearsal_image
+from rhot_node.warm_up import warm_up_image
 
 CLOCK = NodeClock(offset_ns=10**14)
 SETTINGS = CameraSettings(fps=40, exposure_us=4000, gain=2.0, red_gain=1.5, blue_gain=1.8)
@@ -163,7 +163,7 @@ def test_the_image_is_the_buffer_itself_without_its_padding(plug: Open, width: i
 def test_a_native_frame_reaches_the_detector_unconverted(plug: Open, monkeypatch: pytest.MonkeyPatch) -> None:
     camera, fake = plug()
     markers = load_markers(resource_path("markers", "rhot6.json"))
-    picture = rehearsal_image(markers, (640, 480))
+    picture = warm_up_image(markers, (640, 480))
     fake.image = np.concatenate([picture.y.ravel(), picture.u.ravel(), picture.v.ravel()])
 
     def refuse(*_args: object, **_options: object) -> None:

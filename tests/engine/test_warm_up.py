@@ -1,4 +1,4 @@
-"""The rehearsal before the first frame shows a hand, so that all that a hand needs is compiled by then."""
+"""The warm-up before the first frame shows a hand, so that all that a hand needs is compiled by then."""
 
 import msgspec
 import pytest
@@ -48,7 +48,7 @@ def two_hands():
 
 @pytest.mark.parametrize("rig", [make_rig(), model_rig(), table_rig(), two_hands()],
                          ids=["classic", "estimator", "table", "two hands"])
-def test_rehearsal_tracks_the_rigs_hands_and_forgets_them(rig):
+def test_the_warm_up_tracks_the_rigs_hands_and_forgets_them(rig):
     spy = Spy(make_tracker(rig))
     warm_up(spy, rig)
     last = spy.said[-2]

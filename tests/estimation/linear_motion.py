@@ -30,7 +30,7 @@ class ConstantVelocity:
     def transition(self, state, dt_s):
         return np.array([[1.0, dt_s], [0.0, 1.0]])
 
-    def remembered(self, state):
+    def observable_projection(self, state):
         return np.eye(2)
 
     def noise(self, dt_s):

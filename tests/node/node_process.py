@@ -22,7 +22,7 @@ from rhot_node.capture.stream import StreamHeader, pack_header
 from rhot_node.config import CameraSettings, ClockSettings, NodeSettings, save_settings
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.warm_up import rehearsal_image
+from rhot_node.warm_up import warm_up_image
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (
     ClockReply,
@@ -42,7 +42,7 @@ MARKERS = load_markers(resource_path("markers", "rhot6.json"))
 
 
 def i420() -> np.ndarray:
-    image = rehearsal_image(MARKERS, SIZE)
+    image = warm_up_image(MARKERS, SIZE)
     return np.concatenate([image.y.ravel(), image.u.ravel(), image.v.ravel()])
 
 

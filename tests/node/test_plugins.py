@@ -22,7 +22,7 @@ from rhot_node.detect.image import YuvImage
 from rhot_node.errors import CameraError, SettingsError
 from rhot_node.files import resource_path
 from rhot_node.plugins import DetectorChoice, PluginDetector, plugin_names
-from rhot_node.warm_up import rehearsal_image
+from rhot_node.warm_up import warm_up_image
 from rhot_node.wire.codec import decode
 from rhot_node.wire.messages import MarkerFlag, Observations
 
@@ -130,7 +130,7 @@ def test_the_example_detector_is_chosen_by_name(example: Path) -> None:
     choice = DetectorChoice(lambda settings: pytest.fail("not asked for"))
     chosen = settings("plug:middle")
     detector = choice.make(chosen)
-    found = detector.detect(rehearsal_image(chosen.markers, (640, 480)))
+    found = detector.detect(warm_up_image(chosen.markers, (640, 480)))
     assert [(one.index, one.x, one.y) for one in found] == [(k, 320.0, 240.0) for k in range(6)]
     assert choice.troubles() == []
 
@@ -162,7 +162,7 @@ def test_a_detector_that_fails_states_all_as_lost(broken: None, name: str, sente
     choice = DetectorChoice(lambda settings: Fallback())
     detector = choice.make(settings(f"plug:{name}"))
     assert isinstance(detector, PluginDetector)
-    found = detector.detect(rehearsal_image(settings("fast").markers, (64, 48)))
+    found = detector.detect(warm_up_image(settings("fast").markers, (64, 48)))
     assert len(found) == 6 and all(one.flags == MarkerFlag.LOST for one in found)
     assert sentence in choice.troubles()[0].text
 

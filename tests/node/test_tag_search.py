@@ -18,7 +18,7 @@ from rhot_node.markers import load_markers
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import SettingsStore
 from rhot_node.network.session import Stream
-from rhot_node.tag_search import TagSearch, rehearsal_picture
+from rhot_node.tag_search import TagSearch, warm_up_picture
 from rhot_node.wire.messages import FAMILIES, Fiducials, Observations
 
 DICTIONARY = "DICT_APRILTAG_36h11"
@@ -37,7 +37,7 @@ class Search:
         clock = NodeClock(offset_ns=10**15)
         self.camera = FakeCamera(range(1000), clock, 25_000_000)
         self.camera.began_ns -= 10**12
-        self.camera.luma = rehearsal_picture(DICTIONARY)
+        self.camera.luma = warm_up_picture(DICTIONARY)
         self.search, self.sender = TagSearch(settings(**tags), clock), FakeSender()
 
     def offer(self, count: int = 1) -> None:
@@ -112,7 +112,7 @@ def test_the_daemon_sends_both(tmp_path: Path) -> None:
     save_settings(store.path, store.current)
     camera = FakeCamera(range(1000), clock)
     camera.began_ns -= 10**12
-    camera.luma = rehearsal_picture(DICTIONARY)
+    camera.luma = warm_up_picture(DICTIONARY)
     daemon = NodeDaemon(store, clock, lambda _: camera, lambda _: FakeDetector())
     daemon.prepare()
     try:

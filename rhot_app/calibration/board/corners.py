@@ -110,7 +110,7 @@ def _view(grid: Array, blur: float, shape: tuple[int, ...], source: str) -> Boar
     return BoardView(flat[ids], ids, width, height, float(sides.min()), blur, source)
 
 
-# -- finding a plain chessboard's inner corners, roughly, and putting them in the board's own order --------------------
+# -- chessboard detection ----------------------------------------------------------------------------------------------
 
 _EVEN_LIGHT = cv2.CALIB_CB_FAST_CHECK
 _UNEVEN_LIGHT = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE

@@ -111,7 +111,8 @@ def _half_turn(board: Board) -> Array:
     return rigid(np.diag([-1.0, -1.0, 1.0]), span)
 
 
-# -- A board's own errors, found together with the lens: printed, glued or bent boards are off by a tenth of a ---------
+# -- the board's own shape ---------------------------------------------------------------------------------------------
+# Printed, glued or bent boards are off by about 0.1 mm. Their errors are estimated with the lens.
 # On the real images of the tests the corners of one hand-glued board are off by 0.09 mm; taken as drawn it leaves
 # 0.16 px of rms and pulls the focal length by more than its stated error, with its own shape 0.06 px are left, and
 # both cameras find the same shape to 0.02 mm (Strobl and Hirzinger 2011, "More accurate pinhole camera calibration

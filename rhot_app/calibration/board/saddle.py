@@ -135,7 +135,8 @@ def fit_saddles(gray: Gray, corners: Array, directions: Array, radii: Array) -> 
     return found
 
 
-# -- Finding a ChArUco board's inner corners, roughly; parts of the board suffice --------------------------------------
+# -- ChArUco detection -------------------------------------------------------------------------------------------------
+# Parts of the board suffice.
 
 _SMALL_PX = 1000  # longest side: pictures below are read at twice their size, where a marker's bits have 3 px, not 1.5
 _FEWEST = 4

@@ -88,7 +88,8 @@ def _contrast(gray: Gray, squares: Array, pixel_from_board: Array) -> float:
     return float(levels[inside & even].mean() - levels[inside & ~even].mean())
 
 
-# -- Why a picture shows no board of the size that was said: found out slowly, for pictures that were turned -----------
+# -- diagnosis of a board that was not found ---------------------------------------------------------------------------
+# Slow: only for pictures without a board of the stated size.
 
 _FEW_MARKERS = 3
 _ANY_SIZE = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE

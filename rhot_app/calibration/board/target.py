@@ -159,7 +159,7 @@ def _ruler_numbers(foot: float) -> Iterator[Text]:
         yield Text(MARGIN_MM + 10.0 * centimetre - 1.0, foot + 8.5, 0.9 * _TEXT_MM, str(centimetre))
 
 
-# -- a printable page as rectangles and text in millimetres, written as PDF or SVG in true scale -----------------------
+# -- PDF and SVG in true scale -----------------------------------------------------------------------------------------
 
 _MM_PER_POINT = 25.4 / 72.0
 _FONT = "Helvetica"

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sparse
 from numpy.typing import NDArray
+from scipy import sparse
 
 from rhot_app.geometry.transforms import exp_so3
 
@@ -157,7 +157,7 @@ def _times_skew(rows: Array, vectors: Array) -> Array:
     return np.cross(rows, vectors[:, None, :])
 
 
-# -- The unknowns of a bundle adjustment in one vector: which are free, where each stands, the sparse Jacobian ---------
+# -- parameter vector and sparse Jacobian ------------------------------------------------------------------------------
 # Order: the free lens parameters camera by camera, the poses of all cameras but the first, the poses of all boards, and
 # the board's own errors corner by corner where they are estimated. The first camera stays where it is: it is the gauge.
 

@@ -1,4 +1,4 @@
-"""How much more the shots disagree with each other than the scatter of their corners explains.
+"""How much more the shots disagree than the scatter of their corners explains, and which views are outliers.
 
 A sheet that bends from picture to picture, a board that moves while cameras expose one after the other, a rolling
 shutter: such errors move all corners of a shot together. Whatever the pose of the board can take up leaves no trace in
@@ -79,7 +79,7 @@ def _witness(jacobian: Any, off: Array, scaled: Array, shared: NDArray[np.intp],
     return by_shared.T @ (off * scaled[:, None]), by_shared.T @ by_shared
 
 
-# -- Which views do not fit the others, and whether views differ enough: the same for one camera and for many ----------
+# -- outlier views and the disagreement of views -----------------------------------------------------------------------
 
 MOST_DROPPED = 0.34
 """Of the views; who needs more thrown away has another trouble."""

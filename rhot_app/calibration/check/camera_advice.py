@@ -1,4 +1,4 @@
-"""What to change on a camera: exposure, flicker and white balance in one report for the wizard (RHOT 7.1)."""
+"""What to change on a camera: exposure, mains flicker and white balance in one report (RHOT 7.1)."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from rhot_app.errors import CalibrationError
 from rhot_node.config import CameraSettings
 from rhot_node.detect.colour import Box
 from rhot_node.detect.image import YuvImage
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +59,8 @@ class CameraAdvisor:
         self._flicker = FlickerWatch()
 
 
-# -- does the light flicker with the mains? From the rows' mean brightness in a series of frames -----------------------
-
-Array = NDArray[np.float64]
+# -- mains flicker -----------------------------------------------------------------------------------------------------
+# From the rows' mean brightness in a series of frames.
 
 MAINS_HZ = (50.0, 60.0)
 MAINS_SPREAD = 0.01  # of the mains' frequency, grids off their nominal and camera clocks included

@@ -18,7 +18,7 @@ from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import OTHER_HAND, OneEuroSettings, Rig, RigNode, estimator_obstacle
 from rhot_node.files import resource_path
 
-# -- What a rig file says about cameras and lenses, held against what cameras and lenses can be. No picture is ---------
+# -- plausibility of cameras and lenses --------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -192,7 +192,7 @@ def _model(node: RigNode) -> CameraModel:
     return CameraModel.from_rig(node.intrinsics, node.pose)
 
 
-# -- Everything that can be wrong with a rig file and shows without a picture, for ``rhot check`` and before -----------
+# -- the report of ``rhot check`` --------------------------------------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
 class RigReport:
@@ -249,7 +249,7 @@ def _summary(rig: Rig, findings: list[Finding]) -> str:
     return f"{rig.name}, {cameras}: {things}."
 
 
-# -- what a rig file says about markers, hand, filters, ports and times, held against what can be ----------------------
+# -- plausibility of markers, hand, filters, ports and times -----------------------------------------------------------
 
 _USUAL_BONE = (0.6, 1.5)  # of the shipped adult hand's; wider than four standard deviations
 _POSSIBLE_BONE = (0.3, 2.2)
@@ -336,7 +336,7 @@ def _slow(settings: OneEuroSettings) -> bool:
     return settings.min_cutoff_hz < 5.0
 
 
-# -- Whether the cameras can read the tags of the rig's objects --------------------------------------------------------
+# -- size of an object's tags in the images ----------------------------------------------------------------------------
 
 LEAST_TAG_PX = 20.0
 """px: smaller tags are seldom found, and their pose is poorly known (`tests/objects/test_tag_detector.py`)."""

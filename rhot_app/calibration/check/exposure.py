@@ -158,7 +158,7 @@ def _rounded(value_us: float) -> float:
     return round(value_us, -2) if value_us >= 1000.0 else round(value_us, -1)
 
 
-# -- White balance from a grey patch: which red and blue gains make grey grey ------------------------------------------
+# -- white balance from a grey patch -----------------------------------------------------------------------------------
 
 EXPONENT = 1.5
 """A gain acts on linear light, and the picture is usually encoded with a gamma of 2.2: a correction by the ratio to the

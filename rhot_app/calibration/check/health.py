@@ -19,7 +19,10 @@ from rhot_app.hand.skeleton import FINGERS, TIP_ROLES, WRIST_ROLE
 from rhot_app.project import Rig
 from rhot_node.wire.messages import MarkerFlag
 
-# -- What a running rig's figures mean: which calibration is stale, in words -------------------------------------------
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# -- advice on stale calibrations --------------------------------------------------------------------------------------
 
 FAIR_ERROR_PX, POOR_ERROR_PX = 0.5, 1.5
 """Median reprojection error (rms over cameras; half the distance of a pair's epipolar lines). A calibrated rig has 0.1
@@ -157,10 +160,7 @@ def _doubled(figures: HealthFigures) -> list[HealthFinding]:
         "Take it out of the picture, or choose another paint (Calibrate menu)."))]
 
 
-# -- Watches a running rig for calibrations that have gone stale, and says which one mends what it sees ----------------
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+# -- the monitor of a running rig --------------------------------------------------------------------------------------
 
 WINDOW_S = 20.0
 _CAPACITY = 240  # samples: the window at 12 Hz; faster feeding shortens it

@@ -1,4 +1,4 @@
-"""Markers with ambiguous colours: two of one colour, one of the colour of skin, one of another's earlier colour."""
+"""Names of hues, and markers with ambiguous colours."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rhot_app.calibration.colour.surroundings import HUE_BINS, HUE_STEP_DEG
 from rhot_node.detect.colour import Colours
 from rhot_node.markers import ChromaModel
 
-# -- Names for hues, and which paints a room leaves free ---------------------------------------------------------------
+# -- names of hues -----------------------------------------------------------------------------------------------------
 
 PAINTS: tuple[tuple[str, float], ...] = (
     ("red", 105.0), ("orange", 134.0), ("yellow", 166.0), ("lime green", -160.0), ("green", -128.0),
@@ -54,7 +54,8 @@ def _apart(first: float, second: float) -> float:
     return abs((first - second + 180.0) % 360.0 - 180.0)
 
 
-# -- Markers with ambiguous colours: two of one colour, one of the colour of skin, one of another's earlier ------------
+# -- ambiguous colours -------------------------------------------------------------------------------------------------
+# Two markers of one colour, one of the colour of skin, or one of another's earlier colour.
 
 SKIN_HUE_DEG, SKIN_REACH_DEG = 134.0, 20.0
 """Chroma angle of skin of all tones and its half width, degrees (`benchmarks/false_locks.py`)."""

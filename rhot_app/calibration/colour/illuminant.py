@@ -1,4 +1,4 @@
-"""The lamps that a colour model must bear, and colours as a camera would show them by these.
+"""The lamps that a colour model must bear, colours as a camera would show them by these, and drift of the illuminant.
 
 A lamp is a temperature shift (`rhot_node.detect.illuminant`) and a brightness. Pictures are taken to have a gamma of
 2.2: a factor on the light is its 2.2th root on a grey level. Nobody knows by which lamp the colours were learnt, so
@@ -24,6 +24,8 @@ from rhot_node.detect.illuminant import RGB_FROM_YCC, YCC_FROM_RGB, balance_matr
 from rhot_node.detect.image import Plane, YuvImage
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerObservation
+
+Array = NDArray[np.float64]
 
 GAMMA = 2.2
 WARMTH_PER_MIRED = 0.54 / 179.5
@@ -101,9 +103,8 @@ def _bytes(plane: NDArray[Any]) -> Plane:
     return np.clip(np.rint(plane), 0.0, 255.0).astype(np.uint8)
 
 
-# -- Has the light drifted since the colours were learnt? Said before a marker is lost, from the markers ---------------
-
-Array = NDArray[np.float64]
+# -- drift of the illuminant -------------------------------------------------------------------------------------------
+# From the markers' own colours, before a marker is lost.
 
 SIGHTS = 20  # of every marker, of which the median counts
 SIGHTS_LEAST = 3

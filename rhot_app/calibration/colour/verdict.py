@@ -1,4 +1,4 @@
-"""The judgement on learnt colours: what will go wrong, why, and what helps."""
+"""The verdict on learnt colours, and how well the detector finds the markers under other illuminants."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ from rhot_node.detect.image import YuvImage
 from rhot_node.markers import ChromaModel, MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
-# -- Rehearse tracking by other lamps: the calibration's own pictures, relit, shown to the real detector ---------------
+# -- detection under other illuminants ---------------------------------------------------------------------------------
+# The calibration's own pictures, relit, are shown to the real detector.
 # The detector reports several candidates of a marker, and the master chooses among them by place. A marker is therefore
 # found when any of its candidates is where it is.
 
@@ -141,7 +142,7 @@ def _outcome_of(seen: MarkerObservation, region: PaintRegion) -> Outcome | None:
     return "lost" if area < SHRUNK * np.count_nonzero(region.sample) else None
 
 
-# -- The judgement on learnt colours: what will go wrong, why, and what helps ------------------------------------------
+# -- verdict on learnt colours -----------------------------------------------------------------------------------------
 
 OVERLAP = 0.1  # of a colour taken for a marker, over all lamps: less are specks, which the detector leaves out
 SAME_COLOUR = 0.35  # of one marker taken for another: only chance tells them apart

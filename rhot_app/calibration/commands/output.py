@@ -1,4 +1,4 @@
-"""What every calibration command prints: one JSON object, or the verdict in words."""
+"""What calibration commands have in common: the printed verdict or JSON object, and the arguments of a board."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def show(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json:
     return 2
 
 
-# -- The arguments that describe a board, the same for every calibration that uses one ---------------------------------
+# -- arguments that describe a board -----------------------------------------------------------------------------------
 
 def add_board_arguments(parser: argparse.ArgumentParser) -> None:
     """Size, squares and markers."""

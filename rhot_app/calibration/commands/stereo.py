@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rhot_app.project import Rig
 
 
-# -- What the arguments of ``rhot calibrate stereo`` mean; every mistake is a sentence ---------------------------------
+# -- meaning of the arguments ------------------------------------------------------------------------------------------
 
 def files_of(args: argparse.Namespace) -> dict[str, list[Path]]:
     """The pictures of each camera, left and right first."""
@@ -92,7 +92,7 @@ def _split(text: str, option: str, form: str) -> tuple[str, str]:
     return name, rest
 
 
-# -- ``rhot calibrate stereo``: two or more cameras from pictures of a board that they took at the same moments --------
+# -- the command -------------------------------------------------------------------------------------------------------
 
 EPILOG = """Patterns stand in quotes. Pictures of one moment have the same number in their names, such as left07.jpg and
 right07.jpg. Two cameras are --left and --right; more, or others, are --camera NAME=PATTERN, named as in the rig.
@@ -203,7 +203,7 @@ def _base_rig(args: argparse.Namespace) -> Rig:
     return load_rig(resource_path("rigs", "two_pis.json"))
 
 
-# -- What ``rhot calibrate stereo`` prints: the fields of its JSON object, and lines for people ------------------------
+# -- printed report ----------------------------------------------------------------------------------------------------
 
 LENS_NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 

@@ -1,4 +1,4 @@
-"""Depth correction without a board (RHOT 7.2.3): the power law D = k |disparity|^z through measured distances.
+"""Depth from disparity (RHOT eq. 6.12), and its correction by a power law D = k |disparity|^z (RHOT 7.2.3).
 
 The cameras need not be calibrated. The law takes up what parallel axes and equal view angles (eq. 6.12) leave out.
 """
@@ -16,7 +16,8 @@ from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 
-# -- Depth from disparity alone, as the thesis computes it: no calibration, parallel axes, equal cameras ---------------
+# -- depth from disparity (RHOT eq. 6.12) ------------------------------------------------------------------------------
+# Without calibration: parallel axes, equal cameras.
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,8 @@ def _positive(disparity_px: ArrayLike) -> Array:
     return np.where(disparity > 0.0, disparity, np.nan)
 
 
-# -- Depth correction without a board (RHOT 7.2.3): the power law D = k |disparity|^z through measured -----------------
+# -- depth correction by a power law (RHOT 7.2.3) ----------------------------------------------------------------------
+# D = k |disparity|^z, fitted to measured distances.
 
 LEAST_ROWS = 3
 

@@ -1,4 +1,4 @@
-"""Jitter and lag of marker positions: of a whole recording, or of the last seconds while a hand moves.
+"""Jitter and lag of marker positions, of a whole recording or of the last seconds; the verdict on proposed filters.
 
 Jitter is the rms distance from a parabola through the half second about each sample, so that a hand that drifts or
 sways does not count as jitter. Lag is the delay by which the unfiltered curve has to be put back so that the filtered
@@ -139,7 +139,7 @@ class FilterMeter:
         return MeterReading(*np.array(rows, dtype=np.float64).reshape(-1, 4).T)
 
 
-# -- What proposed filters are worth: whether the hand was still and then fast, and what could not be had at -----------
+# -- verdict on proposed filters ---------------------------------------------------------------------------------------
 
 RESTLESS_M_S, MOVING_M_S = 0.02, 0.08
 """A hand held still wanders slower than the first, and one that is faster than the second was not held still."""

@@ -41,7 +41,8 @@ from rhot_app.geometry.triangulate import triangulate
 from rhot_app.progress import Progress, silent
 from rhot_app.project import CameraPose, FilterSettings, Intrinsics, OneEuroSettings, Rig
 
-# -- A recording sent through candidate filters as the tracker does it: filter pixels, triangulate, filter -------------
+# -- a recording through candidate filters -----------------------------------------------------------------------------
+# As in the tracker: filter pixels, triangulate, filter positions.
 
 Array = NDArray[np.float64]
 
@@ -119,7 +120,8 @@ def _run(times: Array, seen: Array, intrinsics: Array, cameras: Array, focal: Ar
         one_euro.step(times[t], flat, position_parameters, position_state, gap_s, flat)
 
 
-# -- The filters' settings from two recordings, in the thesis's two steps (RHOT 7.3): held still, then moved -----------
+# -- choice of the settings (RHOT 7.3) ---------------------------------------------------------------------------------
+# In the thesis's two steps: held still, then moved.
 
 Place = Callable[[Array], tuple[Array, Array]]
 """Puts a candidate's parameters (M, 3) before or after depth: parameters of both filters."""
@@ -246,7 +248,7 @@ def _figures(bench: FilterBench, rig: Rig, pixel: Array, position: Array) -> tup
                  for name, known, figures in zip(ids, bench.known, columns.tolist(), strict=True))
 
 
-# -- two recordings of one hand, held still and moved fast, and what any pair of filters makes of them -----------------
+# -- the two recordings ------------------------------------------------------------------------------------------------
 
 LEAST_INSTANTS = 40
 """A marker must be measured in so many instants of either recording."""

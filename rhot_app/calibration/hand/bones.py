@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.hand import bones_judgement as judgement
+from rhot_app.calibration.hand import bones_judgement
 from rhot_app.calibration.hand.bones_collector import rigid_pairs
 from rhot_app.calibration.hand.bones_report import (
     BoneLength,
@@ -59,14 +59,18 @@ def _by_movement(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) ->
     local = in_segments(unknowns, bundle.vector, bundle.poses, bundle.residuals)
     spots = marker_spots(unknowns, bundle.vector, fit.covariance)
     findings = [
-        *judgement.misplaced_findings(bundle.residuals, tracks.places), *judgement.order_findings(spots, bones),
-        *judgement.length_findings(tracks.duration_s), *judgement.side_findings(base.side, fit.other_side_cost),
-        *judgement.stillness_findings(bundle.poses.angles), *judgement.slip_findings(tracks),
-        *judgement.drift_findings(tracks.times_s[fit.instants], local, tracks.places,
-                                   fit.model_error_m),
-        *judgement.rigid_findings(pairs, tracks), *judgement.error_findings(error_mm),
-        *judgement.bone_findings(bones), *judgement.palm_findings(tracks.places),
-        *judgement.plausibility_findings(bones, size * 1e3 * unknowns.prior.mean[:BONE_COUNT])]
+        *bones_judgement.misplaced_findings(bundle.residuals, tracks.places),
+        *bones_judgement.order_findings(spots, bones),
+        *bones_judgement.length_findings(tracks.duration_s),
+        *bones_judgement.side_findings(base.side, fit.other_side_cost),
+        *bones_judgement.stillness_findings(bundle.poses.angles),
+        *bones_judgement.slip_findings(tracks),
+        *bones_judgement.drift_findings(tracks.times_s[fit.instants], local, tracks.places, fit.model_error_m),
+        *bones_judgement.rigid_findings(pairs, tracks),
+        *bones_judgement.error_findings(error_mm),
+        *bones_judgement.bone_findings(bones),
+        *bones_judgement.palm_findings(tracks.places),
+        *bones_judgement.plausibility_findings(bones, size * 1e3 * unknowns.prior.mean[:BONE_COUNT])]
     return BonesReport(
         hand=unknowns.anatomy(bundle.vector), method="movement", size=size, size_std=size_std,
         bones=bones, reaches=reaches, markers=spots,
@@ -80,8 +84,9 @@ def _by_reach(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) -> Bo
     fit = fit_reach(tracks, base, progress=progress)
     bones = bone_lengths(fit.unknowns, fit.vector, fit.covariance)
     reaches, size, size_std = finger_reaches(fit.unknowns, fit.vector, fit.covariance)
-    findings = [*judgement.length_findings(tracks.duration_s), *judgement.bending_findings(fit.reach_m, fit.bending_m),
-                *judgement.few_marker_findings(len(tracks.places))]
+    findings = [*bones_judgement.length_findings(tracks.duration_s),
+                *bones_judgement.bending_findings(fit.reach_m, fit.bending_m),
+                *bones_judgement.few_marker_findings(len(tracks.places))]
     return BonesReport(
         hand=fit.unknowns.anatomy(fit.vector), method="reach", size=size, size_std=size_std, bones=bones,
         reaches=reaches, markers=(), rigid=(), residual_mm=None, noise_mm=1e3 * fit.raw_noise_m,
@@ -195,7 +200,7 @@ def _stretched_angles(unknowns: HandUnknowns, vector: Array, marker: int, wrist:
     return np.asarray(angles[int(np.argmax(np.linalg.norm(points[:, marker] - points[:, wrist], axis=1)))])
 
 
-# -- Bone lengths entered by hand, and whether a hand can have them ----------------------------------------------------
+# -- bone lengths entered by hand --------------------------------------------------------------------------------------
 
 RULER_SD_MM = 1.5
 """How well a bone is measured from joint to joint with a ruler."""

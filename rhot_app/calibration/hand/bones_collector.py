@@ -1,4 +1,4 @@
-"""Collects the minute of movement, and says all the time which fingers have moved enough and what to do next."""
+"""Collects the minute of movement and says which fingers have moved enough; finds rigid pairs of markers."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class _Sweep:
             self.count += 1
 
 
-# -- Which markers keep their distance: rigid pairs, the bodies they make up, and markers that slipped on the ----------
+# -- rigid pairs of markers --------------------------------------------------------------------------------------------
 
 RIGID_SD_M = 0.3e-3
 """A distance that varies by less than this beyond its noise is constant: skin on bones moves more than that whenever

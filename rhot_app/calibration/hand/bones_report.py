@@ -85,7 +85,7 @@ class RigidDistance:
 
 @dataclass(frozen=True, slots=True)
 class BonesReport:
-    """The result: a hand file and how far to believe it.
+    """The result: a hand file and its uncertainty.
 
     `method`: "movement" (all lengths from many markers), "reach" (size and reaches from few), "entered" (by hand).
     `size` compares the hand with the base hand by the reach of its four fingers, `size_std` its deviation.

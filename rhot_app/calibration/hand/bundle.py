@@ -23,7 +23,7 @@ from rhot_app.hand.kinematics import TWIST
 from rhot_app.hand.limits import natural_pose
 from rhot_app.progress import Progress, silent
 
-# -- What the noise of every instant's own pose does to the shape of the hand, and how to take it out again ------------
+# -- bias by incidental parameters -------------------------------------------------------------------------------------
 # Each instant brings 27 unknowns of its own, so there is never more than a handful of markers to average a pose's
 # noise. Points go round joints on curves: a pose that is off by its noise puts them beside their curve on average, on
 # the outer side, and thousands of instants agree on that. Joints move towards the markers until it fits: a last
@@ -67,7 +67,7 @@ def _roots(covariances: Array) -> Array:
     return np.asarray(axes * np.minimum(np.sqrt(np.maximum(values, 0.0)), _FARTHEST)[:, None, :])
 
 
-# -- One robust adjustment of a hand's shape and of its pose at every instant to where its markers were seen -----------
+# -- robust adjustment of shape and poses ------------------------------------------------------------------------------
 
 HUBER = 3.0
 """Markers farther off than this many standard deviations count less."""

@@ -1,4 +1,4 @@
-"""The whole way from marker tracks to a hand's shape: instants, first guess, adjustment, and how far to believe it."""
+"""The whole way from marker tracks to a hand's shape: instants, first guess, adjustment, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import neutral_pose
 from rhot_app.progress import Progress, silent, within
 
+Indices = NDArray[np.int64]
 Array = NDArray[np.float64]
 
 INSTANTS = 800
@@ -70,7 +71,7 @@ def fit_hand(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = si
     some = seen[np.linspace(0, len(seen) - 1, min(_SIDE_INSTANTS, len(seen))).astype(int)]
     costs = [_begin(unknowns, sights, 15).cost for sights in (some, as_right(some, "left"))]
     bundle = _begin(unknowns, seen, 30)
-    bundle, covariance, model_error_m = _believe(unknowns, seen, bundle, smoothed, progress)
+    bundle, covariance, model_error_m = _adjust_by_error(unknowns, seen, bundle, smoothed, progress)
     return HandFit(unknowns, bundle, covariance, instants, smoothed.raw_noise_m, model_error_m, costs[1] / costs[0])
 
 
@@ -91,13 +92,13 @@ def _begin(unknowns: HandUnknowns, seen: Array, steps: int) -> HandBundle:
     return every.run(begun.vector, every.settle(begun.vector, poses, steps), 0)
 
 
-def _believe(unknowns: HandUnknowns, seen: Array, start: HandBundle, smoothed: SmoothTracks,
-             progress: Progress) -> tuple[HandBundle, Array, float]:
-    """Adjust until the hand fits as well as it can, see how large the errors then are, and adjust once more with
-    markers believed accordingly. Returns the covariance of the shape too, and the error beyond noise, m.
+def _adjust_by_error(unknowns: HandUnknowns, seen: Array, start: HandBundle, smoothed: SmoothTracks,
+                     progress: Progress) -> tuple[HandBundle, Array, float]:
+    """Adjust until the hand fits as well as it can, estimate the errors that remain, and adjust once more with markers
+    weighted accordingly. Returns the covariance of the shape too, and the error beyond noise, m.
 
-    How large they are is seen while the markers are believed entirely: a hand that is held to what is usual fits worse,
-    would be believed less for it, and so be held even more.
+    The errors are estimated with full weight on the markers. With the prior's weight the hand would fit worse, the
+    markers would count less for it, and the prior even more.
     """
     bundle, weights, shift = start, Weights(_START_NOISE_M, 30.0, fresh=0.0), np.zeros_like(seen)
     everything = float(len(seen))
@@ -125,7 +126,7 @@ def _error(residuals: Array, shape_size: int) -> float:
     """Standard deviation of a marker per axis, m, from residuals (F, M, 3) of which the fit took its share.
 
     The worst tenth may be anything, but what is just below decides: a hand errs where it moves, and the median of a
-    recording that rests for a while would be believed much too exactly.
+    recording that rests for a while would be far too small.
     """
     distance = np.linalg.norm(residuals, axis=2)
     distance = distance[np.isfinite(distance)]
@@ -134,8 +135,6 @@ def _error(residuals: Array, shape_size: int) -> float:
 
 
 # -- first guesses for the adjustment ----------------------------------------------------------------------------------
-
-Indices = NDArray[np.int64]
 
 _CANDIDATES = 3000
 _SMALL_M = 5e-3

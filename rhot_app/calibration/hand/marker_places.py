@@ -1,4 +1,4 @@
-"""Where on the hand a marker sits: on which segment, by its name or by what the user says.
+"""The segment of the hand on which a marker sits, by its name or by what the user says; the prior of bone lengths.
 
 A segment is the palm, or one of a finger's three bones. Known words: ``index_proximal``, ``index_medial``,
 ``index_distal`` (``index_tip`` is the same bone; the thumb's are metacarpal, proximal and distal), ``index_middle`` for
@@ -18,7 +18,7 @@ from rhot_app.errors import CalibrationError
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.hand.skeleton import BONES, FINGERS, WRIST_ROLE
 
-# -- What is known of a hand before it is measured: how bone lengths of adults scatter, and how they go ----------------
+# -- prior of bone lengths ---------------------------------------------------------------------------------------------
 # Means and standard deviations: Buryanov and Kotiuk 2010, Int. J. Morphol. 28(3):755-758, table I (X-rays of 66 adults;
 # the last bone is the distal phalanx and the soft tip). A part of the scatter is size: big hands have all bones longer.
 # Hand length is 194 +- 10 mm for men and 181 +- 10 mm for women (Gordon et al. 1989, ANSUR), 6.3 % over both. What is
@@ -74,7 +74,7 @@ class Prior:
     fixed_size: Array
 
 
-# -- Where on the hand a marker sits: on which segment, by its name or by what the user says ---------------------------
+# -- segment of a marker -----------------------------------------------------------------------------------------------
 
 PALM = -1
 DISTAL = 2

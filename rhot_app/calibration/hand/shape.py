@@ -18,8 +18,18 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rhot_app.barehand.landmarks import ANATOMY_SD_M
-from rhot_app.calibration.hand import marker_places as hand_prior
-from rhot_app.calibration.hand.marker_places import DISTAL, MarkerPlace, Prior
+from rhot_app.calibration.hand.marker_places import (
+    BASE_SD_M,
+    BASE_TURN_SD,
+    DISTAL,
+    PAINT_PART,
+    SIZE_SD,
+    TIP_PART,
+    MarkerPlace,
+    Prior,
+    proportion_sd,
+    root_proportion_sd,
+)
 from rhot_app.geometry.transforms import skew
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, build_model
@@ -121,12 +131,12 @@ class HandUnknowns:
         mean = np.zeros(count)
         mean[:ROOTS], mean[ROOTS:TURNS] = model.bones.ravel(), model.base.ravel()
         causes = np.zeros((count, count + 5))
-        causes[np.arange(BONE_COUNT), np.arange(BONE_COUNT)] = mean[:ROOTS] * hand_prior.proportion_sd().ravel()
-        causes[np.arange(ROOTS, TURNS), np.arange(ROOTS, TURNS)] = hand_prior.BASE_SD_M
-        causes[np.arange(TURNS, MARKERS), np.arange(TURNS, MARKERS)] = hand_prior.BASE_TURN_SD.ravel()
+        causes[np.arange(BONE_COUNT), np.arange(BONE_COUNT)] = mean[:ROOTS] * proportion_sd().ravel()
+        causes[np.arange(ROOTS, TURNS), np.arange(ROOTS, TURNS)] = BASE_SD_M
+        causes[np.arange(TURNS, MARKERS), np.arange(TURNS, MARKERS)] = BASE_TURN_SD.ravel()
         for finger in range(5):  # a longer metacarpal moves the root along its own direction
             rows = slice(ROOTS + 3 * finger, ROOTS + 3 * finger + 3)
-            causes[rows, count + finger] = mean[rows] * hand_prior.root_proportion_sd()[finger]
+            causes[rows, count + finger] = mean[rows] * root_proportion_sd()[finger]
         for k, place in enumerate(self.places):
             rows = slice(MARKERS + 3 * k, MARKERS + 3 * k + 3)
             mean[rows], scatter, bone_part = self._marker_prior(place)
@@ -141,7 +151,7 @@ class HandUnknowns:
         size = mean.copy()
         size[TURNS:MARKERS] = 0.0
         fixed_size = causes @ causes.T
-        return Prior(mean, fixed_size + hand_prior.SIZE_SD ** 2 * np.outer(size, size), fixed_size)
+        return Prior(mean, fixed_size + SIZE_SD ** 2 * np.outer(size, size), fixed_size)
 
     def _marker_prior(self, place: MarkerPlace) -> tuple[Array, Array, float]:
         """Mean (3,) and scatter (3,) m of a marker's place, and at which part of its bone it sits."""
@@ -158,9 +168,9 @@ class HandUnknowns:
             return middle, np.array(_PALM_SD_M), 0.0
         bone, radius = model.bones[place.finger, place.segment], model.radii[place.finger, place.segment]
         if place.painted:
-            part, scatter = model.marker[place.finger] / bone, hand_prior.PAINT_PART[1]
+            part, scatter = model.marker[place.finger] / bone, PAINT_PART[1]
             return np.array([part * bone, 0.0, 0.0]), np.array([scatter * bone, _PAINT_SD_M, _PAINT_SD_M]), float(part)
-        part, scatter = hand_prior.TIP_PART if place.segment == DISTAL else _INNER_PART
+        part, scatter = TIP_PART if place.segment == DISTAL else _INNER_PART
         return (np.array([part * bone, 0.0, radius]), np.array([scatter * bone, _ACROSS_SD_M, _ACROSS_SD_M]),
                 float(part))
 

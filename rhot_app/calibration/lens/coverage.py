@@ -1,6 +1,7 @@
-"""How much of what a calibration needs its views show: X, Y, size and skew, and which parts of the picture.
+"""How much of what a calibration needs its views show, and guidance while they are taken.
 
-The four bars are those of ROS camera_calibration: where the board is, how large, how tilted; each spans what is needed.
+X, Y, size and skew are those of ROS camera_calibration: where the board is, how large, how tilted. Each spans what is
+needed.
 """
 
 from __future__ import annotations
@@ -96,8 +97,8 @@ def _skew(quad: Array) -> float:
     return float(min(1.0, np.max(np.abs(angles - np.pi / 2)) / (np.pi / 6)))
 
 
-# -- Guides whoever holds a board before one camera: takes a view when the board is still and somewhere new ------------
-# one sentence what to do next.
+# -- guidance while views are taken ------------------------------------------------------------------------------------
+# A view is taken when the board is still and somewhere new. One sentence says what to do next.
 
 ENOUGH = 12
 """Views at least; more come where the bars are not full."""

@@ -25,7 +25,7 @@ from rhot_app.calibration.bundle.robust_error import MOST_DROPPED, error_inflati
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent, within
 
-# -- What is known about a camera's lens before cameras are put together -----------------------------------------------
+# -- what is known of a lens beforehand --------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def loose_prior(lens: Array, size: tuple[int, int]) -> Array:
                      0.05 / corner**3])
 
 
-# -- A first lens from the same views that will put the cameras together: good enough to start from, refined -----------
+# -- first estimate from the shared views ------------------------------------------------------------------------------
 
 FEWEST_VIEWS = 3
 
@@ -120,7 +120,8 @@ def _closed_form(views: Sequence[BoardView], board: Board, size: tuple[int, int]
     return np.array([focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-# -- The fit of one camera's lens to its views of a board: without the views that do not fit, and with the -------------
+# -- the fit -----------------------------------------------------------------------------------------------------------
+# Views that do not fit are left out.
 
 PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Names of the lens parameters, in their order."""

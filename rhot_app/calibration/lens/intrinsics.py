@@ -135,7 +135,7 @@ def _why_off(view: BoardView, rms: float, usual: float, used: Sequence[BoardView
     return f"{figure}: the board was bent or moved, or something covers a part of it"
 
 
-# -- where in the picture corners are off, and which way ---------------------------------------------------------------
+# -- residual pattern over the image -----------------------------------------------------------------------------------
 
 CELLS = (6, 8)
 """Rows and columns of the means."""
@@ -180,7 +180,7 @@ def residual_field(places: Array, residuals: Array, view: NDArray[np.intp], size
     return ResidualField(places, residuals, view, mean.reshape(rows, cols, 2), count.reshape(rows, cols))
 
 
-# -- One camera's intrinsics as a file (``rhot-intrinsics``), with their certainty and where they come from ------------
+# -- the file ``rhot-intrinsics`` --------------------------------------------------------------------------------------
 # docs/calibration-files.md describes the format. The master itself reads rigs only: this file carries a lens from its
 # own calibration to the one that puts cameras together, or to another program.
 

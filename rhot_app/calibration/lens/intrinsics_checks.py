@@ -15,7 +15,7 @@ from rhot_app.calibration.lens.coverage import Coverage
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.geometry.camera import undistort_points
 
-# -- How certain a lens is: from the covariance of its parameters to millimetres in front of the camera ----------------
+# -- uncertainty of a lens, as an error in space -----------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ def blind_share(lens: Array, size: tuple[int, int]) -> float:
     return float(np.mean(~np.isfinite(undistort_points(picture_grid(size), lens)).all(axis=1)))
 
 
-# -- What is doubtful about a camera's intrinsics: each check gives findings with the figure, the cause and ------------
+# -- findings ----------------------------------------------------------------------------------------------------------
 
 MORE_VIEWS = "Add views: the board near each corner of the picture, near and far, tilted each way."
 

@@ -28,6 +28,8 @@ from rhot_app.geometry.transforms import inverse, quaternion_from_rotation, rigi
 from rhot_app.progress import Progress, silent
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, slots=True)
 class KnownLengths:
@@ -109,9 +111,6 @@ def _summary(figures: StereoFigures) -> str:
 
 # -- putting cameras together ------------------------------------------------------------------------------------------
 
-Array = NDArray[np.float64]
-
-
 def solve(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool = False,
           progress: Progress = silent) -> StereoSolution | Finding:
     """All cameras in the first one's frame; or the finding that says why they cannot be put together.
@@ -181,7 +180,7 @@ def _place_boards(views: SharedViews, lenses: Sequence[LensStart], posed: Sequen
     return boards, dropped
 
 
-# -- What a stereo calibration changes in a rig: lenses and places of its cameras, and nothing else --------------------
+# -- the calibrated rig ------------------------------------------------------------------------------------------------
 
 ARRANGED = frozenset({"swapped", "swapped_or_mirrored", "mirrored"})
 """Findings that say why right stands on the left: the first of them is enough."""

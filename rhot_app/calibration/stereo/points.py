@@ -1,4 +1,4 @@
-"""What the cameras of a solved rig make of the board: its corners in space, and how far they are from its geometry."""
+"""The board's corners as a solved rig triangulates them, their errors, and the test of given lenses."""
 
 from __future__ import annotations
 
@@ -129,7 +129,8 @@ def _off_plane(points: Array) -> tuple[Array, Array]:
     return np.asarray((points - middle) @ normal), normal
 
 
-# -- Whether given lenses belong to the pictures: a lens is not symmetric, so it knows mirrored and swapped ------------
+# -- test of given lenses ----------------------------------------------------------------------------------------------
+# A lens is not symmetric, so it tells mirrored and swapped pictures.
 # The principal point stands tens of pixels off the middle. Corners of mirrored pictures fit the mirrored lens better
 # than the given one, and pictures of the other camera fit the other camera's lens better.
 

@@ -73,7 +73,7 @@ def _name(path: Path, camera: str) -> str:
     return path.name if camera in path.name else f"{camera}/{path.name}"
 
 
-# -- which picture of one camera belongs to which of the others, by the numbers in their names -------------------------
+# -- matching pictures by the numbers in their names -------------------------------------------------------------------
 
 Key = tuple[int, ...]
 

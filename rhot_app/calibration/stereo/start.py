@@ -1,4 +1,4 @@
-"""From links between pairs of cameras to one start for the bundle adjustment: all cameras, all boards."""
+"""The start of the bundle adjustment from relative poses of camera pairs, and the world frame on the table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import apply, exp_so3, inverse, log_so3, rigid
 
-# -- How two cameras stand to each other, by the consensus of the shots that both have seen ----------------------------
+# -- relative pose of two cameras by consensus -------------------------------------------------------------------------
 # A shot proposes its own answer; the one that most shots agree with wins, and whoever disagrees is named. Nothing
 # here is an average over good and bad shots.
 
@@ -121,7 +121,7 @@ def average_pose(poses: Array) -> Array:
     return mean
 
 
-# -- From links between pairs of cameras to one start for the bundle adjustment: all cameras, all boards ---------------
+# -- start of the bundle adjustment ------------------------------------------------------------------------------------
 
 PosedShots = Sequence[Sequence[PosedView | None]]
 """[shot][camera]"""
@@ -177,7 +177,8 @@ def place_shot(shot: int, views: Sequence[PosedView | None], camera_from_world: 
     return best
 
 
-# -- The world frame, placed by a board that lies on the table: z up, origin at its first corner, x along its ----------
+# -- world frame from a board on the table -----------------------------------------------------------------------------
+# z up, origin at the board's first corner, x along its columns.
 # The board's own z points into the paper, away from the viewer; the table's z points up from it, so the table frame
 # is the board's, turned by 180 degrees about x. A board can only be seen from its printed side, so whoever sees it
 # lying on the table is above the table; what can be wrong is that it stands, lies elsewhere in another camera, or is

@@ -100,7 +100,8 @@ def _track(table: CameraTable, marker: int, start_s: Array, model: CameraModel, 
     return Track(start_s[kept], pixels[kept, 1], rays[kept], (gaps <= longest_s) & ~acquired)
 
 
-# -- How noisy tracks are, and the same tracks without most of it: a polynomial through every tenth of a ---------------
+# -- smoothed tracks and their noise -----------------------------------------------------------------------------------
+# By local polynomials.
 # How long a polynomial follows a hand depends on the hand and on the noise that there is to average, so the recording
 # decides: a longer window is taken as long as what it changes about the fastest movements is no more than noise
 # (Lepski's method). Being off the curve would not average out over the recording as noise does.

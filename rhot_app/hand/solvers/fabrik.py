@@ -1,4 +1,4 @@
-"""Joint angles from joint positions: the inverse of the forward kinematics, in closed form."""
+"""FABRIK for a chain without limits (Aristidou and Lasenby 2011), and joint angles from joint positions."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _copy(point: Array, out: Array) -> None:
         out[i] = point[i]
 
 
-# -- Joint angles from joint positions: the inverse of the forward kinematics, in closed form --------------------------
+# -- joint angles from joint positions ---------------------------------------------------------------------------------
 
 def angles_from_joints(model: HandModel, world_from_palm: Array, joints: Array) -> Array:
     """The 21 angles, rad, of a hand whose palm and joints (21, 3) m are known.

@@ -168,7 +168,7 @@ def _edge(bounds: Array, abduction: float, far: float) -> float:
     return inside
 
 
-# -- Cones and parabolas at the knuckles, for solvers that know boxes only ---------------------------------------------
+# -- cones and parabolas for solvers of box limits ---------------------------------------------------------------------
 # A finger bends in one plane through its abduction axis, so its target alone says how far it is abducted. What a cone
 # or parabola then leaves of the flexion is a range again.
 

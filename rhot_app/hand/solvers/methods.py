@@ -1,4 +1,4 @@
-"""Fingers that bend one another: bounds on how much more one knuckle is bent than the next (RHOT 2.1.1).
+"""One interface to every solver, and bounds on how much more one knuckle is bent than the next (RHOT 2.1.1).
 
 The differences tie the fingers together. When fingers that were solved alone break them, one Levenberg-Marquardt over
 all sixteen angles brings targets and differences to agree as far as they can. Around the result each finger alone is a

@@ -157,7 +157,7 @@ def _positive(matrix: Array, least: float) -> bool:
     return True
 
 
-# -- Descents that begin again where limits or a local minimum stop them: the solvers that meet what can be met --------
+# -- restarts at limits and local minima -------------------------------------------------------------------------------
 
 NEWTON, LEVENBERG = 4, 5
 """With inverse.DAMPED the descents to choose from."""

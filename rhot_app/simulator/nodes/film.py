@@ -24,7 +24,7 @@ from rhot_app.simulator.nodes.shot import Shot, make_renderer, save_shot
 from rhot_app.simulator.truth.truth import FrameTruth, save_truth, true_object
 from rhot_node.capture.yuv import YuvWriter
 
-# -- Work on every camera of a shot at once: one process per camera, their progress as one, and no process -------------
+# -- one process per camera --------------------------------------------------------------------------------------------
 
 T = TypeVar("T")
 
@@ -105,7 +105,7 @@ def _run(shot: Shot, index: int, work: Callable[[Shot, int, Report], Any], pipe:
             pipe.send(_Done(None, str(exc)))
 
 
-# -- Film a shot to disk: both cameras' frames as raw YUV recordings, one process per camera, and the truth ------------
+# -- recording to disk -------------------------------------------------------------------------------------------------
 
 TRUTH_NAME = "truth.npz"
 

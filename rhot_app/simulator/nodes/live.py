@@ -36,7 +36,7 @@ from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 from rhot_node.config import load_settings
 from rhot_node.errors import NodeError, SettingsError
 
-# -- The live twin's control door: a ZeroMQ REP socket in the twin's directory, served by a thread of its own ----------
+# -- control socket ----------------------------------------------------------------------------------------------------
 
 Perform = Callable[[Request], dict[str, Any]]
 
@@ -97,7 +97,7 @@ class TwinServer:
             return refusal(str(exc))
 
 
-# -- Keeps the live twin's node daemons alive, on the ports that they had first ----------------------------------------
+# -- supervision of the node daemons -----------------------------------------------------------------------------------
 
 _RESTART_PAUSE_S = 0.5
 
@@ -154,7 +154,7 @@ def socket_path(directory: Path, name: str) -> Path:
     return directory / f"{name}.frames"
 
 
-# -- The live twin: a process that renders both cameras as fast as the machine allows, for two real node ---------------
+# -- the live twin -----------------------------------------------------------------------------------------------------
 
 _NICE = 5
 

@@ -26,7 +26,7 @@ from rhot_node.capture.stream import StreamHeader, pack_header, take_settings
 from rhot_node.config import CameraSettings
 from rhot_node.errors import CameraError
 
-# -- The twin's end of a ``stream:`` camera: a Unix socket to which one node at a time may connect ---------------------
+# -- ``stream:`` server ------------------------------------------------------------------------------------------------
 # Frames go out; what the node tells its camera comes in.
 
 _SEND_TIMEOUT_S = 0.25  # a node that takes no bytes for so long is stuck; it may connect again
@@ -100,7 +100,7 @@ class FrameSocket:
             self._path.unlink()
 
 
-# -- The live twin's cameras: rendered in turn, handed over when a sensor would have read them out, told by ------------
+# -- rendered cameras --------------------------------------------------------------------------------------------------
 
 CORE_SHARE = 0.6
 """Part of one processor core that rendering may take; engine, nodes and window need the rest."""
@@ -192,7 +192,7 @@ class LiveCameras:
         renderer.expose(replace(renderer.exposure, shutter=shutter, controls=controls_of(told)))
 
 
-# -- Whether the live twin keeps up: it says so when its cameras run slower than their preset, or no longer do ---------
+# -- frame rate check --------------------------------------------------------------------------------------------------
 
 WINDOW_S = 2.0
 """Rates are means over this long: a single late frame is none of the user's business."""

@@ -24,7 +24,7 @@ from rhot_node.errors import WireError
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import Start, StartEntry
 
-# -- What a bad network does to datagrams: a seeded decision for each one. No sockets here -----------------------------
+# -- faults of a network -----------------------------------------------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
 class Impairment:
@@ -81,7 +81,7 @@ class DelayQueue:
         return self._heap[0][0] if self._heap else None
 
 
-# -- A bad network between one node and the master: a UDP proxy that loses, delays, reorders and doubles ---------------
+# -- UDP proxy ---------------------------------------------------------------------------------------------------------
 
 Address = tuple[str, int]
 

@@ -31,7 +31,7 @@ from rhot_app.simulator.scene.camera_controls import Controls, Lamp
 from rhot_app.simulator.scene.scene_description import Show
 from rhot_node.files import decode_message
 
-# -- What may be asked of a live twin, as JSON, and its answers (docs/twin.md). No sockets -----------------------------
+# -- requests and answers ----------------------------------------------------------------------------------------------
 # Stage, lamp and caps on lenses belong to the room, not to the rig: nothing that is asked here reaches nodes or engine
 # but as pictures.
 
@@ -99,7 +99,7 @@ def refusal(sentence: str) -> dict[str, Any]:
     return {"ok": False, "error": sentence}
 
 
-# -- A client of the live twin's door: what its cameras see, asked for from another process ----------------------------
+# -- client ------------------------------------------------------------------------------------------------------------
 
 ANSWER_S = 180.0
 """A show that was never shown on this machine is compiled first."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rhot_node.config import CameraSettings
 
-# -- The lamp of the simulated room: how bright, of what colour, and how it flickers with the mains --------------------
+# -- lamp --------------------------------------------------------------------------------------------------------------
 # Colours of the scene are grey levels 0..255 as a camera delivers them, encoded with a gamma of 2.2. Light adds up
 # before that encoding, so a factor g on the light is a factor g^(1/2.2) on the grey level.
 
@@ -81,7 +81,7 @@ def _planck_xyz(kelvin: float) -> Array:
     return np.array([x / y, 1.0, (1.0 - x - y) / y])
 
 
-# -- What a simulated camera is told, and what that does to a picture: gains, white balance, contrast ------------------
+# -- camera settings ---------------------------------------------------------------------------------------------------
 
 Image = NDArray[np.float32]
 

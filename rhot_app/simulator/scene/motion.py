@@ -19,7 +19,7 @@ from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, HandPose
 from rhot_node.files import read_document, resource_path
 
-# -- Named motions as people write them: keyframes in JSON (format ``rhot-motion``, docs/twin.md) ----------------------
+# -- the file ``rhot-motion`` ------------------------------------------------------------------------------------------
 
 FORMAT: Final = "rhot-motion"
 VERSION: Final = 1
@@ -75,7 +75,7 @@ def read_motion_file(path: Path) -> MotionFile:
     return read_document(path, MotionFile, format_name=FORMAT, version=VERSION, error=RigError)
 
 
-# -- How the twin's hand moves: smooth curves of palm pose and joint angles over scene time ----------------------------
+# -- interpolation -----------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 

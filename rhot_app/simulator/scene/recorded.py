@@ -26,7 +26,7 @@ from rhot_app.recording.qualisys import read_qualisys
 from rhot_app.simulator.scene.motion import FACING, WRIST_BELOW_CENTRE_M, Motion, Sway, SwayCurve
 from rhot_node.files import read_input
 
-# -- Recordings of real hands as landmarks: points on the hand over time, from the files that recorders write ----------
+# -- reading recordings ------------------------------------------------------------------------------------------------
 # Read here: Qualisys TSV exports (optical markers on fingertips and finger middles, a triad on the back of the hand)
 # and Leap Motion CSV exports (joint positions). Millimetres in the files, metres from here on.
 
@@ -107,7 +107,7 @@ def _leap(text: str) -> Landmarks:
                      np.stack([joints, joints], axis=1), np.zeros(len(joints)))
 
 
-# -- Real human motion for the twin: the hand model fitted frame by frame to a recording's landmarks -------------------
+# -- fitting the hand model --------------------------------------------------------------------------------------------
 
 LANDMARK_SD_M = 3e-3
 RIGID_SD_M = 2e-3

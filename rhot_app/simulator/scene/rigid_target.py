@@ -79,7 +79,7 @@ def ball_on_stick(markers: MarkerSet, index: int) -> RigidTarget:
         ends=np.array([[np.zeros(3), [0.0, POINT_M, 0.0]], [top, top + down]]), centres=centres)
 
 
-# -- How a person moves a calibration board: from place to place, holding it still for a moment at each ----------------
+# -- motion of a calibration board -------------------------------------------------------------------------------------
 
 STILL_S = 1.3
 MOVE_S = 0.9

@@ -125,7 +125,7 @@ def _marker_act(show: MarkerShow, scene: Scene) -> SceneObject:
                MarkerPath(place, reach, scene.seed))
 
 
-# -- how a single marker is held or swung before the cameras -----------------------------------------------------------
+# -- motion of a single marker -----------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -167,7 +167,7 @@ def swing_reach(half_width_m: float, half_height_m: float, baseline_m: float) ->
     return 0.7 * max(half_width_m - 0.5 * baseline_m, 0.01), 0.7 * half_height_m
 
 
-# -- where to hold a calibration board so that it teaches most ---------------------------------------------------------
+# -- board poses -------------------------------------------------------------------------------------------------------
 
 PLACES = 26
 SHARED = 16  # of the places: seen whole by all cameras

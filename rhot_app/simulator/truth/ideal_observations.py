@@ -218,7 +218,7 @@ def _slow(shot: Shot, count: int, seed: int, slow_s: float, times_s: Array) -> A
     return np.asarray(CubicSpline(grid, walk)(times_s))
 
 
-# -- what part of each marker other parts of the hand hide, by a few rays instead of a picture (numba) -----------------
+# -- occluded part of each marker --------------------------------------------------------------------------------------
 
 Indices = NDArray[np.int64]
 

@@ -33,7 +33,7 @@ from rhot_app.simulator.scene.scene_description import FARTHEST_M, NEAREST_M, Ma
 from rhot_app.simulator.truth.truth import FrameTruth, save_truth, true_object
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
-# -- Where a rolling shutter sees a moving marker: at the time at which the row that it is on is exposed ---------------
+# -- rolling shutter ---------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def at_own_rows(way: Callable[[Array], Array], see: Callable[[Array], Array], ti
     return places, np.where(inside, pixels, np.nan)
 
 
-# -- The twin's ideal detector: what nodes would send if they found every marker, as a raw log, without any ------------
+# -- ideal detector ----------------------------------------------------------------------------------------------------
 
 LOG_NAME: Final = "points.log"
 
@@ -153,7 +153,7 @@ class _Stream:
         return MarkerObservation(index, float(x), float(y), float(diameter), variance, 0.0, variance, 1.0, NO_FLAGS)
 
 
-# -- A marker held at known distances, as a table for the depth calibration: mean disparities that ideal ---------------
+# -- disparity table ---------------------------------------------------------------------------------------------------
 
 TABLE_NAME: Final = "table.csv"
 _SECONDS = 1.0  # at each distance

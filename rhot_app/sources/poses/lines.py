@@ -31,7 +31,7 @@ WINDOW_S = 10.0
 """s: the least delay is looked for within this. Two crystals of 50 ppm drift apart by 1 ms meanwhile."""
 
 SILENCE_NS = 1_000_000_000
-"""ns without a pose that are told."""
+"""ns without a pose after which `notice` reports silence."""
 
 
 @dataclass(frozen=True, slots=True)

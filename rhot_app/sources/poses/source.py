@@ -42,8 +42,8 @@ class ForeignPose:
 
 
 class PoseSource(Protocol):
-    """One tracked body of another tracker. Errors at the start are raised by the constructor; later ones are told by
-    `notice`, and nothing is raised."""
+    """One tracked body of another tracker. Errors at the start are raised by the constructor; later ones are reported
+    by `notice`, and nothing is raised."""
 
     @property
     def name(self) -> str:

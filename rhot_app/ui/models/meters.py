@@ -75,7 +75,7 @@ class JitterWindow:
         return np.where(count >= 4, np.sqrt(total / np.maximum(count, 1)), np.nan)
 
 
-# -- Where the time goes: median and 99th percentile of every stage over the last seconds, and of the whole way --------
+# -- latency by stage --------------------------------------------------------------------------------------------------
 
 STACKED: tuple[str, ...] = LATENCY_STAGES[:-1]
 """The stages that follow one another; the last entry of `LATENCY_STAGES` overlaps them and is not stacked."""
@@ -125,7 +125,7 @@ class LatencyWindow:
         return p50, p99
 
 
-# -- Rates and losses of the nodes and of the states, from the engine's status messages --------------------------------
+# -- rates and losses --------------------------------------------------------------------------------------------------
 
 _GAPS_TOO = ("time", "kernel_overflow")
 _AT_START = frozenset({"clock_in_doubt", "no_clock", "not_started", "session"})

@@ -1,4 +1,4 @@
-"""A sentence for the person at the screen."""
+"""Notices to the operator."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Notice:
     lasting: bool = False
 
 
-# -- Sentences that are shown for a while and then go by themselves: what was done, what could not be done -------------
+# -- notices that disappear by themselves ------------------------------------------------------------------------------
 
 CONFIRMATION_S = 10.0
 FAILURE_S = 15.0

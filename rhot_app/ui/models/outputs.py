@@ -202,7 +202,7 @@ def keeping(path: str, *, simulated: bool) -> str:
     return f"Save rig (Ctrl+S) keeps it in {Path(path).name}."
 
 
-# -- changes -------------------------------------------------------------------------------------------------------
+# -- changed settings --------------------------------------------------------------------------------------------------
 
 Edit = Callable[[tuple[OutputSettings, ...]], tuple[OutputSettings, ...]]
 """The outputs as they shall be, from those of the engine's rig; raises OutputError."""

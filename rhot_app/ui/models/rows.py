@@ -1,4 +1,4 @@
-"""The rows of the panels as text: nodes, markers and joint angles, with units and the right number of digits."""
+"""The rows of the panels and of rig comparisons as text, with units and the right number of digits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rhot_app.ui.models.meters import unused_frames
 from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look, settings_text
 from rhot_app.ui.wizards.models.proposal import Row
 
-# -- How uncertain a place is, as one number: the standard deviation along its worst axis, and how it is ---------------
+# -- standard deviation along the worst axis ---------------------------------------------------------------------------
 
 UNKNOWN = "?"
 """Stands for a standard deviation that nobody knows, because nobody knows how good the calibration is."""
@@ -56,7 +56,7 @@ def sd_text(sd_m: float) -> str:
     return f"± {number} mm" if number else ""
 
 
-# -- The rows of the panels as text: nodes, markers and joint angles, with units and the right number of digits --------
+# -- rows of the panels ------------------------------------------------------------------------------------------------
 
 DASH = "–"
 
@@ -197,7 +197,7 @@ def bytes_text(count: int) -> str:
     return f"{count} B"
 
 
-# -- Two rigs side by side in figures for people: mm, degrees, milliseconds --------------------------------------------
+# -- comparison of two rigs --------------------------------------------------------------------------------------------
 
 Figures = dict[str, str]
 

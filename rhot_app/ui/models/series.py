@@ -1,4 +1,4 @@
-"""A ring of time-stamped rows for a plot, with honest gaps and a text form for the clipboard."""
+"""A ring buffer of time-stamped rows for a plot, with gaps and a text form; the range of the plot's axis."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def to_csv(seconds: Array, rows: Array, names: tuple[str, ...], unit: str) -> st
     return "\n".join(lines) + "\n"
 
 
-# -- How high a plot's axis reaches: rare spikes do not flatten everything else, and are told instead of drawn ---------
+# -- range of a plot's axis --------------------------------------------------------------------------------------------
 
 _USUAL_PERCENT = 90.0
 _ROOM = 1.6  # times the usual: what stays below is drawn whole

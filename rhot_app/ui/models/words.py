@@ -1,4 +1,6 @@
-"""Which word, shape and tone each state has. Colour is never alone: every state also has its own shape.
+"""The words of the app: states, tooltips, hands, motions, trackers, remaining time, grades.
+
+Every state has a word, a shape and a tone. Colour is never alone: every state also has its own shape.
 
 Shapes are names that `rhot_app.ui.shapes` draws; tones are names of `palette.Scheme` colours.
 """
@@ -96,7 +98,7 @@ def marker_look(state: HandState, marker: int) -> Look:
     return HIDDEN if union & int(MarkerFlag.PARTIAL) else OK
 
 
-# -- What each term on the screen means, in one or two sentences: the tooltips -----------------------------------------
+# -- tooltips ----------------------------------------------------------------------------------------------------------
 
 TERMS: dict[str, str] = {
     "condition": "The state of the whole rig in one word: IDLE, SEARCHING, TRACKING, PARTIAL, LOST or FAULT.",
@@ -150,7 +152,7 @@ def tip(term: str) -> str:
     return TERMS[term]
 
 
-# -- The hands of a rig as people call them, and of its states ---------------------------------------------------------
+# -- names of hands ----------------------------------------------------------------------------------------------------
 
 def hand_names(rig: Rig | None) -> tuple[str, ...]:
     """What the hands that the rig's tracker follows are called, the rig's `hand` first.
@@ -168,7 +170,7 @@ def each_hand(state: HandState | None) -> list[HandState]:
     return [hand for hand in (state, state.other if state is not None else None) if hand is not None]
 
 
-# -- The motions that ship with the simulated hand, with a sentence each -----------------------------------------------
+# -- motions of the simulated hand -------------------------------------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
 class MotionInfo:
@@ -190,7 +192,7 @@ def shipped_motions() -> list[MotionInfo]:
     return found
 
 
-# -- The choice of the tracker in words: what each is good at, what stands in the way, how large the hand --------------
+# -- choice of the tracker ---------------------------------------------------------------------------------------------
 
 KINDS: Final = {
     "classic": ("Classic", "The thesis's way: triangulate each marker, smooth it, then bend the fingers one by one. "
@@ -266,7 +268,7 @@ def size_text(state: HandState | None, rig: Rig) -> str:
     return f"{scale_text(state)} of the rig's hand: {after:.0f} mm long instead of {before:.0f} mm."
 
 
-# -- How long a piece of work will still take, in words ----------------------------------------------------------------
+# -- remaining time ----------------------------------------------------------------------------------------------------
 
 _LEAST_DONE = 0.03
 _LEAST_S = 0.5
@@ -298,7 +300,7 @@ class Remaining:
         return f"about {left / 60.0:.0f} min left"
 
 
-# -- How a grade looks: a word, a shape and a tone, as every state of the app has them ---------------------------------
+# -- appearance of grades ----------------------------------------------------------------------------------------------
 
 GRADES: dict[Grade, Look] = {
     Grade.GOOD: Look("good", "disc", "good", "May be used as it is."),

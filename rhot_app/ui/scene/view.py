@@ -18,9 +18,19 @@ from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.models.words import KINDS, each_hand, hand_names
-from rhot_app.ui.scene import frames as stage
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
-from rhot_app.ui.scene.frames import Up, camera_like, camera_like_state, frustum_lines, to_display
+from rhot_app.ui.scene.frames import (
+    Up,
+    axis_labels,
+    axis_lines,
+    camera_like,
+    camera_like_state,
+    floor_lines,
+    frustum_lines,
+    height_lines,
+    tick_labels,
+    to_display,
+)
 from rhot_app.ui.scene.hand_actors import HandActors
 from rhot_app.ui.scene.hands import hands_of, nearest, spots
 from rhot_app.ui.scene.labels import LabelPainter, Legend, TextStyle, ellipsoid_text, pixels_of
@@ -240,14 +250,14 @@ class SceneView(GLViewWidget):
         self.addItem(item)
 
     def _add_stage(self) -> None:
-        segments, strong = stage.floor_lines()
+        segments, strong = floor_lines()
         self._add_lines(segments[~strong], self._scheme.grid)
-        self._add_lines(np.concatenate([segments[strong], stage.height_lines()]), self._scheme.grid_strong)
+        self._add_lines(np.concatenate([segments[strong], height_lines()]), self._scheme.grid_strong)
         on_table = self._up == "z"
-        both = (stage.tick_labels(on_table=on_table), stage.axis_labels(on_table=on_table))
+        both = (tick_labels(on_table=on_table), axis_labels(on_table=on_table))
         self._stage_labels = [(np.array([label.place for label in labels]), [label.text for label in labels])
                               for labels in both]
-        axes, colours = stage.axis_lines(on_table=on_table)
+        axes, colours = axis_lines(on_table=on_table)
         self._add_lines(axes, colours, width=2.0, depth=-5)
 
     def _add_cameras(self, rig: Rig) -> None:
