@@ -170,7 +170,7 @@ def test_a_detector_that_fails_states_all_as_lost(broken: None, name: str, sente
 @pytest.mark.parametrize("detector", ["slow", "plug:", "plug:a b", ""])
 def test_settings_name_a_detector_that_can_be(detector: str) -> None:
     document = msgspec.to_builtins(settings("fast")) | {"detector": detector}
-    with pytest.raises(SettingsError, match="may be \"fast\", \"reference\", .*\"plug:NAME\""):
+    with pytest.raises(SettingsError, match=r"may be \"fast\", \"reference\", .*\"plug:NAME\""):
         parse_settings(msgspec.json.encode(document), "settings")
 
 
