@@ -346,7 +346,10 @@ class RigRefiner:
         return float(np.sqrt(np.einsum("knc,kl,lnc->n", slopes, covariance, slopes).mean()))
 
     def _test(self, found: _Solution) -> tuple[float, int]:
-        """Chi-squared of the correction against none, in the directions that the observations determine."""
+        """Chi-squared of the correction against none, in the directions that the observations determine.
+
+        The calibration's variance is in the prior and is added once more, so false alarms are rarer than the level.
+        """
         scale = np.tile(KNOCK_SD, self._poses // POSE)
         covariance = (found.covariance[:self._poses, :self._poses] + np.diag(self._calibrated)) / np.outer(scale, scale)
         values, vectors = np.linalg.eigh(covariance)

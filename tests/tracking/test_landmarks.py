@@ -127,7 +127,9 @@ def test_joints_are_better_than_triangulated_and_their_covariances_true(motion, 
     assert within.mean() >= (0.95 if bone_sd else 0.97)
 
 
-def test_one_camera_keeps_the_hand_and_says_that_it_knows_the_distance_less():
+@pytest.mark.parametrize("least", [
+    0.7, pytest.param(0.95, marks=pytest.mark.xfail(strict=True, reason="the aim; the stated distance is too sure"))])
+def test_one_camera_keeps_the_hand_and_says_that_it_knows_the_distance_less(least):
     frames = [frame for frame in detected_landmarks(RIG, hand(), 1)
               if frame.camera == 0 or frame.t_row0_master_ns < EPOCH_NS + 10**9]
     alone = [state for state in states_of(RIG, frames) if state.t_master_ns > EPOCH_NS + 17 * 10**8]
@@ -137,7 +139,7 @@ def test_one_camera_keeps_the_hand_and_says_that_it_knows_the_distance_less():
     along, across = line, np.array([0.0, 1.0, 0.0])
     depth = np.sqrt(np.einsum("i,njik,k->nj", along, covariances, along))
     assert depth.mean() > 1.5 * np.sqrt(np.einsum("i,njik,k->nj", across, covariances, across)).mean()
-    assert (np.abs(errors @ along) <= 3.0 * depth).mean() >= 0.7
+    assert (np.abs(errors @ along) <= 3.0 * depth).mean() >= least
     assert np.abs(errors @ along).max() < 0.15 * DISTANCE_M
 
 
