@@ -273,21 +273,25 @@ class BareHandTracker:
 
     def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool) -> ContourFrame:
         """Search one image along the contours of a hand in `state`."""
-        model = self.cameras[camera]
         if not self.noise[camera]:
             self.noise[camera] = noise_of(image)
+        frame = self.expected(camera, state, covariance, STEP_M if last else 2.0 * STEP_M)
+        frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
+        if last:
+            self.frames[camera] = frame
+        return frame
+
+    def expected(self, camera: int, state: Array, covariance: Array, step_m: float = STEP_M) -> ContourFrame:
+        """The slices across the contours, `step_m` apart, of a hand in `state` before one camera; not yet searched."""
+        model = self.cameras[camera]
         size, pose, image_size = state[BIAS:BIAS + SHAPE].copy(), self.poses[camera], (model.width, model.height)
         if self.mode == "feature":
             points = feature_points(self.surface, state, size, pose, model.intrinsics, image_size)
         else:
-            points = contour_points(self.surface, state, size, pose, model.intrinsics, image_size,
-                                    STEP_M if last else 2.0 * STEP_M)
+            points = contour_points(self.surface, state, size, pose, model.intrinsics, image_size, step_m)
         frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, MOTION, self.row_s[camera],
                           REACH, LONGEST_PX)
         frame.expected_sd = np.minimum(frame.expected_sd, CONFUSED_PX)
-        frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
-        if last:
-            self.frames[camera] = frame
         return frame
 
     @property
