@@ -38,7 +38,8 @@ class SearchedNodes:
             lost = np.isnan(seen[:, 0])
             self.give(CameraObservations(
                 camera, t_ns, 0, 1e-4, t_ns + 9_000_000, 0.004, 0.001, seen,
-                np.tile(0.01 * np.eye(2), (len(seen), 1, 1)), np.full(len(seen), 12.0), np.ones(len(seen)), lost.astype(np.uint16)))
+                np.tile(0.01 * np.eye(2), (len(seen), 1, 1)),
+                np.full(len(seen), 12.0), np.ones(len(seen)), lost.astype(np.uint16)))
             if request is None:
                 continue
             if len(request.slices):

@@ -59,7 +59,9 @@ def matched(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: A
 def _on(hand: BareHandTracker, camera: int, frame: ContourFrame, chosen: NDArray[np.int64],
         slices: Array) -> ContourFrame:
     """The frame with the chosen points on other slices."""
-    points = ContourPoints(*(column[chosen] for column in frame.points))
+    p = frame.points
+    points = ContourPoints(p.capsule[chosen], p.kind[chosen], p.along[chosen], p.behind[chosen], p.pixel[chosen],
+                           p.normal[chosen], p.scale[chosen])
     return ContourFrame(hand.surface, points, frame.pose, frame.intrinsics, slices, frame.expected_sd[chosen],
                         frame.late_s[chosen], MOTION)
 
