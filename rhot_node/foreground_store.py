@@ -187,7 +187,7 @@ class ForegroundStore:
         return rgb_of(picture.image)
 
     def _use(self, model: Foreground, *, save: bool) -> None:
-        """Keep the model if `save`, then use it as it would be read. Raises NodeError when the file cannot be written."""
+        """Keep the model if `save`, then use it as it is read. Raises NodeError when the file cannot be written."""
         halved = model._replace(mean=model.mean.astype(np.float16), sd=model.sd.astype(np.float16))
         if save and self.path is not None:
             file = io.BytesIO()
