@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from rhot_app.errors import CalibrationError
-from rhot_app.estimation.residual import Rows, stack, student
+from rhot_app.estimation.least_squares import LEAST_DAMPING, Dense, fit_linear, minimise
+from rhot_app.estimation.residual import Rows, student
 from rhot_app.geometry.transforms import best_rotation, rigid, skew
 from rhot_app.objects.alignment_model import GAP_S, ROTATION, TRANSLATION, AlignmentModel, Estimate
 from rhot_app.objects.motion_stream import MotionStream
@@ -175,13 +177,7 @@ def linear_start(model: AlignmentModel, offset_s: float) -> tuple[Estimate, floa
         for axis in range(3):
             more[:, axis, 3 * axis:3 * axis + 3] = body
         columns, target = np.concatenate([columns, more]), np.concatenate([target, turn])
-    weights, solution = np.ones(len(target)), np.zeros(15)
-    for _ in range(4):
-        solution = np.linalg.lstsq((columns * weights[:, None, None]).reshape(-1, 15),
-                                   (target * weights[:, None]).ravel(), rcond=1e-3)[0]
-        squared = np.sum((target - columns @ solution) ** 2, axis=1)
-        scale2 = float(np.median(squared)) / float(chi2.ppf(0.5, 3))
-        weights = np.sqrt(_KERNEL.weights(squared / max(scale2, 1e-18), np.full(len(target), 3.0)))
+    solution, _ = fit_linear(columns, target, _KERNEL, rounds=4, rcond=1e-3)
     inverse = solution[:9].reshape(3, 3)
     sizes = np.linalg.svd(inverse, compute_uv=False)
     rotation = best_rotation(inverse.T)
@@ -195,7 +191,7 @@ def linear_start(model: AlignmentModel, offset_s: float) -> tuple[Estimate, floa
     return estimate, median / max(float(sizes[1]), 1e-12), float(np.mean(sizes[:2]))
 
 
-def _rows(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float]) -> list[Rows]:
+def _rows(model: AlignmentModel, scales: tuple[float, float], estimate: Estimate) -> list[Rows]:
     error, jacobian, turned, by = model.linearise(estimate)
     rows = []
     for each, slopes, scale in ((error, jacobian, scales[0]), (turned, by, scales[1])):
@@ -207,23 +203,13 @@ def _rows(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float]
 
 def _solve(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float]) \
         -> tuple[Estimate, tuple[float, float]]:
-    """The most probable estimate and the scales of the residuals, m and rad: Gauss-Newton steps that are halved while
-    the cost rises, and the scales' fixed point after each."""
+    """The most probable estimate and the scales of the residuals, m and rad: a Gauss-Newton step, then the scales' next
+    iterate, up to their fixed point."""
     for _ in range(_ITERATIONS):
-        error, jacobian, variances, cost, _ = stack(_rows(model, estimate, scales), model.size, weigh=True)
-        root = 1.0 / np.sqrt(variances)
-        weighted = jacobian * root[:, None]
-        sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-12)
-        step = np.linalg.lstsq(weighted / sizes, error * root, rcond=1e-9)[0] / sizes
-        for _ in range(8):
-            trial = estimate.moved(step)
-            if stack(_rows(model, trial, scales), model.size, weigh=True)[3] <= cost:
-                break
-            step = 0.5 * step
-        estimate = trial
-        before, scales = scales, _rescaled(model, estimate, scales)
-        moved = float(np.sum((weighted @ step) ** 2)) / model.count
-        if moved < _CONVERGED and abs(math.log(scales[0] / before[0])) < 1e-4:
+        start = Dense(estimate, partial(_rows, model, scales), Estimate.moved, model.size)
+        found, _ = minimise(start, steps=1, least_gain=0.0, damping=LEAST_DAMPING)
+        estimate, before, scales = found.state, scales, _rescaled(model, found.state, scales)
+        if start.cost - found.cost < _CONVERGED * model.count and abs(math.log(scales[0] / before[0])) < 1e-4:
             break
     return estimate, scales
 
@@ -231,7 +217,7 @@ def _solve(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float
 def _rescaled(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float]) -> tuple[float, float]:
     """The scales' next iterate: the weighted mean square over what it is for Gaussian errors."""
     out = []
-    for rows, scale in zip(_rows(model, estimate, scales), scales, strict=False):
+    for rows, scale in zip(_rows(model, scales, estimate), scales, strict=False):
         squared = np.sum(rows.error.reshape(-1, 3) ** 2, axis=1)
         share = float(np.mean(_KERNEL.weights(squared, np.full(len(squared), 3.0)) * squared)) / 3.0
         out.append(max(scale * math.sqrt(share / _GAUSSIAN_SHARE), 1e-9))
@@ -239,7 +225,7 @@ def _rescaled(model: AlignmentModel, estimate: Estimate, scales: tuple[float, fl
 
 
 def _finished(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float], kept: float) -> Fit:
-    rows = _rows(model, estimate, scales)
+    rows = _rows(model, scales, estimate)
     covariance, curvature = _covariance(rows, model.size)
     # to a long recording an error of correlation time T is white noise of spectral density 2 T s^2
     lasting = curvature * 2.0 * LASTING_S * (LASTING_M / scales[0]) ** 2 * model.count / model.duration_s

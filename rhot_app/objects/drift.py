@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import chi2
 
+from rhot_app.estimation.least_squares import fit_linear
 from rhot_app.estimation.residual import student
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment import LASTING_M, LASTING_S
@@ -125,16 +126,9 @@ class DriftMonitor:
 
 def _robust(innovation: Array, drift: Array, noise_m: float) -> tuple[Array, Array]:
     """Weights (N,) of the innovations under the drift (7,) that explains them best, and that drift."""
-    weights, step = np.ones(len(innovation)), np.zeros(drift.shape[2])
     size = np.maximum(np.linalg.norm(drift.reshape(-1, drift.shape[2]), axis=0), 1e-12)
-    for _ in range(10):
-        root = np.sqrt(weights)[:, None]
-        step = np.linalg.lstsq((drift * root[:, :, None]).reshape(-1, len(step)) / size, (innovation * root).ravel(),
-                               rcond=1e-6)[0] / size
-        squared = np.sum((innovation - drift @ step) ** 2, axis=1)
-        scale2 = max(noise_m**2, float(np.median(squared)) / float(chi2.ppf(0.5, 3)))
-        weights = _KERNEL.weights(squared / scale2, np.full(len(squared), 3.0))
-    return weights, step
+    step, weights = fit_linear(drift / size, innovation, _KERNEL, rounds=10, rcond=1e-6, least_sd=noise_m)
+    return weights, step / size
 
 
 def _sentence(distance_m: float, offset_s: float, clock_m: float, duration_s: float) -> str:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.hand.bundle_model import POSE, Linearised, Poses, expected, linearise
 from rhot_app.calibration.hand.shape import BONE_COUNT, HandUnknowns
 from rhot_app.errors import CalibrationError
+from rhot_app.estimation.least_squares import minimise
 from rhot_app.hand.kinematics import TWIST
 from rhot_app.hand.limits import natural_pose
 from rhot_app.progress import Progress, silent
@@ -79,7 +81,6 @@ LIMIT_MARGIN = np.radians(10.0)
 """Joints may go this far past the base hand's limits, which nobody measured on this hand, and then pay."""
 
 _STILL = 1e-3  # the step that makes the hand less than this more likely (logarithm) was the last
-_DAMPING_MAX = 1e8
 _INNER_STEPS = 3  # of the poses for each of the shape
 _DIAGONAL = np.arange(POSE)
 
@@ -100,17 +101,16 @@ class Weights:
 @dataclass(frozen=True, slots=True)
 class HandBundle:
     """The adjusted `vector` (G,) and `poses`, what is left (F, M, 3) m, seen minus expected in the world, NaN where
-    unseen; `cost` half the sum of squares; `steps` taken."""
+    unseen; `cost` half the sum of squares."""
 
     vector: Array
     poses: Poses
     residuals: Array
     cost: float
-    steps: int
 
 
 @dataclass(frozen=True, slots=True)
-class _Reduced:
+class Reduced:
     """Normal equations of the shape once the poses are eliminated: `matrix` (G, G), `right` (G,); then an instant's
     pose moves by `alone` (F, 27) less `coupled` (F, 27, G) times the shape's step."""
 
@@ -140,26 +140,10 @@ class HandAdjustment:
         Every trial of a shape lets each instant find its own pose first: one stretched finger, whose joints hardly
         show, would else hold up the shape for all.
         """
-        cost, damping, taken = self._cost(vector, poses), 1e-3, 0
-        for taken in range(1, steps + 1):
-            progress("fitting the hand", (taken - 1) / steps)
-            reduced = self._reduce(vector, poses)
-            accepted = False
-            while damping < _DAMPING_MAX:
-                trial_vector, trial_poses = self._try(reduced, damping, vector, poses)
-                trial = self._cost(trial_vector, trial_poses)
-                if trial <= cost:
-                    accepted = True
-                    break
-                damping = max(10.0 * damping, 1e-6)
-            if not accepted:
-                break
-            gain, cost, vector, poses = cost - trial, trial, trial_vector, trial_poses
-            damping = max(0.1 * damping, 1e-9)
-            if gain < _STILL:
-                break
-        residuals = self._seen - expected(self._unknowns, vector, poses)
-        return HandBundle(vector, poses, residuals, cost, taken)
+        found, _ = minimise(_Iterate(self, vector, poses), steps, _STILL,
+                            watch=lambda taken: progress("fitting the hand", taken / steps))
+        residuals = self._seen - expected(self._unknowns, found.vector, found.poses)
+        return HandBundle(found.vector, found.poses, residuals, found.cost)
 
     def pose_covariances(self, vector: Array, poses: Poses) -> Array:
         """(F, 27, 27), how every pose scatters by the noise of its own instant."""
@@ -170,7 +154,7 @@ class HandAdjustment:
     def covariance(self, vector: Array, poses: Poses) -> Array:
         """(G, G) of the shape. Poses that scatter by their noise look like movement, which would show the joints: what
         that adds to the information is taken off again, as far as the prior, which nobody can know less than."""
-        information = self._reduce(vector, poses).matrix - self._pretended(vector, poses)
+        information = self.reduced(vector, poses).matrix - self._pretended(vector, poses)
         half = np.linalg.cholesky(self._unknowns.prior.covariance)
         values, axes = np.linalg.eigh(half.T @ information @ half)
         root = half @ axes / np.sqrt(np.maximum(values, 1.0))
@@ -193,7 +177,7 @@ class HandAdjustment:
                 break
         return poses
 
-    def _try(self, reduced: _Reduced, damping: float, vector: Array, poses: Poses) -> tuple[Array, Poses]:
+    def after_step(self, reduced: Reduced, damping: float, vector: Array, poses: Poses) -> tuple[Array, Poses]:
         """The hand after one damped step."""
         matrix = reduced.matrix.copy()
         matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
@@ -205,7 +189,8 @@ class HandAdjustment:
         better = self._instant_costs(vector, moved) <= self._instant_costs(vector, poses)
         return vector, self.settle(vector, moved.where(better, poses), _INNER_STEPS)
 
-    def _cost(self, vector: Array, poses: Poses) -> float:
+    def cost(self, vector: Array, poses: Poses) -> float:
+        """Half the sum of squares; infinite where no hand is possible."""
         if not _possible(vector):
             return np.inf
         change = vector - self._unknowns.prior.mean
@@ -225,7 +210,7 @@ class HandAdjustment:
         past = (np.maximum(angles - self._limits[:, 1], 0.0) + np.minimum(angles - self._limits[:, 0], 0.0)) / LIMIT_SD
         return past, past != 0.0
 
-    def _reduce(self, vector: Array, poses: Poses) -> _Reduced:
+    def reduced(self, vector: Array, poses: Poses) -> Reduced:
         """The normal equations of the shape."""
         at = linearise(self._unknowns, vector, poses)
         root, gap, per_pose = self._weighed(at)
@@ -238,7 +223,7 @@ class HandAdjustment:
         matrix = flat.T @ flat + self._prior_information - tied.T @ coupled.reshape(tied.shape)
         change = vector - self._unknowns.prior.mean
         right = flat.T @ gap.ravel() - self._prior_information @ change - tied.T @ alone.ravel()
-        return _Reduced(np.asarray(matrix), np.asarray(right), alone, coupled)
+        return Reduced(np.asarray(matrix), np.asarray(right), alone, coupled)
 
     def _pretended(self, vector: Array, poses: Poses) -> Array:
         """(G, G) of the information, what comes from the scatter of the poses only."""
@@ -282,6 +267,21 @@ class HandAdjustment:
         matrix[:, np.arange(TWIST, POSE), np.arange(TWIST, POSE)] += part * outside / LIMIT_SD ** 2
         matrix[:, np.arange(TWIST), np.arange(TWIST)] += 1e-3
         right[:, TWIST:] -= part * ((angles - self._natural.mean) @ information + past / LIMIT_SD)
+
+
+class _Iterate:
+    """Implements `Iterate`: a hand and its poses."""
+
+    def __init__(self, adjustment: HandAdjustment, vector: Array, poses: Poses) -> None:
+        self._adjustment, self.vector, self.poses = adjustment, vector, poses
+        self.cost = adjustment.cost(vector, poses)
+
+    def moved(self, damping: float) -> _Iterate:
+        return _Iterate(self._adjustment, *self._adjustment.after_step(self._reduced, damping, self.vector, self.poses))
+
+    @cached_property
+    def _reduced(self) -> Reduced:
+        return self._adjustment.reduced(self.vector, self.poses)
 
 
 def _possible(vector: Array) -> bool:
