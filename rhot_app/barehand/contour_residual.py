@@ -18,7 +18,7 @@ from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, follow
 from rhot_app.barehand.surface import PALM, SHAPE, Surface
 from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.hand.limits import LIMIT_SD_RAD
-from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]

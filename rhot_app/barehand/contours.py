@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.surface import FOREARM, SHAPE, Surface, meet, place_capsules
 from rhot_app.geometry.camera import distort
-from rhot_app.tracking.hand_process import ANGLES, POSE, VELOCITY
+from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -8,7 +8,7 @@ from numba import njit
 from rhot_app.barehand.surface import SHAPE, sized_table
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
-from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
 from rhot_app.tracking.state import Knowledge
 
 

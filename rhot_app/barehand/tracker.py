@@ -27,10 +27,7 @@ from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import build_model
-from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, HandPose
-from rhot_app.project import Rig
-from rhot_app.tracking.estimator_state import INFERRED_M, INFERRED_RAD, MEASURED_M, MEASURED_RAD
-from rhot_app.tracking.hand_process import (
+from rhot_app.hand.motion.hand_process import (
     ACCELERATION,
     ANGLES,
     BIAS,
@@ -41,6 +38,9 @@ from rhot_app.tracking.hand_process import (
     VELOCITY,
     HandProcess,
 )
+from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, HandPose
+from rhot_app.project import Rig
+from rhot_app.tracking.estimator_state import INFERRED_M, INFERRED_RAD, MEASURED_M, MEASURED_RAD
 from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, foreground_map, no_foreground

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from rhot_app.simulator.simulate_command import SECONDS_MAX, add_scene_arguments, scene_of
+from rhot_app.simulator.scene.scene_arguments import SECONDS_MAX, add_scene_arguments, scene_of
 from rhot_node.compiled import announce_compilation
 
 _OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs", "baseline")

@@ -46,7 +46,7 @@ LASTING_M = 0.5e-3
 disc)."""
 
 LASTING_S = 1.0
-"""s: correlation time of that error (`tracking.hand_process.BIAS_S`)."""
+"""s: correlation time of that error (`hand.motion.hand_process.BIAS_S`)."""
 
 INLIER_GATE = float(chi2.ppf(0.999, 3))
 """Squared Mahalanobis distance of an inlier: 99.9 % of Gaussian errors."""

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.finger_ik import FABRIK_ITERATIONS, TOLERANCE, solve_fingers_arrays
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel, build_model
-from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
 from rhot_app.hand.places import with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, JOINT_SLICES, JOINTS, HandPose
+from rhot_app.hand.solvers.finger_ik import FABRIK_ITERATIONS, TOLERANCE, solve_fingers_arrays
 from rhot_app.hand.solvers.methods import Method, solve
+from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
 from rhot_app.hand.solvers.problem import make_problem
 from rhot_app.project import IkMethod, Rig
 from rhot_app.tracking import locate, trust
@@ -239,7 +239,7 @@ def no_hand(tips: Array) -> SolvedHand:
 METHODS: dict[IkMethod, Method | None] = {
     "fabrik": None, "transpose": Method.TRANSPOSE, "pseudo_inverse": Method.PSEUDO_INVERSE, "svd": Method.SVD,
     "dls": Method.DAMPED, "newton": Method.NEWTON, "lm": Method.LEVENBERG, "closed_form": Method.CLOSED_FORM}
-"""By `ik` of the rig's tracker settings; None: the solver of `rhot_app.hand.finger_ik`."""
+"""By `ik` of the rig's tracker settings; None: the solver of `rhot_app.hand.solvers.finger_ik`."""
 
 
 class HandSolver:

@@ -10,10 +10,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
 from rhot_app.tracking import locate
 from rhot_app.tracking.association import GATE
-from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
 from rhot_app.tracking.locate import locate_all
 from rhot_app.tracking.marker_model import MarkerModel, project_marker, scaled_table
 from rhot_app.tracking.marker_residual import SIZE_S, SIZE_SD, MarkerFrame

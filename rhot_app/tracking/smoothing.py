@@ -16,13 +16,13 @@ from typing import TypeVar
 import numpy as np
 
 from rhot_app.estimation.filter import ChunkedSmoother, Estimate, Knot
+from rhot_app.hand.motion.hand_process import HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.observations import ObjectFrame
 from rhot_app.project import Rig
 from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
-from rhot_app.tracking.hand_process import HandProcess
 from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.rig_arrays import without_objects
 from rhot_app.tracking.rig_objects import MarkersBeside, SmoothedObjects

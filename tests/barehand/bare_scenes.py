@@ -12,10 +12,10 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.model import HandModel, build_model
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
 from rhot_app.simulator.scene.motion import load_motion
-from rhot_app.tracking.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

@@ -12,7 +12,7 @@ from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_point
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.surface import Surface
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.tracking.hand_process import FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
+from rhot_app.hand.motion.hand_process import FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
 from rhot_node.detect.edges import MOST, Edges, find_edges, noise_of
 from rhot_node.detect.foreground import learn_background, skin_foreground
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from synthetic_rig import WIDE, make_rig
 
 from rhot_app.hand.kinematics import forward_arrays
-from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY, HandProcess
+from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY, HandProcess
 from rhot_app.tracking.marker_model import compile_markers
 
 SPREAD = np.array([0.2, 0.6])

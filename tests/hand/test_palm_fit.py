@@ -7,11 +7,11 @@ import pytest
 from hand_samples import natural_angles, natural_motion, random_world, rotation_about
 from scipy.spatial.transform import Rotation
 
-from rhot_app.hand.finger_ik import solve_fingers
 from rhot_app.hand.kinematics import forward, rotation_vector
 from rhot_app.hand.model import neutral_pose
-from rhot_app.hand.palm_fit import fit_palm
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.hand.solvers.finger_ik import solve_fingers
+from rhot_app.hand.solvers.palm_fit import fit_palm
 
 
 def rotation_error_deg(found, true):

@@ -19,8 +19,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import DIP_PER_PIP
-from rhot_app.hand.finger_chain import miss, status_of
 from rhot_app.hand.limits import clamp_angle, wrap
+from rhot_app.hand.solvers.finger_chain import miss, status_of
 from rhot_app.hand.solvers.problem import assign, clamp, norm
 
 Array = NDArray[np.float64]

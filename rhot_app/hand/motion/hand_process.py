@@ -16,12 +16,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.landmarks import LASTING_S
 from rhot_app.estimation.gauss_markov import integrated, integrated_noise, matern52, matern52_noise
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import move, rotation_vector
-from rhot_app.tracking.marker_model import MarkerModel
-from rhot_app.tracking.null_space import most_probable_pose
+from rhot_app.hand.motion.null_space import most_probable_pose
 
 Array = NDArray[np.float64]
 
@@ -73,14 +71,6 @@ class HandProcess:
             self.stationary[range(first, first + 6), range(first, first + 6)] = scale * np.repeat(spread, 3) ** 2
             self.stationary[first + 6:first + POSE, first + 6:first + POSE] = scale * covariance
         self.set_bias(bias)
-
-    @classmethod
-    def of(cls, markers: MarkerModel) -> HandProcess:
-        """The process of a hand with these markers, with the rates of recorded hands; paint biases are 0 until
-        `set_bias`."""
-        covariance = np.asarray(np.linalg.inv(markers.natural.information), dtype=np.float64)
-        return cls(markers.dh, markers.limits, markers.natural.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
-                   np.zeros((len(markers.finger), 3, 3)), np.where(markers.landmark, LASTING_S, BIAS_S))
 
     def set_bias(self, bias: Array) -> None:
         """Change the covariances (M, 3, 3) m^2 of the paint biases."""

@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import MISSING, Status, chain_points, distance, fabrik_within, miss, status_of
 from rhot_app.hand.linear import solve_in_box
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
+from rhot_app.hand.solvers.finger_chain import MISSING, Status, chain_points, distance, fabrik_within, miss, status_of
 
 Array = NDArray[np.float64]
 
