@@ -14,7 +14,7 @@ from rhot_app.evaluation.score import VISIBLE_FRACTION, count_swaps, rms
 from rhot_app.evaluation.track import DISPLAY_HZ, Track
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, TIP_ROLES
 from rhot_app.project import Rig
-from rhot_app.simulator.truth.truth import Truth
+from rhot_app.simulator.film.truth import Truth
 from rhot_app.tracking.state import Knowledge
 
 # -- errors of states --------------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.progress import Progress, silent
 from rhot_app.project import TrackerSettings
-from rhot_app.simulator.nodes.node_log import CABLE, Network
+from rhot_app.simulator.film.node_log import CABLE, Network
 from rhot_app.simulator.scene.scene import Scene, make_scene
 from rhot_node.files import read_json
 

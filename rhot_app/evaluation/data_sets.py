@@ -21,12 +21,12 @@ import numpy as np
 
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.simulator.nodes.film import TRUTH_NAME, Progress, Report, for_each_camera, new_folder
-from rhot_app.simulator.nodes.node_log import CABLE, Network, NodeSender, write_node_log
-from rhot_app.simulator.nodes.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
+from rhot_app.simulator.film.film import TRUTH_NAME, Progress, Report, for_each_camera, new_folder
+from rhot_app.simulator.film.ideal_observations import ORDINARY, sights
+from rhot_app.simulator.film.node_log import CABLE, Network, NodeSender, write_node_log
+from rhot_app.simulator.film.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
+from rhot_app.simulator.film.truth import FrameTruth, Truth, load_truth, save_truth, true_object
 from rhot_app.simulator.scene.scene import Scene, node_settings
-from rhot_app.simulator.truth.ideal_observations import ORDINARY, sights
-from rhot_app.simulator.truth.truth import FrameTruth, Truth, load_truth, save_truth, true_object
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
 from rhot_node.files import resource_path
@@ -48,7 +48,7 @@ what was found in them."""
 @dataclass(frozen=True, eq=False)
 class Order:
     """What a take shall show: a motion (name or file) in a scene, for how long, and over which network it is sent.
-    `sketched`: without pictures (`rhot_app.simulator.truth.ideal_observations`), a hundred times faster. `missing`: ids
+    `sketched`: without pictures (`rhot_app.simulator.film.ideal_observations`), a hundred times faster. `missing`: ids
     of markers that the hand does not wear."""
 
     scene: Scene
@@ -79,7 +79,7 @@ class Order:
 @dataclass(frozen=True, eq=False)
 class DataSet:
     """A raw log, the rig that a perfect calibration would have found, and the truth. Scene time 0 is
-    `rhot_app.simulator.nodes.node_log.T0_MASTER_NS`. `outdated`: another detector or twin would film it today."""
+    `rhot_app.simulator.film.node_log.T0_MASTER_NS`. `outdated`: another detector or twin would film it today."""
 
     folder: Path
     rig: Rig

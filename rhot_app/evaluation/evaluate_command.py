@@ -157,7 +157,7 @@ def _compare(args: argparse.Namespace) -> int:
     from rhot_app.evaluation.data_sets import data_sets_folder
     from rhot_app.evaluation.run import SETTLE_S
     from rhot_app.progress import ProgressLine
-    from rhot_app.simulator.nodes.node_log import Network
+    from rhot_app.simulator.film.node_log import Network
 
     unseen = [name for name in _OF_PICTURES if getattr(args, name) is not None]
     if args.sketched and unseen:

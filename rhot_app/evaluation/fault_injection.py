@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import ClockReply, ClockRequest, MarkerFlag, MarkerObservation, Observations
 

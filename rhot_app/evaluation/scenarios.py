@@ -27,7 +27,7 @@ from rhot_app.evaluation.track import Timed, Track, tracked
 from rhot_app.hand.skeleton import WRIST_ROLE
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.truth.truth import Truth
+from rhot_app.simulator.film.truth import Truth
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.trackers import make_tracker

@@ -16,7 +16,7 @@ from rhot_app.engine.replay_summary import replay_states
 from rhot_app.errors import SimulatorError
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.state import HandState

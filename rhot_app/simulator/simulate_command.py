@@ -17,8 +17,8 @@ from rhot_app.simulator.scene.scene_arguments import (
 )
 
 if TYPE_CHECKING:
-    from rhot_app.simulator.nodes.film import Progress
-    from rhot_app.simulator.nodes.shot import Shot
+    from rhot_app.simulator.film.film import Progress
+    from rhot_app.simulator.film.shot import Shot
 
 MOST_PICTURES = 999
 POINT_SIGMA_PX = 0.12
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Render; Ctrl-C leaves nothing half-written."""
     from rhot_app.progress import ProgressLine
-    from rhot_app.simulator.nodes.shot import make_shot
+    from rhot_app.simulator.film.shot import make_shot
 
     _check(args)
     if args.depth_table is not None:
@@ -88,7 +88,7 @@ def _check(args: argparse.Namespace) -> None:
 
 def _write_depth_table(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
-    from rhot_app.simulator.truth.points import TABLE_NAME, PointNoise, write_distances
+    from rhot_app.simulator.film.points import TABLE_NAME, PointNoise, write_distances
 
     try:
         distances = [0.01 * float(text) for text in args.depth_table.split(",")]
@@ -106,14 +106,14 @@ def _write(shot: Shot, args: argparse.Namespace, progress: Progress) -> None:
     """Pictures, points or recordings, whatever was asked for."""
     folder = args.out.absolute()
     if args.pictures is not None:
-        from rhot_app.simulator.pictures import take_pictures
+        from rhot_app.simulator.film.pictures import take_pictures
 
         take_pictures(shot, folder, args.pictures, progress)
     elif args.points is not None:
-        from rhot_app.simulator.truth.points import PointNoise, write_points
+        from rhot_app.simulator.film.points import PointNoise, write_points
 
         write_points(shot, folder, PointNoise(args.points), progress)
     else:
-        from rhot_app.simulator.nodes.film import film
+        from rhot_app.simulator.film.film import film
 
         film(shot, folder, progress)

@@ -11,13 +11,13 @@ from rhot_app.project import Rig
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.actions import CLOUD_KINDS, Actions
-from rhot_app.ui.controller import Controller
+from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.common.theme import apply_theme, scheme_named
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.advice_bar import AdviceBar
 from rhot_app.ui.scene.ellipsoid_mesh import LARGER, EllipsoidChoice
 from rhot_app.ui.screen import Screen
-from rhot_app.ui.settings import Settings
-from rhot_app.ui.theme import apply_theme, scheme_named
 
 # -- The hand as the scene shows it: where it is when it is seen, not where it was in the newest pictures --------------
 

@@ -9,8 +9,8 @@ from PySide6.QtCore import QObject
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
 
-from rhot_app.ui.controller import Controller
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.job import Job
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.words import shipped_motions
 

@@ -11,7 +11,7 @@ from rhot_app.estimation.filter import ChunkedSmoother, Estimate, IteratedFilter
 from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.data_sets import Order, data_set
 from rhot_app.project import with_tracker
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import SmoothedTracker

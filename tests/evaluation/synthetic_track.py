@@ -8,7 +8,7 @@ import numpy as np
 
 from rhot_app.evaluation.accuracy import WornMarkers
 from rhot_app.evaluation.track import Track
-from rhot_app.simulator.truth.truth import FrameTruth, Truth
+from rhot_app.simulator.film.truth import FrameTruth, Truth
 from rhot_app.tracking.state import Knowledge
 
 WORN = WornMarkers(np.arange(5), np.arange(5), np.arange(21))

@@ -12,7 +12,7 @@ from rhot_app.evaluation.accuracy import accuracy, deviations, display_error, po
 from rhot_app.evaluation.compare import COLUMNS, Comparison, Judged, Run, consistency_table, table
 from rhot_app.evaluation.track import Predicted, Track
 from rhot_app.project import load_rig
-from rhot_app.simulator.truth.truth import Truth
+from rhot_app.simulator.film.truth import Truth
 from rhot_app.tracking.state import Knowledge
 from rhot_node.files import resource_path
 

@@ -43,9 +43,15 @@ def test_a_planted_circle_is_found() -> None:
 
 
 def rooms() -> dict[str, set[str]]:
-    """By room: the rooms that its files import anywhere. Commands, which only `__main__` imports, are one room."""
+    """By room: the rooms that its files import anywhere. Commands, which only `__main__` imports, are one room; the
+    folders of simulator and window are rooms of their own."""
     def room_of(module: str) -> str:
-        return "commands" if module.endswith("_command") or ".commands." in module else room(module)
+        if module.endswith("_command") or ".commands." in module:
+            return "commands"
+        found = room(module)
+        if found not in ("rhot_app.simulator", "rhot_app.ui"):
+            return found
+        return module if paths[module].name == "__init__.py" else module.rpartition(".")[0]
     paths = {module_name(path, ROOT): path for path in (ROOT / "rhot_app").rglob("*.py")}
     found: dict[str, set[str]] = {}
     for module, path in paths.items():

@@ -14,11 +14,11 @@ from test_worn_markers import Shown
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.film.ideal_observations import ObservationNoise, sights
+from rhot_app.simulator.film.shot import make_shot
+from rhot_app.simulator.film.truth import true_object
 from rhot_app.simulator.render.body import Look, build_body
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
-from rhot_app.simulator.truth.ideal_observations import ObservationNoise, sights
-from rhot_app.simulator.truth.truth import true_object
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerFlag

@@ -9,11 +9,11 @@ import pytest
 
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import point_rays
-from rhot_app.simulator.nodes.shot import Shot, make_renderer, make_shot
+from rhot_app.simulator.film.ideal_observations import ObservationNoise, sights, spots
+from rhot_app.simulator.film.shot import Shot, make_renderer, make_shot
+from rhot_app.simulator.film.truth import true_object
 from rhot_app.simulator.scene.scene import Scene, make_scene, node_settings, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow
-from rhot_app.simulator.truth.ideal_observations import ObservationNoise, sights, spots
-from rhot_app.simulator.truth.truth import true_object
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
 from rhot_node.wire.messages import MarkerFlag

@@ -18,8 +18,8 @@ from rhot_app.project import load_rig
 from rhot_app.sources.discovery import Search, Sighting, conflicts, together
 from rhot_app.sources.pairing import Introduction, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig
+from rhot_app.ui.common.job import CancelledError
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog, PairDialog
-from rhot_app.ui.job import CancelledError
 from rhot_app.ui.models.palette import DARK
 from rhot_node.config import NodeSettings
 from rhot_node.files import resource_path

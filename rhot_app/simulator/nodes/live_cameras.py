@@ -15,11 +15,11 @@ import msgspec
 from numpy.typing import NDArray
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.nodes.shot import renderer_of
+from rhot_app.simulator.film.shot import renderer_of
+from rhot_app.simulator.nodes.live_scene import LiveScene, Setting
+from rhot_app.simulator.render.camera_controls import controls_of
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.render import FrameRenderer
-from rhot_app.simulator.scene.camera_controls import controls_of
-from rhot_app.simulator.scene.live_scene import LiveScene, Setting
 from rhot_app.simulator.scene.scene import Scene
 from rhot_node.capture.camera import available_delay_ns, sleep_until
 from rhot_node.capture.stream import StreamHeader, pack_header, take_settings

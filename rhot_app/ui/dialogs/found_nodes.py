@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.progress import Progress
 from rhot_app.sources.discovery import FoundNode, Search
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
 from rhot_node.wire.messages import TrustState
 
 Find = Callable[[Progress], Search]

@@ -14,8 +14,8 @@ from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import OutputError
 from rhot_app.outputs.spec import OPENXR_ONLY, WEB_PORT, OutputStatus, as_run, host_and_port, parse_output, web_settings
 from rhot_app.project import OutputSettings, Rig, parse_rig
+from rhot_app.ui.models.proposal import Command, set_rig
 from rhot_app.ui.models.words import Look
-from rhot_app.ui.wizards.models.proposal import Command, set_rig
 
 WINDOW_NS: Final = 3_000_000_000
 """A rate is counted over the last 3 s: statuses come in steps of 0.2 s."""

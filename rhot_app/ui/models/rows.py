@@ -15,8 +15,8 @@ from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode
 from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.ui.models.meters import unused_frames
+from rhot_app.ui.models.proposal import Row
 from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look, settings_text
-from rhot_app.ui.wizards.models.proposal import Row
 
 # -- standard deviation along the worst axis ---------------------------------------------------------------------------
 

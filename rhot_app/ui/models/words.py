@@ -2,7 +2,7 @@
 
 Every state has a word, a shape and a tone. Colour is never alone: every state also has its own shape.
 
-Shapes are names that `rhot_app.ui.shapes` draws; tones are names of `palette.Scheme` colours.
+Shapes are names that `rhot_app.ui.common.shapes` draws; tones are names of `palette.Scheme` colours.
 """
 
 from __future__ import annotations

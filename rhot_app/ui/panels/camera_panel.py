@@ -13,11 +13,11 @@ from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
 from rhot_app.ui.backend.live import Live
+from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.panels.empty_state import EmptyState
-from rhot_app.ui.shapes import paint_tag
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]

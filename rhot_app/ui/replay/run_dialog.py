@@ -21,11 +21,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from rhot_app.ui.job import CancelledError, Job, Progress
+from rhot_app.ui.backend.solver import Solver, StoppedError
+from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.replay.run import Run, Tracked, new_run_path, track_log
 from rhot_app.ui.replay.session import Choice, Comparison
-from rhot_app.ui.wizards.framework.solver import Solver, StoppedError
 
 _TRACKERS = (("as the rig says", ""), ("classic", "classic"), ("estimator", "estimator"))
 _WIDTH_PX = 480

@@ -7,10 +7,10 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
+from rhot_app.ui.dialogs.recordings import BookmarkDialog
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
-from rhot_app.ui.recordings import BookmarkDialog
 from rhot_app.ui.replay.session import Replay
 
 _NAME_PX = 240

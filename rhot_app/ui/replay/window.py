@@ -19,19 +19,19 @@ from PySide6.QtWidgets import (
 
 from rhot_app.engine.observer import condition_of
 from rhot_app.recording.bookmarks import Bookmark
-from rhot_app.ui.guide import GuideViewer
+from rhot_app.ui.common.guide import GuideViewer
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.models.notice import Level, Notice, TransientNotices
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Look, condition_look
 from rhot_app.ui.panels.advice_bar import AdviceBar
-from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.replay.run import Run
 from rhot_app.ui.replay.run_dialog import RunDialog, TrackingWork
 from rhot_app.ui.replay.screen import ReplayScreen
 from rhot_app.ui.replay.session import Choice, Comparison, Replay
 from rhot_app.ui.replay.toolbar import BookmarkWriter, ReplayToolBar
 from rhot_app.ui.replay.work_strip import WorkStrip
-from rhot_app.ui.settings import Settings
 
 TICK_MS = 16
 _SIZE = (1280, 800)

@@ -12,13 +12,13 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScro
 
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.contract import Asker
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
+from rhot_app.ui.models.proposal import NodeChange
 from rhot_app.ui.wizards.framework.control_row import ControlRow
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.camera_steps import CONTROLS, CameraChoices, Control, SettingsStep, Value
-from rhot_app.ui.wizards.models.proposal import AcceptStep, NodeChange
-from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, Control, SettingsStep, Value
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -17,11 +17,11 @@ from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark, read_bookmarks
+from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.replay.timeline import FLAG_PX
 from rhot_app.ui.replay.window import ReplayWindow
-from rhot_app.ui.settings import Settings
 from rhot_node.files import resource_path
 
 

@@ -12,13 +12,13 @@ from PySide6.QtWidgets import QMessageBox
 from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.camera import make_plan
-from rhot_app.ui.wizards.framework.feed import Picture
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models.camera_steps import CONTROLS, CameraChoices, CameraEye
 from rhot_app.ui.wizards.models.drawing import Layer
+from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, CameraEye
 from rhot_node.config import CameraSettings
 
 EXPOSURE, RED = CONTROLS[0], CONTROLS[5]

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QGridLayout, QSlider, QWidget
 
-from rhot_app.ui.wizards.models.camera_steps import Control, Value
+from rhot_app.ui.wizards.steps.camera_steps import Control, Value
 
 _STEPS = 400
 

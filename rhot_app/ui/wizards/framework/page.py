@@ -20,13 +20,13 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.calibration.verdict import Finding, Verdict
+from rhot_app.ui.common.shapes import ShapeMark
+from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme, visible_on
+from rhot_app.ui.models.proposal import Row
 from rhot_app.ui.models.words import GRADES
-from rhot_app.ui.shapes import ShapeMark
-from rhot_app.ui.theme import app_font
 from rhot_app.ui.wizards.framework.colour_list import swatch
-from rhot_app.ui.wizards.models.proposal import AcceptStep, Row
-from rhot_app.ui.wizards.models.step import Chart, ChartedStep, Curve, Step, StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, Chart, ChartedStep, Curve, Step, StepView
 
 
 class Page(QWidget):

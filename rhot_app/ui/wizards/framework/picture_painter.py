@@ -8,9 +8,9 @@ import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF
 
+from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import Box, place_at_sides
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.shapes import paint_tag
 from rhot_app.ui.wizards.models.drawing import Array, Callout, Cells, Dots, Layer, Line, Mark, Overlay, Tag
 
 _CELL_ALPHA = 60

@@ -9,9 +9,9 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from rhot_app.ui.backend.feed import LiveFeed, Picture
+from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.shapes import paint_tag
-from rhot_app.ui.wizards.framework.feed import LiveFeed, Picture
 from rhot_app.ui.wizards.framework.picture_painter import Place, fit, paint_overlay
 from rhot_app.ui.wizards.models.drawing import Callout, Overlay
 from rhot_app.ui.wizards.models.step import StepView

@@ -16,7 +16,7 @@ from rhot_app.ui.wizards.framework.page import Page
 # -- What wizards remember between runs, by name: the board, the camera chosen last ------------------------------------
 
 class Memory(Protocol):
-    """`rhot_app.ui.settings.Settings` is one."""
+    """`rhot_app.ui.common.settings.Settings` is one."""
 
     def remembered(self, name: str) -> str:
         """What was remembered by this name, "" for nothing."""

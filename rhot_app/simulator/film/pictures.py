@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.simulator.bare_hand.painter import BareHand
-from rhot_app.simulator.nodes.film import TRUTH_NAME, Progress, new_folder
-from rhot_app.simulator.nodes.shot import Shot, make_renderer, save_shot
+from rhot_app.simulator.film.film import TRUTH_NAME, Progress, new_folder
+from rhot_app.simulator.film.shot import Shot, make_renderer, save_shot
+from rhot_app.simulator.film.truth import FrameTruth, save_truth, true_object
 from rhot_app.simulator.render.painter import Solids
 from rhot_app.simulator.render.sheet import Sheet, ruler_ends
 from rhot_app.simulator.scene.rigid_target import BoardPoses
 from rhot_app.simulator.scene.scene_description import RulerShow
-from rhot_app.simulator.truth.truth import FrameTruth, save_truth, true_object
 from rhot_node.detect.image import from_i420, to_bgr
 from rhot_node.files import write_document
 

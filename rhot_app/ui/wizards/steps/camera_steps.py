@@ -15,9 +15,9 @@ from rhot_app.calibration.check.exposure import BRIGHT, DARK
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.project import RigNode
-from rhot_app.ui.wizards.framework.feed import Picture
+from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.models.proposal import NodeChange, Proposal, Row
 from rhot_app.ui.wizards.models.drawing import Layer, Line, Overlay
-from rhot_app.ui.wizards.models.proposal import NodeChange, Proposal, Row
 from rhot_app.ui.wizards.models.step import Pictures, Step, StepView
 from rhot_node.config import CameraSettings
 from rhot_node.detect.colour import Box

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QImage, QKeySequence, QShortcut, QTextDocument
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QTextBrowser, QVBoxLayout, QWidget
 
-GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide"
+GUIDE = Path(__file__).resolve().parents[3] / "docs" / "guide"
 
 PAGES: tuple[tuple[str, str], ...] = (
     ("start", "Getting started"), ("window", "The window"), ("nodes", "Nodes"), ("markers", "Markers"),

@@ -15,11 +15,11 @@ from rhot_app.calibration.colour.surroundings import HUE_STEP_DEG
 from rhot_app.calibration.verdict import Finding, judged_anew
 from rhot_app.project import Rig
 from rhot_app.ui.models.palette import hex_of
+from rhot_app.ui.models.proposal import Change, NodeChange, Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.wizards.models.camera_steps import Control
-from rhot_app.ui.wizards.models.colour_pick import MaskedPictures, MaskMaker, PickStep, Show, drift_of, mask_overlay
-from rhot_app.ui.wizards.models.proposal import Change, NodeChange, Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Chart, ChartedStep, Curve, Pictures, Step, StepView, Task
+from rhot_app.ui.wizards.steps.camera_steps import Control
+from rhot_app.ui.wizards.steps.colour_pick import MaskedPictures, MaskMaker, PickStep, Show, drift_of, mask_overlay
 from rhot_node.markers import ChromaModel, MarkerSet
 
 # -- The step in which the learnt bounds of every colour can be moved while the mask shows what passes -----------------

@@ -17,7 +17,7 @@ from rhot_app.calibration.colour.illuminant import DriftReport, IlluminantDrift,
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
-from rhot_app.ui.wizards.framework.feed import Picture
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.models.drawing import Callout, Dots, Layer, Overlay
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
 from rhot_node.detect.colour import learn_chroma_from_colours

@@ -23,14 +23,13 @@ from rhot_app.errors import SimulatorError
 from rhot_app.project import Rig, load_rig, save_rig
 from rhot_app.recording.raw_log import Record
 from rhot_app.simulator.bare_hand.painter import BareHand
-from rhot_app.simulator.nodes.film import TRUTH_NAME, Progress, new_folder
-from rhot_app.simulator.nodes.node_log import CABLE, NodeSender, write_node_log
-from rhot_app.simulator.nodes.nodes import NodePorts
-from rhot_app.simulator.nodes.shot import RIG_NAME, Shot, make_shot, save_shot
+from rhot_app.simulator.film.film import TRUTH_NAME, Progress, new_folder
+from rhot_app.simulator.film.node_log import CABLE, NodeSender, write_node_log
+from rhot_app.simulator.film.shot import RIG_NAME, Shot, make_shot, save_shot
+from rhot_app.simulator.film.truth import FrameTruth, save_truth, true_object
 from rhot_app.simulator.render.sheet import Sheet
-from rhot_app.simulator.scene.scene import Scene, build_rig
+from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig
 from rhot_app.simulator.scene.scene_description import FARTHEST_M, NEAREST_M, MarkerShow
-from rhot_app.simulator.truth.truth import FrameTruth, save_truth, true_object
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
 # -- rolling shutter ---------------------------------------------------------------------------------------------------

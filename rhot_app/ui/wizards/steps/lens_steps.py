@@ -16,11 +16,11 @@ from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
 from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
 from rhot_app.project import Intrinsics, Rig
+from rhot_app.ui.backend.feed import Image, Picture
+from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import lens_figures
-from rhot_app.ui.wizards.framework.feed import Image, Picture
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Mark, Overlay, Tag, board_marks
-from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
 
 FEWEST = 5  # views that a solve can do anything with

@@ -21,11 +21,11 @@ from scipy.interpolate import CubicSpline
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import project_normalised
 from rhot_app.hand.skeleton import WRIST_ROLE
-from rhot_app.simulator.nodes.shot import Shot, camera_seed
+from rhot_app.simulator.film.points import at_own_rows
+from rhot_app.simulator.film.shot import Shot, camera_seed
+from rhot_app.simulator.film.truth import FrameTruth
 from rhot_app.simulator.render.body import ACROSS, BOUNDS, CAPSULE, HALF, ON_ONE_SIDE, PALM_GROUP, SIDE, HandBody
 from rhot_app.simulator.render.raycast import PREPARED, hit, prepare
-from rhot_app.simulator.truth.points import at_own_rows
-from rhot_app.simulator.truth.truth import FrameTruth
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
 Array = NDArray[np.float64]

@@ -21,10 +21,10 @@ from rhot_app.calibration.verdict import judge
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress
 from rhot_app.project import Rig, RigNode
+from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import place_figures
 from rhot_app.ui.wizards.models.board_form import BoardStep
 from rhot_app.ui.wizards.models.drawing import Dots, Overlay, board_marks
-from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
 
 # -- The stereo solve as the solving process runs it: lenses that nobody has calibrated come from the same -------------

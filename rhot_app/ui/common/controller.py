@@ -16,7 +16,7 @@ from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Backend, Opened, TwinChoice, TwinPace
 from rhot_app.ui.backend.live import SILENCE_S, Client, Live
-from rhot_app.ui.job import Job, Progress
+from rhot_app.ui.common.job import Job, Progress
 
 # -- The window's line to the engine: one client, and commands that wait in workers so that the window does not --------
 

@@ -14,8 +14,8 @@ from rhot_app.calibration.depth.table import DepthRow, DepthTable
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.tracking.state import HandState
+from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.drawing import Callout, Dots, Overlay
-from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Bar, Chart, ChartedStep, Curve, Step, StepView
 
 REASON = "depth calibration"

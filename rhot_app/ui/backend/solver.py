@@ -17,9 +17,9 @@ from typing import Any
 
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress
-from rhot_app.ui.wizards.framework.solver_process import NICENESS
+from rhot_app.ui.backend.solver_process import NICENESS
 
-_COMMAND = (sys.executable, "-m", "rhot_app.ui.wizards.framework.solver_process")
+_COMMAND = (sys.executable, "-m", "rhot_app.ui.backend.solver_process")
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """More threads of a numerical library would take the cores that the engine and the nodes need."""
 

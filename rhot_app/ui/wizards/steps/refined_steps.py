@@ -15,8 +15,8 @@ from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, parse_rig
 from rhot_app.tracking.refined_rig import REASON
 from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Step, StepView
 
 ASK_S = 1.0

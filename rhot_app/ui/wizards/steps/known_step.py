@@ -6,7 +6,7 @@ import numpy as np
 
 from rhot_app.calibration.stereo.calibrate import KnownLengths
 from rhot_app.calibration.stereo.ruler import RulerReading
-from rhot_app.ui.wizards.framework.feed import Picture
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.models.drawing import Dots, Line, Overlay
 from rhot_app.ui.wizards.models.step import Pictures, Step, StepView
 

@@ -24,9 +24,9 @@ from rhot_app.certificate.recordings import (
 )
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
+from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.movement import MovementStep, Request
-from rhot_app.ui.wizards.models.proposal import AcceptStep, Command, Proposal, Row
-from rhot_app.ui.wizards.models.step import Chart, Curve, StepView, Task
+from rhot_app.ui.wizards.models.step import AcceptStep, Chart, Curve, StepView, Task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

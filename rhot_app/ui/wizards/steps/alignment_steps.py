@@ -29,8 +29,8 @@ from rhot_app.objects.drift import Drift, DriftMonitor
 from rhot_app.objects.motion_stream import SAMPLES, MotionStream
 from rhot_app.progress import Progress
 from rhot_app.tracking.state import HandState
-from rhot_app.ui.wizards.framework.pose_feed import PoseFeed
-from rhot_app.ui.wizards.models.proposal import Command, Proposal, Row
+from rhot_app.ui.backend.pose_feed import PoseFeed
+from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.step import Bar, Chart, Curve, Step, StepView, Task
 
 Array = NDArray[np.float64]

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import SimulatorError
 from rhot_app.simulator.bare_hand.painter import BareHand
+from rhot_app.simulator.film.scene_objects import SceneObject
 from rhot_app.simulator.render.body import HandBody
 from rhot_app.simulator.scene.rigid_target import RigidTarget
-from rhot_app.simulator.scene.scene_objects import SceneObject
 from rhot_node.files import open_input
 
 Array = NDArray[np.float64]

@@ -20,8 +20,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.nodes.shot import Shot, make_renderer, save_shot
-from rhot_app.simulator.truth.truth import FrameTruth, save_truth, true_object
+from rhot_app.simulator.film.shot import Shot, make_renderer, save_shot
+from rhot_app.simulator.film.truth import FrameTruth, save_truth, true_object
 from rhot_node.capture.yuv import YuvWriter
 
 # -- one process per camera --------------------------------------------------------------------------------------------

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rhot_app.geometry.transforms import quaternion_from_rotation, rigid
+from rhot_app.simulator.film.scene_objects import SceneObject
 from rhot_app.simulator.render.body import HandBody
-from rhot_app.simulator.scene.scene_objects import SceneObject
 
 Array = NDArray[np.float64]
 

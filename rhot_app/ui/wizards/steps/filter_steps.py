@@ -14,8 +14,8 @@ from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.palette import hex_of
+from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.wizards.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.step import Bar, Chart, Curve, SolveStep, Task
 
 if TYPE_CHECKING:

@@ -11,16 +11,16 @@ import msgspec
 import numpy as np
 
 from rhot_app.errors import SimulatorError
+from rhot_app.simulator.film.foreign_tracker import RATE_HZ, ForeignTracker
+from rhot_app.simulator.film.scene_objects import SceneObject, make_object
+from rhot_app.simulator.film.shot import camera_seed
 from rhot_app.simulator.nodes.remote import CoverRequest, LampRequest, Request, ShowRequest, TrackerRequest
-from rhot_app.simulator.nodes.shot import camera_seed
+from rhot_app.simulator.render.camera_controls import Lamp
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter
 from rhot_app.simulator.render.painter import Painter
 from rhot_app.simulator.scene.background import background_image
-from rhot_app.simulator.scene.camera_controls import Lamp
-from rhot_app.simulator.scene.foreign_tracker import RATE_HZ, ForeignTracker
 from rhot_app.simulator.scene.scene import Scene
 from rhot_app.simulator.scene.scene_description import RulerShow, Show
-from rhot_app.simulator.scene.scene_objects import SceneObject, make_object
 
 TAKE_UP_S = 5.0
 """A change is taken up with the next frame; a twin that needs longer is stuck."""
