@@ -45,7 +45,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.calibration.commands": BELOW_ENGINE,  # they read logs
     "rhot_app.calibration.recorded_observations": BELOW_ENGINE,  # reads them for all
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),
-    "rhot_app.objects.alignment_command": BELOW_ENGINE,
+    "rhot_app.objects.alignment.alignment_command": BELOW_ENGINE,
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.tracking.state",
                           "rhot_app.tracking.estimator_state"),  # a tracker of its own
     "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS),

@@ -11,7 +11,8 @@ import pytest
 from rhot_app import project
 from rhot_app.calibration.lens import intrinsics
 from rhot_app.hand import anatomy, articulated
-from rhot_app.objects import alignment_file, object_file
+from rhot_app.objects import object_file
+from rhot_app.objects.alignment import alignment_file
 from rhot_app.objects.state import ObjectState
 from rhot_app.tracking.state import HandState
 from rhot_node import config, markers

@@ -19,10 +19,6 @@ MOST_FILES = 15
 CROWDED: dict[str, str] = {
     "rhot_app/tracking": "to be divided",
     "rhot_app/engine": "to be divided",
-    "rhot_node/detect": "to be divided",
-    "rhot_node": "to be divided",
-    "rhot_app/export": "to be divided",
-    "rhot_app/objects": "to be divided",
 }
 """Folders that may hold more, and why."""
 UNOWNED = re.compile(r"\b(?:TO" r"DO|FIX" r"ME|XX" r"X)\b(?!\((\w+)\):)")

@@ -14,9 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import CalibrationError
-from rhot_app.objects.alignment import LASTING_M, SEARCH_S, OffsetSearch, align
-from rhot_app.objects.alignment_file import Alignment, alignment_path, load_alignment, save_alignment, to_alignment
-from rhot_app.objects.alignment_report import (
+from rhot_app.objects.alignment.alignment_file import (
+    Alignment,
+    alignment_path,
+    load_alignment,
+    save_alignment,
+    to_alignment,
+)
+from rhot_app.objects.alignment.drift import Drift, DriftMonitor
+from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S, OffsetSearch, align
+from rhot_app.objects.alignment.motion_stream import SAMPLES, MotionStream
+from rhot_app.objects.alignment.report import (
     FAIR_M,
     FAST_M_S,
     REACH_M,
@@ -25,8 +33,6 @@ from rhot_app.objects.alignment_report import (
     coverage_of_motion,
     judge_alignment,
 )
-from rhot_app.objects.drift import Drift, DriftMonitor
-from rhot_app.objects.motion_stream import SAMPLES, MotionStream
 from rhot_app.progress import Progress
 from rhot_app.tracking.state import HandState
 from rhot_app.ui.backend.pose_feed import PoseFeed
@@ -41,7 +47,7 @@ REASON = "alignment with another tracker"
 ENOUGH_RAD = LASTING_M / FAIR_M
 ENOUGH_M = LASTING_M * REACH_M / FAIR_M
 ENOUGH_M_S = LASTING_M * FAST_M_S / FAIR_M
-"""rad, m and m/s: of the verdict's "good" (`objects.alignment_report`)."""
+"""rad, m and m/s: of the verdict's "good" (`objects.alignment.report`)."""
 
 LEAST_HZ = 20.0
 """Hz: hands move at up to 5 Hz, and a cubic needs four samples a period."""

@@ -14,7 +14,7 @@ def run_command(name: str, arguments: Sequence[str]) -> int:
 
 
 def _detect(name: str, arguments: list[str]) -> int:
-    from rhot_node import detect_command
+    from rhot_node.commands import detect_command
     parser = _parser(name, "Find the markers in an image, a folder of images or a video, frame by frame.")
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     detect_command.add_arguments(parser)
@@ -22,7 +22,7 @@ def _detect(name: str, arguments: list[str]) -> int:
 
 
 def _trust(name: str, arguments: list[str]) -> int:
-    from rhot_node import trust_command
+    from rhot_node.commands import trust_command
     parser = _parser(name, trust_command.SUMMARIES[name])
     trust_command.add_arguments(parser)
     return trust_command.run(name, parser.parse_args(arguments))
@@ -36,7 +36,7 @@ def _service(name: str, arguments: list[str]) -> int:
 
 
 def _doctor(name: str, arguments: list[str]) -> int:
-    from rhot_node import doctor_command
+    from rhot_node.commands import doctor_command
     parser = _parser(name, doctor_command.SUMMARY)
     doctor_command.add_arguments(parser)
     return doctor_command.run(parser.parse_args(arguments))

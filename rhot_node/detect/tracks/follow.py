@@ -4,7 +4,7 @@ A marker's window is predicted at constant velocity. The projection of its chrom
 as the camera shows it (so that no light has to be mended), gives a soft centroid; about that the outline of the last
 frame is fitted anew (`contour`). Whatever is not as plain as it was - area, level, outline, misfit, the frame's border,
 a rival in the window - sends the marker back to the careful measurement (`measure`), which also brings it here
-(`rhot_node.detect.followed`).
+(`rhot_node.detect.tracks.followed`).
 
 All coordinates are chroma pixels.
 """
@@ -16,10 +16,10 @@ import math
 import numpy as np
 from numba import njit
 
-from rhot_node.detect import contour_pixels as c
-from rhot_node.detect import track as t
-from rhot_node.detect.contour import fit
-from rhot_node.detect.contour_pixels import project
+from rhot_node.detect.tracks import contour_pixels as c
+from rhot_node.detect.tracks import track as t
+from rhot_node.detect.tracks.contour import fit
+from rhot_node.detect.tracks.contour_pixels import project
 
 # -- axis of a band ----------------------------------------------------------------------------------------------------
 # All coordinates are chroma pixels.

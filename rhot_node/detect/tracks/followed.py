@@ -12,11 +12,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect import contour_pixels as c
-from rhot_node.detect import position as p
-from rhot_node.detect.contour import fit
-from rhot_node.detect.contour_pixels import project
-from rhot_node.detect.follow import (
+from rhot_node.detect.image import YuvImage
+from rhot_node.detect.region import position as p
+from rhot_node.detect.region.position import BLUR_VARIANCE
+from rhot_node.detect.tracks import contour_pixels as c
+from rhot_node.detect.tracks.contour import fit
+from rhot_node.detect.tracks.contour_pixels import project
+from rhot_node.detect.tracks.follow import (
     AREA_LEAST,
     DONE,
     ELONGATED,
@@ -37,9 +39,7 @@ from rhot_node.detect.follow import (
     follow,
     noise_level,
 )
-from rhot_node.detect.image import YuvImage
-from rhot_node.detect.position import BLUR_VARIANCE
-from rhot_node.detect.track import FITTED, LIMB_OF_SHAPE, OFF_AXIS_SD
+from rhot_node.detect.tracks.track import FITTED, LIMB_OF_SHAPE, OFF_AXIS_SD
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import MarkerObservation
 

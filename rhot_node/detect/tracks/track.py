@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect import measure as m
-from rhot_node.detect import position as p
+from rhot_node.detect.region import measure as m
+from rhot_node.detect.region import position as p
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import FLAGS, MarkerFlag, MarkerObservation
 

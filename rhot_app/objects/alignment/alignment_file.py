@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import quaternion_from_rotation, rigid, rotation_from_quaternion
-from rhot_app.objects.alignment_report import AlignmentReport
+from rhot_app.objects.alignment.report import AlignmentReport
 from rhot_app.project import Metres
 from rhot_node.files import read_document, write_document
 
@@ -52,7 +52,7 @@ class Alignment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where another tracker's world is in the rig.
 
     `time_offset_s` is added to the other tracker's times. `covariance`: 10 or 13 rows in the order of
-    `rhot_app.objects.alignment_model.TRANSLATION`. `noise_m`: standard deviation of an axis' residual.
+    `rhot_app.objects.alignment.model.TRANSLATION`. `noise_m`: standard deviation of an axis' residual.
     """
 
     rig_from_foreign: RigidTransform

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
 
 if TYPE_CHECKING:
-    from rhot_app.objects.alignment_report import AlignmentReport
-    from rhot_app.objects.motion_stream import MotionStream
+    from rhot_app.objects.alignment.motion_stream import MotionStream
+    from rhot_app.objects.alignment.report import AlignmentReport
 
 
 POSE_COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
@@ -37,9 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Solve and report; a file is written only with ``--out``."""
     from rhot_app.errors import CalibrationError
-    from rhot_app.objects.alignment_file import save_alignment, to_alignment
-    from rhot_app.objects.alignment_report import calibrate_alignment
-    from rhot_app.objects.motion_stream import read_stream
+    from rhot_app.objects.alignment.alignment_file import save_alignment, to_alignment
+    from rhot_app.objects.alignment.motion_stream import read_stream
+    from rhot_app.objects.alignment.report import calibrate_alignment
     from rhot_app.progress import ProgressLine
 
     require_folder(args.out)
@@ -63,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
 def _check(path: Path, foreign: MotionStream, rig: MotionStream, *, as_json: bool) -> int:
     """Print whether the alignment is stale; 2 when it is. Raises CalibrationError without a file or overlap."""
     from rhot_app.errors import CalibrationError
-    from rhot_app.objects.alignment_file import load_alignment
-    from rhot_app.objects.drift import DriftMonitor
+    from rhot_app.objects.alignment.alignment_file import load_alignment
+    from rhot_app.objects.alignment.drift import DriftMonitor
 
     test = DriftMonitor.test_streams(load_alignment(path), foreign, rig)
     if test is None:

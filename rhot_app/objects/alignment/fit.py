@@ -26,8 +26,8 @@ from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import LEAST_DAMPING, Dense, fit_linear, minimise
 from rhot_app.estimation.residual import Rows, student
 from rhot_app.geometry.transforms import best_rotation, rigid, skew
-from rhot_app.objects.alignment_model import GAP_S, ROTATION, TRANSLATION, AlignmentModel, Estimate
-from rhot_app.objects.motion_stream import MotionStream
+from rhot_app.objects.alignment.model import GAP_S, ROTATION, TRANSLATION, AlignmentModel, Estimate
+from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -116,7 +116,7 @@ def align(foreign: MotionStream, rig: MotionStream, search_s: float = SEARCH_S,
     """Solve for rig_from_foreign, tracker_from_body and the time offset.
 
     `foreign` has rotations. Raises CalibrationError when the streams are too short or do not overlap. Whether the
-    motion determines the answer is for `rhot_app.objects.alignment_report.judge_alignment` to say.
+    motion determines the answer is for `rhot_app.objects.alignment.report.judge_alignment` to say.
     """
     if not foreign.has_rotations:
         raise CalibrationError("The foreign stream has positions only; its rotations are needed to find where the "

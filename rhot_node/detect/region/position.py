@@ -60,7 +60,7 @@ def centroid(region, coverage, gain, result):
 @njit(cache=True)
 def mask_centroid(mask, components, own, count, result):
     """Fill `result` with centroid, area and principal axes of the components marked in `own`, which `mask` numbers from
-    2 on. Returns whether they touch the frame's border. Columns of components: see rhot_node.detect.measure.
+    2 on. Returns whether they touch the frame's border. Columns of components: see rhot_node.detect.region.measure.
     """
     height, width = mask.shape
     n = s_x = s_y = s_xx = s_xy = s_yy = 0.0

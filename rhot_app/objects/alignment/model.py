@@ -1,6 +1,6 @@
 """The measurement model of an alignment: the residuals of two streams and their analytic Jacobian.
 
-`rhot_app.objects.alignment` has the equations.
+`rhot_app.objects.alignment.fit` has the equations.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rhot_app.geometry.transforms import exp_so3
-from rhot_app.objects.motion_stream import MotionStream
+from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from scipy.stats import chi2
 from rhot_app.estimation.least_squares import fit_linear
 from rhot_app.estimation.residual import student
 from rhot_app.geometry.transforms import rigid
-from rhot_app.objects.alignment import LASTING_M, LASTING_S
-from rhot_app.objects.alignment_file import Alignment
-from rhot_app.objects.alignment_model import GAP_S, skews
-from rhot_app.objects.motion_stream import MotionStream
+from rhot_app.objects.alignment.alignment_file import Alignment
+from rhot_app.objects.alignment.fit import LASTING_M, LASTING_S
+from rhot_app.objects.alignment.model import GAP_S, skews
+from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rhot_app.errors import ExportError
-from rhot_app.export.bones import PARENTS, TURNING, Skeleton, skeleton_of
+from rhot_app.export.formats.bones import PARENTS, TURNING, Skeleton, skeleton_of
 from rhot_app.export.plan import Plan, file_from_frame, frame_up
 from rhot_app.export.states import HandStates
 from rhot_app.hand.model import build_model

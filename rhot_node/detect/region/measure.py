@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rhot_node.detect.coverage import PAD, SUM_COLUMNS, chroma_noise, unmix
-from rhot_node.detect.outline import classify
-from rhot_node.detect.position import RESULT_COLUMNS, band_center, centroid, mask_centroid
+from rhot_node.detect.region.coverage import PAD, SUM_COLUMNS, chroma_noise, unmix
+from rhot_node.detect.region.outline import classify
+from rhot_node.detect.region.position import RESULT_COLUMNS, band_center, centroid, mask_centroid
 
 # Columns of a request: where the marker is expected, how far to look, how big and how saturated it was.
 PX, PY, HALF_X, HALF_Y, SIGMA, AREA_REF, LEVEL_REF, IS_BAND = range(8)
 REQUEST_COLUMNS = 8
-# Columns of a result, after those of rhot_node.detect.position.
+# Columns of a result, after those of rhot_node.detect.region.position.
 # The paint: how many pixels are all paint, and its mean luma and chroma (minus 128).
 LEVEL, AT_BORDER, FRAGMENTS, COST, RIVAL_COST, NOISE_SUM, NOISE_COUNT = range(RESULT_COLUMNS, RESULT_COLUMNS + 7)
 PAINT_PIXELS, PAINT_Y, PAINT_CB, PAINT_CR = range(RESULT_COLUMNS + 7, RESULT_COLUMNS + 11)

@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numba import njit
 
-from rhot_node.detect.contour_pixels import (
+from rhot_node.detect.tracks.contour_pixels import (
     AGE,
     AREA,
     AT_NODE,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import ExportError
-from rhot_app.export.bones import PARENTS, TIPS, TURNING, Skeleton, skeleton_of
+from rhot_app.export.formats.bones import PARENTS, TIPS, TURNING, Skeleton, skeleton_of
 from rhot_app.export.plan import Plan, file_from_frame, frame_up, require
 from rhot_app.export.states import HandStates
 from rhot_app.geometry.transforms import quaternion_from_rotation

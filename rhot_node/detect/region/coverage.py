@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rhot_node.detect.outline import EDGE, HOLE, INTERIOR, OUTSIDE, RING
+from rhot_node.detect.region.outline import EDGE, HOLE, INTERIOR, OUTSIDE, RING
 
 REACH = 5  # half-width of the neighbourhood that paint and surroundings are averaged over
 PAD = RING + REACH  # region around the component that coverage needs

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
-from rhot_app.objects.alignment import LASTING_M, SEARCH_S, STEP_S, Fit, OffsetSearch, align
-from rhot_app.objects.alignment_model import OFFSET, POINT, ROTATION
-from rhot_app.objects.motion_stream import MotionStream
+from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S, STEP_S, Fit, OffsetSearch, align
+from rhot_app.objects.alignment.model import OFFSET, POINT, ROTATION
+from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
 
