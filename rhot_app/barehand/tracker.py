@@ -121,10 +121,10 @@ class BareHandTracker:
         self.poses = [np.ascontiguousarray(camera.camera_from_world[:3]) for camera in self.cameras]
         self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
-        natural = self.model.natural
+        prior = self.model.pose_prior
         size = np.diag(np.square(SIZE_SD)) if not known_size else np.zeros((SHAPE, SHAPE))
-        self.process = HandProcess(self.surface.dh, self.model.limits, natural.mean,
-                                   np.asarray(np.linalg.inv(natural.information)), PALM_SPREAD, np.full(3, FASTEST),
+        self.process = HandProcess(self.surface.dh, self.model.limits, prior.mean,
+                                   np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, np.full(3, FASTEST),
                                    FASTEST, size[None], SIZE_S)
         self.filter = IteratedFilter(self.process)
         self._limits = JointLimits(self.model.limits)

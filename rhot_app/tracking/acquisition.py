@@ -137,7 +137,7 @@ class Starter:
         """The pose that all markers (M, 3) m make the most plausible, by a descent from `pose`."""
         m, world, angles = self._markers, pose.world_from_palm.copy(), pose.angles.copy()
         variance = m.paint_variance + np.where(m.landmark, LASTING_M**2 + NOISE_M**2, _TARGET_SD_M**2)
-        posture = Posture(m.dh, m.limits, m.natural.mean, m.natural.information)
+        posture = Posture(m.dh, m.limits, m.pose_prior.mean, m.pose_prior.information)
         implausibility(posture, markers, np.eye(3) / variance[:, None, None], 0.0, world, angles)
         return HandPose(world, angles)
 

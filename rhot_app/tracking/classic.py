@@ -279,13 +279,13 @@ class HandSolver:
     def _follow(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes,
                 palm: HandPose, dt_s: float, placed: bool) -> SolvedHand:
         """One call of compiled code: between two frames the interpreter's own code and data leave the caches."""
-        model, natural = self._model, self._model.natural
+        model, prior = self._model, self._model.pose_prior
         last = palm if self.pose is None else self.pose
         palm_world, palm_angles = palm.world_from_palm.copy(), palm.angles.copy()
         world, angles = last.world_from_palm.copy(), last.angles.copy()
         points = np.empty((len(JOINTS) + 5, 3))
         joints, known = np.empty(len(JOINTS), np.uint8), np.empty(len(ANGLES), np.uint8)
-        solved = follow(model.dh, model.limits, natural.mean, natural.information, model.mirror, model.base,
+        solved = follow(model.dh, model.limits, prior.mean, prior.information, model.mirror, model.base,
                         model.base_rotation, model.chain, model.chain_bend, wrist, tips, wrist_knowledge, tip_knowledge,
                         dt_s, self.pose is not None, placed, palm_world, palm_angles, world, angles, points, joints,
                         known)

@@ -57,10 +57,10 @@ class Estimator:
     def __init__(self, rig: Rig) -> None:
         """Raises RigError when a marker has no place on the hand."""
         self._rig, self._markers = compile_rig(rig), compile_markers(rig)
-        self._file_size, natural = self._markers, self._markers.natural
+        self._file_size, prior = self._markers, self._markers.pose_prior
         self._size: HandSize | None = None
         if rig.tracker.float_scale:
-            self._size = HandSize(self._markers.dh, self._markers.limits, natural, self._markers.paint_variance)
+            self._size = HandSize(self._markers.dh, self._markers.limits, prior, self._markers.paint_variance)
         self._process = self._markers.process()
         self._filter = IteratedFilter(self._process)
         self._starter = Starter(self._rig, self._markers)

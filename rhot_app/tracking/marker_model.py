@@ -13,7 +13,7 @@ from rhot_app.errors import RigError
 from rhot_app.geometry.camera import CameraModel, distort
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.landmarks import ANATOMY_SD_M, LASTING_S
-from rhot_app.hand.limits import NaturalPose
+from rhot_app.hand.limits import PosePrior
 from rhot_app.hand.model import HandModel, VariantName, build_model, limit_set, make_variant
 from rhot_app.hand.motion.hand_process import BIAS_S, FASTEST, PALM_SPREAD, SLOWEST, HandProcess
 from rhot_app.hand.places import Place, place_of, with_markers
@@ -60,7 +60,7 @@ class MarkerModel:
     landmark: NDArray[np.bool_]
     poses: Array
     intrinsics: Array
-    natural: NaturalPose
+    pose_prior: PosePrior
     limits: Array
     roles: tuple[str, ...]
     places: tuple[Place, ...]
@@ -71,8 +71,8 @@ class MarkerModel:
 
     def process(self) -> HandProcess:
         """How the hand moves, with the rates of recorded hands; paint biases are 0 until `set_bias`."""
-        covariance = np.asarray(np.linalg.inv(self.natural.information), dtype=np.float64)
-        return HandProcess(self.dh, self.limits, self.natural.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
+        covariance = np.asarray(np.linalg.inv(self.pose_prior.information), dtype=np.float64)
+        return HandProcess(self.dh, self.limits, self.pose_prior.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
                            np.zeros((len(self.finger), 3, 3)), np.where(self.landmark, LASTING_S, BIAS_S))
 
     def marker_of(self, role: str) -> int:
@@ -99,7 +99,7 @@ def compile_markers(rig: Rig) -> MarkerModel:
         np.array([marker.shape == "landmark" for marker in rig.markers.markers]),
         np.array([camera.camera_from_world[:3] for camera in cameras]),
         np.array([camera.intrinsics for camera in cameras]),
-        natural_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
+        pose_prior_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
         tuple(marker.role or "" for marker in rig.markers.markers), places)
 
 
@@ -134,13 +134,13 @@ def _slenderness(marker: Marker, model: HandModel) -> float:
     return 2.0 * apart / (math.pi * radius)
 
 
-def natural_of(model: HandModel, variant: VariantName) -> NaturalPose:
-    """The natural pose with the variant's couplings, these as good as exactly."""
+def pose_prior_of(model: HandModel, variant: VariantName) -> PosePrior:
+    """The pose prior with the variant's couplings, these as good as exactly."""
     chosen = make_variant(variant, model.anatomy.couplings)
     basis = chosen.basis
     bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
     bound = bound[np.abs(bound).max(axis=1) > 1e-9]
-    return model.natural.and_also(bound, bound @ chosen.mean)
+    return model.pose_prior.with_terms(bound, bound @ chosen.mean)
 
 
 @njit(cache=True)

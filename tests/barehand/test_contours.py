@@ -19,7 +19,7 @@ from rhot_node.detect.foreground import learn_background, skin_foreground
 
 def process_of(side: str = "right") -> HandProcess:
     model, surface = model_and_surface(side)
-    return HandProcess(surface.dh, model.limits, model.natural.mean, np.linalg.inv(model.natural.information),
+    return HandProcess(surface.dh, model.limits, model.pose_prior.mean, np.linalg.inv(model.pose_prior.information),
                        PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.zeros((1, 3, 3)), 1e3)
 
 

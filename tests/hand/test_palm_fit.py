@@ -85,7 +85,7 @@ def test_fingers_reach_their_markers_from_the_fitted_palm(right_hand):
 
 def test_relaxed_hand_without_noise_is_found_exactly(right_hand):
     """The natural pose itself costs nothing, so nothing pulls the fit away from it."""
-    pose = HandPose(random_world(np.random.default_rng(6)), right_hand.natural.mean)
+    pose = HandPose(random_world(np.random.default_rng(6)), right_hand.pose_prior.mean)
     points = forward(right_hand, pose)
     fit = fit_palm(right_hand, points.joints[0], points.marker_centres, None, 0.0)
     assert fit is not None and fit.cost < 1e-3

@@ -12,9 +12,9 @@ from patience import eventually
 from rhot_app.geometry.transforms import inverse, rigid, rotation_from_quaternion
 from rhot_app.objects.alignment.motion_stream import MotionStream
 from rhot_app.objects.alignment.report import FAIR_M, LASTING_M, REACH_M, calibrate_alignment, coverage_of_motion
-from rhot_app.simulator.film.foreign_tracker import DELAY_S, NOISE_M, RATE_HZ, ForeignTracker, world_from_body
 from rhot_app.simulator.film.scene_objects import make_object
 from rhot_app.simulator.nodes.live import TwinServer
+from rhot_app.simulator.nodes.live_scene import DELAY_S, NOISE_M, RATE_HZ, ForeignTracker, world_from_body
 from rhot_app.simulator.nodes.remote import TrackerRequest
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, HandShow

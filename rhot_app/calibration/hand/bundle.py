@@ -4,8 +4,8 @@ Levenberg-Marquardt; the poses are eliminated instant by instant (Schur compleme
 to solve has only the shape's unknowns. Huber's loss on each marker's distance by reweighting.
 
 Neighbouring instants err alike: skin slides over bones in the same way whenever a finger bends, and nobody's joints go
-together exactly as the natural pose says. So all instants together count only as much as `independent` ones, and what
-the natural pose says of them as `pose_prior_weight` ones.
+together exactly as the pose prior says. So all instants together count only as much as `independent` ones, and the
+pose prior on them as `pose_prior_weight` ones.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rhot_app.calibration.hand.shape import BONE_COUNT, HandUnknowns
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import minimise
 from rhot_app.hand.kinematics import TWIST
-from rhot_app.hand.limits import natural_pose
+from rhot_app.hand.limits import PERSON_LIMIT_SD_RAD, pose_prior
 from rhot_app.progress import Progress, silent
 
 # -- bias by incidental parameters -------------------------------------------------------------------------------------
@@ -74,10 +74,10 @@ def _roots(covariances: Array) -> Array:
 HUBER = 3.0
 """Markers farther off than this many standard deviations count less."""
 
-HABITS = 3.0
+POSE_PRIOR_WEIGHT = 3.0
+"""How many independent instants all together count against the pose prior."""
 
-LIMIT_SD = np.radians(5.0)
-LIMIT_MARGIN = np.radians(10.0)
+LIMIT_MARGIN_RAD = 2.0 * PERSON_LIMIT_SD_RAD
 """Joints may go this far past the base hand's limits, which nobody measured on this hand, and then pay."""
 
 _STILL = 1e-3  # the step that makes the hand less than this more likely (logarithm) was the last
@@ -88,13 +88,12 @@ _DIAGONAL = np.arange(POSE)
 @dataclass(frozen=True, slots=True)
 class Weights:
     """How much the terms count: `noise_m` standard deviation of a marker per axis; all instants together as
-    `independent` ones, the natural pose in `pose_prior_weight` of them; `fresh`: the part of the markers'
-    variance that is noise,
-    anew at every instant."""
+    `independent` ones, the pose prior in `pose_prior_weight` of them; `fresh`: the part of the markers' variance that
+    is noise, anew at every instant."""
 
     noise_m: float
     independent: float
-    pose_prior_weight: float = HABITS
+    pose_prior_weight: float = POSE_PRIOR_WEIGHT
     fresh: float = 1.0
 
 
@@ -127,12 +126,12 @@ class HandAdjustment:
         self._unknowns = unknowns
         self._seen = seen
         self._weights = weights
-        self._limits = unknowns.limits + np.array([-LIMIT_MARGIN, LIMIT_MARGIN])
-        self._natural = natural_pose()
+        self._limits = unknowns.limits + np.array([-LIMIT_MARGIN_RAD, LIMIT_MARGIN_RAD])
+        self._pose_prior = pose_prior()
         self._prior_information = np.linalg.inv(unknowns.prior.covariance)
         count = max(len(seen), 1)
         self._data_part = min(1.0, weights.independent / count)
-        self._habit_part = min(1.0, weights.pose_prior_weight / count)
+        self._prior_part = min(1.0, weights.pose_prior_weight / count)
 
     def run(self, vector: Array, poses: Poses, steps: int, *, progress: Progress = silent) -> HandBundle:
         """Descend from a first guess. Raises CalibrationError when the sights do not hold the hand at all.
@@ -201,14 +200,14 @@ class HandAdjustment:
         distance = np.linalg.norm(self._seen - expected(self._unknowns, vector, poses), axis=2) / self._weights.noise_m
         loss = np.nansum(np.where(distance <= HUBER, distance ** 2, HUBER * (2.0 * distance - HUBER)), axis=1)
         past = self._past_limits(poses.angles)[0]
-        off = poses.angles - self._natural.mean
-        pose_prior_weight = ((off @ self._natural.information) * off).sum(axis=1) + (past ** 2).sum(axis=1)
-        return np.asarray(0.5 * (self._data_part * loss + self._habit_part * pose_prior_weight))
+        off = poses.angles - self._pose_prior.mean
+        prior = ((off @ self._pose_prior.information) * off).sum(axis=1) + (past ** 2).sum(axis=1)
+        return np.asarray(0.5 * (self._data_part * loss + self._prior_part * prior))
 
     def _past_limits(self, angles: Array) -> tuple[Array, Array]:
         """How far angles (F, 21) are past their limits, in standard deviations, signed; and where they are."""
-        past = (np.maximum(angles - self._limits[:, 1], 0.0) + np.minimum(angles - self._limits[:, 0], 0.0)) / LIMIT_SD
-        return past, past != 0.0
+        past = np.maximum(angles - self._limits[:, 1], 0.0) + np.minimum(angles - self._limits[:, 0], 0.0)
+        return past / PERSON_LIMIT_SD_RAD, past != 0.0
 
     def reduced(self, vector: Array, poses: Poses) -> Reduced:
         """The normal equations of the shape."""
@@ -245,7 +244,7 @@ class HandAdjustment:
         _, gap, per_pose = self._weighed(at)
         turned = per_pose.transpose(0, 2, 1)
         matrix, right = turned @ per_pose, (turned @ gap[..., None])[..., 0]
-        self._add_habits(poses.angles, matrix, right)
+        self._add_pose_prior(poses.angles, matrix, right)
         return matrix, right
 
     def _weighed(self, at: Linearised) -> tuple[Array, Array, Array]:
@@ -260,13 +259,13 @@ class HandAdjustment:
         return (root, (root[..., None] * gap).reshape(count, -1),
                 (root[..., None, None] * at.per_pose).reshape(count, -1, POSE))
 
-    def _add_habits(self, angles: Array, matrix: Array, right: Array) -> None:
-        part, information = self._habit_part, self._natural.information
+    def _add_pose_prior(self, angles: Array, matrix: Array, right: Array) -> None:
+        part, information = self._prior_part, self._pose_prior.information
         past, outside = self._past_limits(angles)
         matrix[:, TWIST:, TWIST:] += part * information
-        matrix[:, np.arange(TWIST, POSE), np.arange(TWIST, POSE)] += part * outside / LIMIT_SD ** 2
+        matrix[:, np.arange(TWIST, POSE), np.arange(TWIST, POSE)] += part * outside / PERSON_LIMIT_SD_RAD ** 2
         matrix[:, np.arange(TWIST), np.arange(TWIST)] += 1e-3
-        right[:, TWIST:] -= part * ((angles - self._natural.mean) @ information + past / LIMIT_SD)
+        right[:, TWIST:] -= part * ((angles - self._pose_prior.mean) @ information + past / PERSON_LIMIT_SD_RAD)
 
 
 class _Iterate:

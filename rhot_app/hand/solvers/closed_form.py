@@ -26,7 +26,7 @@ from rhot_app.hand.solvers.problem import assign, clamp, norm
 Array = NDArray[np.float64]
 
 IP_PER_MCP = 1.0
-"""Flexion of the thumb's IP joint per flexion of its MCP joint (`limits.natural_pose`)."""
+"""Flexion of the thumb's IP joint per flexion of its MCP joint (`limits.pose_prior`)."""
 
 SLACK = 1e-9
 """A root this far beyond a limit, rad, is rounding."""

@@ -76,7 +76,7 @@ def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_an
     to_finger(world_from_palm, model.mirror, model.base[finger], model.base_rotation[finger], target, local)
     angles, bend = np.array(start_angles, dtype=np.float64), float(model.chain_bend[finger])
     rows = ANGLE_SLICES[finger]
-    mean, information = model.natural.mean[rows], model.natural.information[rows, rows]
+    mean, information = model.pose_prior.mean[rows], model.pose_prior.information[rows, rows]
     residual, iterations, status = solve_bent(angles, model.chain[finger], bend, model.limits[rows], local, mean,
                                               information, tolerance, max_iterations, 0.0)
     points, end, unused = np.empty((4, 3)), np.empty((4, 3)), np.empty((3, len(angles)))
@@ -101,8 +101,8 @@ def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: f
     angles, residuals = np.array(pose.angles), np.empty(5)
     iterations, statuses = np.empty(5, dtype=np.int64), np.empty(5, dtype=np.uint8)
     solve_fingers_arrays(angles, pose.world_from_palm, model.mirror, model.base, model.base_rotation,
-                         model.chain, model.chain_bend, model.limits, targets, model.natural.mean,
-                         model.natural.information, tolerance, max_iterations, target_sd, residuals, iterations,
+                         model.chain, model.chain_bend, model.limits, targets, model.pose_prior.mean,
+                         model.pose_prior.information, tolerance, max_iterations, target_sd, residuals, iterations,
                          statuses)
     return FingersSolution(angles, residuals, iterations, residuals <= tolerance, statuses)
 

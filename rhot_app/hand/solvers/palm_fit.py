@@ -93,9 +93,9 @@ def _fit_from(model: HandModel, wrist: Array, tips: Array, start: HandPose, prev
     if np.isfinite(wrist).all():
         world[:3, 3] = wrist
     angles = np.clip(start.angles, *model.limits.T)
-    before = previous or start
+    before, prior = previous or start, model.pose_prior
     cost, deviation, converged = fit_arrays(
-        model.dh, model.limits, model.natural.mean, model.natural.information, wrist, tips, before.world_from_palm,
+        model.dh, model.limits, prior.mean, prior.information, wrist, tips, before.world_from_palm,
         before.angles, max(dt_s, SHORTEST_S) if previous is not None else math.inf, steps, world, angles)
     return PalmFit(HandPose(world, angles), deviation, cost, converged)
 
