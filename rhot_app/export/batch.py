@@ -64,7 +64,7 @@ class Outcome:
     unchanged: bool = False
 
 
-Told = Callable[[Outcome], None]
+Report = Callable[[Outcome], None]
 Ends = Generator[Outcome, None, None]
 
 
@@ -176,7 +176,7 @@ class _Sums:
 
 
 def run_batch(jobs: Sequence[Job], folder: Path, *, workers: int = 1, scheduler: str | None = None, again: bool = False,
-              told: Told = lambda outcome: None) -> list[Outcome]:
+              report: Report = lambda outcome: None) -> list[Outcome]:
     """Do all jobs and return what came of them, in their order; `told` is called with each as it ends.
 
     `workers` processes here (1: this one), or those of a Dask cluster whose `scheduler` has this address and whose
@@ -192,7 +192,7 @@ def run_batch(jobs: Sequence[Job], folder: Path, *, workers: int = 1, scheduler:
         before = None if again else manifest.unchanged(job)
         if before is not None:
             found[job.log] = before
-            told(before)
+            report(before)
     waiting = [job for job in jobs if job.log not in found]
     orders = {job.log: (job, manifest.order(job)) for job in waiting}
     ends = (_on_cluster(waiting, scheduler) if scheduler is not None
@@ -201,7 +201,7 @@ def run_batch(jobs: Sequence[Job], folder: Path, *, workers: int = 1, scheduler:
         for outcome in ends:
             found[outcome.log] = outcome
             manifest.note(*orders[outcome.log], outcome)
-            told(outcome)
+            report(outcome)
     return [found[job.log] for job in jobs]
 
 

@@ -53,11 +53,11 @@ def run(args: argparse.Namespace) -> int:
     line = ProgressLine(f"{args.do}: {_logs(len(jobs))}")
     ended: list[Outcome] = []
 
-    def told(outcome: Outcome) -> None:
+    def report(outcome: Outcome) -> None:
         ended.append(outcome)
         line(len(ended), len(jobs))
 
-    outcomes = run_batch(jobs, args.out, workers=workers, scheduler=args.scheduler, again=args.again, told=told)
+    outcomes = run_batch(jobs, args.out, workers=workers, scheduler=args.scheduler, again=args.again, report=report)
     line.finish()
     print(table(outcomes))
     if any(outcome.status == "interrupted" for outcome in outcomes):

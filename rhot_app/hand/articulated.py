@@ -136,12 +136,12 @@ def _layout(value: Any) -> str:
 
 def _terse(row: msgspec.Struct) -> dict[str, Any]:
     """The fields that say something: what is at its default need not be written."""
-    said: dict[str, Any] = {"kind": row.__struct_config__.tag} if row.__struct_config__.tag else {}
+    named: dict[str, Any] = {"kind": row.__struct_config__.tag} if row.__struct_config__.tag else {}
     for field in msgspec.structs.fields(row):
         value = getattr(row, field.name)
         if value != field.default:
-            said[field.name] = _terse(value) if isinstance(value, msgspec.Struct) else value
-    return said
+            named[field.name] = _terse(value) if isinstance(value, msgspec.Struct) else value
+    return named
 
 
 def scaled(document: Articulated, factor: float) -> Articulated:

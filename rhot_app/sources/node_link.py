@@ -56,7 +56,7 @@ class NodeLink:
         return bool(self.node.public_key)
 
     @property
-    def can_be_told(self) -> bool:
+    def reachable(self) -> bool:
         """Whether what we say to the node can have the tag that it needs."""
         return not self.paired or self._seal is not None
 

@@ -19,7 +19,7 @@ from rhot_app.ui.panels.advice_bar import AdviceBar
 from rhot_app.ui.scene.ellipsoid_mesh import LARGER, EllipsoidChoice
 from rhot_app.ui.screen import Screen
 
-# -- The hand as the scene shows it: where it is when it is seen, not where it was in the newest pictures --------------
+# -- The hand at display time ------------------------------------------------------------------------------------------
 
 _FRESH_NS = 500_000_000
 """A state that is older is of a recording, or of a hand that is gone: nothing is predicted of it."""
@@ -46,7 +46,7 @@ class DisplayPrediction:
         return self._extrapolator.at(newest, now_ns + round(1e9 * ahead_s)) or newest
 
 
-# -- Dark or light, names, uncertainty and prediction in the scene: the switches of the View menu, as they -------------
+# -- Switches of the View menu -----------------------------------------------------------------------------------------
 
 _LARGER = "clouds larger"
 _CLOUD_FLAGS = {"clouds": True, **{f"clouds of {kind}": True for kind, _ in CLOUD_KINDS}, _LARGER: False}

@@ -149,7 +149,7 @@ class Screen:
         return self.pacer.cost_s
 
 
-# -- The panels around the scene as docks: where they stand at first, their keys, and all of them away at once ---------
+# -- The panels around the scene as docks ------------------------------------------------------------------------------
 
 _AREAS = {"left": Qt.DockWidgetArea.LeftDockWidgetArea, "right": Qt.DockWidgetArea.RightDockWidgetArea,
           "bottom": Qt.DockWidgetArea.BottomDockWidgetArea}

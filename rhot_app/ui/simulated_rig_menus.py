@@ -110,7 +110,7 @@ class TwinShows(QObject):
         self._tell(Notice("error", sentence))
 
 
-# -- The menu that covers the simulated cameras' lenses, to see what is left of a hand that one camera sees ------------
+# -- Menu: cover the lenses of the simulated cameras -------------------------------------------------------------------
 
 class LensCaps(QObject):
     """An entry per camera of the simulated rig, ticked while the camera is covered; without that rig there is no menu.

@@ -114,8 +114,8 @@ def check_settings(machine: Machine, path: Path | None) -> list[Check]:
 
 def check_service(machine: Machine) -> list[Check]:
     """The system service, where systemd knows of one."""
-    told = machine.run(["systemctl", "show", NAME, "--property=LoadState,ActiveState,NRestarts"]) or ""
-    state = dict(line.split("=", 1) for line in told.splitlines() if "=" in line)
+    shown = machine.run(["systemctl", "show", NAME, "--property=LoadState,ActiveState,NRestarts"]) or ""
+    state = dict(line.split("=", 1) for line in shown.splitlines() if "=" in line)
     if state.get("LoadState") != "loaded":
         return []
     active, restarts = state.get("ActiveState", "unknown"), state.get("NRestarts", "0")

@@ -14,7 +14,7 @@ from test_worn_markers import Shown
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.simulator.film.ideal_observations import ObservationNoise, sights
+from rhot_app.simulator.film.ideal_observations import ObservationNoise, ideal_observations
 from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.film.truth import true_object
 from rhot_app.simulator.render.body import Look, build_body
@@ -146,7 +146,7 @@ def scene(**settings: Any) -> Scene:
 
 def test_the_truth_and_the_sketch_have_nails_where_the_hand_has_them() -> None:
     taken = make_shot(scene(facing="back"), "tap", 1.0)
-    frames, truth = sights(taken, 0, ObservationNoise(white=0.0, common=0.0, own=0.0))
+    frames, truth = ideal_observations(taken, 0, ObservationNoise(white=0.0, common=0.0, own=0.0))
     true = true_object(taken.scene_object, 1.0, (truth, truth))
     camera = taken.scene.camera(0)
     plain = 0
@@ -160,7 +160,7 @@ def test_the_truth_and_the_sketch_have_nails_where_the_hand_has_them() -> None:
             expected = camera.project(true.markers_at(np.array([t_s]))[0, marker][None])[0]
             assert (seen.x, seen.y) == pytest.approx(expected, abs=0.05)
     assert plain > 6
-    away, _ = sights(make_shot(scene(facing="palm"), "still", 0.5), 0)
+    away, _ = ideal_observations(make_shot(scene(facing="palm"), "still", 0.5), 0)
     assert all(frame[marker].flags & MarkerFlag.LOST for frame in away for marker in range(1, 5))
 
 

@@ -232,11 +232,11 @@ def test_conflicts_and_an_empty_network_are_told(qtbot, themed):
     network = Network(("left", 11), ("left", 12))
     dialog = open_dialog(network, qtbot)
     qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=PATIENCE_MS)
-    assert "Two nodes are called left" in dialog.found.told.text()
+    assert "Two nodes are called left" in dialog.found.message.text()
     assert dialog.hosts[0].text() == "", "nobody can know which is meant"
     network.who = ()
     dialog.found.search()
-    qtbot.waitUntil(lambda: "No node was found" in dialog.found.told.text(), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: "No node was found" in dialog.found.message.text(), timeout=PATIENCE_MS)
     assert dialog.found.table.rowCount() == 0
 
 

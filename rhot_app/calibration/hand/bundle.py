@@ -31,7 +31,7 @@ from rhot_app.progress import Progress, silent
 # the outer side, and thousands of instants agree on that. Joints move towards the markers until it fits: a last
 # phalanx came out 3 to 8 mm too short at 0.2 mm of noise (incidental parameters, Neyman and Scott 1948). To second
 # order the mean of what is left of a marker is half the trace of its second derivative by the pose times the pose's
-# covariance: `bend`. Sights moved by it show the shape with little bias.
+# covariance: `bend`. Positions corrected by it show the shape with little bias.
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ class Reduced:
 
 
 class HandAdjustment:
-    """The cost of a hand and its poses given sights (F, M, 3) m, NaN = missing, and its descent."""
+    """The cost of a hand and its poses given marker positions (F, M, 3) m, NaN = missing, and its descent."""
 
     def __init__(self, unknowns: HandUnknowns, seen: Array, weights: Weights) -> None:
         self._unknowns = unknowns
@@ -134,7 +134,7 @@ class HandAdjustment:
         self._prior_part = min(1.0, weights.pose_prior_weight / count)
 
     def run(self, vector: Array, poses: Poses, steps: int, *, progress: Progress = silent) -> HandBundle:
-        """Descend from a first guess. Raises CalibrationError when the sights do not hold the hand at all.
+        """Descend from a first guess. Raises CalibrationError when the markers do not hold the hand at all.
 
         Every trial of a shape lets each instant find its own pose first: one stretched finger, whose joints hardly
         show, would else hold up the shape for all.

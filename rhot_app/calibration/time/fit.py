@@ -125,16 +125,16 @@ class _System:
     def __init__(self, model: TimeModel, times: Times, nuisance: Array, priors: Array, middle: Array) -> None:
         self.found = found = model.residuals(times)
         unknowns = found.miss_slopes.shape[1] + nuisance.shape[1]
-        seen, told = np.isfinite(found.miss_px), np.isfinite(found.breath_m)
-        groups = model.breath_group[told]
+        seen, known = np.isfinite(found.miss_px), np.isfinite(found.breath_m)
+        groups = model.breath_group[known]
         aligned = np.linalg.lstsq(nuisance[seen], -found.miss_px[seen], rcond=None)[0]
         scale = _spread(found.miss_px[seen] + nuisance[seen] @ aligned)
-        scales = np.array([_spread(found.breath_m[told][groups == k]) for k in range(len(model.marker_pairs))])[groups]
-        residuals = np.concatenate([found.miss_px[seen] / scale, found.breath_m[told] / scales])
+        scales = np.array([_spread(found.breath_m[known][groups == k]) for k in range(len(model.marker_pairs))])[groups]
+        residuals = np.concatenate([found.miss_px[seen] / scale, found.breath_m[known] / scales])
         self._jacobian = np.zeros((len(residuals), unknowns))
         count = int(seen.sum())
         self._jacobian[:count] = np.column_stack([found.miss_slopes[seen], nuisance[seen]]) / scale
-        self._jacobian[count:, :found.breath_slopes.shape[1]] = found.breath_slopes[told] / scales[:, None]
+        self._jacobian[count:, :found.breath_slopes.shape[1]] = found.breath_slopes[known] / scales[:, None]
         still = residuals.copy()
         still[:count] += nuisance[seen] @ aligned / scale
         self._weights = np.square(np.clip(1.0 - np.square(still / _TUKEY), 0.0, None))
@@ -145,7 +145,7 @@ class _System:
         self._prior[:len(priors)] = 1.0 / np.square(priors)
         self._pull = np.zeros(unknowns)
         self._pull[:len(priors)] = self._prior[:len(priors)] * (times.vector - middle)
-        self._blocks = np.concatenate([model.miss_times_s[seen], model.breath_times_s[told]]) // _BLOCK_S
+        self._blocks = np.concatenate([model.miss_times_s[seen], model.breath_times_s[known]]) // _BLOCK_S
         self._normal = (self._jacobian * self._weights[:, None]).T @ self._jacobian + np.diag(self._prior)
 
     def step(self) -> Array:

@@ -105,8 +105,8 @@ def _rows_agree(model: TimeModel, free: Fit) -> bool:
     away = free.times.row_times_s - np.array([camera.row_time_s for camera in model.cameras])
     if np.abs(away).max() < 1e-6:
         return True
-    surprise = float(away @ np.linalg.solve(free.covariance[cameras:, cameras:], away))
-    return surprise < 9.0 + 2.0 * cameras
+    mahalanobis_sq = float(away @ np.linalg.solve(free.covariance[cameras:, cameras:], away))
+    return mahalanobis_sq < 9.0 + 2.0 * cameras
 
 
 def _camera(model: TimeModel, index: int, free: Fit, held: Fit, agree: bool) -> CameraTime:
@@ -217,9 +217,9 @@ class TimeFigures:
 
 def judge_times(figures: TimeFigures) -> Verdict:
     """The verdict on a time calibration."""
-    told = ", ".join(f"{camera.name} {1e3 * camera.correction_s:+.2f} ± {1e3 * camera.sd_s:.2f} ms"
-                     for camera in figures.cameras if not camera.reference)
-    summary = (f"against {figures.cameras[0].name}, times are to be corrected by {told}; markers then miss their "
+    offsets = ", ".join(f"{camera.name} {1e3 * camera.correction_s:+.2f} ± {1e3 * camera.sd_s:.2f} ms"
+                        for camera in figures.cameras if not camera.reference)
+    summary = (f"against {figures.cameras[0].name}, times are to be corrected by {offsets}; markers then miss their "
                f"epipolar lines by {figures.rms_px:.2f} px rms instead of {figures.rms_before_px:.2f}.")
     findings = [finding for index, camera in enumerate(figures.cameras) if not camera.reference
                 for finding in (*_movement(camera), *_search(camera, figures.rivals[index]),
@@ -273,14 +273,14 @@ def _row_times(figures: TimeFigures) -> list[Finding]:
             Finding("row_time_not_seen", Grade.GOOD, f"The row times of {', '.join(unseen)} were not seen; they are "
                     "taken as the nodes say.", "", "Two markers on a stiff thing (or a stiff hand), one above the "
                     "other, waved fast, show them.")]
-    told = ", ".join(f"{camera.name} {1e6 * camera.row_time_s:.1f} ± {1e6 * camera.row_time_sd_s:.1f} µs (it says "
-                     f"{1e6 * camera.row_time_node_s:.1f})" for camera in figures.cameras)
+    row_times = ", ".join(f"{camera.name} {1e6 * camera.row_time_s:.1f} ± {1e6 * camera.row_time_sd_s:.1f} µs (it says "
+                          f"{1e6 * camera.row_time_node_s:.1f})" for camera in figures.cameras)
     seen = all(camera.row_time_observed for camera in figures.cameras)
     remedy = ("Set camera.row_time_us of these nodes, then record and run this again: a camera that says another row "
               "time may also say other times." if seen else
               "Record again with two markers on a stiff thing, one above the other, waved fast: then each row time "
               "shows, not only their difference.")
-    return [Finding("row_time", Grade.FAIR, f"Row times: {told}.", "The nodes' row times are not those of their "
+    return [Finding("row_time", Grade.FAIR, f"Row times: {row_times}.", "The nodes' row times are not those of their "
                     "cameras; the offsets written are a compromise in the middle of the pictures.", remedy)]
 
 

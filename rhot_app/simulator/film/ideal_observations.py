@@ -53,7 +53,7 @@ class ObservationNoise:
 ORDINARY = ObservationNoise()
 
 
-def sights(shot: Shot, index: int,
+def ideal_observations(shot: Shot, index: int,
            noise: ObservationNoise = ORDINARY) -> tuple[list[list[MarkerObservation]], FrameTruth]:
     """What camera `index` says of every frame, and what was visible. Raises SimulatorError when no hand is shown."""
     body = shot.scene_object.thing

@@ -258,8 +258,8 @@ def _candidates(sheet: Sheet, cameras: Sequence[CameraModel], rng: np.random.Gen
 
 def _fields(sheet: Sheet, poses: Array, camera: CameraModel) -> NDArray[np.bool_]:
     """(C, fields) the fields of a picture that the sheet covers; none when it is not whole in it, or too steep."""
-    sight = poses[:, :3, :3] @ sheet.middle + poses[:, :3, 3] - camera.centre
-    facing = np.einsum("ci,ci->c", poses[:, :3, 2], sight) > _STEEPEST * np.linalg.norm(sight, axis=1)
+    line_of_sight = poses[:, :3, :3] @ sheet.middle + poses[:, :3, 3] - camera.centre
+    facing = np.einsum("ci,ci->c", poses[:, :3, 2], line_of_sight) > _STEEPEST * np.linalg.norm(line_of_sight, axis=1)
     size = np.array([camera.width, camera.height])
     outline = _project(camera, poses, sheet.outline)
     whole = facing & ((outline > _MARGIN_PX) & (outline < size - 1.0 - _MARGIN_PX)).all(axis=(1, 2))

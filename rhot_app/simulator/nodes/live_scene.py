@@ -27,7 +27,7 @@ from rhot_app.simulator.scene.scene_description import RulerShow, Show
 
 Array = NDArray[np.float64]
 
-# -- A tracker of another system that is tied to the hand: it has a world, a clock and errors of its own ---------------
+# -- A foreign tracker on the hand -------------------------------------------------------------------------------------
 
 RATE_HZ = 120.0
 DELAY_S = 0.037

@@ -175,7 +175,7 @@ def ask_picture(asker: Asker, camera: str, node_id: int) -> Picture:
                    int(about.get("t_node_ns", 0)), received_ns)
 
 
-# -- The hand's states of the last seconds, for wizards that calibrate by a moving hand or marker. A thread ------------
+# -- The hand's states of the last seconds -----------------------------------------------------------------------------
 
 KEPT_S = 4.0
 _PERIOD_S = 0.02

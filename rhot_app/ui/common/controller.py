@@ -18,7 +18,7 @@ from rhot_app.ui.backend.contract import Backend, Opened, TwinChoice, TwinPace
 from rhot_app.ui.backend.live import SILENCE_S, Client, Live
 from rhot_app.ui.common.job import Job, Progress
 
-# -- The window's line to the engine: one client, and commands that wait in workers so that the window does not --------
+# -- The window's client of the engine ---------------------------------------------------------------------------------
 
 class ClosableClient(Client, Protocol):
     """The engine's client, which can be closed."""
@@ -73,7 +73,7 @@ class EngineLink(QObject):
             job.wait(timeout_s)
 
 
-# -- What the window does: opens rigs, gives commands, watches over the engine. Holds no widgets -----------------------
+# -- The controller ----------------------------------------------------------------------------------------------------
 
 SAMPLE_S = 0.1
 RESTART_TRIES = 3

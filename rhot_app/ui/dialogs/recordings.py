@@ -16,7 +16,7 @@ from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.models.notice import Level, Notice
 from rhot_app.ui.models.rows import bytes_text
 
-# -- Asks for a few words about a moment, while a recording is made or replayed ----------------------------------------
+# -- Bookmarks of a recording ------------------------------------------------------------------------------------------
 
 NO_WORDS = "bookmark"
 """What a bookmark says when nothing was typed: hands full of paint type nothing."""
@@ -33,7 +33,7 @@ class BookmarkDialog(QInputDialog):
         self.open()
 
 
-# -- Recordings as the person at the screen makes them: a new file each, and a word about it when it is ----------------
+# -- Recordings and their files ----------------------------------------------------------------------------------------
 
 LOG_SUFFIX = ".rhotlog"
 LOG_FILTER = f"Recordings (*{LOG_SUFFIX});;All files (*)"

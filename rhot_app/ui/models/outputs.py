@@ -142,41 +142,41 @@ def draft(kind: str, target: str, joints: str, rate_hz: float, others: tuple[Out
 
 def rows(outputs: tuple[OutputSettings, ...], status: EngineStatus | None, rates: SendRates) -> list[OutputRow]:
     """A row for each output of the rig, in its order; then those of the engine's command line."""
-    told = {one.spec: one for one in status.outputs} if status is not None else {}
-    found = [_row(settings, told.get(as_run(settings).spec) if settings.enabled else None, status, rates)
+    reported = {one.spec: one for one in status.outputs} if status is not None else {}
+    found = [_row(settings, reported.get(as_run(settings).spec) if settings.enabled else None, status, rates)
              for settings in outputs]
-    return found + [_row(parse_output(one.spec), one, status, rates) for one in told.values() if one.fixed]
+    return found + [_row(parse_output(one.spec), one, status, rates) for one in reported.values() if one.fixed]
 
 
-def _row(settings: OutputSettings, told: OutputStatus | None, status: EngineStatus | None,
+def _row(settings: OutputSettings, reported: OutputStatus | None, status: EngineStatus | None,
          rates: SendRates) -> OutputRow:
     run = as_run(settings)
     detail = f"{run.joints} joints, {'every state' if run.rate_hz is None else f'at most {run.rate_hz:g} states/s'}"
-    fixed = told is not None and told.fixed
+    fixed = reported is not None and reported.fixed
     if fixed:
         detail += "; asked for when the engine was started"
-    if told is None:
+    if reported is None:
         replay = settings.enabled and status is not None and bool(status.replaying)
         look = OFF if not settings.enabled else _LEFT_OUT if replay else _STARTING
         return OutputRow(title_of(settings), detail, look, look.word, look.meaning if replay else "", look.meaning, "",
                          fixed)
-    look, words = _going(told, status is not None and status.running, rates.of(told.spec))
-    counts = f"{told.sent} states sent, {told.dropped} dropped."
-    return OutputRow(title_of(settings), detail, look, words, told.message or web_hint(told.url), f"{look.meaning}\n"
-                     f"{counts}", told.url if told.state == "running" else "", fixed)
+    look, words = _going(reported, status is not None and status.running, rates.of(reported.spec))
+    counts = f"{reported.sent} states sent, {reported.dropped} dropped."
+    return OutputRow(title_of(settings), detail, look, words, reported.message or web_hint(reported.url),
+                     f"{look.meaning}\n{counts}", reported.url if reported.state == "running" else "", fixed)
 
 
-def _going(told: OutputStatus, running: bool, rate_hz: float) -> tuple[Look, str]:
+def _going(reported: OutputStatus, running: bool, rate_hz: float) -> tuple[Look, str]:
     """Look and words of an output that the engine tells of."""
-    if told.state == "failed":
+    if reported.state == "failed":
         return _FAILED, _FAILED.word
-    if told.state != "running":
+    if reported.state != "running":
         return _STARTING, _STARTING.word
-    if told.message:
+    if reported.message:
         return _SLOW, _SLOW.word
-    if told.clients == 0:
-        return _WAITING, "waits for a browser" if told.kind == "web" else "waits for a client"
-    clients = "" if told.clients is None else f", {told.clients} client{'s' if told.clients > 1 else ''}"
+    if reported.clients == 0:
+        return _WAITING, "waits for a browser" if reported.kind == "web" else "waits for a client"
+    clients = "" if reported.clients is None else f", {reported.clients} client{'s' if reported.clients > 1 else ''}"
     if rate_hz > 0.0:
         return _SENDING, f"sending {rate_hz:.0f} states/s{clients}"
     return _WAITING, ("waits for a hand" if running else "waits for Start") + clients

@@ -150,7 +150,7 @@ def _set_node(command: Command, node_id: int, settings: dict[str, Any]) -> None:
     command("node", node_id=node_id, request={"request": "set_settings", "settings": settings})
 
 
-# -- Which calibrations are in force for a rig file, and since when: read out of the file's history --------------------
+# -- Calibrations in force, by the rig file's history ------------------------------------------------------------------
 
 def in_force(path: Path) -> dict[str, datetime]:
     """Time of the last calibration by its reason, as far as it is still in force: one that a restore took away is not,

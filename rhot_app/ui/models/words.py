@@ -82,7 +82,7 @@ def condition_look(condition: str) -> Look:
 
 
 def marker_look(state: HandState, marker: int) -> Look:
-    """State of one marker in words: which camera misses it, or what is wrong with the sight of it."""
+    """State of one marker in words: which camera misses it, or what is wrong with its observation."""
     flags = state.camera_flags[:, marker]
     seen = (flags & int(MarkerFlag.LOST)) == 0
     seen &= np.isfinite(state.camera_pixels[:, marker, 0])

@@ -112,7 +112,7 @@ class RunDialog(QDialog):
         self.accept()
 
 
-# -- Tracks a recording in a process of its own while the window goes on: progress, remaining time, cancel -------------
+# -- Tracking of a recording in its own process ------------------------------------------------------------------------
 
 _COUNT = itertools.count()
 

@@ -19,7 +19,7 @@ from rhot_app.tracking.state import HandState
 from rhot_app.ui.models.series import RecordedSeries
 from rhot_app.ui.replay.run import Codes, Run, Tracked, condition_bins
 
-# -- Two runs of one recording side by side: how far apart their fingertips are at the same instants. No Qt ------------
+# -- Two runs of one recording side by side (no Qt) --------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def nearest(wanted_ns: NDArray[np.int64], given_ns: NDArray[np.int64]) -> NDArra
     return np.where(nearer_before, before, after)
 
 
-# -- Which state of a run is shown: position, speed, steps and the range that is repeated. No Qt, no clock of ----------
+# -- Player: position, speed, steps and range (no Qt) ------------------------------------------------------------------
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Times real time."""
@@ -183,7 +183,7 @@ def time_text(seconds: float) -> str:
     return f"{minutes}:{rest // 100:02d}.{rest % 100:02d}"
 
 
-# -- One recording that is open: its run, a second run beside it, the player, the bookmarks. No Qt ---------------------
+# -- One open recording (no Qt) ----------------------------------------------------------------------------------------
 
 _PLOT_SPACING_NS = 50_000_000  # thirty seconds of a plot are 600 rows then
 

@@ -83,7 +83,7 @@ class ReplayToolBar(QToolBar):
         self.menu.addAction(self.remove)
 
 
-# -- Asks for a few words about a moment and has a worker write them into the recording; removes a bookmark ------------
+# -- Bookmarks of a recording ------------------------------------------------------------------------------------------
 
 class BookmarkWriter(QObject):
     """`written` after the recording has another bookmark, or one less; `failed` says why it has not."""

@@ -139,7 +139,7 @@ class SkeletonMesh:
         return PosedMesh(vertices, normals, np.repeat(bone_knowledge(state.joint_knowledge, near, far), count))
 
 
-# -- The look of knowledge in the scene: measured is solid, inferred translucent, guessed hatched grey -----------------
+# -- Measured, inferred, guessed: how each looks -----------------------------------------------------------------------
 
 Colours = NDArray[np.uint8]
 

@@ -73,7 +73,7 @@ def _unknown(state: HandState) -> HandState:
                    palm_knowledge=Knowledge.UNKNOWN)
 
 
-# -- What lies under the mouse in the scene, and what is known of it in numbers ----------------------------------------
+# -- Tool tips of joints and ellipsoids ---------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 

@@ -114,7 +114,7 @@ def _draw(text: str, style: TextStyle, font: QFont, ratio: float) -> QPixmap:
     return picture
 
 
-# -- The scene's key: which tracker, what solid, translucent and hatched mean, and how large ellipsoids are ------------
+# -- The scene's key ---------------------------------------------------------------------------------------------------
 
 KINDS = (Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED)
 

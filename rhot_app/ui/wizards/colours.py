@@ -113,7 +113,7 @@ class ApartPage(Page):
         return item
 
 
-# -- the pages on which colours are picked and their bounds moved, beside the live mask --------------------------------
+# -- Pages: pick colours and move their bounds -------------------------------------------------------------------------
 
 _SHOWN = (("all", "Mask of all markers"), ("chosen", "Mask of the chosen marker"), ("none", "Picture without mask"))
 

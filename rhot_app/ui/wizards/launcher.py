@@ -156,7 +156,7 @@ def _node_settings(asker: Asker, rig: Rig) -> dict[int, dict[str, Any]]:
     return found
 
 
-# -- earlier versions of the rig file, what was different in them, and a button that brings one back -------------------
+# -- Earlier versions of the rig file ----------------------------------------------------------------------------------
 
 class VersionsDialog(QDialog):
     """`rig_used` gives the rig that was brought back. Bringing back keeps what was there, so it can be undone here."""

@@ -185,7 +185,7 @@ class Track:
 
     @property
     def remembered(self) -> bool:
-        """Is the last sight recent enough to judge candidates by?"""
+        """Is the last observation recent enough to judge candidates by?"""
         return self.missed < MEMORY_FRAMES
 
     def request(self, out: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -207,7 +207,7 @@ class Track:
         return out
 
     def candidate_cost(self, x: float, y: float, area: float) -> float:
-        """How badly a blob of a full search fits the last sight, in squared standard deviations."""
+        """How badly a blob of a full search fits the last observation, in squared standard deviations."""
         gap = self.missed + 1
         reach = self.extent + gap * (3.0 + 0.75 * math.hypot(self.vx, self.vy))
         hold = min(gap, 4)  # a velocity says little after a few frames

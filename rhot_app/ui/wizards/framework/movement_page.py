@@ -82,7 +82,7 @@ class MovementPage(Page):
         self.changed.emit()
 
 
-# -- What every wizard with recorded movements needs: the states, a folder for the logs, and an end that ---------------
+# -- Movements recorded for a wizard -----------------------------------------------------------------------------------
 
 PageT = TypeVar("PageT", bound=MovementPage)
 StepT = TypeVar("StepT", bound=MovementStep)

@@ -61,7 +61,7 @@ class Page(QWidget):
         """A person has clicked or dragged in a picture; px of the frame, a click has no size."""
 
 
-# -- The last page of every wizard: figures before and after side by side, and the way back ----------------------------
+# -- Last page of every wizard: before and after -----------------------------------------------------------------------
 
 HEADS = ("", "before", "after")
 KEPT = ("What is there now is kept, and can be brought back at any time with Calibrate, Bring back an earlier "
@@ -253,7 +253,7 @@ class ChartPage(Page):
         self.charts.show_charts(self._charted.charts)
 
 
-# -- A calibration's verdict: the grade as shape, colour and word, the sentence, each finding with cause and -----------
+# -- A calibration's verdict with its findings -------------------------------------------------------------------------
 
 _SENTENCE_PT = 14.0
 

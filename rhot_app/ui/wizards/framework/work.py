@@ -117,7 +117,7 @@ class Work(QObject):
         self.changed.emit()
 
 
-# -- A thread that looks at the newest pictures for a step and hands over what it has found. No Qt ---------------------
+# -- Thread that has a step look at the newest pictures (no Qt) --------------------------------------------------------
 
 log = logging.getLogger(__name__)
 

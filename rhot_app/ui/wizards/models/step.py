@@ -158,7 +158,7 @@ class ChartedStep(Step):
     charts: tuple[Chart, ...] = ()
 
 
-# -- The step in which the computer works: one task, its report's verdict and charts -----------------------------------
+# -- Step: solve -------------------------------------------------------------------------------------------------------
 
 class SolveStep(ChartedStep):
     """Asks `make_task` for its work whenever it is entered with other input than before; `report` is the result."""
@@ -208,7 +208,7 @@ class SolveStep(ChartedStep):
         return StepView(sentence, done=True, verdict=verdict)
 
 
-# -- The last step of every wizard: before and after, then in force or not, and back again -----------------------------
+# -- Step: accept or restore, the last of every wizard -----------------------------------------------------------------
 
 State = Literal["proposed", "under way", "used", "restored"]
 

@@ -25,7 +25,7 @@ from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_bgr
 from rhot_node.markers import MarkerSet
 
-# -- Camera settings (RHOT 7.1): what each camera is told, tried out live, with a way back. No Qt ----------------------
+# -- Camera settings (RHOT 7.1; no Qt) ---------------------------------------------------------------------------------
 
 Value = float | None
 
@@ -143,7 +143,7 @@ def value_text(control: Control, settings: CameraSettings) -> str:
     return f"{float(value) / control.scale:.{control.decimals}f}{control.unit}"
 
 
-# -- The step in which cameras are set: what is told to whom, what the pictures say to it, what is burnt out -----------
+# -- Step: set the cameras ---------------------------------------------------------------------------------------------
 
 REASON = "camera settings"
 _BURNT, _BLACK = (255, 60, 60), (70, 120, 255)
@@ -202,7 +202,7 @@ class SettingsStep(Step):
         self.cameras = tuple(node.name for node in choices.nodes)
         self._eyes = {node.name: CameraEye(markers) for node in choices.nodes}
         self._ids = {node.name: node.node_id for node in choices.nodes}
-        self._told = dict(choices.before)
+        self._sent = dict(choices.before)
         self._grey: dict[str, Box] = {}
         self._looks: dict[str, Look] = {}
         self._settled_ns: int | None = 0
@@ -210,13 +210,13 @@ class SettingsStep(Step):
 
     def untold(self) -> list[int]:
         """Nodes that go by other settings than were chosen; they are taken as told from now on."""
-        found = [node_id for node_id, settings in self.choices.now.items() if self._told[node_id] != settings]
-        self._told = dict(self.choices.now)
+        found = [node_id for node_id, settings in self.choices.now.items() if self._sent[node_id] != settings]
+        self._sent = dict(self.choices.now)
         if found:
             self._settled_ns = None
         return found
 
-    def note_told(self, now_ns: int) -> None:
+    def note_sent(self, now_ns: int) -> None:
         """The nodes have heard it; pictures that show it come a moment later."""
         self._settled_ns = now_ns + SETTLE_NS
 
@@ -270,7 +270,7 @@ class SettingsStep(Step):
 
     def see(self, pictures: Pictures) -> dict[str, Look]:
         """Advice on each picture."""
-        now, grey = self._told, dict(self._grey)
+        now, grey = self._sent, dict(self._grey)
         return {name: self._eyes[name].look(picture, now[self._ids[name]], grey.get(name))
                 for name, picture in pictures.items() if name in self._eyes}
 

@@ -26,7 +26,7 @@ from rhot_node.detect.image import YuvImage, from_bgr
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerObservation
 
-# -- What the real detector makes of the live pictures: each pixel's marker, and where every marker was found. ---------
+# -- Live detection with masks -----------------------------------------------------------------------------------------
 
 _DIMMED = 150  # alpha of the black over everything that is taken for no marker
 _FAINT = 70  # alpha of a marker's colour where it was not asked for
@@ -66,7 +66,7 @@ class MaskMaker:
         """What every camera's detector finds with `markers`, and why it does not find those that are `asked` for."""
         if markers is not self._markers:
             self._markers, self._detectors, self._drifts, self._explainer = markers, {}, {}, None
-        sights = {}
+        masked = {}
         for name, picture in pictures.items():
             detector = self._detectors.setdefault(name, FastDetector(markers))
             image = from_bgr(picture.bgr)
@@ -74,8 +74,8 @@ class MaskMaker:
             drift = self._drifts.setdefault(name, IlluminantDrift(markers, detector))
             drift.update(image, seen)
             causes = self._causes(detector, image, seen, [marker for marker in asked if marker in markers.ids])
-            sights[name] = MaskedPicture(image, detector.labels(image), seen, drift.report(), causes)
-        return sights
+            masked[name] = MaskedPicture(image, detector.labels(image), seen, drift.report(), causes)
+        return masked
 
     def _causes(self, detector: FastDetector, image: YuvImage, seen: tuple[MarkerObservation, ...],
                 asked: Sequence[str]) -> dict[int, Cause]:
@@ -93,12 +93,12 @@ class MaskMaker:
         return causes
 
 
-def drift_of(sights: MaskedPictures) -> tuple[Finding, ...]:
+def drift_of(masked: MaskedPictures) -> tuple[Finding, ...]:
     """What is to be said of the light."""
-    return drift_findings({name: sight.drift for name, sight in sights.items()})
+    return drift_findings({name: picture.drift for name, picture in masked.items()})
 
 
-def mask_overlay(sight: MaskedPicture, markers: MarkerSet, chosen: int | None) -> Overlay:
+def mask_overlay(picture: MaskedPicture, markers: MarkerSet, chosen: int | None) -> Overlay:
     """The mask over a dimmed picture, every marker in its own colour, those found with a ring and their name.
 
     `chosen`: the only marker that is shown in full; None shows all so.
@@ -107,8 +107,8 @@ def mask_overlay(sight: MaskedPicture, markers: MarkerSet, chosen: int | None) -
     palette[0, 3] = _DIMMED
     for index, marker in enumerate(markers.markers):
         palette[index + 1] = (*marker.display_rgb, 255 if chosen in (None, index) else _FAINT)
-    marks: list[Layer | Dots | Callout] = [Layer(palette[sight.labels])]
-    for number, mark in enumerate(sight.seen):
+    marks: list[Layer | Dots | Callout] = [Layer(palette[picture.labels])]
+    for number, mark in enumerate(picture.seen):
         if mark.found and chosen in (None, mark.index):
             marks.append(Dots(np.array([[mark.x, mark.y]]), "text", radius=3.0))
             further = "" if number < len(markers.markers) else "?"  # something else of the marker's colour
@@ -116,7 +116,7 @@ def mask_overlay(sight: MaskedPicture, markers: MarkerSet, chosen: int | None) -
     return tuple(marks)
 
 
-# -- The step in which a person shows which paint is which marker, and moves the hand until enough of it was -----------
+# -- Step: gather the paints -------------------------------------------------------------------------------------------
 
 Show = Literal["all", "chosen", "none"]
 """Whose mask lies over the pictures."""
@@ -140,7 +140,7 @@ class PickStep(Step):
         self.problem = ""
         self.held: dict[str, Picture] = {}
         self._live: Pictures = {}
-        self._sights: MaskedPictures = {}
+        self._masked: MaskedPictures = {}
         self._maker = MaskMaker()
         self._markers = markers
         self._learnt: dict[str, tuple[int, int]] = {}
@@ -167,9 +167,9 @@ class PickStep(Step):
 
     def take(self, seen: tuple[Pictures, MaskedPictures]) -> None:
         """Gather where markers show something new."""
-        self._live, self._sights = seen
+        self._live, self._masked = seen
         if not self.held:
-            self.gathering.follow({name: sight.image for name, sight in self._sights.items()})
+            self.gathering.follow({name: picture.image for name, picture in self._masked.items()})
         self._learn()
 
     def capture(self) -> bool:
@@ -179,13 +179,13 @@ class PickStep(Step):
 
     def pick(self, camera: str, x: float, y: float, width: float, height: float) -> bool:
         """The chosen marker's paint is there, px of the frame; whether it could be taken. The next one is chosen."""
-        sight = self._sights.get(camera)
-        if sight is None:
+        picture = self._masked.get(camera)
+        if picture is None:
             return False
         click = max(width, height) < _CLICK_PX
         where = (x, y) if click else (round(x), round(y), round(x + width) + 1, round(y + height) + 1)
         try:
-            self.gathering.pick(self.chosen, camera, sight.image, where)
+            self.gathering.pick(self.chosen, camera, picture.image, where)
         except CalibrationError as exc:
             self.problem = str(exc)
             return False
@@ -293,14 +293,14 @@ class PickStep(Step):
             return f"{self._wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z."
         if self.gathering.names and not len(self.gathering.skin):
             return "Pick bare skin too: then it is said whether a marker looks like it."
-        drift = () if self.gathering.names else drift_of(self._sights)
+        drift = () if self.gathering.names else drift_of(self._masked)
         if drift:
             return f"By the rig's colours: {drift[0].figure}"
         if not self.gathering.names:
             return "Space holds the pictures, if your hands are full."
-        unseen = [f"{camera} has not seen {name}: {sight.why(self.base.ids.index(name))}"
-                  for camera, sight in self._sights.items() for name in self.gathering.unseen_by(camera)
-                  if sight.why(self.base.ids.index(name))]
+        unseen = [f"{camera} has not seen {name}: {picture.why(self.base.ids.index(name))}"
+                  for camera, picture in self._masked.items() for name in self.gathering.unseen_by(camera)
+                  if picture.why(self.base.ids.index(name))]
         if unseen:
             return unseen[0]
         missing = [name for name in self.gathering.names if self.gathering.variety(name) < 1.0]
@@ -310,4 +310,4 @@ class PickStep(Step):
         if self.show == "none":
             return {}
         chosen = self.base.ids.index(self.chosen) if self.show == "chosen" and self.chosen != SKIN else None
-        return {name: mask_overlay(sight, self._markers, chosen) for name, sight in self._sights.items()}
+        return {name: mask_overlay(picture, self._markers, chosen) for name, picture in self._masked.items()}

@@ -22,7 +22,7 @@ from rhot_app.ui.wizards.steps.camera_steps import Control
 from rhot_app.ui.wizards.steps.colour_pick import MaskedPictures, MaskMaker, PickStep, Show, drift_of, mask_overlay
 from rhot_node.markers import ChromaModel, MarkerSet
 
-# -- The step in which the learnt bounds of every colour can be moved while the mask shows what passes -----------------
+# -- Step: move the bounds of the colours ------------------------------------------------------------------------------
 
 BOUNDS: tuple[Control, ...] = (
     Control("hue_tolerance_deg", "Hue, either way", "How far a pixel's hue may be from the marker's. Wider bears more "
@@ -55,7 +55,7 @@ class BoundsStep(Step):
         self.markers: MarkerSet = picks.base
         self._revision = -1
         self._undone: list[dict[str, ChromaModel]] = []
-        self._sights: MaskedPictures = {}
+        self._masked: MaskedPictures = {}
         self._maker = MaskMaker()
 
     @property
@@ -67,7 +67,7 @@ class BoundsStep(Step):
         """Other samples, other colours."""
         if self._revision != self.picks.gathering.revision:
             self._revision = self.picks.gathering.revision
-            self.report, self.given, self._undone, self._sights = None, {}, [], {}
+            self.report, self.given, self._undone, self._masked = None, {}, [], {}
             self.markers = self.picks.markers
 
     def task(self) -> Task | None:
@@ -141,7 +141,7 @@ class BoundsStep(Step):
 
     def take(self, seen: MaskedPictures) -> None:
         """What was seen."""
-        self._sights = seen
+        self._masked = seen
 
     def view(self) -> StepView:
         """Look, and move what does not fit."""
@@ -150,13 +150,13 @@ class BoundsStep(Step):
                             "It did not work out." if self.problem else "One moment.", hint=self.problem)
         chosen = self.markers.ids.index(self.chosen) if self.show == "chosen" else None
         overlays = {} if self.show == "none" else {
-            name: mask_overlay(sight, self.markers, chosen) for name, sight in self._sights.items()}
+            name: mask_overlay(picture, self.markers, chosen) for name, picture in self._masked.items()}
         index = self.markers.ids.index(self.chosen)
-        found = [sight.seen[index].found for sight in self._sights.values()]
+        found = [picture.seen[index].found for picture in self._masked.values()]
         hint = f"{self.chosen} is found by {sum(found)} of {len(found)} cameras." if found else ""
-        hint = " ".join([hint, *(f"{name}: {sight.why(index)}" for name, sight in self._sights.items()
-                                 if sight.why(index))])
-        drift = drift_of(self._sights)
+        hint = " ".join([hint, *(f"{name}: {picture.why(index)}" for name, picture in self._masked.items()
+                                 if picture.why(index))])
+        drift = drift_of(self._masked)
         if drift:
             hint = f"Since the colours were picked: {drift[0].sentence}"
         return StepView("The mask must fit the markers.", done=True, hint=hint, overlays=overlays)
@@ -169,7 +169,7 @@ def learning(picks: PickStep, given: dict[str, ChromaModel], title: str) -> Task
                 {"skin": gathering.skin, "base": picks.base, "given": given, "before": gathering.earlier})
 
 
-# -- How far the colours can be told apart: the judged report, its histogram and matrix, and what is proposed ----------
+# -- Step: separability of the colours, and what is proposed -----------------------------------------------------------
 
 REASON = "colour calibration"
 

@@ -118,7 +118,7 @@ def _figure(value: float, decimals: int, unit: str) -> str:
     return f"{value:.{decimals}f} {unit}" if np.isfinite(value) else "–"
 
 
-# -- Jitter and lag of every marker while the hand is held still or moves: for the page, and for the coaches -----------
+# -- Jitter and lag of every marker ------------------------------------------------------------------------------------
 
 _READ_S = 0.25
 _MOST = 0.7  # of the time: a hand may take a moment to come to rest, or to get going
@@ -183,7 +183,7 @@ class _Tally:
         return min(self._so / (_MOST * self._all), 1.0) if self._all else 0.0
 
 
-class _Sight:
+class _Visibility:
     """Which markers both cameras have seen since the recording began."""
 
     def __init__(self, meters: LiveMeters) -> None:
@@ -213,17 +213,17 @@ class StillCoach:
 
     def __init__(self, meters: LiveMeters) -> None:
         self._meters = meters
-        self._still, self._sight = _Tally(), _Sight(meters)
+        self._still, self._visibility = _Tally(), _Visibility(meters)
 
     def watch(self, states: Sequence[HandState]) -> None:
         """See what is new."""
         self._meters.watch(states)
         self._still.add(self._meters.reading, self._meters.speed_m_s <= MOVING_M_S)
-        self._sight.look()
+        self._visibility.look()
 
     def bars(self) -> tuple[Bar, ...]:
         """How much of the time the hand was at rest, and the markers in sight."""
-        return Bar("still", self._still.share, "of the time at rest that is needed"), self._sight.bar()
+        return Bar("still", self._still.share, "of the time at rest that is needed"), self._visibility.bar()
 
     def sentence(self) -> str:
         """Rest it, or go on so."""
@@ -232,7 +232,7 @@ class StillCoach:
 
     def shortfall(self) -> str:
         """That it moved, or what was not seen."""
-        return self._sight.shortfall() if self._still.share >= 1.0 else "The hand moved: rest it on something."
+        return self._visibility.shortfall() if self._still.share >= 1.0 else "The hand moved: rest it on something."
 
 
 class FastCoach:
@@ -240,13 +240,13 @@ class FastCoach:
 
     def __init__(self, meters: LiveMeters) -> None:
         self._meters = meters
-        self._fast, self._sight = _Tally(), _Sight(meters)
+        self._fast, self._visibility = _Tally(), _Visibility(meters)
 
     def watch(self, states: Sequence[HandState]) -> None:
         """See what is new."""
         self._meters.watch(states)
         self._fast.add(self._meters.reading, self._share >= 1.0)
-        self._sight.look()
+        self._visibility.look()
 
     @property
     def _share(self) -> float:
@@ -256,7 +256,7 @@ class FastCoach:
     def bars(self) -> tuple[Bar, ...]:
         """The speed, how much of the time it was enough, and the markers in sight."""
         return (Bar("speed", self._share, f"of {BRISK_M_S:.1f} m/s, the fastest marker of the last two seconds"),
-                Bar("fast", self._fast.share, "of the time at that speed that is needed"), self._sight.bar())
+                Bar("fast", self._fast.share, "of the time at that speed that is needed"), self._visibility.bar())
 
     def sentence(self) -> str:
         """Faster, or go on so."""
@@ -264,7 +264,7 @@ class FastCoach:
 
     def shortfall(self) -> str:
         """That it was slow, or what was not seen."""
-        return self._sight.shortfall() if self._fast.share >= 1.0 else "The hand was too slow."
+        return self._visibility.shortfall() if self._fast.share >= 1.0 else "The hand was too slow."
 
 
 def _text(value: float, decimals: int) -> str:

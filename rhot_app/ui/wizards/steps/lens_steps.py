@@ -140,7 +140,7 @@ class LensShowStep(Step):
                         overlays={self.camera: overlay}, kept=count, passable=count >= FEWEST)
 
 
-# -- What was found about a lens: the solve as a step, with the residuals over the live picture, and the ---------------
+# -- Step: solve for the lens ------------------------------------------------------------------------------------------
 
 REASON = "intrinsics of"
 ARROW_PX = 20.0

@@ -27,7 +27,7 @@ from rhot_app.ui.wizards.models.board_form import BoardStep
 from rhot_app.ui.wizards.models.drawing import Dots, Overlay, board_marks
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
 
-# -- The stereo solve as the solving process runs it: lenses that nobody has calibrated come from the same -------------
+# -- The solve in its own process --------------------------------------------------------------------------------------
 
 def put_together(views: SharedViews, lenses: Sequence[LensStart | None], *, known: KnownLengths,
                  progress: Progress) -> StereoReport:
@@ -42,7 +42,7 @@ def known_lenses(nodes: Sequence[RigNode]) -> list[LensStart | None]:
     return [None if node.intrinsics.nominal else lens_of(node) for node in nodes]
 
 
-# -- The steps that put cameras together: shared captures, the solve, the world on the table. No mathematics -----------
+# -- Steps: captures, solve, world frame (no Qt) -----------------------------------------------------------------------
 
 Views = dict[str, BoardView | None]
 FEWEST = 4  # shots; with fewer the solve refuses
@@ -275,7 +275,7 @@ class TableStep(BoardFinder):
                         kept=int(self.world is not None), passable=not wrong)
 
 
-# -- The rig that a stereo calibration proposes, and its figures beside those in force ---------------------------------
+# -- The proposed rig and its figures ----------------------------------------------------------------------------------
 
 REASON = "stereo calibration"
 

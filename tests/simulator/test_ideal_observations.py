@@ -9,7 +9,7 @@ import pytest
 
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import point_rays
-from rhot_app.simulator.film.ideal_observations import ObservationNoise, sights, spots
+from rhot_app.simulator.film.ideal_observations import ObservationNoise, ideal_observations, spots
 from rhot_app.simulator.film.shot import Shot, make_renderer, make_shot
 from rhot_app.simulator.film.truth import true_object
 from rhot_app.simulator.scene.scene import Scene, make_scene, node_settings, twin_defaults
@@ -31,7 +31,7 @@ def scene(seed: int) -> Scene:
 
 def test_outlines_lead_back_to_the_markers_centres() -> None:
     taken = shot("rest", 1.0)
-    frames, truth = sights(taken, 1, EXACT)
+    frames, truth = ideal_observations(taken, 1, EXACT)
     camera = taken.scene.camera(1)
     true = true_object(taken.scene_object, 1.0, (truth, truth))
     radius = 1e-3 * taken.scene.markers.markers[1].radius_mm
@@ -49,7 +49,7 @@ def test_outlines_lead_back_to_the_markers_centres() -> None:
 
 def test_hidden_parts_are_those_of_the_pictures() -> None:
     taken = shot("cross", 9.0)
-    _, truth = sights(taken, 0)
+    _, truth = ideal_observations(taken, 0)
     renderer = make_renderer(taken, 0)
     chosen = range(0, len(truth.times_s), 12)
     painted = np.array([renderer.radiance(taken.scene_object.source, truth.times_s[k], k)[2].copy() for k in chosen])
@@ -61,7 +61,7 @@ def test_hidden_parts_are_those_of_the_pictures() -> None:
 
 def test_fingertips_are_as_large_as_in_pictures_wherever_they_are_and_however_they_point() -> None:
     taken = shot("fast", 1.0)
-    frames, truth = sights(taken, 0)
+    frames, truth = ideal_observations(taken, 0)
     renderer, detector = make_renderer(taken, 0), make_detector(node_settings(taken.scene, 0))
     width, height = taken.scene.preset.width, taken.scene.preset.height
     ratios = []
@@ -76,7 +76,7 @@ def test_fingertips_are_as_large_as_in_pictures_wherever_they_are_and_however_th
 
 
 def test_what_is_half_hidden_is_said_to_be_and_what_is_hidden_is_lost() -> None:
-    frames, truth = sights(shot("cross", 9.0), 0)
+    frames, truth = ideal_observations(shot("cross", 9.0), 0)
     for markers, parts in zip(frames, truth.visible, strict=True):
         for marker, part in zip(markers, parts, strict=True):
             if part < 0.4:
@@ -98,9 +98,9 @@ def test_noise_is_as_large_as_wanted_and_the_cameras_share_most_of_the_bias() ->
 
 
 def test_one_seed_says_the_same_again() -> None:
-    assert sights(shot("grasp", 0.3), 0)[0] == sights(shot("grasp", 0.3), 0)[0]
+    assert ideal_observations(shot("grasp", 0.3), 0)[0] == ideal_observations(shot("grasp", 0.3), 0)[0]
     other = dataclasses.replace(EXACT, white=0.01)
-    assert sights(shot("grasp", 0.3), 0, other)[0] != sights(shot("grasp", 0.3), 0)[0]
+    assert ideal_observations(shot("grasp", 0.3), 0, other)[0] != ideal_observations(shot("grasp", 0.3), 0)[0]
 
 
 def test_spots_cover_the_disc_evenly() -> None:
@@ -111,11 +111,12 @@ def test_spots_cover_the_disc_evenly() -> None:
 
 def test_a_board_cannot_be_sketched() -> None:
     with pytest.raises(SimulatorError, match="show a hand"):
-        sights(make_shot(scene(1), BoardShow(), 1.0), 0)
+        ideal_observations(make_shot(scene(1), BoardShow(), 1.0), 0)
 
 
 def _offsets(taken: Shot, camera: int, noise: ObservationNoise) -> np.ndarray:
     """(F, 5, 2) px of the fingertips: with noise, less without."""
     def places(one: ObservationNoise) -> np.ndarray:
-        return np.array([[(marker.x, marker.y) for marker in frame[:5]] for frame in sights(taken, camera, one)[0]])
+        frames, _ = ideal_observations(taken, camera, one)
+        return np.array([[(marker.x, marker.y) for marker in frame[:5]] for frame in frames])
     return places(noise) - places(EXACT)
