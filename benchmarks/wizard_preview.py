@@ -22,7 +22,7 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.shared_views import SharedViews, Shot
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import calibrate
 from rhot_app.engine.client import EngineClient
@@ -52,7 +52,7 @@ def shared_views(shots: int) -> SharedViews:
             pixels = cv2.projectPoints(seen, np.zeros(3), np.zeros(3), matrix, LENS[4:])[0].reshape(-1, 2)
             noisy = pixels + NOISE_PX * random.standard_normal(pixels.shape)
             views.append(BoardView(noisy, np.arange(board.count), 640, 480, 20.0, 2.0, f"shot {number}"))
-        taken.append(Shot(f"shot {number}", tuple(views)))
+        taken.append(BoardShot(f"shot {number}", tuple(views)))
     return SharedViews(("left", "right"), board, tuple(taken))
 
 

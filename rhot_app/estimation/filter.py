@@ -186,7 +186,7 @@ JITTER = 1e-9
 
 
 @dataclass(slots=True)
-class Estimate:
+class FilteredState:
     """One instant, s: a state with its covariance (n, n).
 
     `process`: leads on from here. `label`: the caller's own. A covariance may be inflated after its update: the
@@ -200,10 +200,10 @@ class Estimate:
     label: Any = None
 
 
-def smooth(filtered: Sequence[Estimate], count: int | None = None) -> list[Estimate]:
+def smooth(filtered: Sequence[FilteredState], count: int | None = None) -> list[FilteredState]:
     """The first `count` (None: all) of the filtered estimates, in ascending time, by all the observations."""
     count = len(filtered) if count is None else count
-    found: list[Estimate] = []
+    found: list[FilteredState] = []
     state, covariance = np.empty(0), np.empty((0, 0))
     for number in range(len(filtered) - 1, -1, -1):
         here = filtered[number]
@@ -216,7 +216,7 @@ def smooth(filtered: Sequence[Estimate], count: int | None = None) -> list[Estim
     return found[::-1]
 
 
-def _step_back(here: Estimate, after: Estimate, state: Array, covariance: Array) -> tuple[Array, Array]:
+def _step_back(here: FilteredState, after: FilteredState, state: Array, covariance: Array) -> tuple[Array, Array]:
     """Smoothed state and covariance at `here`; `state` and `covariance` are those at `after`.
 
     A later estimate holds no information on what a prediction resets, but a linearised gain would correct it all the
@@ -257,9 +257,9 @@ class ChunkedSmoother:
 
     def __init__(self, chunk_s: float = CHUNK_S, ahead_s: float = AHEAD_S) -> None:
         self._chunk_s, self._ahead_s = chunk_s, ahead_s
-        self._waiting: list[Estimate] = []
+        self._waiting: list[FilteredState] = []
 
-    def add(self, estimate: Estimate) -> list[Estimate]:
+    def add(self, estimate: FilteredState) -> list[FilteredState]:
         """Take the next estimate; returns those that are smoothed with it, mostly none."""
         self._waiting.append(estimate)
         begin_s = self._waiting[0].t_s
@@ -270,7 +270,7 @@ class ChunkedSmoother:
         del self._waiting[:count]
         return found
 
-    def finish(self) -> list[Estimate]:
+    def finish(self) -> list[FilteredState]:
         """The rest. The next estimate begins anew."""
         found, self._waiting = smooth(self._waiting), []
         return found

@@ -61,7 +61,7 @@ class Root(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shape: Shape | None = None
 
 
-class Frame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ArticulatedFrame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One row: Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha) in its parent's frame (Rehg eq. 2.2).
 
     `angle`, if any, times `sign` adds to theta. A frame with a `shape` is a body of its own.
@@ -106,7 +106,7 @@ class Articulated(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     mirror_axis: Literal["x", "y"] = "y"
     length_mm: Size | None = None
     root: Root
-    frames: tuple[Frame, ...]
+    frames: tuple[ArticulatedFrame, ...]
     angles: tuple[Angle, ...] = ()
     points: tuple[Point, ...] = ()
     couplings: tuple[Coupling, ...] = ()
@@ -236,10 +236,11 @@ def _row_names() -> tuple[str, ...]:
     return tuple(f"{name}_{row}" for name in FINGERS for row in (thumb if name == "thumb" else finger))
 
 
-def _frame(name: str, row: DhRow, names: tuple[str, ...], shapes: dict[str, Capsule]) -> Frame:
-    return Frame(name, PALM if row.parent == ROOT else names[row.parent], _degrees(row.theta), _mm(row.d), _mm(row.a),
-                 _degrees(row.alpha), None if row.angle == FIXED else ANGLES[row.angle], 1 if row.sign > 0 else -1,
-                 shapes.get(name))
+def _frame(name: str, row: DhRow, names: tuple[str, ...], shapes: dict[str, Capsule]) -> ArticulatedFrame:
+    return ArticulatedFrame(
+        name, PALM if row.parent == ROOT else names[row.parent], _degrees(row.theta), _mm(row.d), _mm(row.a),
+        _degrees(row.alpha), None if row.angle == FIXED else ANGLES[row.angle], 1 if row.sign > 0 else -1,
+        shapes.get(name))
 
 
 def _points(table: HandTable, names: tuple[str, ...]) -> tuple[Point, ...]:

@@ -19,8 +19,8 @@ from rhot_app.geometry.camera import undistort_point, undistort_points
 from rhot_app.geometry.transforms import fit_rigid, inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
 from rhot_app.objects.motion import (
-    POSE,
     SIZE,
+    TWIST,
     VELOCITY,
     CameraArrays,
     ObjectProcess,
@@ -114,7 +114,7 @@ def find_modes(points: ObjectPoints, cameras: CameraArrays, views: Sequence[Obje
     residuals = [point_residual(points, cameras, view, views[0].t_ns if moving else None) for view in views]
     starts = [start for view in views for start in _tag_starts(points, cameras, view)]
     starts += _triangulated_starts(points, cameras, views)
-    size, priors = (SIZE, [VelocityPrior()]) if moving else (POSE, [])
+    size, priors = (SIZE, [VelocityPrior()]) if moving else (TWIST, [])
     ranked = sorted((_start(residuals, priors, state_of(start), size).cost, number)
                     for number, start in enumerate(starts))
     modes: list[Mode] = []
@@ -249,8 +249,8 @@ def _add(modes: list[Mode], mode: Mode | None) -> None:
 
 def same_pose(state: Array, covariance: Array, other: Array, other_covariance: Array) -> bool:
     """Whether two minima are one: nearer than SAME_POSE standard deviations of either."""
-    step = ObjectProcess().difference(state, other)[:POSE]
-    return bool(min(step @ np.linalg.solve(one[:POSE, :POSE], step)
+    step = ObjectProcess().difference(state, other)[:TWIST]
+    return bool(min(step @ np.linalg.solve(one[:TWIST, :TWIST], step)
                     for one in (covariance, other_covariance)) < SAME_POSE**2)
 
 

@@ -19,7 +19,7 @@ from rhot_node.errors import WireError
 from rhot_node.wire.codec import Seal, decode, decode_sealed, decode_verified, is_tagged
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import Fiducials, MarkerFlag, Message, Observations
-from rhot_node.wire.sequence import SequenceWindow, Verdict
+from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
 from rhot_node.wire.text import parse_text
 
 # -- authentication ----------------------------------------------------------------------------------------------------
@@ -176,7 +176,7 @@ class DatagramValidator:
         if message.session != self._session:
             return "session" if self._session else "not_started"
         verdict = sequence.judge(message.sequence)
-        if verdict is not Verdict.FRESH and verdict is not Verdict.LATE:
+        if verdict is not SequenceVerdict.FRESH and verdict is not SequenceVerdict.LATE:
             return verdict.name.lower()
         if isinstance(message, Observations) and (message.marker_checksum != self._checksum
                                                   or message.marker_count != self._count):

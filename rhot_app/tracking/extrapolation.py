@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, VELOCITY
 from rhot_app.hand.skeleton import JOINT_SLICES
-from rhot_app.objects.motion import POSE, SIZE, ObjectProcess, pose_of
+from rhot_app.objects.motion import SIZE, TWIST, ObjectProcess, pose_of
 from rhot_app.objects.state import ObjectState
 from rhot_app.project import Rig
 from rhot_app.tracking.marker_model import compile_markers, scaled_table
@@ -110,11 +110,11 @@ def _later(one: ObjectState, dt_s: float) -> ObjectState:
     if not one.tracked or dt_s == 0.0:
         return one
     covariance = np.zeros((SIZE, SIZE))
-    covariance[:POSE, :POSE] = one.covariance
+    covariance[:TWIST, :TWIST] = one.covariance
     state, grown = ObjectProcess().predict(np.concatenate([one.world_from_object[:3].ravel(), one.velocity]),
                                            covariance, dt_s)
     return replace(one, t_master_ns=one.t_master_ns + round(1e9 * dt_s), world_from_object=pose_of(state),
-                   covariance=grown[:POSE, :POSE])
+                   covariance=grown[:TWIST, :TWIST])
 
 
 def _grown(covariances: Array, way_m: Array) -> Array:

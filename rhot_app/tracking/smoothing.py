@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rhot_app.estimation.filter import ChunkedSmoother, Estimate, Knot
+from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, Knot
 from rhot_app.hand.motion.hand_process import HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.observations import ObjectFrame
@@ -54,7 +54,7 @@ class Instant:
     scale: tuple[float, float] = (1.0, math.nan)
     process: HandProcess | None = None
     filtered: Knot | None = None
-    estimate: Estimate | None = None
+    estimate: FilteredState | None = None
 
 
 class RecordingEstimator(Estimator):
@@ -165,7 +165,7 @@ class RecordingEstimator(Estimator):
         process = None if instant is None else instant.process
         if instant is not None:
             instant.filtered, instant.t_ns = knot, self._time_ns(knot.t_s)
-        self._conclude(self._smoother.add(Estimate(
+        self._conclude(self._smoother.add(FilteredState(
             knot.t_s, knot.state, knot.covariance, _copied(self._process) if process is None else process, instant)))
 
     def _smooth_buffered(self) -> None:
@@ -173,7 +173,7 @@ class RecordingEstimator(Estimator):
             self._smooth(knot)
         self._buffered = []
 
-    def _conclude(self, estimates: list[Estimate]) -> None:
+    def _conclude(self, estimates: list[FilteredState]) -> None:
         for estimate in estimates:
             if isinstance(estimate.label, Instant):
                 estimate.label.estimate = replace(estimate, label=None)

@@ -34,7 +34,7 @@ PAGES: tuple[tuple[str, str, int, tuple[type[msgspec.Struct], ...]], ...] = (
         object_file.SphereShape, object_file.CylinderShape)),
     ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy, anatomy.Coupling)),
     ("hand.md", articulated.FORMAT, articulated.VERSION, (
-        articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, anatomy.Coupling,
+        articulated.Articulated, articulated.Root, articulated.ArticulatedFrame, articulated.Angle, anatomy.Coupling,
         articulated.Point, articulated.Capsule, articulated.Box)),
     ("node.md", config.FORMAT, config.VERSION, (
         config.NodeSettings, config.CameraSettings, config.TagSettings, config.ClockSettings)),

@@ -59,7 +59,7 @@ class PaintSamples:
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class MarkedPicture:
     """A picture and the markers that are known in it, by name."""
 
     image: YuvImage
@@ -87,7 +87,7 @@ class ColourSamples:
 
     def __init__(self) -> None:
         self._observations: dict[str, list[_Observation]] = {}
-        self._views: list[View] = []
+        self._views: list[MarkedPicture] = []
         self._pictures = 0
         self._last: YuvImage | None = None
         self._detector: FastDetector | None = None
@@ -98,7 +98,7 @@ class ColourSamples:
         return tuple(self._observations)
 
     @property
-    def views(self) -> tuple[View, ...]:
+    def views(self) -> tuple[MarkedPicture, ...]:
         """Pictures that were kept to search the room in."""
         return tuple(self._views)
 
@@ -161,7 +161,7 @@ class ColourSamples:
     def keep_view(self, image: YuvImage) -> None:
         """Keep a picture to search the room in, whether or not it shows a marker that anybody named."""
         if len(self._views) < VIEWS_MOST and all(view.image is not image for view in self._views):
-            self._views.append(View(image))
+            self._views.append(MarkedPicture(image))
 
     def forget(self, name: str) -> None:
         """Drop a marker's samples."""

@@ -54,7 +54,7 @@ class OffsetSearch:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class TimeFit:
     """Times with their covariance (2 C, 2 C) s^2; what is left of the misses (E,) px, misalignment taken off, and their
     derivatives (E, 2 C) px/s."""
 
@@ -95,7 +95,7 @@ def search(model: TimeModel, reference: int = 0) -> tuple[Times, tuple[OffsetSea
 
 
 def fit(model: TimeModel, start: Times, *, reference: int = 0, hold_rows: bool = False,
-        progress: Progress = silent) -> Fit:
+        progress: Progress = silent) -> TimeFit:
     """Improve `start`. `hold_rows`: the nodes' row times are taken for true, only offsets are sought."""
     priors = np.concatenate([np.full(len(model.cameras), _OFFSET_PRIOR_S),
                              np.full(len(model.cameras), _HELD_S if hold_rows else ROW_PRIOR_S)])
@@ -116,7 +116,7 @@ def fit(model: TimeModel, start: Times, *, reference: int = 0, hold_rows: bool =
     system = _System(model, Times.of(vector), nuisance, priors, middle)
     step = system.step()
     left = system.found.miss_px + nuisance @ step[free:]
-    return Fit(Times.of(vector), system.covariance()[:free, :free], left, system.found.miss_slopes)
+    return TimeFit(Times.of(vector), system.covariance()[:free, :free], left, system.found.miss_slopes)
 
 
 class _System:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.observations import ObservationTable
-from rhot_app.calibration.time.fit import Fit, OffsetSearch, fit, search
+from rhot_app.calibration.time.fit import OffsetSearch, TimeFit, fit, search
 from rhot_app.calibration.time.model import TimeModel, Times
 from rhot_app.calibration.time.tracks import build_tracks
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
@@ -99,7 +99,7 @@ def _require_geometry(rig: Rig) -> None:
                                "geometry first, times come after it.")
 
 
-def _rows_agree(model: TimeModel, free: Fit) -> bool:
+def _rows_agree(model: TimeModel, free: TimeFit) -> bool:
     """Whether the nodes' row times may be true: within 3 standard deviations, all together, or too near to matter."""
     cameras = len(model.cameras)
     away = free.times.row_times_s - np.array([camera.row_time_s for camera in model.cameras])
@@ -109,7 +109,7 @@ def _rows_agree(model: TimeModel, free: Fit) -> bool:
     return mahalanobis_sq < 9.0 + 2.0 * cameras
 
 
-def _camera(model: TimeModel, index: int, free: Fit, held: Fit, agree: bool) -> CameraTime:
+def _camera(model: TimeModel, index: int, free: TimeFit, held: TimeFit, agree: bool) -> CameraTime:
     across = _across(model, held, index)
     used, speed = held if agree else free, _rms(across)
     return CameraTime(
@@ -122,7 +122,7 @@ def _camera(model: TimeModel, index: int, free: Fit, held: Fit, agree: bool) -> 
         samples=int(np.count_nonzero(across)), direction=_direction(model, index))
 
 
-def _across(model: TimeModel, found: Fit, index: int) -> Array:
+def _across(model: TimeModel, found: TimeFit, index: int) -> Array:
     """Speeds across the epipolar lines of all samples that tell this camera's time, px/s."""
     slopes = found.slopes[:, index]
     return slopes[np.isfinite(found.left_px) & (slopes != 0.0)]
@@ -136,7 +136,7 @@ def _direction(model: TimeModel, index: int) -> str:
     return "up and down" if abs(line[1]) >= abs(line[0]) else "left and right"
 
 
-def _plot(model: TimeModel, found: OffsetSearch, used: Fit, before: Array) -> TimePlot:
+def _plot(model: TimeModel, found: OffsetSearch, used: TimeFit, before: Array) -> TimePlot:
     slopes = used.slopes[:, found.camera]
     rows = np.flatnonzero(np.isfinite(before) & np.isfinite(used.left_px) & (slopes != 0.0))
     parts = (model.miss_times_s[rows] // _PART_S).astype(int)

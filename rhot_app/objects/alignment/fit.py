@@ -26,7 +26,7 @@ from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import LEAST_DAMPING, Dense, fit_linear, minimise
 from rhot_app.estimation.residual import Rows, student
 from rhot_app.geometry.transforms import best_rotation, rigid, skew
-from rhot_app.objects.alignment.model import GAP_S, ROTATION, TRANSLATION, AlignmentModel, Estimate
+from rhot_app.objects.alignment.model import GAP_S, ROTATION, TRANSLATION, AlignmentEstimate, AlignmentModel
 from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ _ITERATIONS, _CONVERGED = 50, 1e-8
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class AlignmentFit:
     """A solved alignment.
 
     `covariance` (10, 10) or (13, 13), by the noise of the residuals, and `lasting`, by errors that last (LASTING_M), in
@@ -105,14 +105,14 @@ class Fit:
 class OffsetSearch:
     """The start: an estimate, the median residual, m, of each trial offset, and the foreign unit in metres (1: m)."""
 
-    estimate: Estimate
+    estimate: AlignmentEstimate
     offsets_s: Array
     median_m: Array
     scale: float
 
 
 def align(foreign: MotionStream, rig: MotionStream, search_s: float = SEARCH_S,
-          progress: Callable[[str, float], None] = lambda text, part: None) -> tuple[Fit, OffsetSearch]:
+          progress: Callable[[str, float], None] = lambda text, part: None) -> tuple[AlignmentFit, OffsetSearch]:
     """Solve for rig_from_foreign, tracker_from_body and the time offset.
 
     `foreign` has rotations. Raises CalibrationError when the streams are too short or do not overlap. Whether the
@@ -154,7 +154,7 @@ def search(model: AlignmentModel, search_s: float, progress: Callable[[str, floa
     return OffsetSearch(starts[best][0], offsets, median, starts[best][2])
 
 
-def linear_start(model: AlignmentModel, offset_s: float) -> tuple[Estimate, float, float]:
+def linear_start(model: AlignmentModel, offset_s: float) -> tuple[AlignmentEstimate, float, float]:
     """The estimate for a known time offset, its median residual, m, and the scale of the foreign world (1: metres).
 
     P = N z - Q p + k, with N the inverse rotation, is linear in N, p and k; poses add that N turns the body's rotation
@@ -186,12 +186,12 @@ def linear_start(model: AlignmentModel, offset_s: float) -> tuple[Estimate, floa
     body_rotation = np.eye(3)
     if model.poses:
         body_rotation = best_rotation(np.einsum("nji,nkj,nkl->il", device, rotation[None], seen_rotation))
-    estimate = Estimate(rotation, centre, solution[9:12], offset_s, body_rotation)
+    estimate = AlignmentEstimate(rotation, centre, solution[9:12], offset_s, body_rotation)
     median = float(np.sqrt(np.median(np.sum((target - columns @ solution)[:count] ** 2, axis=1))))
     return estimate, median / max(float(sizes[1]), 1e-12), float(np.mean(sizes[:2]))
 
 
-def _rows(model: AlignmentModel, scales: tuple[float, float], estimate: Estimate) -> list[Rows]:
+def _rows(model: AlignmentModel, scales: tuple[float, float], estimate: AlignmentEstimate) -> list[Rows]:
     error, jacobian, turned, by = model.linearise(estimate)
     rows = []
     for each, slopes, scale in ((error, jacobian, scales[0]), (turned, by, scales[1])):
@@ -201,12 +201,12 @@ def _rows(model: AlignmentModel, scales: tuple[float, float], estimate: Estimate
     return rows
 
 
-def _solve(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float]) \
-        -> tuple[Estimate, tuple[float, float]]:
+def _solve(model: AlignmentModel, estimate: AlignmentEstimate, scales: tuple[float, float]) \
+        -> tuple[AlignmentEstimate, tuple[float, float]]:
     """The most probable estimate and the scales of the residuals, m and rad: a Gauss-Newton step, then the scales' next
     iterate, up to their fixed point."""
     for _ in range(_ITERATIONS):
-        start = Dense(estimate, partial(_rows, model, scales), Estimate.moved, model.size)
+        start = Dense(estimate, partial(_rows, model, scales), AlignmentEstimate.moved, model.size)
         found, _ = minimise(start, steps=1, least_gain=0.0, damping=LEAST_DAMPING)
         estimate, before, scales = found.state, scales, _rescaled(model, found.state, scales)
         if start.cost - found.cost < _CONVERGED * model.count and abs(math.log(scales[0] / before[0])) < 1e-4:
@@ -214,7 +214,7 @@ def _solve(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float
     return estimate, scales
 
 
-def _rescaled(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float]) -> tuple[float, float]:
+def _rescaled(model: AlignmentModel, estimate: AlignmentEstimate, scales: tuple[float, float]) -> tuple[float, float]:
     """The scales' next iterate: the weighted mean square over what it is for Gaussian errors."""
     out = []
     for rows, scale in zip(_rows(model, scales, estimate), scales, strict=False):
@@ -224,7 +224,8 @@ def _rescaled(model: AlignmentModel, estimate: Estimate, scales: tuple[float, fl
     return out[0], out[1] if len(out) > 1 else scales[1]
 
 
-def _finished(model: AlignmentModel, estimate: Estimate, scales: tuple[float, float], kept: float) -> Fit:
+def _finished(model: AlignmentModel, estimate: AlignmentEstimate, scales: tuple[float, float],
+              kept: float) -> AlignmentFit:
     rows = _rows(model, scales, estimate)
     covariance, curvature = _covariance(rows, model.size)
     # to a long recording an error of correlation time T is white noise of spectral density 2 T s^2
@@ -235,7 +236,7 @@ def _finished(model: AlignmentModel, estimate: Estimate, scales: tuple[float, fl
     error, jacobian, _, _ = model.linearise(estimate)
     (_, _, device, _), (places, _, _, _) = model.sampled(estimate.offset_s)
     inlier = np.sum(rows[0].error.reshape(-1, 3) ** 2, axis=1) < INLIER_GATE
-    return Fit(
+    return AlignmentFit(
         rigid(estimate.rotation, estimate.centre - offset), rigid(estimate.body, estimate.point), estimate.offset_s,
         change @ covariance @ change.T, change @ lasting @ change.T, estimate.centre,
         (covariance + lasting)[TRANSLATION, TRANSLATION], scales[0], scales[1] if model.poses else math.nan, error,

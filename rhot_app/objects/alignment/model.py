@@ -28,7 +28,7 @@ GAP_S = 0.04
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class AlignmentEstimate:
     """The unknowns: `rotation` (3, 3) rig_from_foreign; `centre` (3,) m, where the rig sees the foreign point
     `AlignmentModel.centre`; `point` (3,) m and `body` (3, 3), tracker_from_body; `offset_s`, rig less foreign clock."""
 
@@ -38,11 +38,11 @@ class Estimate:
     offset_s: float
     body: Array
 
-    def moved(self, step: Array) -> Estimate:
+    def moved(self, step: Array) -> AlignmentEstimate:
         """After a step (10,) or (13,) in the order of the covariance."""
         body = self.body @ exp_so3(step[BODY]) if len(step) > 10 else self.body
-        return Estimate(exp_so3(step[ROTATION]) @ self.rotation, self.centre + step[TRANSLATION],
-                        self.point + step[POINT], self.offset_s + float(step[9]), body)
+        return AlignmentEstimate(exp_so3(step[ROTATION]) @ self.rotation, self.centre + step[TRANSLATION],
+                                 self.point + step[POINT], self.offset_s + float(step[9]), body)
 
 
 class AlignmentModel:
@@ -83,7 +83,7 @@ class AlignmentModel:
                             (self._times, self._times + offset_s))
         return self.foreign.at(foreign_s), self.rig.at(rig_s)
 
-    def linearise(self, estimate: Estimate) -> tuple[Array, Array, Array, Array]:
+    def linearise(self, estimate: AlignmentEstimate) -> tuple[Array, Array, Array, Array]:
         """Errors (N, 3) m with their Jacobian (N, 3, n), then rotation errors (N, 3) rad with theirs; N = 0 without
         poses. A Jacobian is that of the predicted value: minus that of the error."""
         (place, speed, device, turning), (seen, seen_speed, seen_rotation, seen_turning) = self.sampled(

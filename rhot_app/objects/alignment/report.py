@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
-from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S, STEP_S, Fit, OffsetSearch, align
+from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S, STEP_S, AlignmentFit, OffsetSearch, align
 from rhot_app.objects.alignment.model import OFFSET, POINT, ROTATION
 from rhot_app.objects.alignment.motion_stream import MotionStream
 
@@ -62,7 +62,7 @@ class AlignmentReport:
     `offset_sd_s`. `scale`: size of the foreign world in the rig's metres.
     """
 
-    fit: Fit
+    fit: AlignmentFit
     coverage: Coverage
     covariance: Array
     place_sd_m: float
@@ -81,7 +81,7 @@ def calibrate_alignment(foreign: MotionStream, rig: MotionStream, search_s: floa
     return judge_alignment(fit, search)
 
 
-def judge_alignment(fit: Fit, search: OffsetSearch) -> AlignmentReport:
+def judge_alignment(fit: AlignmentFit, search: OffsetSearch) -> AlignmentReport:
     """The report on a fit and the search that it began with."""
     coverage, covariance = coverage_of(fit), fit.covariance + fit.lasting
     place, turn, point, offset = (math.sqrt(max(float(np.trace(block)), 0.0)) for block in (
@@ -100,7 +100,7 @@ def judge_alignment(fit: Fit, search: OffsetSearch) -> AlignmentReport:
                            judge(summary, findings))
 
 
-def coverage_of(fit: Fit) -> Coverage:
+def coverage_of(fit: AlignmentFit) -> Coverage:
     """The motion that the inliers show."""
     return coverage_of_motion(fit.device[fit.inlier], fit.places[fit.inlier], fit.velocity[fit.inlier])
 
@@ -136,7 +136,7 @@ def _rotation(coverage: Coverage) -> list[Finding]:
                     "Turn the tracker about a second axis as well.")]
 
 
-def _translation(coverage: Coverage, fit: Fit) -> list[Finding]:
+def _translation(coverage: Coverage, fit: AlignmentFit) -> list[Finding]:
     """A lasting error e turns the alignment by e / spread; about the longest axis by e over that of the other two."""
     if fit.poses:
         return []
@@ -154,7 +154,7 @@ def _translation(coverage: Coverage, fit: Fit) -> list[Finding]:
     return []
 
 
-def _time(coverage: Coverage, offset_sd_s: float, fit: Fit) -> list[Finding]:
+def _time(coverage: Coverage, offset_sd_s: float, fit: AlignmentFit) -> list[Finding]:
     """A lasting error e shifts the offset by e / speed."""
     total = max(offset_sd_s, LASTING_M / max(coverage.speed_m_s, 1e-9))
     grade = _grade(total * FAST_M_S)
@@ -165,7 +165,7 @@ def _time(coverage: Coverage, offset_sd_s: float, fit: Fit) -> list[Finding]:
                     f"Move faster: {1e3 * LASTING_M * FAST_M_S / FAIR_M:.0f} mm/s rms, such as 20 cm once a second.")]
 
 
-def _match(fit: Fit, search: OffsetSearch) -> list[Finding]:
+def _match(fit: AlignmentFit, search: OffsetSearch) -> list[Finding]:
     """Whether the two streams are of one rigid thing, in the same units."""
     found = []
     scale = abs(search.scale - 1.0)
@@ -187,7 +187,7 @@ def _match(fit: Fit, search: OffsetSearch) -> list[Finding]:
     return found
 
 
-def _search(search: OffsetSearch, fit: Fit) -> list[Finding]:
+def _search(search: OffsetSearch, fit: AlignmentFit) -> list[Finding]:
     best = int(np.argmin(search.median_m))
     usable = np.flatnonzero(np.isfinite(search.median_m))
     if best in (usable[0], usable[-1]):

@@ -54,7 +54,7 @@ ORDINARY = ObservationNoise()
 
 
 def ideal_observations(shot: Shot, index: int,
-           noise: ObservationNoise = ORDINARY) -> tuple[list[list[MarkerObservation]], FrameTruth]:
+                       noise: ObservationNoise = ORDINARY) -> tuple[list[list[MarkerObservation]], FrameTruth]:
     """What camera `index` says of every frame, and what was visible. Raises SimulatorError when no hand is shown."""
     body = shot.scene_object.thing
     if not isinstance(body, HandBody):

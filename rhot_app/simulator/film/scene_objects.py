@@ -18,7 +18,7 @@ from rhot_app.objects.object_file import ObjectModel, save_object
 from rhot_app.project import RigObject
 from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter
 from rhot_app.simulator.bare_hand.sequence import BareHandOptions, drawn_hand
-from rhot_app.simulator.render.body import HandBody, Look, build_body
+from rhot_app.simulator.render.body import Appearance, HandBody, build_body
 from rhot_app.simulator.render.held_painter import HeldPainter, held_cube
 from rhot_app.simulator.render.painter import Image, Painter, PoseSource
 from rhot_app.simulator.render.sheet import Sheet, board_sheet, ruler_sheet
@@ -65,7 +65,7 @@ def make_object(show: Show, scene: Scene, hidden: frozenset[str] = frozenset()) 
     match show:
         case HandShow():
             model, motion, settings = *_moved_hand(show.motion, scene), scene.settings
-            look = Look(settings.worn_paint, settings.uneven_paint, settings.glove_rgb, scene.seed)
+            look = Appearance(settings.worn_paint, settings.uneven_paint, settings.glove_rgb, scene.seed)
             return SceneObject(motion.name, build_body(model, scene.markers, hidden, look), motion,
                                held_cube() if show.cube else None)
         case BareHandShow():

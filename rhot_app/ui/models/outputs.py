@@ -34,7 +34,7 @@ JOINT_SETS: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class OutputKind:
     """A kind of output: its name, who listens, what its target means, and one that works on this computer."""
 
     title: str
@@ -46,18 +46,18 @@ class Kind:
 
 _LISTEN: Final = "[HOST:]PORT to listen on. 127.0.0.1 is this computer only; 0.0.0.0 lets others in"
 KINDS: Final = {
-    "osc": Kind("OSC", "Messages by UDP, for Unity, Blender, Unreal, TouchDesigner, Max, Pure Data.",
-                "HOST:PORT of the program that listens.", "127.0.0.1:9000"),
-    "vmc": Kind("VMC", "Finger bones for avatars: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace.",
-                "HOST:PORT of the program that listens; most take 39539.", "127.0.0.1:39539"),
-    "ws": Kind("JSON over WebSocket", "Programs connect to this port and get every state as JSON.",
-               f"{_LISTEN}, unencrypted.", "127.0.0.1:9001", "on"),
-    "web": Kind("Web view", "A page that shows the hand in browsers and headsets.", f"{_LISTEN}, by HTTPS.",
-                f"127.0.0.1:{WEB_PORT}", "on"),
-    "lsl": Kind("Lab Streaming Layer", "LabRecorder and others find the streams by name.",
-                "Name of the streams; RHOT when empty.", "", "as"),
-    "zenoh": Kind("Zenoh", "JSON under the key rhot/state, for robots and ROS 2.",
-                  "HOST:PORT of a router; when empty, whoever is found on the network.", "", "by"),
+    "osc": OutputKind("OSC", "Messages by UDP, for Unity, Blender, Unreal, TouchDesigner, Max, Pure Data.",
+                      "HOST:PORT of the program that listens.", "127.0.0.1:9000"),
+    "vmc": OutputKind("VMC", "Finger bones for avatars: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace.",
+                      "HOST:PORT of the program that listens; most take 39539.", "127.0.0.1:39539"),
+    "ws": OutputKind("JSON over WebSocket", "Programs connect to this port and get every state as JSON.",
+                     f"{_LISTEN}, unencrypted.", "127.0.0.1:9001", "on"),
+    "web": OutputKind("Web view", "A page that shows the hand in browsers and headsets.", f"{_LISTEN}, by HTTPS.",
+                      f"127.0.0.1:{WEB_PORT}", "on"),
+    "lsl": OutputKind("Lab Streaming Layer", "LabRecorder and others find the streams by name.",
+                      "Name of the streams; RHOT when empty.", "", "as"),
+    "zenoh": OutputKind("Zenoh", "JSON under the key rhot/state, for robots and ROS 2.",
+                        "HOST:PORT of a router; when empty, whoever is found on the network.", "", "by"),
 }
 _HOSTS: Final = {"osc": None, "vmc": None, "ws": "127.0.0.1", "zenoh": None}
 """Kinds whose target is HOST:PORT; the host that a port alone means."""
@@ -115,9 +115,9 @@ class SendRates:
         return 1e9 * (last - first) / (end_ns - begin_ns)
 
 
-def kind_of(name: str) -> Kind:
+def kind_of(name: str) -> OutputKind:
     """The words for a kind; a plug-in has its own name."""
-    return KINDS.get(name) or Kind(name, f"The installed plug-in {name}.")
+    return KINDS.get(name) or OutputKind(name, f"The installed plug-in {name}.")
 
 
 def title_of(settings: OutputSettings) -> str:

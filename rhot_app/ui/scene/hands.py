@@ -73,7 +73,7 @@ def _unknown(state: HandState) -> HandState:
                    palm_knowledge=Knowledge.UNKNOWN)
 
 
-# -- Tool tips of joints and ellipsoids ---------------------------------------------------------------------------------
+# -- Tool tips of joints and ellipsoids --------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 

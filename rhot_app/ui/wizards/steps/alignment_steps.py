@@ -110,7 +110,7 @@ class SourceStep(Step):
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class StreamRecording:
     """A movement of both: the other tracker's `foreign` poses (N, 4, 4) m at `foreign_s` (N,) s, and `places` (M, 3) m
     of the marker in the rig at `rig_s` (M,) s, both by the master's clock. Equal only to itself."""
 
@@ -146,7 +146,7 @@ class TogetherStep(Step):
         self.marker = self.markers.index("index") if "index" in self.markers else 0
         self.seconds = SECONDS
         self.phase: Phase = "waiting"
-        self.recording: Recording | None = None
+        self.recording: StreamRecording | None = None
         self.problem = ""
         self._recent, self._now_ns = recent, now_ns
         self._began_ns = self._ended_ns = 0
@@ -193,13 +193,13 @@ class TogetherStep(Step):
                 self._places.append((state.t_master_ns, np.array(place)))
                 last_ns = state.t_master_ns
 
-    def _recorded(self, now_ns: int) -> Recording:
+    def _recorded(self, now_ns: int) -> StreamRecording:
         # the other clock may be off by as much as is searched
         poses = self.feed.between(self._began_ns - round(1e9 * SEARCH_S), now_ns)
-        return Recording(np.array([1e-9 * (pose.t_master_ns - self._began_ns) for pose in poses]),
-                         np.array([pose.world_from_body for pose in poses]).reshape(-1, 4, 4),
-                         np.array([1e-9 * (t_ns - self._began_ns) for t_ns, _ in self._places]),
-                         np.array([place for _, place in self._places]).reshape(-1, 3))
+        return StreamRecording(np.array([1e-9 * (pose.t_master_ns - self._began_ns) for pose in poses]),
+                               np.array([pose.world_from_body for pose in poses]).reshape(-1, 4, 4),
+                               np.array([1e-9 * (t_ns - self._began_ns) for t_ns, _ in self._places]),
+                               np.array([place for _, place in self._places]).reshape(-1, 3))
 
     def view(self) -> StepView:
         """Coverage and what is missing."""
@@ -258,7 +258,7 @@ class AlignmentResult:
     drift: Drift | None
 
 
-def solve_recording(recording: Recording, before: Alignment | None, *, progress: Progress) -> AlignmentResult:
+def solve_recording(recording: StreamRecording, before: Alignment | None, *, progress: Progress) -> AlignmentResult:
     """What ``rhot calibrate alignment`` does with two files. Raises CalibrationError as `align` does."""
     foreign = MotionStream.of_poses(recording.foreign_s, recording.foreign)
     rig = MotionStream(recording.rig_s, recording.places)

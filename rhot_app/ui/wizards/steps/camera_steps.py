@@ -155,7 +155,7 @@ _GREY_PX = 24  # a click on grey paper is a box of this side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class PictureAdvice:
     """What one picture says: the advice, the `problem` of a grey patch that is none, and what to draw."""
 
     received_ns: int
@@ -173,7 +173,7 @@ class CameraEye:
         self._advisor = CameraAdvisor()
         self._settings: CameraSettings | None = None
 
-    def look(self, picture: Picture, settings: CameraSettings, grey: Box | None) -> Look:
+    def look(self, picture: Picture, settings: CameraSettings, grey: Box | None) -> PictureAdvice:
         """The advice on a picture that was taken with `settings`."""
         if settings != self._settings:
             self._advisor.restart()
@@ -188,7 +188,7 @@ class CameraEye:
             advice = self._advisor.update(image, t_s, settings, masks, grey)
         except CalibrationError as exc:
             advice, problem = self._advisor.update(image, t_s, settings, masks), str(exc)
-        return Look(picture.received_ns, advice, _overlay(image, grey), problem)
+        return PictureAdvice(picture.received_ns, advice, _overlay(image, grey), problem)
 
 
 class SettingsStep(Step):
@@ -204,7 +204,7 @@ class SettingsStep(Step):
         self._ids = {node.name: node.node_id for node in choices.nodes}
         self._sent = dict(choices.before)
         self._grey: dict[str, Box] = {}
-        self._looks: dict[str, Look] = {}
+        self._looks: dict[str, PictureAdvice] = {}
         self._settled_ns: int | None = 0
         self._problem = ""
 
@@ -268,13 +268,13 @@ class SettingsStep(Step):
         """Whether anything was changed."""
         return bool(self.choices.changed)
 
-    def see(self, pictures: Pictures) -> dict[str, Look]:
+    def see(self, pictures: Pictures) -> dict[str, PictureAdvice]:
         """Advice on each picture."""
         now, grey = self._sent, dict(self._grey)
         return {name: self._eyes[name].look(picture, now[self._ids[name]], grey.get(name))
                 for name, picture in pictures.items() if name in self._eyes}
 
-    def take(self, seen: dict[str, Look]) -> None:
+    def take(self, seen: dict[str, PictureAdvice]) -> None:
         """The newest advice."""
         self._looks = {**self._looks, **seen}
         for name, look in seen.items():
