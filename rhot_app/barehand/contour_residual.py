@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, follow
-from rhot_app.barehand.surface import PALM, SHAPE, Surface
+from rhot_app.barehand.surface import FOREARM, SHAPE, Surface
 from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.hand.limits import LIMIT_SD_RAD
 from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE
@@ -32,8 +32,8 @@ RADIUS_SD = 0.08
 MISSED = np.array([0.1, 0.4])
 """Probability that a silhouette, or an edge within the hand, is no edge of the image."""
 
-GROUPS = PALM + 1
-"""Fingers and palm."""
+GROUPS = FOREARM + 1
+"""Fingers, palm and forearm."""
 
 DEGREES = 4.0
 """Of freedom, of Student's distribution of edges about the contour (Lange, Little and Taylor 1989)."""
@@ -50,7 +50,7 @@ class ContourFrame:
     """Implements `estimation.residual.Residual`: one camera's slices, the edges on them, and where the contour is.
 
     `slices` (K, 5) as `find_edges` takes them; `expected_sd` (K,) px: of the contour along each slice. `seen`
-    (GROUPS, 2): of each finger and the palm, the slices whose contour was found, and all, when last linearised.
+    (GROUPS, 2): of each finger, the palm and the forearm, the slices whose contour was found, and all, when last linearised.
     """
 
     def __init__(self, surface: Surface, points: ContourPoints, pose: Array, intrinsics: Array, slices: Array,

@@ -15,7 +15,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.surface import FOREARM, SHAPE, Surface, meet, place_capsules
+from rhot_app.barehand.surface import (
+    FOREARM,
+    FOREARM_TURN,
+    LENGTH,
+    SHAPE,
+    WHOLE,
+    Surface,
+    meet,
+    place_capsules,
+    radius_number,
+)
 from rhot_app.geometry.camera import distort
 from rhot_app.tracking.hand_process import ANGLES, POSE, VELOCITY
 
@@ -146,8 +156,6 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
     used = 0
     e1, e2 = np.empty(3), np.empty(3)
     for k in range(count):
-        if surface.group[k] == FOREARM:
-            continue
         c0, c1, r0, r1 = centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1]
         for kind in range(4):
             straight = kind < 2
@@ -326,7 +334,7 @@ def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along,
             g[i] = (across[0] * slope[0, i] + across[1] * slope[1, i]) / turned
         widths[s] = r * (g[0] * n[0] + g[1] * n[1] + g[2] * n[2])
         _point_row(surface, world, frames, k, c, px, py, pz, g, size, rows[s])
-        rows[s, POSE + 2] = widths[s]
+        rows[s, POSE + radius_number(surface, k)] = widths[s]
         if late_s[s] != 0.0:
             for j in range(POSE):
                 offset[s] += late_s[s] * rows[s, j] * state[VELOCITY + j]
@@ -340,20 +348,17 @@ def _point_row(surface, world, frames, k, axis, px, py, pz, g, size, row):
     lx, ly, lz = px - world[0, 3], py - world[1, 3], pz - world[2, 3]
     row[0], row[1], row[2] = g[0], g[1], g[2]
     row[3], row[4], row[5] = ly * g[2] - lz * g[1], lz * g[0] - lx * g[2], lx * g[1] - ly * g[0]
-    row[POSE] = g[0] * lx + g[1] * ly + g[2] * lz
-    at = surface.row[k]
-    if at >= 0:  # from the bone's beginning to the axis point
-        f = frames[at]
-        length = dh.a[at] * math.exp(size[0] + size[1])
-        for i in range(3):
-            row[POSE + 1] += g[i] * (axis[i] - (f[i, 3] - length * f[i, 0]))
-    first = True
+    row[POSE + WHOLE] = g[0] * lx + g[1] * ly + g[2] * lz
+    if surface.group[k] == FOREARM:
+        _forearm_row(world, size, lx, ly, lz, g, row)
+    at, first = surface.row[k], True
     while at >= 0:
-        parent = dh.parent[at]
-        if not first and surface.bone[at] > 0.0:
-            length = dh.a[at] * math.exp(size[0] + size[1])
+        parent, bone = dh.parent[at], surface.bone[at]
+        if bone >= 0:  # from its beginning to its end, or to the axis point
+            f, length = frames[at], dh.a[at] * math.exp(size[WHOLE] + size[LENGTH + bone])
             for i in range(3):
-                row[POSE + 1] += g[i] * length * frames[at, i, 0]
+                way = axis[i] - (f[i, 3] - length * f[i, 0]) if first else length * f[i, 0]
+                row[POSE + LENGTH + bone] += g[i] * way
         first = False
         if dh.angle[at] >= 0:
             base = world if parent < 0 else frames[parent]
@@ -363,3 +368,23 @@ def _point_row(surface, world, frames, k, axis, px, py, pz, g, size, row):
             row[6 + dh.angle[at]] += (g[0] * (ay * rz - az * ry) + g[1] * (az * rx - ax * rz)
                                       + g[2] * (ax * ry - ay * rx))
         at = parent
+
+
+@njit(cache=True)
+def _forearm_row(world, shape, lx, ly, lz, g, row):
+    """Fill the columns of the forearm's rotation: of a point at (lx, ly, lz) from the wrist, world axes. The derivative
+    of R(w) e is -[R e]x J, with the left Jacobian J of the rotations (Sola 2018, eq. 145)."""
+    p, n, w = np.empty(3), np.empty(3), shape[FOREARM_TURN:FOREARM_TURN + 3]
+    for i in range(3):  # in the palm's frame
+        p[i] = world[0, i] * lx + world[1, i] * ly + world[2, i] * lz
+        n[i] = world[0, i] * g[0] + world[1, i] * g[1] + world[2, i] * g[2]
+    mx, my, mz = p[1] * n[2] - p[2] * n[1], p[2] * n[0] - p[0] * n[2], p[0] * n[1] - p[1] * n[0]
+    angle = math.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
+    a = math.sin(angle) / angle if angle > 1e-6 else 1.0
+    b = (1.0 - a) / angle**2 if angle > 1e-3 else 1.0 / 6.0
+    c = (1.0 - math.cos(angle)) / angle**2 if angle > 1e-6 else 0.5
+    dot = b * (w[0] * mx + w[1] * my + w[2] * mz)
+    first = POSE + FOREARM_TURN
+    row[first] = a * mx + dot * w[0] + c * (my * w[2] - mz * w[1])
+    row[first + 1] = a * my + dot * w[1] + c * (mz * w[0] - mx * w[2])
+    row[first + 2] = a * mz + dot * w[2] + c * (mx * w[1] - my * w[0])

@@ -21,7 +21,7 @@ from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search, silhouettes
 from rhot_app.barehand.start import STEP, Found, find_hand
-from rhot_app.barehand.surface import PALM, SHAPE, surface_of
+from rhot_app.barehand.surface import FOREARM, LENGTH, PALM, RADIUS, SHAPE, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Residual
@@ -65,12 +65,22 @@ PASSES, START_PASSES = 2, 5
 """Searches of an image, and of one in which the hand is not where it was expected. Each halves how far from the contour
 an edge may be."""
 
-SIZE_SD = 0.1, 0.05, 0.08
-"""Standard deviations of a hand whose size is unknown: logarithms of its length, of its fingers' part of it, and of
-its thickness beyond that, in adults (`tracking.hand_size`; Buryanov and Kotiuk 2010)."""
+SIZE_SD = 0.1
+"""Standard deviation of the logarithm of a hand's size, in adults, where it is unknown (`tracking.hand_size`)."""
 
-SIZE_S = 1e3
-"""s: correlation time of the size. It does not change; what the surface model has wrong of it does."""
+LENGTH_SD, RADIUS_SD, FOREARM_SD = 0.05, 0.08, 0.2
+"""Standard deviations of the logarithms of a phalanx's length and of the radii of phalanges and palm, in hands of one
+size (Buryanov and Kotiuk 2010), and of the forearm's radius, with or without a sleeve."""
+
+TURN_SD = 0.0, 0.5, 0.25
+"""rad: standard deviations of the forearm's rotation about its own axis, of flexion and of deviation of the wrist:
+a third of their ranges (Ryu et al. 1991: 78 and 60 degrees of flexion and extension, 21 and 38 of deviation)."""
+
+SHAPE_S, TURN_S = 1e3, 0.3
+"""s: correlation times of the hand's shape, which does not change, and of the forearm's rotation, which moves as the
+hand does (`hand_process.SLOWEST`)."""
+
+CONSIDERED = MOTION + np.arange(LENGTH, RADIUS)
 
 DRAWS = 100, 4, 10
 """Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
@@ -99,8 +109,8 @@ class Fit:
 
     @property
     def support(self) -> Array:
-        """(GROUPS,) part of the contour that was found, of all cameras together; NaN where none is expected."""
-        total = self.seen.sum(axis=0)
+        """(6,) part of the contour of fingers and palm that was found, of all cameras together; NaN where none is expected."""
+        total = self.seen[:, :FOREARM].sum(axis=0)
         return np.asarray(total[:, 0] / np.where(total[:, 1] > 0.0, total[:, 1], np.nan))
 
 
@@ -122,11 +132,13 @@ class BareHandTracker:
         self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
         natural = self.model.natural
-        size = np.diag(np.square(SIZE_SD)) if not known_size else np.zeros((SHAPE, SHAPE))
+        spread = np.concatenate([[0.0 if known_size else SIZE_SD, RADIUS_SD, FOREARM_SD], np.full(15, LENGTH_SD),
+                                 np.full(15, RADIUS_SD), TURN_SD]).reshape(-1, 3)
         self.process = HandProcess(self.surface.dh, self.model.limits, natural.mean,
                                    np.asarray(np.linalg.inv(natural.information)), PALM_SPREAD, np.full(3, FASTEST),
-                                   FASTEST, size[None], SIZE_S)
-        self.filter = IteratedFilter(self.process)
+                                   FASTEST, np.square(spread)[:, :, None] * np.eye(3),
+                                   np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S))
+        self.filter = IteratedFilter(self.process, considered=CONSIDERED)
         self._limits = JointLimits(self.model.limits)
         self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
@@ -218,7 +230,7 @@ class BareHandTracker:
                       for camera, image in images.items()]
             residuals = [*frames, self._limits, *extra]
             if number < passes - 1:
-                initial = state = update(self.process, t_s, prediction, residuals, initial).state
+                initial = state = update(self.process, t_s, prediction, residuals, initial, CONSIDERED).state
         return self.filter.add(t_s, residuals, prediction, initial)
 
     def _silhouettes(self, images: dict[int, Image]) -> Silhouettes | None:

@@ -19,6 +19,9 @@ from scipy.linalg import cho_factor, cho_solve
 from rhot_app.estimation.residual import Process, Residual, stack
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+NONE: Indices = np.empty(0, np.int64)
 
 ITERATIONS = 3
 """Gauss-Newton steps of an update, at most."""
@@ -45,8 +48,10 @@ class Knot:
 class IteratedFilter:
     """The newest knots of an estimate."""
 
-    def __init__(self, process: Process, knots: int = KNOTS) -> None:
+    def __init__(self, process: Process, knots: int = KNOTS, considered: Sequence[int] = ()) -> None:
+        """`considered`: see `update`."""
         self.process, self._most = process, knots
+        self._considered = np.array(considered, dtype=np.int64)
         self.knots: list[Knot] = []
 
     @property
@@ -75,25 +80,26 @@ class IteratedFilter:
         if place == 0:
             oldest = self.knots[0]
             prior = oldest.state, oldest.covariance
-            self.knots[0] = update(self.process, oldest.t_s, prior, residuals)
+            self.knots[0] = update(self.process, oldest.t_s, prior, residuals, None, self._considered)
             place = 1
         else:
             prior = self.predict(t_s) if prediction is None else prediction
-            self.knots.insert(place, update(self.process, t_s, prior, residuals, initial))
+            self.knots.insert(place, update(self.process, t_s, prior, residuals, initial, self._considered))
             place += 1
         added = self.knots[place - 1]
         for later in range(place, len(self.knots)):
             before, knot = self.knots[later - 1], self.knots[later]
             prior = self.process.predict(before.state, before.covariance, knot.t_s - before.t_s)
-            self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals)
+            self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals, None, self._considered)
         del self.knots[:-self._most]
         return added
 
 
 def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: Sequence[Residual],
-           initial: Array | None = None) -> Knot:
+           initial: Array | None = None, considered: Indices = NONE) -> Knot:
     """The posterior of a `prior` (state, covariance) and residuals. The first step begins at the state `initial`, or at
-    the prior's.
+    the prior's. Numbers of the tangent space that are `considered` are not estimated: they stay as the prior has them,
+    and their uncertainty counts (Schmidt 1966).
 
     `away` is the present state less the prior's, in the tangent space of the present state.
     """
@@ -112,11 +118,14 @@ def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: 
             continue
         before = cost + distance
         cross, root, reached, distance, moved = _solve(covariance, jacobian, error, variances, away)
+        reached[considered] = 0.0
         last = (state, reached - away)
         state, away = process.retract(state, reached - away), reached
         if iteration and moved < CONVERGED**2:
             break
-    return Knot(t_s, state, _reduce(covariance, cross, root), list(residuals), weights)
+    posterior = _reduce(covariance, cross, root)
+    posterior[np.ix_(considered, considered)] = covariance[np.ix_(considered, considered)]
+    return Knot(t_s, state, posterior, list(residuals), weights)
 
 
 @njit(cache=True)
