@@ -275,11 +275,10 @@ def _behind(surface, centres, radii, o, px, py, pz, n):
 
 
 @njit(cache=True)
-def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, widths,
-           good):
+def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good):
     """How the contour crosses K slices at `state`: fill `offset` (K,) px along each slice's normal from its centre
-    `pixel` (K, 2), `rows` (K, COLUMNS) its derivative by pose and size, `widths` (K,) that by the logarithm of the
-    capsule's radius, and `good` (K,). `late_s` (K,): a slice's time less the state's."""
+    `pixel` (K, 2), `rows` (K, COLUMNS) its derivative by pose and shape, and `good` (K,). `late_s` (K,): a slice's time
+    less the state's."""
     world, frames = np.eye(4), np.empty((surface.dh.parent.shape[0], 3, 4))
     world[:3] = state[:ANGLES].reshape(3, 4)
     count = surface.row.shape[0]
@@ -332,9 +331,8 @@ def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along,
         offset[s] = (across[0] * (at[0] - pixel[s, 0]) + across[1] * (at[1] - pixel[s, 1])) / turned
         for i in range(3):
             g[i] = (across[0] * slope[0, i] + across[1] * slope[1, i]) / turned
-        widths[s] = r * (g[0] * n[0] + g[1] * n[1] + g[2] * n[2])
         _point_row(surface, world, frames, k, c, px, py, pz, g, size, rows[s])
-        rows[s, POSE + radius_number(surface, k)] = widths[s]
+        rows[s, POSE + radius_number(surface, k)] = r * (g[0] * n[0] + g[1] * n[1] + g[2] * n[2])
         if late_s[s] != 0.0:
             for j in range(POSE):
                 offset[s] += late_s[s] * rows[s, j] * state[VELOCITY + j]

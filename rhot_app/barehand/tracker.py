@@ -15,13 +15,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import GROUPS, ContourFrame, JointLimits, slices_of
+from rhot_app.barehand.contour_residual import GROUPS, ContourFrame, Contours, JointLimits, slices_of
 from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search, silhouettes
 from rhot_app.barehand.start import STEP, Found, find_hand
-from rhot_app.barehand.surface import FOREARM, LENGTH, PALM, RADIUS, SHAPE, surface_of
+from rhot_app.barehand.surface import FOREARM, FOREARM_TURN, PALM, SHAPE, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Residual
@@ -80,7 +80,9 @@ SHAPE_S, TURN_S = 1e3, 0.3
 """s: correlation times of the hand's shape, which does not change, and of the forearm's rotation, which moves as the
 hand does (`hand_process.SLOWEST`)."""
 
-CONSIDERED = MOTION + np.arange(LENGTH, RADIUS)
+CONSIDERED = MOTION + np.arange(FOREARM_TURN)
+"""Lengths and radii are uncertain but not estimated here. Errors of the surface and of edges last; taken as new in every
+image they would move the lengths, which contours show only through bent joints."""
 
 DRAWS = 100, 4, 10
 """Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
@@ -145,6 +147,7 @@ class BareHandTracker:
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._epoch_ns, self._fresh = 0, 0, False
         self._cover, self._rng = 0.0, np.random.default_rng(0)
+        self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
               size: Array | None = None) -> None:
@@ -158,6 +161,7 @@ class BareHandTracker:
             state[BIAS:BIAS + SHAPE] = size
         self.filter.start(0.0, state, covariance)
         self.tracking = self._fresh = True
+        self._taken_s = [-np.inf] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
         """Look for a hand of which nothing is known, and begin with the most probable one. False without any.
@@ -197,6 +201,9 @@ class BareHandTracker:
         """Weigh the images of some cameras at one instant, and other residuals of the same state."""
         t_s = 1e-9 * (t_ns - self._epoch_ns)
         prediction = self.filter.predict(t_s)
+        for camera in images:
+            self._repeated[camera] = max(1.0 / (FASTEST * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
+            self._taken_s[camera] = t_s
         seen = self._silhouettes(images)
         start = None if seen is None or self._fresh else self._relocate(seen, prediction, t_s - self.filter.newest.t_s)
         passes = START_PASSES if self._fresh or start is not None else PASSES
@@ -228,7 +235,7 @@ class BareHandTracker:
         for number in range(passes):
             frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1)
                       for camera, image in images.items()]
-            residuals = [*frames, self._limits, *extra]
+            residuals = [Contours(frames), self._limits, *extra]
             if number < passes - 1:
                 initial = state = update(self.process, t_s, prediction, residuals, initial, CONSIDERED).state
         return self.filter.add(t_s, residuals, prediction, initial)
@@ -295,7 +302,7 @@ class BareHandTracker:
             points = contour_points(self.surface, state, size, pose, model.intrinsics, image_size,
                                     STEP_M if last else 2.0 * STEP_M)
         frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, MOTION, self.row_s[camera],
-                          REACH, LONGEST_PX)
+                          REACH, LONGEST_PX, self._repeated[camera])
         frame.expected_sd = np.minimum(frame.expected_sd, CONFUSED_PX)
         frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
         if last:
