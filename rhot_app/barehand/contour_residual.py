@@ -4,7 +4,7 @@ On a slice, the hand's edge is one of the edges found, or none of them (Isard an
 process along the slice. An edge counts by the probability that it is the hand's, at the present state. So a slice
 without edges, or with edges of other things only, changes nothing.
 
-The phalanges' lengths and radii are numbers of the state, uncertain and not estimated here (`tracker.CONSIDERED`). Two
+The phalanges' lengths and radii are numbers of the state, uncertain (`tracker.SIZES`). Two
 opposite edges then determine the axis, as in feature mode, and one edge alone is less certain. What else the surface
 has wrong lasts as long as the hand shows the same side: images within that time count as one.
 """
@@ -108,7 +108,8 @@ class ContourFrame:
         return Contours([self]).linearise(state)
 
     def gather(self, state: Array, information: Array, pull: Array) -> float:
-        """Add the slices' information (COLUMNS, COLUMNS) and its gradient (COLUMNS,); returns their cost."""
+        """Add the slices' information (COLUMNS, COLUMNS), its lower triangle, and its gradient (COLUMNS,); returns their
+        cost."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         p, e = self.points, self.edges
         self.seen = np.zeros((GROUPS, 2))
@@ -133,7 +134,8 @@ class Contours:
 
 
 def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int) -> Rows:
-    """Rows of whitened errors with this information (COLUMNS, COLUMNS), gradient (COLUMNS,) and cost in all."""
+    """Rows of whitened errors with this information (COLUMNS, COLUMNS), of which the lower triangle is read, gradient
+    (COLUMNS,) and cost in all."""
     root = np.linalg.cholesky(information + _RIDGE * np.eye(COLUMNS))
     error, jacobian = np.zeros(COLUMNS + 1), np.zeros((COLUMNS + 1, size))
     error[:-1] = np.linalg.solve(root, pull)
@@ -209,7 +211,8 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
 @njit(cache=True)
 def _gather(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, pixel, normal,
             count, offsets, sds, inside, outside, expected_sd, clutter, information, pull, seen):
-    """Add the slices' information to `information` (COLUMNS, COLUMNS) and `pull` (COLUMNS,); returns their cost."""
+    """Add the slices' information to the lower triangle of `information` (COLUMNS, COLUMNS) and to `pull` (COLUMNS,);
+    returns their cost."""
     slices = capsule.shape[0]
     offset, rows = np.zeros(slices), np.zeros((slices, COLUMNS))
     good, found = np.zeros(slices, np.bool_), np.empty(offsets.shape[1])
@@ -231,6 +234,6 @@ def _gather(surface, state, size, pose, intrinsics, late_s, capsule, kind, along
         for p in range(used):
             a = weight * rows[s, own[p]]
             pull[own[p]] += a * error
-            for q in range(used):
+            for q in range(p + 1):
                 information[own[p], own[q]] += a * rows[s, own[q]]
     return cost

@@ -157,6 +157,7 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
     e1, e2 = np.empty(3), np.empty(3)
     for k in range(count):
         c0, c1, r0, r1 = centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1]
+        spacing = 2.0 * step_m if surface.group[k] == FOREARM else step_m  # smoother than fingers
         for kind in range(4):
             straight = kind < 2
             if straight:
@@ -172,7 +173,7 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
                     along += line * line
                     dot += line * ray
                     square += ray * ray
-                number = max(int(math.sqrt(max(along - dot * dot / square, 0.0)) / step_m + 0.5), 1)
+                number = max(int(math.sqrt(max(along - dot * dot / square, 0.0)) / spacing + 0.5), 1)
             else:
                 if not surface.open_ends[k, kind - 2]:
                     continue

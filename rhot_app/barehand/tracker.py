@@ -23,7 +23,7 @@ from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search,
 from rhot_app.barehand.start import STEP, Found, find_hand
 from rhot_app.barehand.surface import FOREARM, FOREARM_TURN, PALM, SHAPE, surface_of
 from rhot_app.errors import TrackingError
-from rhot_app.estimation.filter import IteratedFilter, Knot, update
+from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import build_model
@@ -80,9 +80,12 @@ SHAPE_S, TURN_S = 1e3, 0.3
 """s: correlation times of the hand's shape, which does not change, and of the forearm's rotation, which moves as the
 hand does (`hand_process.SLOWEST`)."""
 
-CONSIDERED = MOTION + np.arange(FOREARM_TURN)
-"""Lengths and radii are uncertain but not estimated here. Errors of the surface and of edges last; taken as new in every
-image they would move the lengths, which contours show only through bent joints."""
+SIZES = MOTION + np.arange(FOREARM_TURN)
+"""The lengths and radii in the tangent space."""
+
+SAME_POSE_S = 1.0
+"""s: images within this time show the hand in much the same pose, and count as one for its lengths: a grasp takes a
+second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
 
 DRAWS = 100, 4, 10
 """Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
@@ -140,7 +143,7 @@ class BareHandTracker:
                                    np.asarray(np.linalg.inv(natural.information)), PALM_SPREAD, np.full(3, FASTEST),
                                    FASTEST, np.square(spread)[:, :, None] * np.eye(3),
                                    np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S))
-        self.filter = IteratedFilter(self.process, considered=CONSIDERED)
+        self.filter = IteratedFilter(self.process)
         self._limits = JointLimits(self.model.limits)
         self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
@@ -204,6 +207,7 @@ class BareHandTracker:
         for camera in images:
             self._repeated[camera] = max(1.0 / (FASTEST * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
             self._taken_s[camera] = t_s
+        self.filter.partial = Partial(SIZES, min((t_s - self.filter.newest.t_s) / SAME_POSE_S, 1.0))
         seen = self._silhouettes(images)
         start = None if seen is None or self._fresh else self._relocate(seen, prediction, t_s - self.filter.newest.t_s)
         passes = START_PASSES if self._fresh or start is not None else PASSES
@@ -237,7 +241,7 @@ class BareHandTracker:
                       for camera, image in images.items()]
             residuals = [Contours(frames), self._limits, *extra]
             if number < passes - 1:
-                initial = state = update(self.process, t_s, prediction, residuals, initial, CONSIDERED).state
+                initial = state = update(self.process, t_s, prediction, residuals, initial, self.filter.partial).state
         return self.filter.add(t_s, residuals, prediction, initial)
 
     def _silhouettes(self, images: dict[int, Image]) -> Silhouettes | None:

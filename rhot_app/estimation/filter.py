@@ -21,8 +21,6 @@ from rhot_app.estimation.residual import Process, Residual, stack
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-NONE: Indices = np.empty(0, np.int64)
-
 ITERATIONS = 3
 """Gauss-Newton steps of an update, at most."""
 
@@ -31,6 +29,21 @@ CONVERGED = 1e-2
 
 KNOTS = 12
 """Knots kept for observations that arrive late."""
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    """Numbers `columns` (P,) of the tangent space that an update moves by `share` of their step only.
+
+    Their errors are taken as new in every update, but last longer than one. With a share of 0 they are considered, not
+    estimated (Schmidt 1966); between, see Brink 2017, "Partial-update Schmidt-Kalman filter", eq. 15 to 19.
+    """
+
+    columns: Indices
+    share: float = 0.0
+
+
+ALL = Partial(np.empty(0, np.int64))
 
 
 @dataclass(slots=True)
@@ -48,10 +61,9 @@ class Knot:
 class IteratedFilter:
     """The newest knots of an estimate."""
 
-    def __init__(self, process: Process, knots: int = KNOTS, considered: Sequence[int] = ()) -> None:
-        """`considered`: see `update`."""
+    def __init__(self, process: Process, knots: int = KNOTS) -> None:
         self.process, self._most = process, knots
-        self._considered = np.array(considered, dtype=np.int64)
+        self.partial = ALL
         self.knots: list[Knot] = []
 
     @property
@@ -80,26 +92,25 @@ class IteratedFilter:
         if place == 0:
             oldest = self.knots[0]
             prior = oldest.state, oldest.covariance
-            self.knots[0] = update(self.process, oldest.t_s, prior, residuals, None, self._considered)
+            self.knots[0] = update(self.process, oldest.t_s, prior, residuals, None, self.partial)
             place = 1
         else:
             prior = self.predict(t_s) if prediction is None else prediction
-            self.knots.insert(place, update(self.process, t_s, prior, residuals, initial, self._considered))
+            self.knots.insert(place, update(self.process, t_s, prior, residuals, initial, self.partial))
             place += 1
         added = self.knots[place - 1]
         for later in range(place, len(self.knots)):
             before, knot = self.knots[later - 1], self.knots[later]
             prior = self.process.predict(before.state, before.covariance, knot.t_s - before.t_s)
-            self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals, None, self._considered)
+            self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals, None, self.partial)
         del self.knots[:-self._most]
         return added
 
 
 def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: Sequence[Residual],
-           initial: Array | None = None, considered: Indices = NONE) -> Knot:
+           initial: Array | None = None, partial: Partial = ALL) -> Knot:
     """The posterior of a `prior` (state, covariance) and residuals. The first step begins at the state `initial`, or at
-    the prior's. Numbers of the tangent space that are `considered` are not estimated: they stay as the prior has them,
-    and their uncertainty counts (Schmidt 1966).
+    the prior's.
 
     `away` is the present state less the prior's, in the tangent space of the present state.
     """
@@ -118,13 +129,14 @@ def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: 
             continue
         before = cost + distance
         cross, root, reached, distance, moved = _solve(covariance, jacobian, error, variances, away)
-        reached[considered] = 0.0
+        reached[partial.columns] *= partial.share
         last = (state, reached - away)
         state, away = process.retract(state, reached - away), reached
         if iteration and moved < CONVERGED**2:
             break
     posterior = _reduce(covariance, cross, root)
-    posterior[np.ix_(considered, considered)] = covariance[np.ix_(considered, considered)]
+    kept, block = (1.0 - partial.share) ** 2, np.ix_(partial.columns, partial.columns)
+    posterior[block] = kept * covariance[block] + (1.0 - kept) * posterior[block]
     return Knot(t_s, state, posterior, list(residuals), weights)
 
 
