@@ -4,7 +4,7 @@ On a slice, the hand's edge is one of the edges found, or none of them (Isard an
 process along the slice. An edge counts by the probability that it is the hand's, at the present state. So a slice
 without edges, or with edges of other things only, changes nothing.
 
-The phalanges' lengths and radii are numbers of the state, uncertain (`tracker.SIZES`). Two
+The phalanges' lengths and radii are numbers of the state, uncertain (`tracker.PHALANGES`). Two
 opposite edges then determine the axis, as in feature mode, and one edge alone is less certain. What else the surface
 has wrong lasts as long as the hand shows the same side: images within that time count as one.
 """
@@ -108,8 +108,8 @@ class ContourFrame:
         return Contours([self]).linearise(state)
 
     def gather(self, state: Array, information: Array, pull: Array) -> float:
-        """Add the slices' information (COLUMNS, COLUMNS), its lower triangle, and its gradient (COLUMNS,); returns their
-        cost."""
+        """Add the lower triangle of the slices' information (COLUMNS, COLUMNS) and their gradient (COLUMNS,); returns
+        their cost."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         p, e = self.points, self.edges
         self.seen = np.zeros((GROUPS, 2))

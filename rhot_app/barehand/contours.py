@@ -16,15 +16,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.surface import (
+    FINGERS,
     FOREARM,
+    FOREARM_RADIUS,
     FOREARM_TURN,
     LENGTH,
+    RADIUS,
     SHAPE,
+    THICKNESS,
     WHOLE,
     Surface,
     meet,
     place_capsules,
-    radius_number,
 )
 from rhot_app.geometry.camera import distort
 from rhot_app.tracking.hand_process import ANGLES, POSE, VELOCITY
@@ -333,7 +336,10 @@ def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along,
         for i in range(3):
             g[i] = (across[0] * slope[0, i] + across[1] * slope[1, i]) / turned
         _point_row(surface, world, frames, k, c, px, py, pz, g, size, rows[s])
-        rows[s, POSE + radius_number(surface, k)] = r * (g[0] * n[0] + g[1] * n[1] + g[2] * n[2])
+        thicker = r * (g[0] * n[0] + g[1] * n[1] + g[2] * n[2])
+        rows[s, POSE + (FOREARM_RADIUS if surface.group[k] == FOREARM else THICKNESS)] = thicker
+        if surface.row[k] >= 0:
+            rows[s, POSE + RADIUS + surface.bone[surface.row[k]]] = thicker
         if late_s[s] != 0.0:
             for j in range(POSE):
                 offset[s] += late_s[s] * rows[s, j] * state[VELOCITY + j]
@@ -354,10 +360,11 @@ def _point_row(surface, world, frames, k, axis, px, py, pz, g, size, row):
     while at >= 0:
         parent, bone = dh.parent[at], surface.bone[at]
         if bone >= 0:  # from its beginning to its end, or to the axis point
-            f, length = frames[at], dh.a[at] * math.exp(size[WHOLE] + size[LENGTH + bone])
+            f, length = frames[at], dh.a[at] * math.exp(size[WHOLE] + size[FINGERS] + size[LENGTH + bone])
             for i in range(3):
                 way = axis[i] - (f[i, 3] - length * f[i, 0]) if first else length * f[i, 0]
                 row[POSE + LENGTH + bone] += g[i] * way
+                row[POSE + FINGERS] += g[i] * way
         first = False
         if dh.angle[at] >= 0:
             base = world if parent < 0 else frames[parent]
@@ -373,17 +380,15 @@ def _point_row(surface, world, frames, k, axis, px, py, pz, g, size, row):
 def _forearm_row(world, shape, lx, ly, lz, g, row):
     """Fill the columns of the forearm's rotation: of a point at (lx, ly, lz) from the wrist, world axes. The derivative
     of R(w) e is -[R e]x J, with the left Jacobian J of the rotations (Sola 2018, eq. 145)."""
-    p, n, w = np.empty(3), np.empty(3), shape[FOREARM_TURN:FOREARM_TURN + 3]
+    p, n, wy, wz = np.empty(3), np.empty(3), shape[FOREARM_TURN], shape[FOREARM_TURN + 1]
     for i in range(3):  # in the palm's frame
         p[i] = world[0, i] * lx + world[1, i] * ly + world[2, i] * lz
         n[i] = world[0, i] * g[0] + world[1, i] * g[1] + world[2, i] * g[2]
     mx, my, mz = p[1] * n[2] - p[2] * n[1], p[2] * n[0] - p[0] * n[2], p[0] * n[1] - p[1] * n[0]
-    angle = math.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
+    angle = math.sqrt(wy * wy + wz * wz)
     a = math.sin(angle) / angle if angle > 1e-6 else 1.0
     b = (1.0 - a) / angle**2 if angle > 1e-3 else 1.0 / 6.0
     c = (1.0 - math.cos(angle)) / angle**2 if angle > 1e-6 else 0.5
-    dot = b * (w[0] * mx + w[1] * my + w[2] * mz)
-    first = POSE + FOREARM_TURN
-    row[first] = a * mx + dot * w[0] + c * (my * w[2] - mz * w[1])
-    row[first + 1] = a * my + dot * w[1] + c * (mz * w[0] - mx * w[2])
-    row[first + 2] = a * mz + dot * w[2] + c * (mx * w[1] - my * w[0])
+    dot = b * (wy * my + wz * mz)
+    row[POSE + FOREARM_TURN] = a * my + dot * wy - c * mx * wz
+    row[POSE + FOREARM_TURN + 1] = a * mz + dot * wz + c * mx * wy

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rhot_app.barehand.surface import LENGTH, RADIUS, SHAPE, WHOLE, sized_table
+from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
@@ -33,18 +33,19 @@ def place_joints(state, covariance, dh, bone, points, covariances, motion):
                      dh.point_offset * factor)
     forward_arrays(table, world, state[ANGLES:VELOCITY], frames, points)
     lengths = RADIUS - LENGTH
-    jacobian = np.zeros((points.shape[0], 3, POSE + 1 + lengths))
+    jacobian = np.zeros((points.shape[0], 3, POSE + 2 + lengths))
     jacobian_arrays(table, world, frames, points, jacobian)
     for p in range(points.shape[0]):
         jacobian[p, :, POSE] = points[p] - world[:3, 3]
         row = dh.point_row[p]
         while row >= 0:
             if bone[row] >= 0:
-                jacobian[p, :, POSE + 1 + bone[row]] = a[row] * frames[row, :, 0]
+                jacobian[p, :, POSE + 2 + bone[row]] = a[row] * frames[row, :, 0]
+                jacobian[p, :, POSE + 1] += a[row] * frames[row, :, 0]
             row = dh.parent[row]
-    own = np.empty(POSE + 1 + lengths, np.int64)
-    own[POSE] = MOTION + WHOLE
-    own[POSE + 1:] = MOTION + LENGTH + np.arange(lengths)
+    own = np.empty(POSE + 2 + lengths, np.int64)
+    own[POSE], own[POSE + 1] = MOTION + WHOLE, MOTION + FINGERS
+    own[POSE + 2:] = MOTION + LENGTH + np.arange(lengths)
     for order in range(3):
         own[:POSE] = order * POSE + np.arange(POSE)
         count = len(own) if order == 0 else POSE

@@ -26,10 +26,11 @@ Indices = NDArray[np.int64]
 PALM, FOREARM = 5, 6
 """Groups beyond the fingers 0..4."""
 
-WHOLE, PALM_RADIUS, FOREARM_RADIUS, LENGTH, RADIUS, FOREARM_TURN, SHAPE = 0, 1, 2, 3, 18, 33, 36
-"""Where a shape's numbers begin, and how many it has: logarithms of the hand's size, of the palm's and the forearm's
-radii, and of the 15 phalanges' lengths and radii, all relative to the hand file's at that size; then the forearm's
-rotation vector about the wrist in the palm's frame, rad."""
+WHOLE, FINGERS, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN, SHAPE = 0, 1, 2, 3, 18, 33, 34, 36
+"""Where a shape's numbers begin, and how many it has: logarithms of the hand's size, of all phalanges' lengths and of
+all radii but the forearm's, relative to the hand file's at that size; of the 15 phalanges' own lengths and radii beyond
+these; of the forearm's radius; and the forearm's flexion and deviation, a rotation vector (0, y, z) rad about the wrist
+in the palm's frame."""
 
 TIP_TAPER = 0.85
 """Radius at the end of a fingertip, of that of its last segment: fingertips are round, not flat."""
@@ -104,16 +105,8 @@ def sized_table(dh, bone, shape, a, d):
     """Fill `a` (R,) and `d` (R,), the lengths of a table for a hand of `shape` (SHAPE,)."""
     whole = np.exp(shape[WHOLE])
     for row in range(a.shape[0]):
-        a[row] = dh.a[row] * whole * (np.exp(shape[LENGTH + bone[row]]) if bone[row] >= 0 else 1.0)
+        a[row] = dh.a[row] * whole * (np.exp(shape[FINGERS] + shape[LENGTH + bone[row]]) if bone[row] >= 0 else 1.0)
         d[row] = dh.d[row] * whole
-
-
-@njit(cache=True)
-def radius_number(surface, k):
-    """Which number of the shape scales the radii of capsule `k`."""
-    if surface.row[k] >= 0:
-        return RADIUS + surface.bone[surface.row[k]]
-    return FOREARM_RADIUS if surface.group[k] == FOREARM else PALM_RADIUS
 
 
 @njit(cache=True)
@@ -126,12 +119,15 @@ def place_capsules(surface, world, angles, shape, frames, centres, radii):
                      dh.point_offset)
     forward_arrays(table, world, angles, frames, dh.point_offset)
     whole, turned = np.exp(shape[WHOLE]), np.empty((3, 3))
-    rotation_of(shape[FOREARM_TURN:], turned)
+    rotation_of(0.0, shape[FOREARM_TURN], shape[FOREARM_TURN + 1], turned)
     forearm = np.dot(np.ascontiguousarray(world[:3, :3]), turned)
     for k in range(centres.shape[0]):
         row = surface.row[k]
-        thick = np.exp(shape[radius_number(surface, k)])
-        longer = np.exp(shape[LENGTH + surface.bone[row]]) if row >= 0 else 1.0
+        thick = np.exp(shape[FOREARM_RADIUS] if surface.group[k] == FOREARM else shape[THICKNESS])
+        longer = 1.0
+        if row >= 0:
+            thick *= np.exp(shape[RADIUS + surface.bone[row]])
+            longer = np.exp(shape[FINGERS] + shape[LENGTH + surface.bone[row]])
         base = world if row < 0 else frames[row]
         for end in range(2):
             radii[k, end] = surface.radii[k, end] * whole * thick
@@ -145,9 +141,8 @@ def place_capsules(surface, world, angles, shape, frames, centres, radii):
 
 
 @njit(cache=True)
-def rotation_of(vector, out):
-    """Fill `out` (3, 3) with the rotation of a rotation vector (3,) rad (Rodrigues)."""
-    x, y, z = vector[0], vector[1], vector[2]
+def rotation_of(x, y, z, out):
+    """Fill `out` (3, 3) with the rotation of the rotation vector (x, y, z) rad (Rodrigues)."""
     angle = np.sqrt(x * x + y * y + z * z)
     cosine, s = np.cos(angle), np.sin(angle) / angle if angle > 1e-6 else 1.0
     c = (1.0 - cosine) / angle**2 if angle > 1e-6 else 0.5

@@ -21,7 +21,7 @@ from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search, silhouettes
 from rhot_app.barehand.start import STEP, Found, find_hand
-from rhot_app.barehand.surface import FOREARM, FOREARM_TURN, PALM, SHAPE, surface_of
+from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
 from rhot_app.estimation.residual import Residual
@@ -65,26 +65,29 @@ PASSES, START_PASSES = 2, 5
 """Searches of an image, and of one in which the hand is not where it was expected. Each halves how far from the contour
 an edge may be."""
 
-SIZE_SD = 0.1
-"""Standard deviation of the logarithm of a hand's size, in adults, where it is unknown (`tracking.hand_size`)."""
+SIZE_SD = 0.1, 0.05, 0.08
+"""Standard deviations of the logarithms of a hand's size, of its fingers' part of it, and of its thickness beyond that,
+in adults, where they are unknown (`tracking.hand_size`; Buryanov and Kotiuk 2010)."""
 
-LENGTH_SD, RADIUS_SD, FOREARM_SD = 0.05, 0.08, 0.2
-"""Standard deviations of the logarithms of a phalanx's length and of the radii of phalanges and palm, in hands of one
-size (Buryanov and Kotiuk 2010), and of the forearm's radius, with or without a sleeve."""
+LENGTH_SD, RADIUS_SD = 0.05, 0.08
+"""The same of a phalanx's own length and radius."""
 
-TURN_SD = 0.0, 0.5, 0.25
-"""rad: standard deviations of the forearm's rotation about its own axis, of flexion and of deviation of the wrist:
-a third of their ranges (Ryu et al. 1991: 78 and 60 degrees of flexion and extension, 21 and 38 of deviation)."""
+MEASURED_SD = 0.02
+"""The same of a hand whose file describes it (`python benchmarks/bones.py`, with noise)."""
+
+FOREARM_SD = 0.2, 0.5, 0.25
+"""Standard deviations of the logarithm of the forearm's radius, with or without a sleeve, and, rad, of the wrist's
+flexion and deviation: a third of their ranges (Ryu et al. 1991: 138 and 59 degrees)."""
 
 SHAPE_S, TURN_S = 1e3, 0.3
 """s: correlation times of the hand's shape, which does not change, and of the forearm's rotation, which moves as the
 hand does (`hand_process.SLOWEST`)."""
 
-SIZES = MOTION + np.arange(FOREARM_TURN)
-"""The lengths and radii in the tangent space."""
+PHALANGES = MOTION + np.arange(THICKNESS, FOREARM_RADIUS)
+"""The phalanges' lengths and radii in the tangent space."""
 
 SAME_POSE_S = 1.0
-"""s: images within this time show the hand in much the same pose, and count as one for its lengths: a grasp takes a
+"""s: images within this time show the hand in much the same pose, and count as one for its phalanges: a grasp takes a
 second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
 
 DRAWS = 100, 4, 10
@@ -114,7 +117,8 @@ class Fit:
 
     @property
     def support(self) -> Array:
-        """(6,) part of the contour of fingers and palm that was found, of all cameras together; NaN where none is expected."""
+        """(6,) part of the contour of fingers and palm that was found, of all cameras together; NaN where none is
+        expected."""
         total = self.seen[:, :FOREARM].sum(axis=0)
         return np.asarray(total[:, 0] / np.where(total[:, 1] > 0.0, total[:, 1], np.nan))
 
@@ -137,8 +141,11 @@ class BareHandTracker:
         self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
         natural = self.model.natural
-        spread = np.concatenate([[0.0 if known_size else SIZE_SD, RADIUS_SD, FOREARM_SD], np.full(15, LENGTH_SD),
-                                 np.full(15, RADIUS_SD), TURN_SD]).reshape(-1, 3)
+        if known_size:
+            size, phalanges = (0.0, 0.0, MEASURED_SD), np.full(30, MEASURED_SD)
+        else:
+            size, phalanges = SIZE_SD, np.repeat((LENGTH_SD, RADIUS_SD), 15)
+        spread = np.concatenate([size, phalanges, FOREARM_SD]).reshape(-1, 3)
         self.process = HandProcess(self.surface.dh, self.model.limits, natural.mean,
                                    np.asarray(np.linalg.inv(natural.information)), PALM_SPREAD, np.full(3, FASTEST),
                                    FASTEST, np.square(spread)[:, :, None] * np.eye(3),
@@ -207,7 +214,7 @@ class BareHandTracker:
         for camera in images:
             self._repeated[camera] = max(1.0 / (FASTEST * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
             self._taken_s[camera] = t_s
-        self.filter.partial = Partial(SIZES, min((t_s - self.filter.newest.t_s) / SAME_POSE_S, 1.0))
+        self.filter.partial = Partial(PHALANGES, min((t_s - self.filter.newest.t_s) / SAME_POSE_S, 1.0))
         seen = self._silhouettes(images)
         start = None if seen is None or self._fresh else self._relocate(seen, prediction, t_s - self.filter.newest.t_s)
         passes = START_PASSES if self._fresh or start is not None else PASSES

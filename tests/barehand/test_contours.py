@@ -55,7 +55,7 @@ def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> No
     process, pose = process_of(), poses("grasp", (0.9,))[0]
     camera, state = two_cameras()[1], state_of(pose)
     state[BIAS:] = np.random.default_rng(0).normal(0.0, 0.05, SHAPE)
-    state[BIAS + FOREARM_TURN:] = 0.1, 0.4, -0.2
+    state[BIAS + FOREARM_TURN:] = 0.4, -0.2
     frame = frame_of(surface, state, camera, features)
     start, rows, good = frame.predict(state)
     assert good.all()
