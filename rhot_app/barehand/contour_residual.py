@@ -59,7 +59,7 @@ class ContourFrame:
         self.surface, self.points, self.pose, self.intrinsics = surface, points, pose, intrinsics
         self.slices, self.expected_sd, self.late_s, self.size_column = slices, expected_sd, late_s, size_column
         self.pixel, self.normal = slices[:, :2].copy(), slices[:, 2:4].copy()
-        self.shape_variance = repeated * (SHAPE_SD_M * points.scale) ** 2
+        self.repeated, self.shape_variance = repeated, repeated * (SHAPE_SD_M * points.scale) ** 2
         self.edges: Edges | None = None
         self.clutter = np.empty((0, 0))
         self.seen = np.zeros((GROUPS, 2))

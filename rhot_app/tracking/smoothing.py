@@ -32,7 +32,8 @@ from rhot_app.tracking.trackers import TwoHands, require_estimator
 
 Kept = TypeVar("Kept")
 
-NOT_SMOOTHED = "only the estimator smooths. Choose it (tracker.kind, or --tracker estimator), or do not smooth."
+NOT_SMOOTHED = ("only the estimator smooths, and only markers and landmarks. Choose it (tracker.kind, or --tracker "
+                "estimator), or do not smooth.")
 """Why states of another tracker are not smoothed, and what to do."""
 
 _RECENT = 16  # frames: those that an estimator weighs again when it starts are fewer
@@ -234,8 +235,8 @@ class SmoothedTracker:
     """Takes the frames of a recording in the order of arrival, and gives smoothed states in the order of time."""
 
     def __init__(self, rig: Rig) -> None:
-        """Raises RigError as `make_tracker` does; the rig's tracker must be the estimator."""
-        assert rig.tracker.kind == "estimator"
+        """Raises RigError as `make_tracker` does; the rig's tracker must be the estimator of markers."""
+        assert rig.tracker.smooths
         require_estimator(rig)
         hand, own = without_objects(rig)
         self._tracker = RecordingEstimator(hand) if rig.other_hand is None else TwoRecordingEstimators(hand)

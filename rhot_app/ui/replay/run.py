@@ -76,7 +76,7 @@ def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress:
     Raises RecordingError when the log is none, holds nothing that can be tracked, or the rig's tracker does not smooth;
     RigError as the tracker does.
     """
-    if smooth and rig.tracker.kind != "estimator":
+    if smooth and not rig.tracker.smooths:
         raise RecordingError(NOT_SMOOTHED)
     reader = LogReader(log)
     try:
