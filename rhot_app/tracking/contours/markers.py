@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.hand.landmarks import LASTING_M, LASTING_S
 from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.estimation.residual import Rows
+from rhot_app.hand.landmarks import LASTING_M, LASTING_S
+from rhot_app.hand.motion.hand_process import BIAS, BIAS_S, FASTEST, MOTION, PALM_SPREAD, HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.acquisition import Starter
 from rhot_app.tracking.association import MarkerAssociation
-from rhot_app.hand.motion.hand_process import BIAS, BIAS_S, FASTEST, MOTION, PALM_SPREAD, HandProcess
 from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
 from rhot_app.tracking.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
