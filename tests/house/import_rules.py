@@ -45,6 +45,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.objects.alignment_command": BELOW_ENGINE,
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.tracking.hand_process",
                           "rhot_app.tracking.state", "rhot_app.tracking.estimator_state"),  # one process for all kinds
+    "rhot_app.articulated": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand"),
     "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS),
     "rhot_app.recording": BELOW_ENGINE,
     "rhot_app.sources": BELOW_ENGINE,
