@@ -48,6 +48,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.objects.alignment.alignment_command": BELOW_ENGINE,
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.tracking.state",
                           "rhot_app.tracking.estimator_state"),  # a tracker of its own
+    "rhot_app.articulated": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand"),
     "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS),
     "rhot_app.recording": BELOW_ENGINE,
     "rhot_app.sources": BELOW_ENGINE,
