@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,17 +21,18 @@ from rhot_app.evaluation.track import Timed
 from rhot_app.hand.skeleton import TIP_ROLES
 from rhot_app.mouse.pick_scene import Ball, PickScene
 from rhot_app.mouse.pointer import GROUND_M, Mouse, MouseSettings, MouseState
-from rhot_app.mouse.script import LEAD_S, Script, write_motion
+from rhot_app.mouse.script import LEAD_S, Script, motion_file
 from rhot_app.mouse.target_test import EFFECTIVE, WIDTH_M, TargetTest
 from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.motion import Sway
-from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.truth.truth import Truth
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.state import Condition, HandState, Knowledge
 from rhot_app.tracking.trackers import make_tracker
+from rhot_node.files import write_document
 
 Array = NDArray[np.float64]
 Figures = dict[str, Any]
@@ -51,6 +51,7 @@ HELD_M: Final = 0.029
 ORDINARY_SWAY: Final = Sway(position_mm=0.5, rotation_deg=0.3, angle_deg=0.3, tremor_mm=0.05)
 """Of a hand that rests on a table: a quarter of one held in the air (resources/motions/tap.json), with its tremor."""
 
+_KEY_S: Final = 0.01  # for ways of a tenth of a second
 _CARRY_M: Final = 0.025  # radius of the ball that is picked and placed
 
 
@@ -83,20 +84,15 @@ class MouseRun:
         return np.asarray((self.times_s >= begin_s) & (self.times_s <= end_s) & there)
 
 
-def mouse_scene(seed: int) -> Scene:
-    """The twin as the script wants it: the cameras see the back of the hand. Raises RhotError."""
-    return make_scene(msgspec.structs.replace(twin_defaults(), facing="back"), seed)
-
-
 def play(script: Script, seed: int, *, settings: MouseSettings | None = None, pictures: bool = False,
          sway: Sway | None = None, covered_s: float = math.inf, told: Told = lambda title: None) -> MouseRun:
     """Play a script to the twin and its states to the mouse. `pictures`: render and detect; else the observations are
     made without pictures (`rhot_app.simulator.truth.ideal_observations`). From `covered_s` on the second camera is
     silent. Raises RhotError."""
-    settings, scene = settings or MouseSettings(), mouse_scene(seed)
+    settings, scene = settings or MouseSettings(), make_scene(twin_defaults(), seed)
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name:
         path = Path(name) / "mouse.json"
-        write_motion(script, path, scene.hand, settings, sway or Sway())
+        write_document(path, motion_file(script, scene.hand, settings, sway or Sway(), key_s=_KEY_S))
         order = Order(scene, str(path), script.end_s, sketched=not pictures)
         data = data_set(order, data_sets_folder() if pictures else Path(name) / "sets", told)
         truth, second = data.truth, data.rig.nodes[1].node_id
@@ -136,6 +132,12 @@ def _cursors(mouse: list[MouseState]) -> Array:
     return np.array([np.full(3, np.nan) if one.cursor is None else one.cursor for one in mouse])
 
 
+def _axes(lengths_m: Array) -> Figures:
+    """Lengths (3,) m along the cursor's axes, in mm."""
+    x, y, z = (1e3 * float(value) for value in lengths_m)
+    return {"x_mm": x, "y_mm": y, "height_mm": z}
+
+
 # -- resolution, coupling, speed, latency (4.3.5) ----------------------------------------------------------------------
 
 def resolution(turn_deg: float, seed: int, **how: Any) -> Figures:
@@ -146,13 +148,12 @@ def resolution(turn_deg: float, seed: int, **how: Any) -> Figures:
     script.wait(3.5)
     run = play(script, seed, **how)
     still = run.during(begin_s, script.end_s)
-    x, y, z = (float(value) for value in 1e3 * run.cursor[still].std(axis=0))
-    return {"turn_deg": turn_deg, "x_mm": x, "y_mm": y, "height_mm": z, "states": int(still.sum()),
-            "tracked": float(np.mean([state.tracked for state in run.states]))}
+    return {"turn_deg": turn_deg, "states": int(still.sum()), **_axes(run.cursor[still].std(axis=0))}
 
 
 def coupling(seed: int, **how: Any) -> list[Figures]:
-    """How far the cursor strays from the true hand's while one degree of freedom alone is moved: peak per axis, mm."""
+    """How far the cursor strays from the true hand's while one degree of freedom alone is moved: `rms` and `peak` per
+    axis, mm."""
     script = Script()
     script.move((0.0, 0.0, 0.08), 0.5)
     spans = []
@@ -173,9 +174,9 @@ def coupling(seed: int, **how: Any) -> list[Figures]:
     figures = []
     for name, begin_s, end_s in spans:
         inside = run.during(begin_s, end_s)
-        peaks = 1e3 * np.abs(off[inside] - off[inside][0]).max(axis=0)
-        x, y, z = (float(value) for value in peaks)
-        figures.append({"moved": name, "x_mm": x, "y_mm": y, "height_mm": z})
+        strays = off[inside] - off[inside][0]
+        figures.append({"moved": name, "rms": _axes(np.sqrt(np.square(strays).mean(axis=0))),
+                        "peak": _axes(np.abs(strays).max(axis=0))})
     return figures
 
 
@@ -219,8 +220,7 @@ def one_camera(seed: int, **how: Any) -> Figures:
     for name, on_table in (("free", False), ("on_table", True)):
         run = play(script, seed, settings=MouseSettings(on_table=on_table), covered_s=LEAD_S, **how)
         inside = run.during(LEAD_S, script.end_s)
-        x, y, z = 1e3 * np.sqrt(np.square(run.cursor[inside] - run.true_cursor[inside]).mean(axis=0))
-        figures[name] = {"x_mm": float(x), "y_mm": float(y), "height_mm": float(z)}
+        figures[name] = _axes(np.sqrt(np.square(run.cursor[inside] - run.true_cursor[inside]).mean(axis=0)))
     return figures
 
 

@@ -26,6 +26,9 @@ LINE_S = 0.1
 """Between lines for people."""
 
 PLACES = 20
+MOTION = "mouse"
+"""Of resources/motions; the hand carries the balls of the app's page about."""
+
 TRACKED_S = 60.0
 """The first start of all compiles the numerical code."""
 
@@ -172,20 +175,15 @@ def simulated_hand(seed: int) -> Iterator[Path]:
 
     from rhot_app.engine.client import EngineClient
     from rhot_app.engine.process import ensure_engine, stop_engine
-    from rhot_app.mouse.pointer import MouseSettings
-    from rhot_app.mouse.script import carrying, write_motion
     from rhot_app.project import load_rig, save_rig, with_tracker
     from rhot_app.simulator.nodes.remote import TwinRemote
-    from rhot_app.simulator.scene.motion import Sway
-    from rhot_app.simulator.scene.scene import make_scene, twin_defaults
     from rhot_app.simulator.scene.scene_description import HandShow
 
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name, contextlib.ExitStack() as stack:
         place = Path(name)
-        motion, rig = place / "mouse.json", place / "rig.json"
-        write_motion(carrying(), motion, make_scene(twin_defaults(), seed).hand, MouseSettings(), Sway())
-        twin = subprocess.Popen([sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", str(motion),
-                                 "--back", "--seed", str(seed), "--directory", str(place), "--rig", str(rig)],
+        rig = place / "rig.json"
+        twin = subprocess.Popen([sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", MOTION,
+                                 "--seed", str(seed), "--directory", str(place), "--rig", str(rig)],
                                 stdout=subprocess.PIPE)
         stack.callback(twin.wait)
         stack.callback(twin.terminate)
@@ -202,7 +200,7 @@ def simulated_hand(seed: int) -> Iterator[Path]:
                 if time.monotonic() > deadline:
                     raise SimulatorError(f"the simulated hand was not tracked within {TRACKED_S:.0f} s. Is this "
                                          "computer busy? Try again.")
-            remote.show(HandShow(str(motion)))  # from its beginning, where it rests
+            remote.show(HandShow(MOTION))  # from its beginning, where it rests
         yield place / "engine"
 
 

@@ -17,8 +17,8 @@ def report(figures: Figures) -> str:
     lines = [f"3-D mouse on the twin, seed {figures['seed']}, from {seen}. Lengths are the cursor's.",
              "", "Hand speed along the table (always from images)      time in which the hand is held",
              *(f"  {one['speed_m_per_s']:5.2f} m/s {100.0 * one['held']:40.1f} %" for one in figures["speed"]),
-             "", "Moved alone     error of the cursor, peak [mm]: right  forward  height",
-             *(f"  {one['moved']:<14}{_three(one):>53}" for one in figures["coupling"]),
+             "", "Moved alone    error of the cursor [mm]: rms of right, forward, height; then their peaks",
+             *(f"  {one['moved']:<12}{_three(one['rms'])}    {_three(one['peak'])}" for one in figures["coupling"]),
              "", "Palm turned on the table   jitter, standard deviation [mm]: right  forward  height",
              *(f"  {one['turn_deg']:+5.0f} deg{_three(one):>71}" for one in figures["resolution"]),
              "", f"Latency: a state is ready {late['ready_p50_ms']:.1f} ms (p50), {late['ready_p99_ms']:.1f} ms (p99) "

@@ -7,7 +7,6 @@ where a person would correct the cursor by eye. Ways are of minimum jerk (Flash 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -20,16 +19,16 @@ from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, HandPose
 from rhot_app.mouse.pick_scene import START, Ball
 from rhot_app.mouse.pointer import BUTTONS, HOME_S, MouseSettings
-from rhot_app.simulator.scene.motion import BACK_FACING, Key, MotionFile, Sway
-from rhot_node.files import write_document
+from rhot_app.simulator.scene.motion import FACING, Key, MotionFile, Sway
 
 Array = NDArray[np.float64]
 
-TILT_DEG: Final = -45.0
-"""The table as the cameras see it: they look down at 45 degrees on the back of the hand (Rehg 1995, 4.3.4)."""
+TILT_DEG: Final = 45.0
+"""The hand's plane leans so far towards the cameras: they look at it at 45 degrees, as in Rehg 1995, 4.3.4, but see the
+palm, which is the side that RHOT's cameras usually see."""
 
-KEY_S: Final = 0.01
-"""Between keys; a spline goes through them."""
+KEY_S: Final = 0.05
+"""Between keys, unless a faster hand needs more of them; a spline goes through them."""
 
 CLICK_S: Final = 0.15
 """A finger spreads or returns in this time."""
@@ -128,35 +127,32 @@ def carrying(balls: tuple[Ball, ...] = START) -> Script:
     return script
 
 
-def motion_file(script: Script, anatomy: HandAnatomy, settings: MouseSettings, sway: Sway) -> MotionFile:
-    """The script as a motion of a hand whose back the cameras see."""
+def motion_file(script: Script, anatomy: HandAnatomy, settings: MouseSettings, sway: Sway, *,
+                key_s: float = KEY_S) -> MotionFile:
+    """The script as a motion of a hand whose palm the cameras see, with a key every `key_s`."""
     period = script.end_s + 1.0
-    times = np.arange(0.0, period - 0.5 * KEY_S, KEY_S)
+    times = np.arange(0.0, period - 0.5 * key_s, key_s)
     tilt = Rotation.from_rotvec([np.radians(TILT_DEG), 0.0, 0.0])
-    home = tilt.as_matrix() @ BACK_FACING
+    home = tilt.as_matrix() @ FACING
     lengths, flexions = _index_heights(anatomy)
     keys = []
     for t_s, row in zip(times, script.sample(times), strict=True):
         cursor, spread, turn = row[:3], row[3:5], row[5]
         place = home @ np.array([cursor[1], -cursor[0], 0.0]) / settings.gain
         palm = home @ Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix()
-        rotation = Rotation.from_matrix(palm @ BACK_FACING.T).as_rotvec(degrees=True)
+        rotation = Rotation.from_matrix(palm @ FACING.T).as_rotvec(degrees=True)
         index = float(np.interp(cursor[2] / settings.height_gain, lengths, flexions))
-        angles = {"index_mcp_flexion": index}
+        angles = {"index_mcp_flexion": round(index, 3)}
         for button, out in zip(BUTTONS, spread, strict=True):
             name, sign = _SPREADS[button]
-            angles[name] = _REST_DEG[name] + sign * SPREAD_DEG * float(out)
-        keys.append(Key(float(t_s), _triple(1e3 * place), _triple(rotation), angles))
-    return MotionFile("mouse", "A hand works the 3-D mouse.", float(period), tuple(keys), dict(_REST_DEG), sway)
-
-
-def write_motion(script: Script, path: Path, anatomy: HandAnatomy, settings: MouseSettings, sway: Sway) -> None:
-    """The motion as a file that the twin plays (``--motion``, with ``--back``). Raises OSError."""
-    write_document(path, motion_file(script, anatomy, settings, sway))
+            angles[name] = round(_REST_DEG[name] + sign * SPREAD_DEG * float(out), 3)
+        keys.append(Key(round(float(t_s), 6), _triple(1e3 * place), _triple(rotation), angles))
+    words = "The hand works the 3-D mouse: it picks three balls and carries them."
+    return MotionFile("mouse", words, round(float(period), 6), tuple(keys), dict(_REST_DEG), sway)
 
 
 def _triple(values: Array) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
+    x, y, z = (round(float(value), 3) for value in values)
     return x, y, z
 
 
