@@ -9,7 +9,7 @@ from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, siz
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 
 
 def knowledge_of(sd: float, observed: bool, measured: float, inferred: float) -> int:

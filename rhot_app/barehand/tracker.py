@@ -40,8 +40,16 @@ from rhot_app.hand.motion.hand_process import (
 )
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, HandPose
 from rhot_app.project import Rig
-from rhot_app.tracking.estimator_state import INFERRED_M, INFERRED_RAD, MEASURED_M, MEASURED_RAD
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import (
+    INFERRED_M,
+    INFERRED_RAD,
+    MEASURED_M,
+    MEASURED_RAD,
+    UNESTIMATED,
+    Condition,
+    HandState,
+    Knowledge,
+)
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, foreground_map, no_foreground
 

@@ -215,7 +215,7 @@ def _tree_complaints(document: Articulated) -> Iterator[str]:
             yield f'{what}: "{max(names, key=names.count)}" occurs twice'
 
 
-def _parent_complaint(frame: Frame, parents: dict[str, str]) -> str:
+def _parent_complaint(frame: ArticulatedFrame, parents: dict[str, str]) -> str:
     """Why the parent of a frame is neither the root nor an earlier frame."""
     way = [frame.name]
     while way[-1] in parents and way[-1] not in way[:-1]:

@@ -20,13 +20,13 @@ from rhot_app.hand.motion.hand_process import HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.observations import ObjectFrame
 from rhot_app.project import Rig
+from rhot_app.state import Condition, HandState
 from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
 from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.rig_arrays import without_objects
 from rhot_app.tracking.rig_objects import MarkersBeside, SmoothedObjects
-from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import TwoHands, require_estimator
 
