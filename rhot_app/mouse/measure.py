@@ -25,10 +25,10 @@ from rhot_app.mouse.script import LEAD_S, Script, motion_file
 from rhot_app.mouse.target_test import EFFECTIVE, WIDTH_M, TargetTest
 from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import RecordKind
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.truth import Truth
 from rhot_app.simulator.scene.motion import Sway
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.simulator.truth.truth import Truth
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.trackers import make_tracker
