@@ -195,7 +195,7 @@ def _trust(path: Path, settings: NodeSettings) -> NodeTrust | None:
 
 def _invite(settings: NodeSettings, offers: OfferFile) -> None:
     """Show a pairing code on the console. Raises TrustError."""
-    from rhot_node.trust_command import invitation
+    from rhot_node.commands.trust_command import invitation
     logging.getLogger(__name__).warning("not paired yet\n%s",
                                         invitation(settings, offers.current() or offers.renew()))
 

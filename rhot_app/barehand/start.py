@@ -81,7 +81,7 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
         tried.append((value, world, angles))
     tried.sort(key=lambda one: -one[0])
     covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
-    covariance[6:, 6:] = np.linalg.inv(model.natural.information + np.eye(21) / _SPREAD[2] ** 2)
+    covariance[6:, 6:] = np.linalg.inv(model.pose_prior.information + np.eye(21) / _SPREAD[2] ** 2)
     for _, world, angles in _distinct(tried, KEPT * max(min(len(centres), 2), 1)):
         moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, seen, rng, 60, 4, 8)
         bent = bend_fingers(surface, moved, bent, model.limits, size, seen)
@@ -121,7 +121,7 @@ def _shapes(model: HandModel) -> list[Array]:
     """Angles (21,) of an open, a relaxed, a closed and a pointing hand."""
     out = []
     for curl in _CURLS_DEG:
-        angles = model.natural.mean.copy()
+        angles = model.pose_prior.mean.copy()
         for flexions in FLEXIONS[1:]:
             angles[list(flexions)] = np.radians(curl)
         out.append(angles)

@@ -19,8 +19,8 @@ from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.smoothing import SmoothedTracker
-from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker, solve_after
 
 

@@ -134,7 +134,7 @@ class NodeLinks:
                 if link.wants_start(now_ns):
                     self._start_again(link, now_ns)
                 wait_ns = EAGER_NS - REQUEST_NS if link.door.clock_in_doubt else 0
-                if now_ns >= self._due_ns[node_id] + wait_ns and link.can_be_told:
+                if now_ns >= self._due_ns[node_id] + wait_ns and link.reachable:
                     self._ask(link, now_ns)
 
     def start_thread(self) -> None:
@@ -212,7 +212,7 @@ class NodeLinks:
                 for link in open_links:
                     self._send(link, datagram)
         for node_id, link in self._links.items():
-            if link.paired and link.can_be_told:
+            if link.paired and link.reachable:
                 datagram = link.encode(message([self._entries[node_id]]))
                 self._note(kind, node_id, now_ns, datagram)
                 for _ in range(times):

@@ -57,7 +57,7 @@ class NodeLink:
         return bool(self.node.public_key)
 
     @property
-    def can_be_told(self) -> bool:
+    def reachable(self) -> bool:
         """Whether what we say to the node can have the tag that it needs."""
         return not self.paired or self._seal is not None
 
@@ -90,7 +90,7 @@ class NodeLink:
 
     def slices(self, request: SliceRequest) -> list[bytes]:
         """The datagrams that ask the node to search slices; none while it does not stream for us or has no tag."""
-        if not self.wanted or self.node.text_datagrams or not self.can_be_told:
+        if not self.wanted or self.node.text_datagrams or not self.reachable:
             return []
         size = self.node.intrinsics.width, self.node.intrinsics.height
         return [self.encode(message) for message in self.door.searches.ask(request, self.node.node_id, self.wanted,

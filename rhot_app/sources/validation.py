@@ -28,7 +28,7 @@ from rhot_node.wire.messages import (
     Observations,
     SliceEdges,
 )
-from rhot_node.wire.sequence import SequenceWindow, Verdict
+from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
 from rhot_node.wire.text import parse_text
 
 # -- authentication ----------------------------------------------------------------------------------------------------
@@ -201,7 +201,7 @@ class DatagramValidator:
         if message.session != self._session:
             return "session" if self._session else "not_started"
         verdict = sequence.judge(message.sequence)
-        if verdict is not Verdict.FRESH and verdict is not Verdict.LATE:
+        if verdict is not SequenceVerdict.FRESH and verdict is not SequenceVerdict.LATE:
             return verdict.name.lower()
         if isinstance(message, Observations) and (message.marker_checksum != self._checksum
                                                   or message.marker_count != self._count):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ImageFrame, SliceRequest
 from rhot_app.objects.observations import ObjectFrame
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 Array = NDArray[np.float64]
 

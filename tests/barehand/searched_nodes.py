@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, ImageTracking, Tracker, solve_after
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, foreground_map

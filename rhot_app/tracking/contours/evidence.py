@@ -11,8 +11,8 @@ from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.kinematics import forward
+from rhot_app.hand.motion.hand_process import MOTION
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.tracking.hand_process import MOTION
 from rhot_node.wire.slices import pack_slices, unpack_slices
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def _on(hand: BareHandTracker, camera: int, frame: ContourFrame, chosen: NDArray
     points = ContourPoints(p.capsule[chosen], p.kind[chosen], p.along[chosen], p.behind[chosen], p.pixel[chosen],
                            p.normal[chosen], p.scale[chosen])
     return ContourFrame(hand.surface, points, frame.pose, frame.intrinsics, slices, frame.expected_sd[chosen],
-                        frame.late_s[chosen], MOTION)
+                        frame.late_s[chosen], MOTION, frame.repeated)
 
 
 def on_foreground(hand: BareHandTracker, frame: ForegroundFrame, state: Array) -> tuple[float, float]:

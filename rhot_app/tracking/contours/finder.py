@@ -108,7 +108,7 @@ class Finder:
         """The pose in later maps, near to where it was."""
         hand = self._hand
         seen = maps.silhouettes(hand)
-        natural = np.linalg.inv(hand.model.natural.information + np.eye(21) / TURNED**2)
+        natural = np.linalg.inv(hand.model.pose_prior.information + np.eye(21) / TURNED**2)
         covariance = np.diag(np.repeat(np.square([MOVED_M, TURNED, TURNED]), (3, 3, 21)))
         covariance[6:, 6:] = natural
         world, angles, _ = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,

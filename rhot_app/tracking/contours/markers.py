@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.landmarks import LASTING_M, LASTING_S
 from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.estimation.residual import Rows
+from rhot_app.hand.landmarks import LASTING_M, LASTING_S
+from rhot_app.hand.motion.hand_process import BIAS, BIAS_S, FASTEST, MOTION, PALM_SPREAD, HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.acquisition import Starter
 from rhot_app.tracking.association import MarkerAssociation
-from rhot_app.tracking.hand_process import BIAS, BIAS_S, FASTEST, MOTION, PALM_SPREAD, HandProcess
 from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
 from rhot_app.tracking.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
@@ -35,13 +35,12 @@ class MarkersOfHand:
         """Gives the tracker a state with the markers' lasting errors. Raises RigError when one has no place."""
         arrays, self._markers = compile_rig(rig), compile_markers(rig)
         self._starter, self._association = Starter(arrays, self._markers), MarkerAssociation(arrays)
-        count, natural, own = len(self._markers.finger), hand.model.natural, hand.process.stationary[MOTION:, MOTION:]
-        self._size = own[:SHAPE, :SHAPE].copy()
+        count, prior, self._shape = len(self._markers.finger), hand.model.pose_prior, hand.shape_covariance
         lasting = np.where(self._markers.landmark, LASTING_S, BIAS_S)
         self._process = HandProcess(
-            hand.surface.dh, hand.model.limits, natural.mean, np.asarray(np.linalg.inv(natural.information)),
-            PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.concatenate([self._size[None], np.zeros((count, 3, 3))]),
-            np.concatenate([[1e3], lasting]))
+            hand.surface.dh, hand.model.limits, prior.mean, np.asarray(np.linalg.inv(prior.information)),
+            PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.concatenate([self._shape, np.zeros((count, 3, 3))]),
+            np.concatenate([hand.shape_s, lasting]))
         hand.process, hand.filter = self._process, IteratedFilter(self._process)
 
     def reset(self) -> None:
@@ -70,6 +69,7 @@ class MarkersOfHand:
         t_s = 1e-9 * (markers.t_ns - epoch_ns)
         if not markers.seen.any() or t_s < hand.filter.knots[0].t_s:
             return False
+        hand.take((), t_s)
         prediction = hand.filter.predict(t_s)
         markers.add_landmark_noise(without_size(prediction[0]))
         self._note(prediction[0])
@@ -81,7 +81,7 @@ class MarkersOfHand:
         bias = np.empty((len(m.finger), 3, 3))
         triangulation_covariance(without_size(state), m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
                                  np.where(m.landmark, LASTING_M, 0.0), m.paint_variance, bias)
-        self._process.set_bias(np.concatenate([self._size[None], bias]))
+        self._process.set_bias(np.concatenate([self._shape, bias]))
 
 
 class BesideContours:

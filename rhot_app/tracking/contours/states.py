@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rhot_app.barehand.observations import EdgeFrame
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import ContourFrame
+from rhot_app.barehand.contour_residual import ContourFrame, Contours
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
 from rhot_app.barehand.silhouette import CORRELATED
@@ -31,12 +31,12 @@ from rhot_app.estimation.filter import update
 from rhot_app.estimation.residual import Residual
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
+from rhot_app.state import Condition, HandState
 from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand
 from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.states import no_hand, published
 from rhot_app.tracking.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
-from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.slices import SLICES_MAX
 
@@ -134,7 +134,7 @@ class ContourEstimator:
         world[:3, :3], world[:3, 3] = first[:3, :3], first[:3, :3] @ np.array([0.0, 0.0, 0.5]) + first[:3, 3]
         disc = np.hypot(*np.mgrid[-30:30, -40:40]) < 12.0
         maps = Maps(1, [disc.astype(np.float32)] * len(self._names))
-        hand.start(HandPose(world, hand.model.natural.mean.copy()), 0)
+        hand.start(HandPose(world, hand.model.pose_prior.mean.copy()), 0)
         contour = asked(hand, 0, *hand.filter.predict(0.0), STEP_M)
         contour.observe(edges_of(len(contour.slices), np.zeros(1, np.int64), np.array([[0.0, 1.0, 9.0, 1.0, 0.0]])))
         hand.frames[0], hand.cover = contour, 1e9  # so that it is looked for elsewhere
@@ -338,14 +338,15 @@ class ContourEstimator:
         contours = [contour for _, contour in waiting.values()]
         for contour, t_ns in zip(contours, times_ns, strict=True):
             contour.late_s = contour.late_s + (self._seconds(t_ns) - t_s)
+        hand.take(waiting, t_s)
         prediction, spreads = hand.filter.predict(t_s), [contour.expected_sd for contour in contours]
-        residuals: list[Residual] = [*contours, hand.limits]
+        residuals: list[Residual] = [Contours(contours), hand.limits]
         initial = prediction[0]
         for number in range(PASSES):
             for contour, spread in zip(contours, spreads, strict=True):
                 contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
             if number < PASSES - 1:
-                initial = update(hand.process, t_s, prediction, residuals, initial).state
+                initial = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial).state
         hand.filter.add(t_s, residuals, prediction, initial)
 
     def _weigh_markers(self, frame: CameraObservations) -> bool:

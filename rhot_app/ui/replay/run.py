@@ -29,8 +29,8 @@ from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import Condition, HandState
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
-from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.trackers import make_tracker
 from rhot_app.ui.models.meters import JitterWindow
 
