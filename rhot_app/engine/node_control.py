@@ -163,6 +163,11 @@ class NodeControl:
                 peer.previews.close()
                 peer.previews = None
 
+    @property
+    def previewing(self) -> bool:
+        """Whether somebody looks at the pictures."""
+        return self._preview
+
     def previews(self) -> list[Preview]:
         """The pictures that came since the last call."""
         found = []

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene
-from bench import START_S, TEST_S, Bench, states_of, wait_until
+from bench import START_S, TEST_S, Bench, node_status, states_of, wait_until
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.replay_summary import replay_states
@@ -61,7 +61,9 @@ def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench, capsys: pyt
         bench.start_node(index, f"yuv:{bench.folder / node.name}.yuv?start={begin}")
     bench.start_engine("--start")
     with EngineClient(bench.sockets) as client:
-        wait_until(client, lambda: client.state is not None, START_S, "the first state")
+        wait_until(client, lambda: all((status := node_status(client, node.name)) is not None
+                                       and status.state == "streaming" and status.rate_hz > 0.5 * FPS
+                                       for node in bench.rig.nodes), 2 * START_S, "both nodes' frames")
         for node in bench.rig.nodes:
             client.command("node", node_id=node.node_id, request={"request": "learn_background", "seconds": 2.0},
                            timeout_s=COMMAND_S)
