@@ -37,7 +37,7 @@ SIZE_FRAMES = 10
 
 SIZE_FLOOR = 0.005
 """Standard deviation of the logarithm of a fingertip's width by what the pose and the light change about it, at least
-(`python benchmarks/sight_errors.py`)."""
+(`python benchmarks/marker_errors.py`)."""
 
 _SIZE_MEMORY = 200  # frames over which a fingertip's size is averaged
 _SAME_FRAME_NS = 1_000_000

@@ -28,7 +28,7 @@ CENTROID_KERNEL = student(4.0)
 """Centroids have heavy tails: blobs are partly hidden. 4 degrees of freedom (Lange, Little and Taylor 1989)."""
 
 SIZE_SD = 0.02
-"""Standard deviation of the logarithm of a fingertip's apparent width (`python benchmarks/sight_errors.py`)."""
+"""Standard deviation of the logarithm of a fingertip's apparent width (`python benchmarks/marker_errors.py`)."""
 
 SIZE_S = 0.2
 """s: correlation time of that error. Within it, all frames together count as one observation."""

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from knocked_rig import filmed, moved, rig_of, scene_of, volume_motion
-from synthetic_rig import WIDE, Sight, hand_trajectory, make_rig, observe
+from synthetic_rig import WIDE, Viewing, hand_trajectory, make_rig, observe
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import CameraCalibration, DepthSettings, Rig
@@ -143,7 +143,7 @@ def test_outliers_do_not_pull(still: list[CameraObservations]) -> None:
 
 def test_a_late_camera_is_no_turned_one() -> None:
     rig = make_rig()
-    frames = observe(rig, WIDE, hand_trajectory(rig, "wave", SECONDS), SECONDS, Sight(noise_px=0.05))
+    frames = observe(rig, WIDE, hand_trajectory(rig, "wave", SECONDS), SECONDS, Viewing(noise_px=0.05))
     late = [delayed(frame, 2_000_000) for frame in frames]
     assert refined(frames, rig).holds
     found = refined(late, rig)

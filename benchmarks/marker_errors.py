@@ -1,6 +1,6 @@
 """How wrong the image positions of nodes are, beside what they state: px per axis, against the twin's truth.
 
-    python benchmarks/sight_errors.py [--seeds 3] [--motions rest,wave,grasp,pinch,fast] [--sketched]
+    python benchmarks/marker_errors.py [--seeds 3] [--motions rest,wave,grasp,pinch,fast] [--sketched]
 
 The takes of `rhot evaluate --compare`, sights without flags only. `common` is what both cameras see alike: half the sum
 of two sights that are nearest in time; `own` is each camera's alone: half their difference, as an rms of one camera.
