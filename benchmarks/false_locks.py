@@ -29,7 +29,7 @@ from rhot_app.evaluation.track import rig_with
 from rhot_app.project import TrackerSettings
 from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_app.tracking.trackers import make_tracker
 
 MOTIONS = ("grasp", "fast", "wave", "spread", "rest")

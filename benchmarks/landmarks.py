@@ -36,7 +36,7 @@ from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettin
 from rhot_app.recording.landmark_command import track
 from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log
 from rhot_app.simulator.nodes.landmark_detector import EPOCH_NS, detected_landmarks, landmark_rig, moving_hand
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers

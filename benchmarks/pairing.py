@@ -35,7 +35,7 @@ from rhot_app.simulator.film.film import TRUTH_NAME, film
 from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.film.truth import load_truth
 from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, make_scene, twin_defaults
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.capture.yuv import FRAMES_NAME, read_header

@@ -55,8 +55,16 @@ def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[Came
               rng: np.random.Generator, most: int = 3) -> list[Found]:
     """The most probable hands in images (H, W, 3) RGB of some cameras, best first, at most `most`; none without
     foreground as thick as a palm."""
-    used = [c for c, image in enumerate(images) if image is not None]
-    maps = [foreground_map(images[c], foreground[c], STEP) for c in used]  # type: ignore[arg-type]
+    maps = [None if image is None else foreground_map(image, known, STEP)
+            for image, known in zip(images, foreground, strict=True)]
+    return find_in_maps(maps, cameras, model, surface, size, rng, most)
+
+
+def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequence[CameraModel], model: HandModel,
+                 surface: Surface, size: Array, rng: np.random.Generator, most: int = 3) -> list[Found]:
+    """The same in foreground probabilities (h, w) of every STEP-th pixel, None of a camera without an image."""
+    used = [c for c, one in enumerate(foreground) if one is not None]
+    maps = [one for one in foreground if one is not None]
     seen = silhouettes(maps, STEP, [cameras[c].camera_from_world[:3] for c in used],
                        [cameras[c].intrinsics for c in used])
     breadth = 0.5 * float(np.exp(size[0])) * float(model.base[1, 1] - model.base[4, 1] + model.radii[1, 0]

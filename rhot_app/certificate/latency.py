@@ -18,7 +18,7 @@ from rhot_app.certificate import thesis
 from rhot_app.certificate.document import Line, figure, in_words, not_measured, number
 from rhot_app.certificate.intervals import Interval, mean_of, percentile_of
 from rhot_app.certificate.recordings import CertifiedRecording, Latencies
-from rhot_app.tracking.state import LATENCY_STAGES
+from rhot_app.state import LATENCY_STAGES
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]

@@ -22,10 +22,10 @@ from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import LATENCY_STAGES
 from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import RigArrays, compile_rig, locate_by_disparity
-from rhot_app.tracking.state import LATENCY_STAGES
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import read_document, write_document

@@ -15,7 +15,7 @@ from rhot_app.evaluation.track import DISPLAY_HZ, TrackedStates
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, TIP_ROLES
 from rhot_app.project import Rig
 from rhot_app.simulator.film.truth import Truth
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 
 # -- errors of states --------------------------------------------------------------------------------------------------
 

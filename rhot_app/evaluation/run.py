@@ -24,7 +24,7 @@ from rhot_app.simulator.film.truth import load_truth
 from rhot_app.simulator.nodes.nodes import TwinNodes
 from rhot_app.simulator.nodes.proxy import Impairment, UdpProxy
 from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, node_settings
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node.files import write_atomically
 
 Progress = Callable[[int, int], None]

@@ -18,8 +18,8 @@ from rhot_app.project import Rig, TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import HandState
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.trackers import make_tracker
 

@@ -24,7 +24,7 @@ from rhot_app.export.states import BLOCK, states_of
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.sources.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_node.detect.foreground import Foreground, foreground_map, learn_background, learn_skin, skin_foreground
 
 Image = NDArray[np.uint8]

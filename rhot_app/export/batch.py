@@ -27,7 +27,7 @@ from rhot_app.errors import ExportError, RhotError
 from rhot_app.export.export import FORMATS, export_log
 from rhot_app.export.plan import ExportOptions, require
 from rhot_app.export.recording import TrackedLog
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_node.errors import NodeError
 from rhot_node.files import write_atomically, write_document
 

@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.key_exchange import KeyExchange
@@ -90,6 +91,13 @@ class NodeLinks:
                 self._tell(RecordKind.STOP, functools.partial(self._stop, session), now_ns, times=2)
             for link in self._links.values():
                 link.want(0, now_ns)
+
+    def search(self, link: NodeLink, request: SliceRequest) -> None:
+        """Ask a node to search its next frames. May be called by any thread."""
+        with self._lock:
+            for datagram in link.slices(request):
+                self._send(link, datagram)
+                self._note(RecordKind.SLICES, link.node.node_id, time.monotonic_ns(), datagram)
 
     def record_to(self, tap: RecordSink | None) -> None:
         """Hand every command datagram to `tap` from now on: first the running session and the last exchanges,
@@ -315,6 +323,10 @@ class UdpNodes:
         self._commands.stop()
         for link in self.links:
             link.want(0, time.monotonic_ns())
+
+    def search(self, request: SliceRequest) -> None:
+        """Ask a node to search its next frames."""
+        self._commands.search(self.links[request.camera], request)
 
     def record_to(self, tap: RecordSink | None) -> None:
         """Tap all sockets; None ends it."""

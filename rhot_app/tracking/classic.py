@@ -20,12 +20,12 @@ from rhot_app.hand.solvers.methods import Method, solve
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
 from rhot_app.hand.solvers.problem import make_problem
 from rhot_app.project import IkMethod, Rig
+from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking import locate, trust
 from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.locate import Sheet
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]

@@ -18,6 +18,7 @@ from rhot_app.hand.landmarks import LASTING_M, LASTING_S
 from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
+from rhot_app.state import Condition, HandState
 from rhot_app.tracking.acquisition import Located, Starter
 from rhot_app.tracking.association import GATE, MarkerAssociation, assign
 from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
@@ -25,7 +26,6 @@ from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
 from rhot_app.tracking.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
-from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 

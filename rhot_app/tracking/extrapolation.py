@@ -18,9 +18,9 @@ from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.objects.motion import SIZE, TWIST, ObjectProcess, pose_of
 from rhot_app.objects.state import ObjectState
 from rhot_app.project import Rig
+from rhot_app.state import HandState
 from rhot_app.tracking.marker_model import compile_markers, scaled_table
 from rhot_app.tracking.rig_arrays import rigs_of_hands
-from rhot_app.tracking.state import HandState
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

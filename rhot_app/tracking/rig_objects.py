@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.observations import ImageFrame, SliceRequest
 from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
@@ -24,9 +25,9 @@ from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
 from rhot_app.project import Rig
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.marker_model import scaled_table
-from rhot_app.tracking.state import HandState, Knowledge
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraObservations, ImageTracking, Tracker
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -138,6 +139,25 @@ class WithObjects:
     def ingest_objects(self, frame: ObjectFrame) -> None:
         """Take one frame's tags, or a pose of another tracker, in."""
         self._objects.ingest_objects(frame)
+
+    def ingest_image(self, frame: ImageFrame) -> None:
+        """Take one frame's edges or foreground in, where the hand's tracker searches images."""
+        if isinstance(self._hand, ImageTracking):
+            self._hand.ingest_image(frame)
+
+    def requests(self) -> list[SliceRequest]:
+        """What the nodes shall search for the hand."""
+        return self._hand.requests() if isinstance(self._hand, ImageTracking) else []
+
+    def warm_up(self) -> None:
+        """See `ImageTracking`."""
+        if isinstance(self._hand, ImageTracking):
+            self._hand.warm_up()
+
+    def wait(self) -> None:
+        """Until the hand that is being looked for is found or not."""
+        if isinstance(self._hand, ImageTracking):
+            self._hand.wait()
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, of all markers, None before its first."""

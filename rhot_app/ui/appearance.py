@@ -8,8 +8,8 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication
 
 from rhot_app.project import Rig
+from rhot_app.state import HandState
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.state import HandState
 from rhot_app.ui.actions import CLOUD_KINDS, Actions
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.settings import Settings

@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
 from rhot_app.project import Rig
-from rhot_app.tracking.state import Condition, HandState
+from rhot_app.state import Condition, HandState
 from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme

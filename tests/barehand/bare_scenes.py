@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from pictures import picture, two_cameras, wall
 
-from rhot_app.barehand.surface import Surface, surface_of
+from rhot_app.barehand.surface import SHAPE, Surface, surface_of
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
@@ -50,7 +50,7 @@ def rig_of(cameras: list[CameraModel], hand: HandAnatomy) -> Rig:
 
 def state_of(pose: HandPose) -> np.ndarray:
     """The estimator's state of a hand at rest."""
-    state = np.zeros(BIAS + 3)
+    state = np.zeros(BIAS + SHAPE)
     state[:ANGLES], state[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
     return state
 

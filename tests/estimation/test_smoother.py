@@ -14,8 +14,8 @@ from rhot_app.project import with_tracker
 from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import Condition
 from rhot_app.tracking.smoothing import SmoothedTracker
-from rhot_app.tracking.state import Condition
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 

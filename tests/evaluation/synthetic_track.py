@@ -9,7 +9,7 @@ import numpy as np
 from rhot_app.evaluation.accuracy import WornMarkers
 from rhot_app.evaluation.track import TrackedStates
 from rhot_app.simulator.film.truth import FrameTruth, Truth
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 
 WORN = WornMarkers(np.arange(5), np.arange(5), np.arange(21))
 PLACES = np.array([[0.02 * k, 0.0, 0.6] for k in range(6)])

@@ -13,7 +13,7 @@ from rhot_app.evaluation.compare import COLUMNS, Comparison, Judged, Run, consis
 from rhot_app.evaluation.track import Predicted, TrackedStates
 from rhot_app.project import load_rig
 from rhot_app.simulator.film.truth import Truth
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_node.files import resource_path
 
 TIMES = np.arange(0.5, 3.5, 0.025)

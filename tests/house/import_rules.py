@@ -15,7 +15,7 @@ APP_BASE = ("rhot_node", "resources", "rhot_app.errors", "rhot_app.progress", "r
 MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
-BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.tracking", "rhot_app.barehand", *ENGINE_SIDE)
+BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.tracking", "rhot_app.barehand", *ENGINE_SIDE)
 
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # the node
@@ -46,9 +46,10 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.calibration.recorded_observations": BELOW_ENGINE,  # reads them for all
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),
     "rhot_app.objects.alignment.alignment_command": BELOW_ENGINE,
-    "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.tracking.state",
-                          "rhot_app.tracking.estimator_state"),  # a tracker of its own
-    "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS),
+    "rhot_app.state": ("rhot_app.objects.state",),
+    "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.state"),
+    "rhot_app.articulated": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand"),
+    "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.barehand"),
     "rhot_app.recording": BELOW_ENGINE,
     "rhot_app.sources": BELOW_ENGINE,
     "rhot_app.outputs": BELOW_ENGINE,
@@ -58,8 +59,9 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.certificate": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation"),
     "rhot_app.export": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.certificate"),
     "rhot_app.api": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.export"),
+    "rhot_app.mouse": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation"),
     "rhot_app.ui": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation", "rhot_app.export",
-                    "rhot_app.certificate"),
+                    "rhot_app.certificate", "rhot_app.mouse"),
     "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine"),
     "rhot_app": ("rhot_app",),  # __init__
     "rhot_app.__main__": ("rhot_node", "rhot_app", "resources"),

@@ -14,7 +14,7 @@ from rhot_app.hand import anatomy, articulated
 from rhot_app.objects import object_file
 from rhot_app.objects.alignment import alignment_file
 from rhot_app.objects.state import ObjectState
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node import config, markers
 
 DOCS = Path(__file__).parents[2] / "docs"

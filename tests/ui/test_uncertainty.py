@@ -14,7 +14,7 @@ from PySide6.QtGui import QHelpEvent, QImage
 from PySide6.QtWidgets import QApplication, QToolButton, QToolTip
 from test_tracker_dialog import FLOATING
 
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_app.ui.models.rows import sd_number, worst_sd
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import to_display

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import EngineError, RhotError
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker, Listener
 
 Image = NDArray[np.uint8]

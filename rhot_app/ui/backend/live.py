@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, Preview
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.meters import STACKED, JitterWindow, LatencyWindow, LossMeter, RateRows, rate_names
 from rhot_app.ui.models.series import Series
 

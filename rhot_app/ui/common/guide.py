@@ -15,6 +15,7 @@ PAGES: tuple[tuple[str, str], ...] = (
     ("start", "Getting started"), ("window", "The window"), ("nodes", "Nodes"), ("markers", "Markers"),
     ("cameras", "Cameras"), ("hand", "The hand"), ("scene", "The scene"), ("plots", "The plots"),
     ("calibration", "Calibration"), ("tracker", "The tracker"), ("outputs", "Streams to other programs"),
+    ("mouse", "The 3-D mouse"),
     ("recording", "Recording and replay"), ("troubles", "When something is wrong"), ("keys", "Keys"),
 )
 """Name of each page's file and its title, in reading order."""

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.models.proposal import RigChange

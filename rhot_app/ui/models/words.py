@@ -17,7 +17,7 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import RigError
 from rhot_app.hand.anthropometry import hand_length
 from rhot_app.project import Rig, TrackerSettings
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.state import Condition, HandState, Knowledge
 from rhot_node.files import read_json, resource_path
 from rhot_node.wire.messages import MarkerFlag
 

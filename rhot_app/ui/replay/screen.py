@@ -12,7 +12,7 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
 from rhot_app.hand.skeleton import FINGERS
-from rhot_app.tracking.state import Condition, HandState
+from rhot_app.state import Condition, HandState
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.models.pacing import FramePacer

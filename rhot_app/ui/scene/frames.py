@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.project import CameraPose, Intrinsics
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 # -- Floor grid and axes -----------------------------------------------------------------------------------------------
 

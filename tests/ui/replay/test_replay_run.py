@@ -13,7 +13,7 @@ from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
 from rhot_app.simulator.film.node_log import T0_MASTER_NS
-from rhot_app.tracking.state import Condition
+from rhot_app.state import Condition
 from rhot_app.ui.replay.run import LOST, NO_STATE, PARTIAL, TRACKING, Run, condition_bins, new_run_path, track_log
 from rhot_app.ui.replay.session import Comparison, Replay, TrackerChoice, nearest
 

@@ -20,7 +20,7 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.geometry.transforms import inverse
 from rhot_app.objects.alignment.alignment_file import alignment_path, load_alignment
 from rhot_app.project import save_rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards import alignment
 from rhot_app.ui.wizards.framework.plan import Kit

@@ -34,7 +34,7 @@ from rhot_app.objects.alignment.report import (
     judge_alignment,
 )
 from rhot_app.progress import Progress
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.step import Bar, Chart, Curve, Step, StepView, Task

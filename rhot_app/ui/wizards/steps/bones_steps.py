@@ -16,7 +16,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import BONES, FINGERS
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
 from rhot_app.ui.wizards.models.movement import Coach, MovementStep, QuietCoach

@@ -13,7 +13,7 @@ from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, g
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.drawing import Callout, Dots, Overlay
 from rhot_app.ui.wizards.models.step import Bar, Chart, ChartedStep, Curve, Step, StepView

@@ -25,6 +25,13 @@ class Knowledge(enum.IntEnum):
     UNKNOWN = 3  # nothing to say; the value is NaN
 
 
+MEASURED_M, INFERRED_M = 3e-3, 12e-3
+"""m: standard deviation (root of the trace) up to which a place counts as measured, and as inferred."""
+
+MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
+"""rad: the same of angles and of the palm's rotation."""
+
+
 class Condition(enum.Enum):
     """The one word the operator reads from two metres away."""
 
