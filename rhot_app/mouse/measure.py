@@ -87,7 +87,7 @@ class MouseRun:
 def play(script: Script, seed: int, *, settings: MouseSettings | None = None, pictures: bool = False,
          sway: Sway | None = None, covered_s: float = math.inf, told: Watch = lambda title: None) -> MouseRun:
     """Play a script to the twin and its states to the mouse. `pictures`: render and detect; else the observations are
-    made without pictures (`rhot_app.simulator.truth.ideal_observations`). From `covered_s` on the second camera is
+    made without pictures (`rhot_app.simulator.film.ideal_observations`). From `covered_s` on the second camera is
     silent. Raises RhotError."""
     settings, scene = settings or MouseSettings(), make_scene(twin_defaults(), seed)
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name:
