@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import replay_states
 from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
 from rhot_app.evaluation.track import Timed
 from rhot_app.hand.skeleton import TIP_ROLES

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from synthetic_rig import WIDE, Viewing, altered, hand_trajectory, make_rig, observe, run
 
-from rhot_app.tracking.estimator import Estimator
+from rhot_app.tracking.markers.estimator import Estimator
 
 SECONDS, PIXELS = 10.0, 1e-12
 

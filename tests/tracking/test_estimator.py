@@ -15,8 +15,8 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES
 from rhot_app.simulator.scene.motion import FACING
 from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.classic import ClassicTracker
-from rhot_app.tracking.estimator import Estimator
-from rhot_app.tracking.marker_model import compile_markers
+from rhot_app.tracking.markers.estimator import Estimator
+from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.trackers import make_tracker
 

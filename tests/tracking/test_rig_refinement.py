@@ -13,9 +13,9 @@ from synthetic_rig import WIDE, Viewing, hand_trajectory, make_rig, observe
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import CameraCalibration, DepthSettings, Rig
-from rhot_app.tracking.pair_observations import CAPACITY, PairStore, linearise
-from rhot_app.tracking.refined_rig import Refinement, Scale, refined_rig, stale_sentence, usable, verdict_of
-from rhot_app.tracking.rig_refinement import RigRefiner
+from rhot_app.tracking.refinement.pair_observations import CAPACITY, PairStore, linearise
+from rhot_app.tracking.refinement.refined_rig import Refinement, Scale, refined_rig, stale_sentence, usable, verdict_of
+from rhot_app.tracking.refinement.rig_refinement import RigRefiner
 from rhot_app.tracking.tracker import CameraObservations
 
 SCENE = scene_of(1)

@@ -9,9 +9,9 @@ from modelled_hand import after_s, deviations, model_rig, moving, seconds, state
 from synthetic_rig import WIDE, Viewing, observe
 
 from rhot_app.state import Condition, Knowledge
-from rhot_app.tracking.estimator_state import Sightings
-from rhot_app.tracking.marker_model import compile_markers
-from rhot_app.tracking.marker_residual import MarkerFrame
+from rhot_app.tracking.markers.estimator_state import RecentObservations
+from rhot_app.tracking.markers.marker_model import compile_markers
+from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.rig_arrays import compile_rig
 
 RIG = model_rig()
@@ -63,10 +63,10 @@ def test_a_lost_frame_of_a_slow_camera_is_no_lost_hand():
 
 def test_sights_are_fresh_for_one_and_a_half_of_each_cameras_periods():
     markers = compile_markers(RIG)
-    sightings = Sightings(compile_rig(RIG), markers)
+    observations = RecentObservations(compile_rig(RIG), markers)
     for frame in frames_at(40.0, 8.0, "rest", Viewing(frame_loss=0.05)):
-        sightings.enter(MarkerFrame(markers, frame))
-    np.testing.assert_allclose(sightings.periods_s, [1 / 40, 1 / 8], rtol=0.25)
-    np.testing.assert_allclose(sightings.fresh_ns, 1.5e9 * np.array(sightings.periods_s), atol=1.0)
-    sightings.reset()
-    assert sightings.periods_s[0] == sightings.periods_s[1] == pytest.approx(0.04)
+        observations.enter(MarkerFrame(markers, frame))
+    np.testing.assert_allclose(observations.periods_s, [1 / 40, 1 / 8], rtol=0.25)
+    np.testing.assert_allclose(observations.fresh_ns, 1.5e9 * np.array(observations.periods_s), atol=1.0)
+    observations.reset()
+    assert observations.periods_s[0] == observations.periods_s[1] == pytest.approx(0.04)
