@@ -19,7 +19,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
 from rhot_app.objects.motion import TWIST, VELOCITY, pose_of
-from rhot_app.objects.observations import MarkerPoints, ObjectFrame, ObjectPose
+from rhot_app.objects.observations import MarkerPoints, MeasuredPose, ObjectFrame
 from rhot_app.objects.shape import shape_of
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.objects.stream import PoseMeasurement
@@ -64,7 +64,7 @@ class RigObjects:
 
     def ingest_objects(self, frame: ObjectFrame) -> None:
         """Take the tags of one frame, or a pose of another tracker, in."""
-        if isinstance(frame, ObjectPose):
+        if isinstance(frame, MeasuredPose):
             self._tracker.take_pose(frame.name, PoseMeasurement(frame.t_ns, frame.world_from_object, frame.covariance))
         else:
             self._tracker.take(frame)
