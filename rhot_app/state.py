@@ -20,7 +20,7 @@ class Knowledge(enum.IntEnum):
     """How a value came to be known; shown alike everywhere (solid, translucent, hatched)."""
 
     MEASURED = 0  # seen by enough cameras at this instant
-    INFERRED = 1  # follows from measured values through the model, or from a half-hidden sight
+    INFERRED = 1  # follows from measured values through the model, or from a half-occluded observation
     GUESSED = 2  # the images do not determine it; prior or last value
     UNKNOWN = 3  # nothing to say; the value is NaN
 

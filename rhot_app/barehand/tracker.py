@@ -75,7 +75,7 @@ an edge may be."""
 
 SIZE_SD = 0.1, 0.05, 0.08
 """Standard deviations of the logarithms of a hand's size, of its fingers' part of it, and of its thickness beyond that,
-in adults, where they are unknown (`tracking.hand_size`; Buryanov and Kotiuk 2010)."""
+in adults, where they are unknown (`tracking.markers.hand_size`; Buryanov and Kotiuk 2010)."""
 
 LENGTH_SD, RADIUS_SD = 0.05, 0.08
 """The same of a phalanx's own length and radius."""

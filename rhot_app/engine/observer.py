@@ -89,7 +89,7 @@ class Observer:
                  for camera, status in enumerate(nodes)]
         nowhere = no_marker_advice(facts, running)
         marker_ids = self.rig.markers.ids
-        found = [advice for one in facts for advice in node_advice(one, marker_ids, running, sight=not nowhere)]
+        found = [advice for one in facts for advice in node_advice(one, marker_ids, running, visibility=not nowhere)]
         if running:
             self.rig_watch.take(self._pipeline.recent)
             stale = self.rig_watch.advice(now_ns)

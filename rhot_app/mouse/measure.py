@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import replay_states
 from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
 from rhot_app.evaluation.track import Timed
 from rhot_app.hand.skeleton import TIP_ROLES
@@ -87,7 +87,7 @@ class MouseRun:
 def play(script: Script, seed: int, *, settings: MouseSettings | None = None, pictures: bool = False,
          sway: Sway | None = None, covered_s: float = math.inf, told: Watch = lambda title: None) -> MouseRun:
     """Play a script to the twin and its states to the mouse. `pictures`: render and detect; else the observations are
-    made without pictures (`rhot_app.simulator.truth.ideal_observations`). From `covered_s` on the second camera is
+    made without pictures (`rhot_app.simulator.film.ideal_observations`). From `covered_s` on the second camera is
     silent. Raises RhotError."""
     settings, scene = settings or MouseSettings(), make_scene(twin_defaults(), seed)
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name:

@@ -31,7 +31,7 @@ from rhot_app.ui.replay.windows import ReplayWindows
 from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Docks, Screen
 from rhot_app.ui.simulated_rig_menus import LensCaps, TwinShows
-from rhot_app.ui.status_words import RigWatch, label_of, look_of, notices_of
+from rhot_app.ui.status_words import RigFileWatch, label_of, look_of, notices_of
 from rhot_app.ui.tracked_objects import TrackedObjects
 from rhot_app.ui.welcome import WelcomePage
 from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, WIZARDS, wizard_named
@@ -56,7 +56,7 @@ class MainWindow(QMainWindow):
         self.passing = TransientNotices()
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, self.tell)
-        self.rig_watch = RigWatch(controller)
+        self.rig_watch = RigFileWatch(controller)
         self.wizards = Launcher(controller.backend.asker, controller.backend.client,
                                 lambda: self.appearance.scheme, settings, self)
         self.replays = ReplayWindows(settings, lambda: self.appearance.scheme, self, lambda: controller.rig)

@@ -36,7 +36,7 @@ from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, s
 from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.states import published
-from rhot_app.tracking.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
+from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.slices import SLICES_MAX
 
