@@ -26,6 +26,7 @@ from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
 from rhot_app.project import Rig
 from rhot_app.state import HandState, Knowledge
+from rhot_app.tracking.contours.seen import SeenContour, ShowsContours
 from rhot_app.tracking.markers.marker_model import scaled_table
 from rhot_app.tracking.tracker import CameraObservations, ImageTracking, Tracker
 from rhot_node.wire.messages import MarkerFlag
@@ -144,6 +145,10 @@ class WithObjects:
         """Take one frame's edges or foreground in, where the hand's tracker searches images."""
         if isinstance(self._hand, ImageTracking):
             self._hand.ingest_image(frame)
+
+    def seen(self) -> list[SeenContour]:
+        """What the hand's tracker has seen of a bare hand."""
+        return self._hand.seen() if isinstance(self._hand, ShowsContours) else []
 
     def requests(self) -> list[SliceRequest]:
         """What the nodes shall search for the hand."""

@@ -35,6 +35,7 @@ from rhot_app.state import Condition, HandState, no_hand
 from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand
 from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.markers import MarkersOfHand
+from rhot_app.tracking.contours.seen import SeenContour, seen_contour
 from rhot_app.tracking.contours.states import published
 from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
@@ -121,6 +122,16 @@ class ContourEstimator:
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""
         return tuple(camera.newest for camera in self._cameras)
+
+    def seen(self) -> list[SeenContour]:
+        """See `ShowsContours`."""
+        if not (self._tracking and self._confirmed):
+            return []
+        state, found = self._hand.filter.newest.state, []
+        for name, camera, frame in zip(self._names, self._cameras, list(self._hand.frames), strict=True):
+            if frame is not None:
+                found.append(seen_contour(name, camera.answered_ns, frame, state))
+        return found
 
     def requests(self) -> list[SliceRequest]:
         """What the nodes shall search now."""
