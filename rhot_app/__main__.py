@@ -48,6 +48,7 @@ SUBCOMMANDS = {
     "pair": Subcommand("rhot_app.sources.pair_command", "pair with a node by the code that it shows"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),
     "report": Subcommand("rhot_app.engine.report_command", "collect what somebody needs who looks for a fault"),
+    "mouse": Subcommand("rhot_app.mouse.mouse_command", "work a 3-D cursor and two buttons with the hand"),
     "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "play a simulated run and compare with its truth"),
 }
 

@@ -65,7 +65,7 @@ class Root(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     free: Literal["pose", "translation", "none"] = "pose"
 
 
-class Frame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ArticulatedFrame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One row: Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha) in its parent's frame (Rehg eq. 2.2).
 
     `angle`, if any, times `sign` adds to theta. A frame with a `shape` is a body of its own.
@@ -112,7 +112,7 @@ class Articulated(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     mirror_axis: Literal["x", "y"] = "y"
     length_mm: Size | None = None
     root: Root
-    frames: tuple[Frame, ...]
+    frames: tuple[ArticulatedFrame, ...]
     angles: tuple[Angle, ...] = ()
     points: tuple[Point, ...] = ()
     couplings: tuple[Coupling, ...] = ()
@@ -142,12 +142,12 @@ def _layout(value: Any) -> str:
 
 def _terse(row: msgspec.Struct) -> dict[str, Any]:
     """The fields that say something: what is at its default need not be written."""
-    said: dict[str, Any] = {"kind": row.__struct_config__.tag} if row.__struct_config__.tag else {}
+    named: dict[str, Any] = {"kind": row.__struct_config__.tag} if row.__struct_config__.tag else {}
     for field in msgspec.structs.fields(row):
         value = getattr(row, field.name)
         if value != field.default:
-            said[field.name] = _terse(value) if isinstance(value, msgspec.Struct) else value
-    return said
+            named[field.name] = _terse(value) if isinstance(value, msgspec.Struct) else value
+    return named
 
 
 def scaled(document: Articulated, factor: float) -> Articulated:
@@ -215,7 +215,7 @@ def _tree_complaints(document: Articulated) -> Iterator[str]:
             yield f'{what}: "{max(names, key=names.count)}" occurs twice'
 
 
-def _parent_complaint(frame: Frame, parents: dict[str, str]) -> str:
+def _parent_complaint(frame: ArticulatedFrame, parents: dict[str, str]) -> str:
     """Why the parent of a frame is neither the root nor an earlier frame."""
     way = [frame.name]
     while way[-1] in parents and way[-1] not in way[:-1]:
@@ -256,10 +256,11 @@ def _row_names() -> tuple[str, ...]:
     return tuple(f"{name}_{row}" for name in FINGERS for row in (thumb if name == "thumb" else finger))
 
 
-def _frame(name: str, row: DhRow, names: tuple[str, ...], shapes: dict[str, Capsule]) -> Frame:
-    return Frame(name, PALM if row.parent == ROOT else names[row.parent], _degrees(row.theta), _mm(row.d), _mm(row.a),
-                 _degrees(row.alpha), None if row.angle == FIXED else ANGLES[row.angle], 1 if row.sign > 0 else -1,
-                 shapes.get(name))
+def _frame(name: str, row: DhRow, names: tuple[str, ...], shapes: dict[str, Capsule]) -> ArticulatedFrame:
+    return ArticulatedFrame(
+        name, PALM if row.parent == ROOT else names[row.parent], _degrees(row.theta), _mm(row.d), _mm(row.a),
+        _degrees(row.alpha), None if row.angle == FIXED else ANGLES[row.angle], 1 if row.sign > 0 else -1,
+        shapes.get(name))
 
 
 def _points(table: HandTable, names: tuple[str, ...]) -> tuple[Point, ...]:

@@ -11,7 +11,7 @@ import math
 import re
 import socket
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 from typing import Final
 
@@ -76,6 +76,13 @@ def object_messages(sample: Sample) -> Iterator[bytes]:
         distances = one.distances.tolist()
         if all(map(math.isfinite, distances)):
             yield osc_message(f"{begin}/fingertips", *distances, *map(int, one.contacts.tolist()))
+
+
+def mouse_messages(cursor: Iterable[float] | None, pressed: Collection[str]) -> Iterator[bytes]:
+    """What is said of the 3-D mouse: its cursor, m, left out while it is unknown, and its two buttons, 1 when held."""
+    if cursor is not None:
+        yield osc_message("/rhot/mouse/cursor", *map(float, cursor))
+    yield osc_message("/rhot/mouse/buttons", *(int(button in pressed) for button in ("thumb", "little")))
 
 
 class UdpSink:

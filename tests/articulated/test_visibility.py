@@ -39,7 +39,7 @@ def random_hand(rng):
     """A hand of the pose prior before the camera, turned anyhow."""
     model, surface = model_and_surface()
     bodies, _ = hand_bodies(surface)
-    angles = np.clip(rng.multivariate_normal(model.natural.mean, np.linalg.inv(model.natural.information)),
+    angles = np.clip(rng.multivariate_normal(model.pose_prior.mean, np.linalg.inv(model.pose_prior.information)),
                      model.limits[:, 0], model.limits[:, 1])
     root = np.eye(4)
     root[:3, :3] = Rotation.random(random_state=rng).as_matrix()

@@ -56,6 +56,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                   "--json"),
     "rhot object": ("FILE", "--images", "--rig", "--json"),
     "rhot poses": ("--source", "--tracker", "--seconds", "--out", "--json", "openvr", "libsurvive"),
+    "rhot mouse": ("--directory", "--simulated", "--seed", "--gain", "--height-gain", "--height-from", "--on-table",
+                   "--osc", "--pointer", "--seconds", "--measure", "--pictures", "--json"),
     "rhot nodes": ("--seconds", "--json"),
     "rhot pair": ("NODE", "--rig", "--port", "--code"),
     "rhot-node pair": ("--settings",),

@@ -1,0 +1,168 @@
+"""A scripted hand that works the 3-D mouse: a plan in the cursor's frame becomes a motion of the twin.
+
+It knows the hand's true lengths and the mouse's settings, and nothing of what a tracker makes of it: it moves blindly,
+where a person would correct the cursor by eye. Ways are of minimum jerk (Flash and Hogan 1985).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.model import build_model
+from rhot_app.hand.skeleton import ANGLES, HandPose
+from rhot_app.mouse.pick_scene import START, Ball
+from rhot_app.mouse.pointer import BUTTONS, HOME_S, MouseSettings
+from rhot_app.simulator.scene.motion import FACING, Key, MotionFile, Sway
+
+Array = NDArray[np.float64]
+
+TILT_DEG: Final = 45.0
+"""The hand's plane leans so far towards the cameras: they look at it at 45 degrees, as in Rehg 1995, 4.3.4, but see the
+palm, which is the side that RHOT's cameras usually see."""
+
+KEY_S: Final = 0.05
+"""Between keys, unless a faster hand needs more of them; a spline goes through them."""
+
+CLICK_S: Final = 0.15
+"""A finger spreads or returns in this time."""
+
+LEAD_S: Final = 1.0 + HOME_S
+"""The hand rests so long first: the tracker settles, and the mouse takes the rest."""
+
+SPREAD_DEG: Final = 27.0
+"""A finger spreads so far: 12 degrees, its natural variation (`rhot_app.hand.limits`), beyond a press."""
+
+_REST_DEG: Final = {
+    "thumb_cmc_abduction": -18.0, "thumb_cmc_flexion": 8.0, "thumb_mcp_flexion": 12.0, "thumb_ip_flexion": 12.0,
+    "index_mcp_flexion": 26.0, "index_pip_flexion": 10.0, "index_dip_flexion": 6.0, "index_mcp_abduction": 5.0,
+    "middle_mcp_flexion": 12.0, "middle_pip_flexion": 16.0, "middle_dip_flexion": 10.0,
+    "ring_mcp_flexion": 12.0, "ring_pip_flexion": 16.0, "ring_dip_flexion": 10.0, "ring_mcp_abduction": -3.0,
+    "little_mcp_flexion": 12.0, "little_pip_flexion": 16.0, "little_dip_flexion": 10.0, "little_mcp_abduction": -6.0}
+"""A flat relaxed hand, the thumb beside it on the table; its index finger hangs down a little, so that it can rise."""
+
+
+_SPREADS: Final = {"thumb": ("thumb_cmc_flexion", -1.0), "little": ("little_mcp_abduction", -1.0)}
+"""Angle that spreads each button's finger in the palm's plane, and its sign."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """Where the script wants the mouse at a time: `cursor` (3,) m, spread of each button 0..1, `turn_rad` about up."""
+
+    t_s: float
+    cursor: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    spread: tuple[float, float] = (0.0, 0.0)  # as BUTTONS
+    turn_rad: float = 0.0
+
+
+class Script:
+    """Grows by commands; `end_s` is where it has got to."""
+
+    def __init__(self, *, turn_deg: float = 0.0) -> None:
+        """`turn_deg`: how the resting palm is turned on the table."""
+        turn = float(np.radians(turn_deg))
+        self.moments = [Moment(0.0, turn_rad=turn), Moment(LEAD_S, turn_rad=turn)]
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last moment."""
+        return self.moments[-1].t_s
+
+    def wait(self, seconds: float) -> None:
+        """Do nothing for a while."""
+        self._add(seconds)
+
+    def move(self, cursor: tuple[float, float, float], seconds: float, *, release: bool = False) -> None:
+        """Bring the cursor somewhere; `release`: fingers that are spread return on the way."""
+        self._add(seconds, cursor=cursor, spread=(0.0, 0.0) if release else None)
+
+    def spread(self, button: str, *, out: bool) -> None:
+        """Spread a finger, or let it return."""
+        spread = list(self.moments[-1].spread)
+        spread[BUTTONS.index(button)] = float(out)
+        self._add(CLICK_S, spread=(spread[0], spread[1]))
+
+    def click(self, button: str, held_s: float = 0.15) -> None:
+        """Press and release."""
+        self.spread(button, out=True)
+        self.wait(held_s)
+        self.spread(button, out=False)
+
+    def _add(self, seconds: float, *, cursor: tuple[float, float, float] | None = None,
+             spread: tuple[float, float] | None = None) -> None:
+        last = self.moments[-1]
+        self.moments.append(Moment(last.t_s + seconds, cursor or last.cursor, spread or last.spread, last.turn_rad))
+
+    def sample(self, times_s: Array) -> Array:
+        """(N, 6): cursor, spreads and turn at times (N,), by ways of minimum jerk."""
+        rows = np.array([[*moment.cursor, *moment.spread, moment.turn_rad] for moment in self.moments])
+        ends = np.array([moment.t_s for moment in self.moments])
+        after = np.clip(np.searchsorted(ends, times_s, side="right"), 1, len(ends) - 1)
+        part = np.clip((times_s - ends[after - 1]) / (ends[after] - ends[after - 1]), 0.0, 1.0)
+        part = part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+        return np.asarray(rows[after - 1] + part[:, None] * (rows[after] - rows[after - 1]))
+
+
+def carrying(balls: tuple[Ball, ...] = START) -> Script:
+    """A hand that picks each ball, carries it to the place of the next one, and lies at rest again."""
+    script = Script()
+    for ball, following in zip(balls, (*balls[1:], balls[0]), strict=True):
+        x, y, z = following.centre
+        script.move(ball.centre, 1.0)
+        script.wait(0.3)
+        script.spread("thumb", out=True)
+        script.wait(0.3)
+        script.move((0.6 * x, 0.6 * y, 0.12), 0.8)
+        script.move((x, y - 3.0 * ball.radius_m, z), 0.8)
+        script.spread("thumb", out=False)
+        script.wait(0.4)
+    script.move((0.0, 0.0, 0.0), 1.0)
+    return script
+
+
+def motion_file(script: Script, anatomy: HandAnatomy, settings: MouseSettings, sway: Sway, *,
+                key_s: float = KEY_S) -> MotionFile:
+    """The script as a motion of a hand whose palm the cameras see, with a key every `key_s`."""
+    period = script.end_s + 1.0
+    times = np.arange(0.0, period - 0.5 * key_s, key_s)
+    tilt = Rotation.from_rotvec([np.radians(TILT_DEG), 0.0, 0.0])
+    home = tilt.as_matrix() @ FACING
+    lengths, flexions = _index_heights(anatomy)
+    keys = []
+    for t_s, row in zip(times, script.sample(times), strict=True):
+        cursor, spread, turn = row[:3], row[3:5], row[5]
+        place = home @ np.array([cursor[1], -cursor[0], 0.0]) / settings.gain
+        palm = home @ Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix()
+        rotation = Rotation.from_matrix(palm @ FACING.T).as_rotvec(degrees=True)
+        index = float(np.interp(cursor[2] / settings.height_gain, lengths, flexions))
+        angles = {"index_mcp_flexion": round(index, 3)}
+        for button, out in zip(BUTTONS, spread, strict=True):
+            name, sign = _SPREADS[button]
+            angles[name] = round(_REST_DEG[name] + sign * SPREAD_DEG * float(out), 3)
+        keys.append(Key(round(float(t_s), 6), _triple(1e3 * place), _triple(rotation), angles))
+    words = "The hand works the 3-D mouse: it picks three balls and carries them."
+    return MotionFile("mouse", words, round(float(period), 6), tuple(keys), dict(_REST_DEG), sway)
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 3) for value in values)
+    return x, y, z
+
+
+def _index_heights(anatomy: HandAnatomy) -> tuple[Array, Array]:
+    """Heights m of the index marker above its rest, and the MCP flexions deg that give them; heights increase."""
+    model = build_model(anatomy)
+    angles = np.radians([_REST_DEG.get(name, 0.0) for name in ANGLES])
+    number = ANGLES.index("index_mcp_flexion")
+    heights, flexions = [], np.arange(70.0, -0.5, -1.0)
+    for flexion in (_REST_DEG["index_mcp_flexion"], *flexions):
+        angles[number] = np.radians(flexion)
+        heights.append(forward(model, HandPose(np.eye(4), angles.copy())).marker_centres[1, 2])
+    return np.array(heights[1:]) - heights[0], flexions

@@ -1,0 +1,116 @@
+"""What leaves the 3-D mouse: OSC messages, events of the system's pointer, lines of the command, sentences."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pythonosc.osc_bundle import OscBundle
+
+from rhot_app.errors import OutputError
+from rhot_app.mouse.pointer import MouseState
+from rhot_app.mouse.system_pointer import SystemPointer
+from rhot_app.outputs.osc import bundles, mouse_messages
+from rhot_app.state import Condition
+
+ROOT = Path(__file__).parents[2]
+
+
+def mouse(*cursor: float, pressed: tuple[str, ...] = ()) -> MouseState:
+    return MouseState(0, Condition.TRACKING, np.array(cursor) if cursor else None, frozenset(pressed))
+
+
+def test_osc_says_cursor_and_buttons() -> None:
+    first, second = mouse_messages((0.5, -1.0, 0.25), {"little"})
+    assert first == b"/rhot/mouse/cursor\0\0,fff\0\0\0\0\x3f\0\0\0\xbf\x80\0\0\x3e\x80\0\0"
+    assert second == b"/rhot/mouse/buttons\0,ii\0\0\0\0\0\0\0\0\1"
+    (bundle,) = bundles(mouse_messages(None, ()))
+    assert [(one.address, one.params) for one in OscBundle(bundle)] == [("/rhot/mouse/buttons", [0, 0])]
+
+
+class Device:
+    """A file in place of /dev/uinput, and what was asked of it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / "uinput"
+        self.path.touch()
+        self.asked: list[tuple[int, object]] = []
+
+    def ioctl(self, file: int, request: int, argument: object) -> None:
+        self.asked.append((request, argument))
+
+    def events(self) -> list[tuple[int, int, int]]:
+        """(type, code, value) of what was written."""
+        return [event[2:] for event in struct.iter_unpack("@llHHi", self.path.read_bytes())]
+
+
+def test_the_pointer_is_made_moved_clicked_and_removed(tmp_path: Path) -> None:
+    device = Device(tmp_path)
+    pointer = SystemPointer(device.path, device.ioctl)
+    assert (0x40045565, 0x110) in device.asked and (0x40045565, 0x111) in device.asked  # both buttons
+    setups = [argument for request, argument in device.asked if request == 0x401C5504]
+    assert setups[0] == struct.pack("@HHiiiiii", 0, 0, 0, 0, 32767, 0, 0, 0) and len(setups[0]) == 28
+    (setup,) = [argument for request, argument in device.asked if request == 0x405C5503]
+    assert len(setup) == 92 and setup[8:22] == b"RHOT 3-D mouse"
+    assert device.asked[-1][0] == 0x5501
+    pointer.write(mouse(0.24, 0.18, 0.0))
+    pointer.write(mouse(0.24, 0.18, 0.1, pressed=("thumb",)))
+    pointer.write(mouse(0.24, 0.18, 0.2, pressed=("thumb",)))  # nothing new
+    pointer.write(mouse(-0.24, -0.18, 0.0))
+    pointer.close()
+    assert device.events() == [(3, 0, 32767), (0, 0, 0), (1, 0x110, 1), (0, 0, 0),
+                               (3, 0, 0), (3, 1, 32767), (1, 0x110, 0), (0, 0, 0)]
+    assert device.asked[-1][0] == 0x5502
+
+
+def test_a_pointer_without_device_or_permission_says_what_it_needs(tmp_path: Path, monkeypatch) -> None:
+    with pytest.raises(OutputError, match="modprobe uinput"):
+        SystemPointer(tmp_path / "none")
+
+    def refuse(*args: object) -> int:
+        raise PermissionError(13, "Permission denied")
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(OutputError, match="needs write permission"):
+        SystemPointer(tmp_path / "uinput")
+
+
+def test_a_file_that_is_no_uinput_device_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "uinput").touch()
+    with pytest.raises(OutputError, match="uinput device"):
+        SystemPointer(tmp_path / "uinput")
+
+
+def rhot_mouse(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "rhot_app", "mouse", *arguments], capture_output=True, text=True,
+                          check=False, cwd=ROOT)
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (("--osc", "nowhere"), "HOST:PORT"), (("--measure", "--pointer"), "leave --simulated"),
+    (("--directory", "NONE"), "no engine is heard")])
+def test_what_cannot_be_is_a_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
+    done = rhot_mouse(*(str(tmp_path / "none") if one == "NONE" else one for one in arguments))
+    assert done.returncode == 2 and words in done.stderr and not done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_the_simulated_hand_works_the_mouse_by_itself() -> None:
+    """Twin, nodes, engine and command as processes; the cursor moves, and OSC says the same."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(1.0)
+        done = rhot_mouse("--simulated", "--seconds", "6", "--json", "--osc", f"127.0.0.1:{receiver.getsockname()[1]}")
+        heard = {message.address for message in OscBundle(receiver.recv(65536))}
+    assert done.returncode == 0, done.stderr
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    cursors = np.array([line["cursor_m"] for line in lines if line["cursor_m"] is not None])
+    assert len(cursors) > 10 and np.ptp(cursors[:, 0]) > 0.05
+    assert "/rhot/mouse/buttons" in heard
+    assert "from the hand to the cursor" in done.stderr
