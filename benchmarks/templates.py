@@ -38,12 +38,13 @@ from rhot_app.articulated.view import draw_layers  # noqa: E402
 from rhot_app.articulated.visibility import segment, visibility  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
+from rhot_app.hand.limits import pose_prior  # noqa: E402
+from rhot_app.hand.motion.hand_process import FASTEST, PALM_SPREAD, HandProcess  # noqa: E402
 from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter, light_of  # noqa: E402
 from rhot_app.simulator.bare_hand.skin import skin_colours  # noqa: E402
 from rhot_app.simulator.bare_hand.surface import build_surface  # noqa: E402
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter  # noqa: E402
-from rhot_app.tracking.hand_process import FASTEST, PALM_SPREAD, HandProcess  # noqa: E402
 
 CURL_HZ = 15.0
 SAME_M = 1e-6
@@ -85,11 +86,11 @@ def order(poses: int) -> None:
     bodies, _ = hand_bodies(surface)
     camera = look_at(np.zeros(3), np.array([0.0, 0.0, 0.5]), focal=225.0, width=240, height=180)
     rays, pose = camera_rays(camera), np.ascontiguousarray(camera.camera_from_world[:3])
-    rng, covariance = np.random.default_rng(1), np.linalg.inv(model.natural.information)
+    rng, covariance = np.random.default_rng(1), np.linalg.inv(pose_prior().information)
     wrong = deep = digits = cyclic = above = 0
     worst, spent = 0.0, 0.0
     for _ in range(poses):
-        angles = np.clip(rng.multivariate_normal(model.natural.mean, covariance), *model.limits.T)
+        angles = np.clip(rng.multivariate_normal(pose_prior().mean, covariance), *model.limits.T)
         root = np.eye(4)
         root[:3, :3] = Rotation.random(random_state=rng).as_matrix()
         root[:3, 3] = [0.0, 0.0, 0.5] - 0.09 * root[:3, 0]
@@ -159,13 +160,13 @@ def turning(seconds: float, amplitude_deg: float = 35.0, rate_hz: float = 60.0, 
             show: Path | None = None) -> None:
     model, surface = model_and_surface()
     bodies, _ = hand_bodies(surface)
-    cameras, source = two_cameras(), Turning(model.natural.mean.copy(), 0.45, *np.radians([speed_deg, amplitude_deg]))
+    cameras, source = two_cameras(), Turning(pose_prior().mean.copy(), 0.45, *np.radians([speed_deg, amplitude_deg]))
     hand = textured_hand(source, 1)
     walls = [np.ascontiguousarray(wall(camera, k, False).transpose(2, 0, 1), np.float32)
              for k, camera in enumerate(cameras)]
     painters = [BareHandPainter(hand, camera, one, samples=4) for camera, one in zip(cameras, walls, strict=True)]
     empty = [np.clip(one.transpose(1, 2, 0), 0.0, 255.0).astype(np.uint8) for one in walls]
-    natural = model.natural
+    natural = pose_prior()
     process = HandProcess(surface.dh, model.limits, natural.mean, np.asarray(np.linalg.inv(natural.information)),
                           PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.zeros((0, 3, 3)), 1.0)
     tracker = LayeredTracker(bodies, model.limits, process, cameras, backgrounds=empty)
@@ -181,7 +182,8 @@ def turning(seconds: float, amplitude_deg: float = 35.0, rate_hz: float = 60.0, 
         spent += time.process_time() - begun
         found = np.eye(4)
         found[:3] = state[:ANGLES].reshape(3, 4)
-        joints = [forward(model, HandPose(*pose)).joints for pose in ((found, state[ANGLES:ANGLES + 21]), (world, angles))]
+        joints = [forward(model, HandPose(*pose)).joints
+                  for pose in ((found, state[ANGLES:ANGLES + 21]), (world, angles))]
         errors.append(1e3 * np.linalg.norm(joints[0] - joints[1], axis=1))
         if show is not None and k % 10 == 0:
             drawn = [draw_layers(images[c], bodies, place(bodies, found, state[ANGLES:ANGLES + 21]), camera,
@@ -197,7 +199,8 @@ def turning(seconds: float, amplitude_deg: float = 35.0, rate_hz: float = 60.0, 
         part = errors[first:first + period]
         print(f"{round(first / rate_hz):3d}-{round((first + len(part)) / rate_hz):3d}   {part.mean():19.2f}   "
               f"{part[:, 0].mean():8.2f}   {part.max():16.1f}")
-    print(f"templates {len(tracker.templates.templates)}, processor time {1e3 * spent / max(len(errors), 1):.0f} ms a frame")
+    print(f"templates {len(tracker.templates.templates)}, processor time {1e3 * spent / max(len(errors), 1):.0f} ms a "
+          "frame")
 
 
 def main() -> None:

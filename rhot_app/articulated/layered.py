@@ -104,7 +104,8 @@ class LayeredFrame:
             cost += self._boundary(placed, np.vstack(shown), offset, noise, information, pull)
         return compressed(information, pull, cost, len(state) - ANGLES + POSE)
 
-    def _boundary(self, placed: Placed, shown: Array, offset: Array, noise: float, information: Array, pull: Array) -> float:
+    def _boundary(self, placed: Placed, shown: Array, offset: Array, noise: float, information: Array,
+                  pull: Array) -> float:
         assert self.outline is not None
         spread = np.zeros(len(self.bodies.layer_row))
         for one in self.templates:
@@ -184,8 +185,8 @@ def _form(matrix, row):
 @njit(cache=True)
 def _region(bodies, placed, order, pose, intrinsics, image, layer, points, normals, values, noise, light, spacing_m,
             expected, information, pull, seen, offset):
-    """Add the information of a template; fill `seen` (K, 3) px, px, 0 to 2 as above, and `offset` (2,): brightness and contrast
-    in this image. Returns the cost."""
+    """Add the information of a template; fill `seen` (K, 3) px, px, 0 to 2 as above, and `offset` (2,):
+    brightness and contrast in this image. Returns the cost."""
     count, size = points.shape[0], pull.shape[0]
     base = placed.root[:3] if bodies.layer_row[layer] < 0 else placed.frames[bodies.layer_row[layer]]
     rows, error, variance, wide = np.zeros((count, size)), np.zeros(count), np.ones(count), np.ones(count)

@@ -53,8 +53,9 @@ class LayeredTracker:
                  kind: Kind = "raw", layered: bool = True, outline: bool = True,
                  backgrounds: Sequence[Image] | None = None) -> None:
         """`limits` (A, 2) rad. `process`: a state begins with world_from_root (3, 4) and the angles, its tangent space
-        with the root's translation, rotation and the angles. `kind`: how images are filtered; outlines need ``raw``. `layered` False: every template
-        is taken for visible. `backgrounds`: each camera's image (H, W, 3) RGB without the object."""
+        with the root's translation, rotation and the angles. `kind`: how images are filtered; outlines
+        need ``raw``. `layered` False: every template is taken for visible. `backgrounds`: each camera's image (H, W, 3)
+        RGB without the object."""
         self.bodies, self.process, self.layered = bodies, process, layered
         self.outline = outline and kind == "raw"
         self.templates = TemplateSet(kind)

@@ -143,7 +143,8 @@ def _relate(bodies, placed, pose, margin, weight, depth):
             if not shown[a] or not shown[b]:
                 continue
             link, carrier = (a, b) if bodies.carrier[a] == b else (b, a)
-            if bodies.carrier[link] == carrier and bodies.first[carrier + 1] == bodies.first[carrier] + 1 and np.any(placed.plane[link] != 0.0):
+            single = bodies.first[carrier + 1] == bodies.first[carrier] + 1
+            if bodies.carrier[link] == carrier and single and np.any(placed.plane[link] != 0.0):
                 base = joint_of(bodies, placed, link)
                 for i in range(3):
                     joint[i], axis[i] = base[i, 3], base[i, 2]
