@@ -199,11 +199,11 @@ def finger_spread(state: HandState, button: str) -> tuple[float, float]:
     across = palm @ np.array([-way[1], way[0], 0.0]) / length**2
     variance = (across @ state.fingertip_covariances[finger] @ across
                 + palm[:, 2] @ state.palm_covariance[3:, 3:] @ palm[:, 2])
-    hand = 1.0 if palm_is_right(state) else -1.0
+    hand = 1.0 if _is_right(state) else -1.0
     return hand * _AWAY[button] * float(np.arctan2(way[1], way[0])), float(np.sqrt(max(np.nan_to_num(variance), 0.0)))
 
 
-def palm_is_right(state: HandState) -> bool:
+def _is_right(state: HandState) -> bool:
     """Whether the thumb's root lies on the side of +y, as on a right hand."""
     palm = state.world_from_palm
     return bool(palm[:3, 1] @ (state.joint_positions[_ROOT["thumb"]] - state.joint_positions[_ROOT["little"]]) > 0.0)
