@@ -164,8 +164,8 @@ class _Outputs:
             import numpy as np
 
             p50, p99 = np.percentile(self._ages_ms, [50, 99])
-            print(f"rhot: the last {len(self._ages_ms)} states: from the hand to the cursor {p50:.0f} ms (p50), {p99:.0f} ms "
-                  "(p99).", file=sys.stderr)
+            print(f"rhot: the last {len(self._ages_ms)} states: from the hand to the cursor {p50:.0f} ms (p50), "
+                  f"{p99:.0f} ms (p99).", file=sys.stderr)
 
 
 def line_of(mouse: MouseState) -> str:
