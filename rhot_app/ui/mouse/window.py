@@ -205,7 +205,7 @@ class MouseWindow(QDialog):
             return self.state.needs[0]
         if self.test is not None:
             found = self.test.result()
-            done = "Move the cursor's foot into the bright target and spread the thumb."
+            done = "Move the cursor's foot into the blue target and spread the thumb."
             return done if found is None else f"Done: {found.sentence}"
         if self.pick.held is not None:
             return f"The {self.pick.balls[self.pick.held].name} moves with the cursor until the thumb returns."
