@@ -20,8 +20,8 @@ import msgspec
 
 from rhot_app.errors import RhotError
 from rhot_app.evaluation.run import evaluate_frames, table
-from rhot_app.simulator.nodes.film import film
-from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.film.film import film
+from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.scene.scene import Scene, TwinSettings, make_scene, twin_defaults
 
 

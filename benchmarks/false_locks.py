@@ -27,9 +27,9 @@ from rhot_app.engine.replay_summary import replay_states
 from rhot_app.evaluation.data_sets import DataSet, Order, data_set
 from rhot_app.evaluation.track import rig_with
 from rhot_app.project import TrackerSettings
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_app.tracking.trackers import make_tracker
 
 MOTIONS = ("grasp", "fast", "wave", "spread", "rest")

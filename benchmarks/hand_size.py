@@ -82,11 +82,11 @@ def main() -> int:
 def learnt(group: People, rig: Rig, markers: MarkerModel, rng: np.random.Generator) -> tuple[float, float, float]:
     """Of one person: the logarithm of the size, its standard deviation, and the truth."""
     log_scale, size = USUAL_SD * rng.normal(), HandSize(
-        markers.dh, markers.limits, markers.natural, markers.paint_variance)
+        markers.dh, markers.limits, markers.pose_prior, markers.paint_variance)
     hand = person(rig.hand, group.bones, rng)
     worn = compile_markers(msgspec.structs.replace(rig, hand=hand)).dh
-    spread = np.linalg.cholesky(np.linalg.inv(markers.natural.information))
-    mean = np.clip(markers.natural.mean + group.habit * (spread @ rng.normal(size=21)), *markers.limits.T)
+    spread = np.linalg.cholesky(np.linalg.inv(markers.pose_prior.information))
+    mean = np.clip(markers.pose_prior.mean + group.habit * (spread @ rng.normal(size=21)), *markers.limits.T)
     for _ in range(group.shapes):
         angles, points = pose(mean, group.within * spread, markers.limits, rng), np.empty((len(markers.roles), 3))
         forward_arrays(worn, np.eye(4), angles, empty_frames(worn), points)

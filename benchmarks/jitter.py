@@ -15,8 +15,8 @@ from typing import Any
 import msgspec
 
 from rhot_app.evaluation.run import evaluate_frames
-from rhot_app.simulator.nodes.film import film
-from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.film.film import film
+from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.scene.scene import TwinSettings, make_scene, twin_defaults
 
 DETECTORS = ("fast", "reference")

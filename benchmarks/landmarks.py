@@ -3,7 +3,7 @@
     python benchmarks/landmarks.py [--data ../shared/data/bare_hand_stereo] [--unit-mm 40] [--seeds 2] [--json FILE]
 
 First the recorded hand, if it is there: the errors of its landmarks about the hand that fits them (the source of the
-constants in `barehand.landmarks`), then reprojection, jitter and lag of the tracked hand against plain triangulation of
+constants in `hand.landmarks`), then reprojection, jitter and lag of the tracked hand against plain triangulation of
 the same landmarks. The recording's unit of length is unknown: `--unit-mm` makes its hand as large as the rig's.
 Then synthetic hands with landmarks that err as much: errors of the joints against triangulation, NEES and the part of
 errors within three sigma. The jitter is the rms of third differences, divided by sqrt(20), of a point's coordinates.
@@ -36,7 +36,7 @@ from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettin
 from rhot_app.recording.landmark_command import track
 from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log
 from rhot_app.simulator.nodes.landmark_detector import EPOCH_NS, detected_landmarks, landmark_rig, moving_hand
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers

@@ -27,7 +27,7 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import StartedProcess, end_processes, ensure_engine, start_ticks, stop_engine
 from rhot_app.project import OutputSettings, Rig, load_rig, save_rig
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
-from rhot_app.tracking.state import LATENCY_STAGES, HandState
+from rhot_app.state import LATENCY_STAGES, HandState
 from rhot_node.clock import NodeClock
 
 SETTLE_S = 2.0

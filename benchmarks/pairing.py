@@ -31,12 +31,11 @@ from synthetic_rig import FAST, WIDE, Preset, Sight, compare, hand_trajectory, m
 
 from rhot_app.evaluation.score import rms
 from rhot_app.project import FilterSettings, Rig
-from rhot_app.simulator.nodes.film import TRUTH_NAME, film
-from rhot_app.simulator.nodes.nodes import NodePorts
-from rhot_app.simulator.nodes.shot import make_shot
-from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
-from rhot_app.simulator.truth.truth import load_truth
-from rhot_app.tracking.state import Knowledge
+from rhot_app.simulator.film.film import TRUTH_NAME, film
+from rhot_app.simulator.film.shot import make_shot
+from rhot_app.simulator.film.truth import load_truth
+from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, make_scene, twin_defaults
+from rhot_app.state import Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.capture.yuv import FRAMES_NAME, read_header

@@ -35,7 +35,7 @@ def speeds(path: Path, model: HandModel, centre: np.ndarray) -> tuple[float, flo
     moved = (after[:, :3, 3] - before[:, :3, 3]) / (2.0 * STEP_S)
     turned = Rotation.from_matrix(after[:, :3, :3] @ before[:, :3, :3].swapaxes(1, 2)).as_rotvec() / (2.0 * STEP_S)
     bending = (later - bent) / (2.0 * STEP_S)
-    angles = np.einsum("ni,ij,nj->n", bending, model.natural.information, bending).mean() / bending.shape[1]
+    angles = np.einsum("ni,ij,nj->n", bending, model.pose_prior.information, bending).mean() / bending.shape[1]
     return float(np.sqrt(np.mean(moved**2))), float(np.sqrt(np.mean(turned**2))), math.sqrt(angles)
 
 

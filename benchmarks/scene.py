@@ -20,7 +20,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, HandPose
 from rhot_app.project import Rig, load_rig
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.ui.app import cap_software_gl, choose_gl_platform
 from rhot_node.files import resource_path
 

@@ -1,6 +1,6 @@
 """How soon a turned camera is noticed by a moving hand alone, and how well it is refined.
 
-Observations without pictures (`rhot_app.simulator.truth.ideal_observations`) of a hand that moves through the volume
+Observations without pictures (`rhot_app.simulator.film.ideal_observations`) of a hand that moves through the volume
 before two cameras; each seed has its own motion, noise and camera phases. A camera is turned about a random axis, or
 shifted across the baseline in a random direction, at 60 s; the pose is refined every ten seconds. Reported are the time
 until it is noticed, the errors 120 s after the knock, the share of them inside the stated 95 %, and alarms on a rig

@@ -23,7 +23,7 @@ from rhot_app.evaluation.compare import MOTIONS, orders
 from rhot_app.evaluation.data_sets import DataSet, data_set, data_sets_folder
 from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.progress import ProgressLine
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.marker_model import MarkerModel, compile_markers, project_marker

@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 from solvers_chart import draw_chart
 
 from rhot_app.hand.anatomy import DIP_PER_PIP, load_hand
-from rhot_app.hand.finger_chain import Status, chain_points
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model, inter_finger, neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
+from rhot_app.hand.solvers.finger_chain import Status, chain_points
 from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, shape_knuckles
 from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
 from rhot_app.hand.solvers.methods import (

@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel, ellipsoid, undistort_point
-from rhot_app.simulator.nodes.shot import make_renderer, make_shot
+from rhot_app.simulator.film.shot import make_renderer, make_shot
 from rhot_app.simulator.render.body import CYLINDER, HandBody
 from rhot_app.simulator.render.painter import PoseSource
 from rhot_app.simulator.render.raycast import NO_HIT, PREPARED, hit, prepare

@@ -22,15 +22,15 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.shared_views import SharedViews, Shot
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import calibrate
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import RhotError
+from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.backend.session import Session, TwinChoice
-from rhot_app.ui.wizards.framework.feed import LiveFeed
-from rhot_app.ui.wizards.framework.solver import Solver
+from rhot_app.ui.backend.solver import Solver
 
 NOISE_PX = 0.05
 LENS = np.array([530.0, 530.0, 319.5, 239.5, -0.1, 0.05, 0.0, 0.0, 0.0])
@@ -52,7 +52,7 @@ def shared_views(shots: int) -> SharedViews:
             pixels = cv2.projectPoints(seen, np.zeros(3), np.zeros(3), matrix, LENS[4:])[0].reshape(-1, 2)
             noisy = pixels + NOISE_PX * random.standard_normal(pixels.shape)
             views.append(BoardView(noisy, np.arange(board.count), 640, 480, 20.0, 2.0, f"shot {number}"))
-        taken.append(Shot(f"shot {number}", tuple(views)))
+        taken.append(BoardShot(f"shot {number}", tuple(views)))
     return SharedViews(("left", "right"), board, tuple(taken))
 
 

@@ -26,8 +26,8 @@ from rhot_app.objects.state import ObjectState, Validity
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, save_rig
 from rhot_app.project import load_rig as _load_rig
+from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.state import Condition, HandState, Knowledge
 
 if TYPE_CHECKING:
     import pandas

@@ -141,13 +141,18 @@ IkMethod = Literal["fabrik", "transpose", "pseudo_inverse", "svd", "dls", "newto
 towards the pose prior that allows for the noise of the target. The others meet the target exactly."""
 
 
+Observe = Literal["markers", "contours", "both"]
+"""What the estimator observes of the hand: markers (landmarks are markers, too), the bare hand's contours, or both."""
+
+
 class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which tracker makes a hand of the markers, and what it may assume.
 
     `kind`: `classic` is the thesis's (pair, triangulate, 1-euro, palm fit, inverse kinematics by `ik`); `estimator`
     estimates one hand from every image position. The other fields are the estimator's.
     `variant`: `full` (27 degrees of freedom) or `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT
-    2.2 to 2.4). `float_scale`: estimate the hand's size as it moves.
+    2.2 to 2.4). `float_scale`: estimate the hand's size as it moves. `observe`: markers or landmarks, the contours of
+    the bare hand, or both at once.
     """
 
     kind: TrackerKind = "classic"
@@ -155,10 +160,19 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     variant: Literal["full", "coupled"] = "full"
     limits: Literal["anatomical", "thesis"] = "anatomical"
     float_scale: bool = False
+    observe: Observe = "markers"
+
+    @property
+    def smooths(self) -> bool:
+        """Whether what is tracked can be smoothed afterwards."""
+        return self.kind == "estimator" and self.observe == "markers"
 
     def __post_init__(self) -> None:
         if self.kind == "model":
             msgspec.structs.force_setattr(self, "kind", "estimator")
+        if self.kind == "classic" and self.observe != "markers":
+            raise ValueError(f"the classic tracker knows markers only, and observe is \"{self.observe}\"; choose the "
+                             "kind \"estimator\", or take observe away")
 
 
 class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -325,6 +339,9 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
         return Obstacle("The estimator needs calibrated cameras; this rig takes distance from disparity alone "
                         "(depth.mode).",
                         "Use Calibrate, Put the cameras together, or the classic tracker (tracker.kind).")
+    if rig.tracker.observe != "markers" and rig.other_hand is not None:
+        return Obstacle("The contours of one bare hand can be tracked, and this rig has two hands.",
+                        "Take other_hand out of the rig file, or track markers (tracker.observe).")
     text = next((node.name for node in rig.nodes if node.text_datagrams), None)
     if text is not None:
         return Obstacle(f"The estimator needs the time of every picture; node {text} sends text datagrams, which "
@@ -335,7 +352,8 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
 
 def with_tracker(rig: Rig, kind: TrackerKind) -> Rig:
     """The rig with another kind of tracker, which may assume what the one before might."""
-    return msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, kind=kind))
+    observe: Observe = "markers" if kind == "classic" else rig.tracker.observe
+    return msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, kind=kind, observe=observe))
 
 
 def load_rig(path: Path, folder: Path | None = None) -> Rig:

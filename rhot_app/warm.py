@@ -27,7 +27,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.outputs.joints import JointConverter
 from rhot_app.project import Rig, TrackerSettings, load_rig
-from rhot_app.simulator.nodes.shot import make_renderer, make_shot
+from rhot_app.simulator.film.shot import make_renderer, make_shot
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BareHandShow, BoardShow, HandShow
 from rhot_app.tracking.trackers import make_tracker

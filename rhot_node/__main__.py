@@ -115,6 +115,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     """Put the parts together and loop until the end."""
     from rhot_node.capture.open import data_set_settings, open_camera
     from rhot_node.daemon import NodeDaemon
+    from rhot_node.foreground_store import ForegroundStore, foreground_path
     from rhot_node.health.checks import HealthMonitor
     from rhot_node.health.machine import Machine
     from rhot_node.keys import trust_state
@@ -136,9 +137,11 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     keys = None if trust is None else LinkKeys()
     choice, health = DetectorChoice(make_detector), HealthMonitor(Machine())
     videos = VideoRecorder(video_folder(options.settings))
+    foreground = ForegroundStore(foreground_path(options.settings))
     daemon = NodeDaemon(store, clock, lambda camera: open_camera(options.camera, camera, clock), choice.make,
                         camera_takes_settings=data_set_settings(options.camera), loop=options.loop,
-                        troubles=lambda: [*choice.troubles(), *health.troubles()], video=videos.offer)
+                        troubles=lambda: [*choice.troubles(), *health.troubles()], video=videos.offer,
+                        foreground=foreground)
     manager = ServiceManager()
     boot_id = secrets.randbits(32)
     with contextlib.ExitStack() as stack:
@@ -155,10 +158,11 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
         def introduce() -> Presence:
             return Presence(settings.node_id, boot_id, store.current.name, **ports, trust=trust_state(trust))
         link.introduce = introduce
+        link.take_slices = daemon.slices.take
         link.start()
         control.start(Responder(store, daemon.sessions, control.pictures, clock, daemon.report,
                                 lambda: {**daemon.count(), **link.count(), "strangers": control.refused}, keys,
-                                videos),
+                                videos, foreground),
                       Reception(trust, offers, lambda: {**daemon.introduce(), **ports}))
         daemon.prepare()
         gc.freeze()
@@ -191,7 +195,7 @@ def _trust(path: Path, settings: NodeSettings) -> NodeTrust | None:
 
 def _invite(settings: NodeSettings, offers: OfferFile) -> None:
     """Show a pairing code on the console. Raises TrustError."""
-    from rhot_node.trust_command import invitation
+    from rhot_node.commands.trust_command import invitation
     logging.getLogger(__name__).warning("not paired yet\n%s",
                                         invitation(settings, offers.current() or offers.renew()))
 

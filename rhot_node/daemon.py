@@ -14,12 +14,21 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.image import Detector
 from rhot_node.errors import CameraError
+from rhot_node.foreground_store import ForegroundStore
 from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import SettingsStore
 from rhot_node.network.session import Sessions, Stream
+from rhot_node.slice_search import SliceSearch
 from rhot_node.tag_search import TagSearch
-from rhot_node.wire.messages import Fiducials, MarkerObservation, NodeState, Observations
+from rhot_node.wire.messages import (
+    Fiducials,
+    ForegroundPart,
+    MarkerObservation,
+    NodeState,
+    Observations,
+    SliceEdges,
+)
 
 log = logging.getLogger(__name__)
 
@@ -33,9 +42,9 @@ MakeDetector = Callable[[NodeSettings], Detector]
 
 
 class ObservationSender(Protocol):
-    """Where observations go; the UDP link or a fake. Two threads call it."""
+    """Where observations go; the UDP link or a fake. Three threads call it."""
 
-    def send(self, observations: Observations | Fiducials, stream: Stream) -> bool:
+    def send(self, observations: Observations | Fiducials | SliceEdges | ForegroundPart, stream: Stream) -> bool:
         """Send them where the stream goes; False when they could not be sent."""
         ...
 
@@ -59,10 +68,11 @@ class NodeDaemon:
 
     def __init__(self, store: SettingsStore, clock: NodeClock, open_camera: OpenCamera, make_detector: MakeDetector,
                  *, camera_takes_settings: bool = True, loop: bool = False,
-                 troubles: Callable[[], list[Check]] = list, video: Callable[[Frame], object] | None = None) -> None:
+                 troubles: Callable[[], list[Check]] = list, video: Callable[[Frame], object] | None = None,
+                 foreground: ForegroundStore | None = None) -> None:
         """`loop`: a recording that ends begins again. `troubles`: what is wrong with the machine; called by whoever
-        asks for a report. `video` is given every frame, after its observations are sent. Nothing is opened before
-        `prepare`."""
+        asks for a report. `video` is given every frame, after its observations are sent. `foreground`: what
+        was learnt of background and skin; nothing by default. Nothing is opened before `prepare`."""
         self.sessions = Sessions()
         self.counters = Counters()
         self._store = store
@@ -75,6 +85,8 @@ class NodeDaemon:
         self._troubles = troubles
         self._video = video
         self._tags = TagSearch(store.current, clock)
+        self.foreground = ForegroundStore(None) if foreground is None else foreground
+        self.slices = SliceSearch(store.current.node_id, clock, self.foreground)
         self._camera: Camera | None = None
         self._detector: Detector | None = None
         self._prepared = False
@@ -109,6 +121,7 @@ class NodeDaemon:
                 "message": self._message, "session": stream.session if stream else 0,
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
                 "tags": list(self._settings.tags.sought),
+                "foreground": self.foreground.report(*self._size),
                 "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns(),
                 "camera": camera.report() if isinstance(camera, Reporting) else {},
                 "health": [*self._troubles(), *([BLACK_PICTURE] if self._black else [])]}
@@ -119,19 +132,22 @@ class NodeDaemon:
 
     def count(self) -> dict[str, Any]:
         """Counters, for the control channel."""
-        return dataclasses.asdict(self.counters) | self._tags.count()
+        return dataclasses.asdict(self.counters) | self._tags.count() | self.slices.count()
 
     def prepare(self) -> None:
         """Make the detector and open the camera: the node is then ready. Raises CameraError."""
         self._detector = self._make_detector(self._settings)
         self._tags.prepare()
+        self.slices.prepare()
         self._open()
         self._prepared = True
         self._show_state()
 
     def close(self) -> None:
-        """Close the camera and end the search for tags."""
+        """Close the camera and end the searches beside that for markers."""
         self._tags.close()
+        self.slices.close()
+        self.foreground.close()
         self._close_camera()
 
     def _close_camera(self) -> None:
@@ -166,6 +182,7 @@ class NodeDaemon:
                 self.counters.late_dropped += 1
             else:
                 self._send(frame, markers, stream, sender)
+            self.slices.offer(frame, stream, sender)
             self._tags.offer(frame, stream, sender)
         pictures.offer(frame)
         if self._video is not None:

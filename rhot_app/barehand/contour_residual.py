@@ -4,21 +4,24 @@ On a slice, the hand's edge is one of the edges found, or none of them (Isard an
 process along the slice. An edge counts by the probability that it is the hand's, at the present state. So a slice
 without edges, or with edges of other things only, changes nothing.
 
-What the surface model has wrong is the same along a phalanx: its radius is a nuisance, integrated out for each capsule
-in each camera. Two opposite edges then determine the axis, as in feature mode, and one edge alone is less certain.
+The phalanges' lengths and radii are numbers of the state, uncertain (`tracker.PHALANGES`). Two
+opposite edges then determine the axis, as in feature mode, and one edge alone is less certain. What else the surface
+has wrong lasts as long as the hand shows the same side: images within that time count as one.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, follow
-from rhot_app.barehand.surface import PALM, SHAPE, Surface
+from rhot_app.barehand.surface import FOREARM, SHAPE, Surface
 from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.hand.limits import LIMIT_SD_RAD
-from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]
@@ -26,14 +29,11 @@ Array = NDArray[np.float64]
 SHAPE_SD_M = 0.7e-3
 """m: standard deviation of skin about the model's surface within a phalanx: creases, joints and nails."""
 
-RADIUS_SD = 0.08
-"""Standard deviation of a phalanx's radius, as a part of it, in hands of one size (Buryanov and Kotiuk 2010)."""
-
 MISSED = np.array([0.1, 0.4])
 """Probability that a silhouette, or an edge within the hand, is no edge of the image."""
 
-GROUPS = PALM + 1
-"""Fingers and palm."""
+GROUPS = FOREARM + 1
+"""Fingers, palm and forearm."""
 
 DEGREES = 4.0
 """Of freedom, of Student's distribution of edges about the contour (Lange, Little and Taylor 1989)."""
@@ -50,14 +50,16 @@ class ContourFrame:
     """Implements `estimation.residual.Residual`: one camera's slices, the edges on them, and where the contour is.
 
     `slices` (K, 5) as `find_edges` takes them; `expected_sd` (K,) px: of the contour along each slice. `seen`
-    (GROUPS, 2): of each finger and the palm, the slices whose contour was found, and all, when last linearised.
+    (GROUPS, 2): of each finger, the palm and the forearm, the slices whose contour was found, and all, when last
+    linearised. `repeated`: images that count as one, this one included.
     """
 
     def __init__(self, surface: Surface, points: ContourPoints, pose: Array, intrinsics: Array, slices: Array,
-                 expected_sd: Array, late_s: Array, size_column: int) -> None:
+                 expected_sd: Array, late_s: Array, size_column: int, repeated: float = 1.0) -> None:
         self.surface, self.points, self.pose, self.intrinsics = surface, points, pose, intrinsics
         self.slices, self.expected_sd, self.late_s, self.size_column = slices, expected_sd, late_s, size_column
         self.pixel, self.normal = slices[:, :2].copy(), slices[:, 2:4].copy()
+        self.repeated, self.shape_variance = repeated, repeated * (SHAPE_SD_M * points.scale) ** 2
         self.edges: Edges | None = None
         self.clutter = np.empty((0, 0))
         self.seen = np.zeros((GROUPS, 2))
@@ -74,11 +76,11 @@ class ContourFrame:
     def predict(self, state: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """The contour on each slice: (K,) px from its centre, its derivative (K, COLUMNS), and whether it exists."""
         count = len(self.slices)
-        offset, rows, widths = np.zeros(count), np.zeros((count, COLUMNS)), np.zeros(count)
+        offset, rows = np.zeros(count), np.zeros((count, COLUMNS))
         good = np.zeros(count, np.bool_)
         p = self.points
         follow(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule, p.kind,
-               p.along, self.pixel, self.normal, offset, rows, widths, good)
+               p.along, self.pixel, self.normal, offset, rows, good)
         return offset, rows, good
 
     def _size(self, state: Array) -> Array:
@@ -93,10 +95,9 @@ class ContourFrame:
         error = np.full(len(offset), np.nan)
         for s in range(len(offset)):
             if good[s]:
-                scale = self.points.scale[s]
                 _, weight, mean, _ = _mix(self.edges.number[s], self.edges.offset[s], self.edges.sd[s],
                                           self.edges.inside[s], self.edges.outside[s], self.points.behind[s],
-                                          offset[s], (SHAPE_SD_M * scale) ** 2, self.expected_sd[s] ** 2,
+                                          offset[s], self.shape_variance[s], self.expected_sd[s] ** 2,
                                           self.clutter[s], found[s])
                 if weight > 0.0:
                     error[s] = mean
@@ -104,18 +105,37 @@ class ContourFrame:
 
     def linearise(self, state: Array) -> Rows:
         """COLUMNS rows with the information of all slices, and one with the rest of their cost."""
+        return Contours([self]).linearise(state)
+
+    def gather(self, state: Array, information: Array, pull: Array) -> float:
+        """Add the lower triangle of the slices' information (COLUMNS, COLUMNS) and their gradient (COLUMNS,); returns
+        their cost."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         p, e = self.points, self.edges
-        information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
         self.seen = np.zeros((GROUPS, 2))
-        cost = _gather(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule,
-                       p.kind, p.along, p.behind, p.scale, self.pixel, self.normal, e.number, e.offset, e.sd, e.inside,
-                       e.outside, self.expected_sd, self.clutter, information, pull, self.seen)
-        return compressed(information, pull, cost, len(state) - BIAS + MOTION, self.size_column)
+        return float(_gather(
+            self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule, p.kind, p.along,
+            p.behind, self.shape_variance, self.pixel, self.normal, e.number, e.offset, e.sd, e.inside, e.outside,
+            self.expected_sd, self.clutter, information, pull, self.seen))
+
+
+class Contours:
+    """Implements `Residual`: the frames of some cameras at one instant."""
+
+    def __init__(self, frames: Sequence[ContourFrame]) -> None:
+        self.frames = frames
+
+    def linearise(self, state: Array) -> Rows:
+        """COLUMNS rows with the information of all frames, and one with the rest of their cost."""
+        information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
+        cost = sum(frame.gather(state, information, pull) for frame in self.frames)
+        column = self.frames[0].size_column
+        return compressed(information, pull, cost, len(state) - BIAS + MOTION, column)
 
 
 def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int) -> Rows:
-    """Rows of whitened errors with this information (COLUMNS, COLUMNS), gradient (COLUMNS,) and cost in all."""
+    """Rows of whitened errors with this information (COLUMNS, COLUMNS), of which the lower triangle is read, gradient
+    (COLUMNS,) and cost in all."""
     root = np.linalg.cholesky(information + _RIDGE * np.eye(COLUMNS))
     error, jacobian = np.zeros(COLUMNS + 1), np.zeros((COLUMNS + 1, size))
     error[:-1] = np.linalg.solve(root, pull)
@@ -141,18 +161,19 @@ class JointLimits:
 
 
 def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, intrinsics: Array,
-              points: ContourPoints, size_column: int, row_s: float, reach: float, longest_px: float) -> ContourFrame:
+              points: ContourPoints, size_column: int, row_s: float, reach: float, longest_px: float,
+              repeated: float = 1.0) -> ContourFrame:
     """The slices that a camera should search at `points`, which are expected of a hand in `state` with `covariance`
     (n, n): `reach` standard deviations to both sides, at most `longest_px`. `row_s`: time between rows, s."""
     count = len(points.along)
     late = row_s * (points.pixel[:, 1] - points.pixel[:, 1].mean()) if count and row_s else np.zeros(count)
     slices = np.column_stack([points.pixel, points.normal, np.ones(count)])
-    frame = ContourFrame(surface, points, pose, intrinsics, slices, np.zeros(count), late, size_column)
+    frame = ContourFrame(surface, points, pose, intrinsics, slices, np.zeros(count), late, size_column, repeated)
     _, rows, _ = frame.predict(state)
     own = np.r_[0:POSE, size_column:size_column + SHAPE]
     variance = np.sum((rows @ covariance[np.ix_(own, own)]) * rows, axis=1)
     frame.expected_sd = np.sqrt(np.maximum(variance, 0.0))
-    spread = np.sqrt(variance + (2.0 * SHAPE_SD_M * points.scale) ** 2)
+    spread = np.sqrt(variance + 4.0 * frame.shape_variance)
     slices[:, 4] = np.clip(reach * spread + 1.0, 3.0, longest_px)
     return frame
 
@@ -188,50 +209,31 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
 
 
 @njit(cache=True)
-def _gather(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, scale, pixel, normal, count,
-            offsets, sds, inside, outside, expected_sd, clutter, information, pull, seen):
-    """Add the slices' information to `information` (COLUMNS, COLUMNS) and `pull` (COLUMNS,); returns their cost."""
+def _gather(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, pixel, normal,
+            count, offsets, sds, inside, outside, expected_sd, clutter, information, pull, seen):
+    """Add the slices' information to the lower triangle of `information` (COLUMNS, COLUMNS) and to `pull` (COLUMNS,);
+    returns their cost."""
     slices = capsule.shape[0]
-    offset, rows, widths = np.zeros(slices), np.zeros((slices, COLUMNS)), np.zeros(slices)
+    offset, rows = np.zeros(slices), np.zeros((slices, COLUMNS))
     good, found = np.zeros(slices, np.bool_), np.empty(offsets.shape[1])
-    follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, widths,
-           good)
-    cost, s = 0.0, 0
-    common, own = np.empty(COLUMNS), np.empty(COLUMNS, np.int64)
-    while s < slices:
-        k = capsule[s]
-        common[:] = 0.0
-        wide, drawn = 1.0 / RADIUS_SD**2, 0.0
-        while s < slices and capsule[s] == k:
-            if good[s]:
-                one, weight, error, present = _mix(
-                    count[s], offsets[s], sds[s], inside[s], outside[s], behind[s], offset[s],
-                    (SHAPE_SD_M * scale[s]) ** 2, expected_sd[s] ** 2, clutter[s], found)
-                cost += one
-                seen[surface.group[k], 0] += present
-                seen[surface.group[k], 1] += 1.0
-                if weight > 0.0:
-                    used = 0
-                    for i in range(COLUMNS):
-                        if rows[s, i] != 0.0:
-                            own[used] = i
-                            used += 1
-                    for p in range(used):
-                        i = own[p]
-                        a = weight * rows[s, i]
-                        pull[i] += a * error
-                        common[i] += a * widths[s]
-                        for q in range(p + 1):
-                            information[i, own[q]] += a * rows[s, own[q]]
-                    wide += weight * widths[s] ** 2
-                    drawn += weight * widths[s] * error
-            s += 1
-        for i in range(COLUMNS):  # the capsule's radius is integrated out
-            if common[i] != 0.0:
-                pull[i] -= common[i] * drawn / wide
-                for j in range(i + 1):
-                    information[i, j] -= common[i] * common[j] / wide
-    for i in range(COLUMNS):
-        for j in range(i):
-            information[j, i] = information[i, j]
+    follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good)
+    cost, own = 0.0, np.empty(COLUMNS, np.int64)
+    for s in range(slices):
+        if not good[s]:
+            continue
+        one, weight, error, present = _mix(count[s], offsets[s], sds[s], inside[s], outside[s], behind[s], offset[s],
+                                           shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
+        cost += one
+        seen[surface.group[capsule[s]], 0] += present
+        seen[surface.group[capsule[s]], 1] += 1.0
+        used = 0
+        for i in range(COLUMNS):
+            if rows[s, i] != 0.0:
+                own[used] = i
+                used += 1
+        for p in range(used):
+            a = weight * rows[s, own[p]]
+            pull[own[p]] += a * error
+            for q in range(p + 1):
+                information[own[p], own[q]] += a * rows[s, own[q]]
     return cost

@@ -15,9 +15,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.surface import FOREARM, SHAPE, Surface, meet, place_capsules
+from rhot_app.barehand.surface import (
+    FINGERS,
+    FOREARM,
+    FOREARM_RADIUS,
+    FOREARM_TURN,
+    LENGTH,
+    RADIUS,
+    SHAPE,
+    THICKNESS,
+    WHOLE,
+    Surface,
+    meet,
+    place_capsules,
+)
 from rhot_app.geometry.camera import distort
-from rhot_app.tracking.hand_process import ANGLES, POSE, VELOCITY
+from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -146,9 +159,8 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
     used = 0
     e1, e2 = np.empty(3), np.empty(3)
     for k in range(count):
-        if surface.group[k] == FOREARM:
-            continue
         c0, c1, r0, r1 = centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1]
+        spacing = 2.0 * step_m if surface.group[k] == FOREARM else step_m  # smoother than fingers
         for kind in range(4):
             straight = kind < 2
             if straight:
@@ -164,7 +176,7 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
                     along += line * line
                     dot += line * ray
                     square += ray * ray
-                number = max(int(math.sqrt(max(along - dot * dot / square, 0.0)) / step_m + 0.5), 1)
+                number = max(int(math.sqrt(max(along - dot * dot / square, 0.0)) / spacing + 0.5), 1)
             else:
                 if not surface.open_ends[k, kind - 2]:
                     continue
@@ -267,11 +279,10 @@ def _behind(surface, centres, radii, o, px, py, pz, n):
 
 
 @njit(cache=True)
-def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, widths,
-           good):
+def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good):
     """How the contour crosses K slices at `state`: fill `offset` (K,) px along each slice's normal from its centre
-    `pixel` (K, 2), `rows` (K, COLUMNS) its derivative by pose and size, `widths` (K,) that by the logarithm of the
-    capsule's radius, and `good` (K,). `late_s` (K,): a slice's time less the state's."""
+    `pixel` (K, 2), `rows` (K, COLUMNS) its derivative by pose and shape, and `good` (K,). `late_s` (K,): a slice's time
+    less the state's."""
     world, frames = np.eye(4), np.empty((surface.dh.parent.shape[0], 3, 4))
     world[:3] = state[:ANGLES].reshape(3, 4)
     count = surface.row.shape[0]
@@ -324,9 +335,11 @@ def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along,
         offset[s] = (across[0] * (at[0] - pixel[s, 0]) + across[1] * (at[1] - pixel[s, 1])) / turned
         for i in range(3):
             g[i] = (across[0] * slope[0, i] + across[1] * slope[1, i]) / turned
-        widths[s] = r * (g[0] * n[0] + g[1] * n[1] + g[2] * n[2])
         _point_row(surface, world, frames, k, c, px, py, pz, g, size, rows[s])
-        rows[s, POSE + 2] = widths[s]
+        thicker = r * (g[0] * n[0] + g[1] * n[1] + g[2] * n[2])
+        rows[s, POSE + (FOREARM_RADIUS if surface.group[k] == FOREARM else THICKNESS)] = thicker
+        if surface.row[k] >= 0:
+            rows[s, POSE + RADIUS + surface.bone[surface.row[k]]] = thicker
         if late_s[s] != 0.0:
             for j in range(POSE):
                 offset[s] += late_s[s] * rows[s, j] * state[VELOCITY + j]
@@ -340,20 +353,18 @@ def _point_row(surface, world, frames, k, axis, px, py, pz, g, size, row):
     lx, ly, lz = px - world[0, 3], py - world[1, 3], pz - world[2, 3]
     row[0], row[1], row[2] = g[0], g[1], g[2]
     row[3], row[4], row[5] = ly * g[2] - lz * g[1], lz * g[0] - lx * g[2], lx * g[1] - ly * g[0]
-    row[POSE] = g[0] * lx + g[1] * ly + g[2] * lz
-    at = surface.row[k]
-    if at >= 0:  # from the bone's beginning to the axis point
-        f = frames[at]
-        length = dh.a[at] * math.exp(size[0] + size[1])
-        for i in range(3):
-            row[POSE + 1] += g[i] * (axis[i] - (f[i, 3] - length * f[i, 0]))
-    first = True
+    row[POSE + WHOLE] = g[0] * lx + g[1] * ly + g[2] * lz
+    if surface.group[k] == FOREARM:
+        _forearm_row(world, size, lx, ly, lz, g, row)
+    at, first = surface.row[k], True
     while at >= 0:
-        parent = dh.parent[at]
-        if not first and surface.bone[at] > 0.0:
-            length = dh.a[at] * math.exp(size[0] + size[1])
+        parent, bone = dh.parent[at], surface.bone[at]
+        if bone >= 0:  # from its beginning to its end, or to the axis point
+            f, length = frames[at], dh.a[at] * math.exp(size[WHOLE] + size[FINGERS] + size[LENGTH + bone])
             for i in range(3):
-                row[POSE + 1] += g[i] * length * frames[at, i, 0]
+                way = axis[i] - (f[i, 3] - length * f[i, 0]) if first else length * f[i, 0]
+                row[POSE + LENGTH + bone] += g[i] * way
+                row[POSE + FINGERS] += g[i] * way
         first = False
         if dh.angle[at] >= 0:
             base = world if parent < 0 else frames[parent]
@@ -363,3 +374,21 @@ def _point_row(surface, world, frames, k, axis, px, py, pz, g, size, row):
             row[6 + dh.angle[at]] += (g[0] * (ay * rz - az * ry) + g[1] * (az * rx - ax * rz)
                                       + g[2] * (ax * ry - ay * rx))
         at = parent
+
+
+@njit(cache=True)
+def _forearm_row(world, shape, lx, ly, lz, g, row):
+    """Fill the columns of the forearm's rotation: of a point at (lx, ly, lz) from the wrist, world axes. The derivative
+    of R(w) e is -[R e]x J, with the left Jacobian J of the rotations (Sola 2018, eq. 145)."""
+    p, n, wy, wz = np.empty(3), np.empty(3), shape[FOREARM_TURN], shape[FOREARM_TURN + 1]
+    for i in range(3):  # in the palm's frame
+        p[i] = world[0, i] * lx + world[1, i] * ly + world[2, i] * lz
+        n[i] = world[0, i] * g[0] + world[1, i] * g[1] + world[2, i] * g[2]
+    mx, my, mz = p[1] * n[2] - p[2] * n[1], p[2] * n[0] - p[0] * n[2], p[0] * n[1] - p[1] * n[0]
+    angle = math.sqrt(wy * wy + wz * wz)
+    a = math.sin(angle) / angle if angle > 1e-6 else 1.0
+    b = (1.0 - a) / angle**2 if angle > 1e-3 else 1.0 / 6.0
+    c = (1.0 - math.cos(angle)) / angle**2 if angle > 1e-6 else 0.5
+    dot = b * (wy * my + wz * mz)
+    row[POSE + FOREARM_TURN] = a * my + dot * wy - c * mx * wz
+    row[POSE + FOREARM_TURN + 1] = a * mz + dot * wz + c * mx * wy

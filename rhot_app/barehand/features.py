@@ -23,7 +23,7 @@ from rhot_app.barehand.contours import (
     side_normals,
 )
 from rhot_app.barehand.surface import PALM, Surface, place_capsules
-from rhot_app.tracking.hand_process import ANGLES, VELOCITY
+from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 
 Array = NDArray[np.float64]
 

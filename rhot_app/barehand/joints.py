@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rhot_app.barehand.surface import SHAPE, sized_table
+from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
-from rhot_app.tracking.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
-from rhot_app.tracking.state import Knowledge
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.state import Knowledge
 
 
 def knowledge_of(sd: float, observed: bool, measured: float, inferred: float) -> int:
@@ -28,25 +28,33 @@ def place_joints(state, covariance, dh, bone, points, covariances, motion):
     world[:3] = state[:ANGLES].reshape(3, 4)
     a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
     sized_table(dh, bone, state[BIAS:BIAS + SHAPE], a, d)
-    factor = np.exp(state[BIAS])
+    factor = np.exp(state[BIAS + WHOLE])
     table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
                      dh.point_offset * factor)
     forward_arrays(table, world, state[ANGLES:VELOCITY], frames, points)
-    jacobian = np.empty((points.shape[0], 3, POSE + 1))
+    lengths = RADIUS - LENGTH
+    jacobian = np.zeros((points.shape[0], 3, POSE + 2 + lengths))
     jacobian_arrays(table, world, frames, points, jacobian)
-    own = np.empty(POSE + 1, np.int64)
+    for p in range(points.shape[0]):
+        jacobian[p, :, POSE] = points[p] - world[:3, 3]
+        row = dh.point_row[p]
+        while row >= 0:
+            if bone[row] >= 0:
+                jacobian[p, :, POSE + 2 + bone[row]] = a[row] * frames[row, :, 0]
+                jacobian[p, :, POSE + 1] += a[row] * frames[row, :, 0]
+            row = dh.parent[row]
+    own = np.empty(POSE + 2 + lengths, np.int64)
+    own[POSE], own[POSE + 1] = MOTION + WHOLE, MOTION + FINGERS
+    own[POSE + 2:] = MOTION + LENGTH + np.arange(lengths)
     for order in range(3):
-        for j in range(POSE):
-            own[j] = order * POSE + j
-        own[POSE] = MOTION
-        block = np.empty((POSE + 1, POSE + 1))
-        for i in range(POSE + 1):
-            for j in range(POSE + 1):
+        own[:POSE] = order * POSE + np.arange(POSE)
+        count = len(own) if order == 0 else POSE
+        block = np.empty((count, count))
+        for i in range(count):
+            for j in range(count):
                 block[i, j] = covariance[own[i], own[j]]
         for p in range(points.shape[0] if order == 0 else 21):
-            for i in range(3):
-                jacobian[p, i, POSE] = points[p, i] - world[i, 3] if order == 0 else 0.0
-            one = np.dot(jacobian[p], np.dot(block, jacobian[p].T))
+            one = np.dot(np.ascontiguousarray(jacobian[p, :, :count]), np.dot(block, jacobian[p, :, :count].T.copy()))
             if order == 0:
                 covariances[p] = one
             else:

@@ -141,7 +141,7 @@ def score(surface: Surface, world: Array, angles: Array, size: Array, images: Si
                         parts)), parts
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)  # it takes long, and frames come meanwhile
 def _score_many(surface, world, angles, steps, limits, size, odds, step, poses, intrinsics, scores):
     mask, parts = np.zeros(odds.shape[1:], np.uint8), np.zeros((odds.shape[0], 3))
     moved, turned = np.empty((4, 4)), np.empty(21)

@@ -55,8 +55,16 @@ def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[Came
               rng: np.random.Generator, most: int = 3) -> list[Found]:
     """The most probable hands in images (H, W, 3) RGB of some cameras, best first, at most `most`; none without
     foreground as thick as a palm."""
-    used = [c for c, image in enumerate(images) if image is not None]
-    maps = [foreground_map(images[c], foreground[c], STEP) for c in used]  # type: ignore[arg-type]
+    maps = [None if image is None else foreground_map(image, known, STEP)
+            for image, known in zip(images, foreground, strict=True)]
+    return find_in_maps(maps, cameras, model, surface, size, rng, most)
+
+
+def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequence[CameraModel], model: HandModel,
+                 surface: Surface, size: Array, rng: np.random.Generator, most: int = 3) -> list[Found]:
+    """The same in foreground probabilities (h, w) of every STEP-th pixel, None of a camera without an image."""
+    used = [c for c, one in enumerate(foreground) if one is not None]
+    maps = [one for one in foreground if one is not None]
     seen = silhouettes(maps, STEP, [cameras[c].camera_from_world[:3] for c in used],
                        [cameras[c].intrinsics for c in used])
     breadth = 0.5 * float(np.exp(size[0])) * float(model.base[1, 1] - model.base[4, 1] + model.radii[1, 0]
@@ -73,7 +81,7 @@ def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[Came
         tried.append((value, world, angles))
     tried.sort(key=lambda one: -one[0])
     covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
-    covariance[6:, 6:] = np.linalg.inv(model.natural.information + np.eye(21) / _SPREAD[2] ** 2)
+    covariance[6:, 6:] = np.linalg.inv(model.pose_prior.information + np.eye(21) / _SPREAD[2] ** 2)
     for _, world, angles in _distinct(tried, KEPT * max(min(len(centres), 2), 1)):
         moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, seen, rng, 60, 4, 8)
         bent = bend_fingers(surface, moved, bent, model.limits, size, seen)
@@ -113,7 +121,7 @@ def _shapes(model: HandModel) -> list[Array]:
     """Angles (21,) of an open, a relaxed, a closed and a pointing hand."""
     out = []
     for curl in _CURLS_DEG:
-        angles = model.natural.mean.copy()
+        angles = model.pose_prior.mean.copy()
         for flexions in FLEXIONS[1:]:
             angles[list(flexions)] = np.radians(curl)
         out.append(angles)

@@ -1,7 +1,10 @@
 """The hand's surface: tapered capsules, each the convex hull of two balls that ride on one row of the hand's table.
 
 The radii are those of the hand file. Neighbouring phalanges have the ball at their joint in common, so that a bent
-finger is closed. The forearm's direction is not the palm's: its capsule only says where the hand's contour ends.
+finger is closed. The forearm turns about the wrist.
+
+A hand's shape is what may differ from its file: logarithms of lengths and radii, and the forearm's rotation. It is a
+part of the estimator's state.
 """
 
 from __future__ import annotations
@@ -23,8 +26,11 @@ Indices = NDArray[np.int64]
 PALM, FOREARM = 5, 6
 """Groups beyond the fingers 0..4."""
 
-SHAPE = 3
-"""Numbers that a hand's unknown size has: the logarithms of its size, of its fingers' bones and of its radii beyond."""
+WHOLE, FINGERS, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN, SHAPE = 0, 1, 2, 3, 18, 33, 34, 36
+"""Where a shape's numbers begin, and how many it has: logarithms of the hand's size, of all phalanges' lengths and of
+all radii but the forearm's, relative to the hand file's at that size; of the 15 phalanges' own lengths and radii beyond
+these; of the forearm's radius; and the forearm's flexion and deviation, a rotation vector (0, y, z) rad about the wrist
+in the palm's frame."""
 
 TIP_TAPER = 0.85
 """Radius at the end of a fingertip, of that of its last segment: fingertips are round, not flat."""
@@ -33,7 +39,7 @@ TIP_TAPER = 0.85
 class Surface(NamedTuple):
     """N capsules. `row` (N,): of the hand's table, ROOT for the palm; `ends` (N, 2, 3) m in that row's frame; `radii`
     (N, 2) m; `group` (N,): finger, PALM or FOREARM; `open_ends` (N, 2): whether an end's ball may be a contour.
-    `dh`: the hand's table without points; `bone` (R,): 1.0 for rows that are a finger's bone.
+    `dh`: the hand's table without points; `bone` (R,): the phalanx, 0..14, of each of its rows, else -1.
     """
 
     dh: DhArrays
@@ -42,19 +48,19 @@ class Surface(NamedTuple):
     radii: Array
     group: Indices
     open_ends: NDArray[np.bool_]
-    bone: Array
+    bone: Indices
 
 
 def surface_of(model: HandModel) -> Surface:
     """The capsules of a hand."""
     parts: list[tuple[int, Array, Array, float, float, int, bool, bool]] = []
-    bones = np.zeros(len(model.dh.parent))
+    bones = np.full(len(model.dh.parent), -1)
     for finger in range(5):
         radii = model.radii[finger]
         joints = [radii[0], 0.5 * (radii[0] + radii[1]), 0.5 * (radii[1] + radii[2]), TIP_TAPER * radii[2]]
         for k in range(3):
             row = int(model.dh.point_row[2 + 4 * finger + k])
-            bones[row] = 1.0
+            bones[row] = 3 * finger + k
             end = -joints[3] if k == 2 else 0.0
             parts.append((row, np.array([-model.bones[finger, k], 0.0, 0.0]), np.array([end, 0.0, 0.0]), joints[k],
                           joints[k + 1], finger, k == 0, True))
@@ -95,40 +101,61 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
 
 
 @njit(cache=True)
-def sized_table(dh, bone, size, a, d):
-    """Fill `a` (R,) and `d` (R,), the lengths of a table for a hand of `size` (SHAPE,)."""
-    whole, longer = np.exp(size[0]), np.exp(size[1])
+def sized_table(dh, bone, shape, a, d):
+    """Fill `a` (R,) and `d` (R,), the lengths of a table for a hand of `shape` (SHAPE,)."""
+    whole = np.exp(shape[WHOLE])
     for row in range(a.shape[0]):
-        a[row] = dh.a[row] * whole * (longer if bone[row] > 0.0 else 1.0)
+        a[row] = dh.a[row] * whole * (np.exp(shape[FINGERS] + shape[LENGTH + bone[row]]) if bone[row] >= 0 else 1.0)
         d[row] = dh.d[row] * whole
 
 
 @njit(cache=True)
-def place_capsules(surface, world, angles, size, frames, centres, radii):
+def place_capsules(surface, world, angles, shape, frames, centres, radii):
     """Fill frames (R, 3, 4), the balls' `centres` (N, 2, 3) m and `radii` (N, 2) m of a hand at `world` (4, 4)."""
     dh = surface.dh
     a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
-    sized_table(dh, surface.bone, size, a, d)
+    sized_table(dh, surface.bone, shape, a, d)
     table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
                      dh.point_offset)
     forward_arrays(table, world, angles, frames, dh.point_offset)
-    whole, longer, thicker = np.exp(size[0]), np.exp(size[1]), np.exp(size[2])
+    whole, turned = np.exp(shape[WHOLE]), np.empty((3, 3))
+    rotation_of(0.0, shape[FOREARM_TURN], shape[FOREARM_TURN + 1], turned)
+    forearm = np.dot(np.ascontiguousarray(world[:3, :3]), turned)
     for k in range(centres.shape[0]):
         row = surface.row[k]
+        thick = np.exp(shape[FOREARM_RADIUS] if surface.group[k] == FOREARM else shape[THICKNESS])
+        longer = 1.0
+        if row >= 0:
+            thick *= np.exp(shape[RADIUS + surface.bone[row]])
+            longer = np.exp(shape[FINGERS] + shape[LENGTH + surface.bone[row]])
         base = world if row < 0 else frames[row]
         for end in range(2):
-            radii[k, end] = surface.radii[k, end] * whole * thicker
+            radii[k, end] = surface.radii[k, end] * whole * thick
+            x, y, z = surface.ends[k, end, 0], surface.ends[k, end, 1], surface.ends[k, end, 2]
             for i in range(3):
-                x = surface.ends[k, end, 0] * whole * (longer if row >= 0 else 1.0)
-                centres[k, end, i] = (base[i, 3] + base[i, 0] * x + base[i, 1] * surface.ends[k, end, 1] * whole
-                                      + base[i, 2] * surface.ends[k, end, 2] * whole)
+                if surface.group[k] == FOREARM:
+                    along = forearm[i, 0] * x + forearm[i, 1] * y + forearm[i, 2] * z
+                else:
+                    along = base[i, 0] * x * longer + base[i, 1] * y + base[i, 2] * z
+                centres[k, end, i] = base[i, 3] + whole * along
 
 
-def capsules_of(surface: Surface, world: Array, angles: Array, size: Array | None = None) -> tuple[Array, Array]:
+@njit(cache=True)
+def rotation_of(x, y, z, out):
+    """Fill `out` (3, 3) with the rotation of the rotation vector (x, y, z) rad (Rodrigues)."""
+    angle = np.sqrt(x * x + y * y + z * z)
+    cosine, s = np.cos(angle), np.sin(angle) / angle if angle > 1e-6 else 1.0
+    c = (1.0 - cosine) / angle**2 if angle > 1e-6 else 0.5
+    out[0, 0], out[0, 1], out[0, 2] = cosine + c * x * x, c * x * y - s * z, c * x * z + s * y
+    out[1, 0], out[1, 1], out[1, 2] = c * x * y + s * z, cosine + c * y * y, c * y * z - s * x
+    out[2, 0], out[2, 1], out[2, 2] = c * x * z - s * y, c * y * z + s * x, cosine + c * z * z
+
+
+def capsules_of(surface: Surface, world: Array, angles: Array, shape: Array | None = None) -> tuple[Array, Array]:
     """`centres` (N, 2, 3) m and `radii` (N, 2) m of a posed hand: `world` (4, 4), `angles` (21,) rad."""
     frames = np.empty((len(surface.dh.parent), 3, 4))
     centres, radii = np.empty_like(surface.ends), np.empty_like(surface.radii)
-    place_capsules(surface, world, angles, np.zeros(SHAPE) if size is None else size, frames, centres, radii)
+    place_capsules(surface, world, angles, np.zeros(SHAPE) if shape is None else shape, frames, centres, radii)
     return centres, radii
 
 

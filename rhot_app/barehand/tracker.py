@@ -8,29 +8,26 @@ contours are then. Marker and landmark residuals of the same state may be added 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import GROUPS, ContourFrame, JointLimits, slices_of
+from rhot_app.barehand.contour_residual import GROUPS, ContourFrame, Contours, JointLimits, slices_of
 from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search, silhouettes
 from rhot_app.barehand.start import STEP, Found, find_hand
-from rhot_app.barehand.surface import PALM, SHAPE, surface_of
+from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
-from rhot_app.estimation.filter import IteratedFilter, Knot, update
+from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import build_model
-from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, HandPose
-from rhot_app.project import Rig
-from rhot_app.tracking.estimator_state import INFERRED_M, INFERRED_RAD, MEASURED_M, MEASURED_RAD
-from rhot_app.tracking.hand_process import (
+from rhot_app.hand.motion.hand_process import (
     ACCELERATION,
     ANGLES,
     BIAS,
@@ -41,7 +38,18 @@ from rhot_app.tracking.hand_process import (
     VELOCITY,
     HandProcess,
 )
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, HandPose
+from rhot_app.project import Rig
+from rhot_app.state import (
+    INFERRED_M,
+    INFERRED_RAD,
+    MEASURED_M,
+    MEASURED_RAD,
+    UNESTIMATED,
+    Condition,
+    HandState,
+    Knowledge,
+)
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, foreground_map, no_foreground
 
@@ -66,11 +74,29 @@ PASSES, START_PASSES = 2, 5
 an edge may be."""
 
 SIZE_SD = 0.1, 0.05, 0.08
-"""Standard deviations of a hand whose size is unknown: logarithms of its length, of its fingers' part of it, and of
-its thickness beyond that, in adults (`tracking.hand_size`; Buryanov and Kotiuk 2010)."""
+"""Standard deviations of the logarithms of a hand's size, of its fingers' part of it, and of its thickness beyond that,
+in adults, where they are unknown (`tracking.hand_size`; Buryanov and Kotiuk 2010)."""
 
-SIZE_S = 1e3
-"""s: correlation time of the size. It does not change; what the surface model has wrong of it does."""
+LENGTH_SD, RADIUS_SD = 0.05, 0.08
+"""The same of a phalanx's own length and radius."""
+
+MEASURED_SD = 0.02
+"""The same of a hand whose file describes it (`python benchmarks/bones.py`, with noise)."""
+
+FOREARM_SD = 0.2, 0.5, 0.25
+"""Standard deviations of the logarithm of the forearm's radius, with or without a sleeve, and, rad, of the wrist's
+flexion and deviation: a third of their ranges (Ryu et al. 1991: 138 and 59 degrees)."""
+
+SHAPE_S, TURN_S = 1e3, 0.3
+"""s: correlation times of the hand's shape, which does not change, and of the forearm's rotation, which moves as the
+hand does (`hand_process.SLOWEST`)."""
+
+PHALANGES = MOTION + np.arange(THICKNESS, FOREARM_RADIUS)
+"""The phalanges' lengths and radii in the tangent space."""
+
+SAME_POSE_S = 1.0
+"""s: images within this time show the hand in much the same pose, and count as one for its phalanges: a grasp takes a
+second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
 
 DRAWS = 100, 4, 10
 """Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
@@ -99,8 +125,9 @@ class Fit:
 
     @property
     def support(self) -> Array:
-        """(GROUPS,) part of the contour that was found, of all cameras together; NaN where none is expected."""
-        total = self.seen.sum(axis=0)
+        """(6,) part of the contour of fingers and palm that was found, of all cameras together; NaN where none is
+        expected."""
+        total = self.seen[:, :FOREARM].sum(axis=0)
         return np.asarray(total[:, 0] / np.where(total[:, 1] > 0.0, total[:, 1], np.nan))
 
 
@@ -121,18 +148,25 @@ class BareHandTracker:
         self.poses = [np.ascontiguousarray(camera.camera_from_world[:3]) for camera in self.cameras]
         self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
-        natural = self.model.natural
-        size = np.diag(np.square(SIZE_SD)) if not known_size else np.zeros((SHAPE, SHAPE))
-        self.process = HandProcess(self.surface.dh, self.model.limits, natural.mean,
-                                   np.asarray(np.linalg.inv(natural.information)), PALM_SPREAD, np.full(3, FASTEST),
-                                   FASTEST, size[None], SIZE_S)
+        prior = self.model.pose_prior
+        if known_size:
+            size, phalanges = (0.0, 0.0, MEASURED_SD), np.full(30, MEASURED_SD)
+        else:
+            size, phalanges = SIZE_SD, np.repeat((LENGTH_SD, RADIUS_SD), 15)
+        spread = np.concatenate([size, phalanges, FOREARM_SD]).reshape(-1, 3)
+        self.shape_covariance = np.square(spread)[:, :, None] * np.eye(3)
+        self.shape_s = np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S)
+        self.process = HandProcess(self.surface.dh, self.model.limits, prior.mean,
+                                   np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, np.full(3, FASTEST),
+                                   FASTEST, self.shape_covariance, self.shape_s)
         self.filter = IteratedFilter(self.process)
-        self._limits = JointLimits(self.model.limits)
+        self.limits = JointLimits(self.model.limits)
         self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._epoch_ns, self._fresh = 0, 0, False
-        self._cover, self._rng = 0.0, np.random.default_rng(0)
+        self.cover, self._rng = 0.0, np.random.default_rng(0)
+        self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
               size: Array | None = None) -> None:
@@ -146,6 +180,7 @@ class BareHandTracker:
             state[BIAS:BIAS + SHAPE] = size
         self.filter.start(0.0, state, covariance)
         self.tracking = self._fresh = True
+        self._taken_s = [-np.inf] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
         """Look for a hand of which nothing is known, and begin with the most probable one. False without any.
@@ -185,28 +220,41 @@ class BareHandTracker:
         """Weigh the images of some cameras at one instant, and other residuals of the same state."""
         t_s = 1e-9 * (t_ns - self._epoch_ns)
         prediction = self.filter.predict(t_s)
+        self.take(images, t_s)
         seen = self._silhouettes(images)
-        start = None if seen is None or self._fresh else self._relocate(seen, prediction, t_s - self.filter.newest.t_s)
+        start = None if seen is None or self._fresh else self.relocate(seen, prediction, t_s - self.filter.newest.t_s)
         passes = START_PASSES if self._fresh or start is not None else PASSES
         knot = self._fit(images, t_s, prediction, prediction[0] if start is None else start, extra, passes)
         if seen is not None:
-            covered = self._covered(seen, knot.state)
-            if start is not None and covered < self._covered(seen, start) - COVER_DROP:
+            covered = self.covered(seen, knot.state)
+            if start is not None and covered < self.covered(seen, start) - COVER_DROP:
                 knot = self._anew(images, t_s, start, extra)  # the contour led away from the foreground
-                covered = self._covered(seen, knot.state)
-            self._cover += (1.0 if self._fresh else COVER_SHARE) * (covered - self._cover)
+                covered = self.covered(seen, knot.state)
+            self.cover += (1.0 if self._fresh else COVER_SHARE) * (covered - self.cover)
         self._fresh = False
         return knot
 
+    def take(self, cameras: Iterable[int], t_s: float) -> None:
+        """Note that images of `cameras` of the time `t_s`, s since the start, are weighed next."""
+        for camera in cameras:
+            self._repeated[camera] = max(1.0 / (FASTEST * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
+            self._taken_s[camera] = t_s
+        self.filter.partial = Partial(PHALANGES, min(max(t_s - self.filter.newest.t_s, 0.0) / SAME_POSE_S, 1.0))
+
     def _anew(self, images: dict[int, Image], t_s: float, start: Array, extra: Sequence[Residual]) -> Knot:
         """Begin again at rest in the state `start`."""
+        prediction = self.restart(t_s, start)
+        return self._fit(images, t_s, prediction, prediction[0], extra, START_PASSES)
+
+    def restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
+        """Begin at rest in the state `start`; what is known of the size stays. Returns state and covariance."""
         world = np.eye(4)
         world[:3] = start[:ANGLES].reshape(3, 4)
         state, covariance = self.process.start(world, start[ANGLES:VELOCITY], START_SD[:2])
         state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
         covariance[own, own] = self.filter.newest.covariance[own, own]
         self.filter.start(t_s, state, covariance)
-        return self._fit(images, t_s, (state, covariance), state, extra, START_PASSES)
+        return state, covariance
 
     def _fit(self, images: dict[int, Image], t_s: float, prediction: tuple[Array, Array], initial: Array,
              extra: Sequence[Residual], passes: int) -> Knot:
@@ -216,9 +264,9 @@ class BareHandTracker:
         for number in range(passes):
             frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1)
                       for camera, image in images.items()]
-            residuals = [*frames, self._limits, *extra]
+            residuals = [Contours(frames), self.limits, *extra]
             if number < passes - 1:
-                initial = state = update(self.process, t_s, prediction, residuals, initial).state
+                initial = state = update(self.process, t_s, prediction, residuals, initial, self.filter.partial).state
         return self.filter.add(t_s, residuals, prediction, initial)
 
     def _silhouettes(self, images: dict[int, Image]) -> Silhouettes | None:
@@ -229,20 +277,20 @@ class BareHandTracker:
         maps = [foreground_map(images[c], self.foreground[c], STEP) for c in known]
         return silhouettes(maps, STEP, [self.poses[c] for c in known], [self.cameras[c].intrinsics for c in known])
 
-    def _score(self, seen: Silhouettes, state: Array) -> float:
+    def score_of(self, seen: Silhouettes, state: Array) -> float:
         """Log odds of the hand in `state` by the foreground."""
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
         return score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)[0]
 
-    def _covered(self, seen: Silhouettes, state: Array) -> float:
+    def covered(self, seen: Silhouettes, state: Array) -> float:
         """Log odds of the hand in `state` by the foreground, per pixel of the hand."""
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
         _, parts = score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)
         return float((parts[:, 0] - parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
 
-    def _relocate(self, seen: Silhouettes, prediction: tuple[Array, Array], dt_s: float) -> Array | None:
+    def relocate(self, seen: Silhouettes, prediction: tuple[Array, Array], dt_s: float) -> Array | None:
         """A state that covers the foreground better than the prediction by RELOCATION_LOG_ODDS, or None.
 
         It is searched for where the prediction covers the foreground worse than the hand did of late, where it is too
@@ -253,11 +301,11 @@ class BareHandTracker:
         depth = self.poses[0][2] @ np.array([*state[[3, 7, 11]], 1.0])
         wide = np.sqrt(np.trace(covariance[:3, :3]) / 3.0) * self.cameras[0].intrinsics[0] / depth
         unfound = float(np.min(np.nan_to_num(self.fit.support, nan=1.0))) < LEAST_SUPPORT
-        if wide < CONFUSED_PX and not unfound and self._covered(seen, state) > self._cover - COVER_DROP:
+        if wide < CONFUSED_PX and not unfound and self.covered(seen, state) > self.cover - COVER_DROP:
             return None
         pace = FASTEST / np.sqrt(3.0) * dt_s
         spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
-        best: tuple[float, Array | None] = self._score(seen, state) / CORRELATED + RELOCATION_LOG_ODDS, None
+        best: tuple[float, Array | None] = self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS, None
         for begin in (state, self.filter.newest.state):
             world = np.eye(4)
             world[:3] = begin[:ANGLES].reshape(3, 4)
@@ -273,21 +321,25 @@ class BareHandTracker:
 
     def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool) -> ContourFrame:
         """Search one image along the contours of a hand in `state`."""
-        model = self.cameras[camera]
         if not self.noise[camera]:
             self.noise[camera] = noise_of(image)
+        frame = self.expected(camera, state, covariance, STEP_M if last else 2.0 * STEP_M)
+        frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
+        if last:
+            self.frames[camera] = frame
+        return frame
+
+    def expected(self, camera: int, state: Array, covariance: Array, step_m: float = STEP_M) -> ContourFrame:
+        """The slices across the contours, `step_m` apart, of a hand in `state` before one camera; not yet searched."""
+        model = self.cameras[camera]
         size, pose, image_size = state[BIAS:BIAS + SHAPE].copy(), self.poses[camera], (model.width, model.height)
         if self.mode == "feature":
             points = feature_points(self.surface, state, size, pose, model.intrinsics, image_size)
         else:
-            points = contour_points(self.surface, state, size, pose, model.intrinsics, image_size,
-                                    STEP_M if last else 2.0 * STEP_M)
+            points = contour_points(self.surface, state, size, pose, model.intrinsics, image_size, step_m)
         frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, MOTION, self.row_s[camera],
-                          REACH, LONGEST_PX)
+                          REACH, LONGEST_PX, self._repeated[camera])
         frame.expected_sd = np.minimum(frame.expected_sd, CONFUSED_PX)
-        frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
-        if last:
-            self.frames[camera] = frame
         return frame
 
     @property

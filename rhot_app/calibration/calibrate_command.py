@@ -19,7 +19,7 @@ KINDS: dict[str, str] = {
 }
 """Name of each calibration, and what it is for."""
 
-_ELSEWHERE = {"alignment": "rhot_app.objects.alignment_command"}
+_ELSEWHERE = {"alignment": "rhot_app.objects.alignment.alignment_command"}
 """Modules of calibrations that do not stand in `commands` under their name."""
 
 

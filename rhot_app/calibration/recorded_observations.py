@@ -20,8 +20,8 @@ from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.pairing import Paired, Pairing
-from rhot_app.tracking.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 

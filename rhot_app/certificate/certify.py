@@ -15,7 +15,7 @@ import numpy as np
 from rhot_app.certificate.document import Certificate, Line, not_measured
 from rhot_app.certificate.latency import LATENCY, TIMING, judge_latency, judge_timing
 from rhot_app.certificate.lengths import DEPTH, ROD, judge_depth, judge_rod, read_distance
-from rhot_app.certificate.recordings import ProtocolFile, Recording, read_latencies, read_recording
+from rhot_app.certificate.recordings import CertifiedRecording, ProtocolFile, read_latencies, read_recording
 from rhot_app.certificate.static import (
     HANDEDNESS,
     TITLE,
@@ -42,7 +42,7 @@ STEPS: dict[str, str] = {
 def certify(folder: Path, protocol: ProtocolFile, rig: Rig, progress: Progress = silent) -> Certificate:
     """Judge every line; logs that `protocol` names stand in `folder`. Raises CertificateError for a log that is
     missing or none, and for a statement that does not fit the rig; then there is no certificate."""
-    def read(log: str, start: float, end: float) -> Recording:
+    def read(log: str, start: float, end: float) -> CertifiedRecording:
         path = folder / log
         if not path.is_file():
             raise CertificateError(f"{path}: there is no such recording; record the step again, or take it out of the "
@@ -93,7 +93,7 @@ def _missing(code: str, title: str, step: str) -> Line:
     return not_measured(code, title, f"the step \"{step}\" was not recorded.", STEPS[step])
 
 
-def _depth(protocol: ProtocolFile, rig: Rig, read: Callable[[str, float, float], Recording]) -> Line:
+def _depth(protocol: ProtocolFile, rig: Rig, read: Callable[[str, float, float], CertifiedRecording]) -> Line:
     if not protocol.ruler:
         return _missing("depth", DEPTH, "ruler")
     count = len(protocol.ruler)

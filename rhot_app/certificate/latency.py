@@ -17,8 +17,8 @@ from scipy import stats
 from rhot_app.certificate import thesis
 from rhot_app.certificate.document import Line, figure, in_words, not_measured, number
 from rhot_app.certificate.intervals import Interval, mean_of, percentile_of
-from rhot_app.certificate.recordings import Latencies, Recording
-from rhot_app.tracking.state import LATENCY_STAGES
+from rhot_app.certificate.recordings import CertifiedRecording, Latencies
+from rhot_app.state import LATENCY_STAGES
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -96,7 +96,8 @@ def flash_edges(seconds: float, seed: int) -> list[tuple[float, bool]]:
     return edges
 
 
-def judge_latency(recording: Recording, marker: str, edges: Sequence[tuple[int, bool]], latencies: Latencies) -> Line:
+def judge_latency(recording: CertifiedRecording, marker: str, edges: Sequence[tuple[int, bool]],
+                  latencies: Latencies) -> Line:
     """The delay between the screen's code and what arrives; `latencies` of the same log's states, whose instants wait
     for the slower camera."""
     m = recording.marker(marker)

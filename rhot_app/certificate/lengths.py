@@ -22,7 +22,7 @@ from rhot_app.certificate import thesis
 from rhot_app.certificate.document import Figure, Line, figure, in_words, not_measured, number
 from rhot_app.certificate.geometry import axes_of
 from rhot_app.certificate.intervals import UNKNOWN, Interval, mean_of, sd_of
-from rhot_app.certificate.recordings import READING_SD_M, Recording
+from rhot_app.certificate.recordings import READING_SD_M, CertifiedRecording
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import Rig
@@ -49,7 +49,7 @@ class DistanceReading:
     disparities: Array
 
 
-def read_distance(recording: Recording, marker: str, ruler_m: float, rig: Rig) -> DistanceReading:
+def read_distance(recording: CertifiedRecording, marker: str, ruler_m: float, rig: Rig) -> DistanceReading:
     """One still marker; `seen` is NaN when it was not located. Raises CertificateError for a marker the rig lacks."""
     m = recording.marker(marker)
     depth = mean_of(axes_of(rig).depth(recording.positions[:, m]))
@@ -178,7 +178,7 @@ def _spread_of(residuals: Array, taken: int) -> tuple[float, float, float]:
 
 # -- line 4: rod of known length ---------------------------------------------------------------------------------------
 
-def judge_rod(recording: Recording, markers: tuple[str, str], length_m: float, rig: Rig) -> Line:
+def judge_rod(recording: CertifiedRecording, markers: tuple[str, str], length_m: float, rig: Rig) -> Line:
     """The rod's length wherever and however it is held. `length_m` was read off a ruler."""
     axes = axes_of(rig)
     first, second = (recording.positions[:, recording.marker(name)] for name in markers)

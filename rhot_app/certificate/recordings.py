@@ -22,10 +22,10 @@ from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import LATENCY_STAGES
 from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import RigArrays, compile_rig, locate_by_disparity
-from rhot_app.tracking.state import LATENCY_STAGES
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import read_document, write_document
@@ -136,7 +136,7 @@ def copy_protocol(folder: Path, protocol: ProtocolFile, into: Path) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class CertifiedRecording:
     """One log through a rig. T instants that all cameras bracket, F frames in the order of arrival; C cameras, M
     markers in the rig's order.
 
@@ -163,7 +163,7 @@ class Recording:
         return self.marker_ids.index(name)
 
 
-def read_recording(path: Path, rig: Rig, progress: Progress = silent) -> Recording:
+def read_recording(path: Path, rig: Rig, progress: Progress = silent) -> CertifiedRecording:
     """A log located by `rig`, whatever rig it was recorded with. No hand is assumed: a rod or a board is none.
 
     Raises CertificateError when it is no log or holds no frame of the rig's.
@@ -184,7 +184,7 @@ def read_recording(path: Path, rig: Rig, progress: Progress = silent) -> Recordi
     rows = np.where(np.isfinite(pixels[:, :, 1]), pixels[:, :, 1], middles[:, None])
     row0 = np.array([frame.t_row0_master_ns for frame in frames], dtype=np.int64)
     row_time = np.array([frame.row_time_ns for frame in frames])
-    return Recording(
+    return CertifiedRecording(
         rig.markers.ids, np.asarray(1e-9 * (times - times[:1]), dtype=np.float64), positions, cameras,
         np.array([frame.t_receive_ns for frame in frames], dtype=np.int64),
         row0[:, None] + np.round(rows * row_time[:, None]).astype(np.int64), pixels, len(rig.nodes),

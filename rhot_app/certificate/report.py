@@ -15,7 +15,7 @@ from rhot_app.certificate.charts import chart_of
 from rhot_app.certificate.document import Certificate, Figure, Line, Word, number
 from rhot_app.certificate.recordings import ProtocolFile, copy_protocol
 from rhot_app.errors import CertificateError
-from rhot_app.simulator.nodes.film import new_folder
+from rhot_app.simulator.film.film import new_folder
 from rhot_node.files import write_document
 
 INKS: dict[Word, Ink] = {"agrees": (0.10, 0.45, 0.20), "differs": (0.75, 0.12, 0.10),

@@ -29,16 +29,15 @@ from rhot_app.evaluation.fault_injection import changed, lost
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.simulator.nodes.film import Report, for_each_camera
-from rhot_app.simulator.nodes.node_log import CABLE, T0_MASTER_NS, NodeSender, write_node_log
-from rhot_app.simulator.nodes.nodes import NodePorts
-from rhot_app.simulator.nodes.shot import Shot, make_renderer, make_shot
+from rhot_app.simulator.film.film import Report, for_each_camera
+from rhot_app.simulator.film.node_log import CABLE, T0_MASTER_NS, NodeSender, write_node_log
+from rhot_app.simulator.film.points import LOG_NAME, PointNoise, write_points
+from rhot_app.simulator.film.scene_objects import MarkerPath, SceneObject
+from rhot_app.simulator.film.shot import Shot, make_renderer, make_shot
 from rhot_app.simulator.render.body import PALM_GROUP, POINT_M, SKIN
 from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, RigidTarget
-from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
+from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, node_settings
 from rhot_app.simulator.scene.scene_description import MarkerShow
-from rhot_app.simulator.scene.scene_objects import MarkerPath, SceneObject
-from rhot_app.simulator.truth.points import LOG_NAME, PointNoise, write_points
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
 from rhot_node.wire.messages import MarkerObservation

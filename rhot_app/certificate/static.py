@@ -12,7 +12,7 @@ from rhot_app.certificate import thesis
 from rhot_app.certificate.document import Figure, Line, figure, in_words, not_measured, number
 from rhot_app.certificate.geometry import axes_of
 from rhot_app.certificate.intervals import Interval, mean_of, sd_of
-from rhot_app.certificate.recordings import Recording
+from rhot_app.certificate.recordings import CertifiedRecording
 from rhot_app.project import Rig
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ _SWAYS = 2.0
 """White noise has the same standard deviation over the whole as within half a second; twice as much is a movement."""
 
 
-def judge_static(recording: Recording, rig: Rig) -> Line:
+def judge_static(recording: CertifiedRecording, rig: Rig) -> Line:
     """The standard deviation of every marker: in the pictures, along the rig's axes, and of its distance."""
     axes = axes_of(rig)
     figures: list[Figure] = []
@@ -68,7 +68,7 @@ def judge_static(recording: Recording, rig: Rig) -> Line:
                 f"{thesis.JITTER_PX[0]:g} to {limit:g} px.{swaying}{unseen}", figures=tuple(figures), curves=curves)
 
 
-def _pixel_sd(recording: Recording, marker: int, axis: int) -> Interval:
+def _pixel_sd(recording: CertifiedRecording, marker: int, axis: int) -> Interval:
     """px, common to all cameras, each with its own frames."""
     return sd_of([recording.pixels[recording.cameras == camera, marker, axis]
                   for camera in range(recording.camera_count)])
@@ -84,7 +84,7 @@ LEVEL_RAD = math.radians(1.0)
 _MARK_SD_M = 0.5e-3  # of a marker's centre beside the axis of the rod, set by hand
 
 
-def judge_upright(recording: Recording, upper: str, lower: str, rig: Rig) -> Line:
+def judge_upright(recording: CertifiedRecording, upper: str, lower: str, rig: Rig) -> Line:
     """The rig's up against a rod that hangs from a string."""
     axes = axes_of(rig)
     up, down = recording.marker(upper), recording.marker(lower)
@@ -119,7 +119,7 @@ def judge_upright(recording: Recording, upper: str, lower: str, rig: Rig) -> Lin
 _PLUMB = "Hang the rod from a string, let it come to rest, and record 3 s."
 
 
-def judge_handedness(recording: Recording, facing: str | None, rig: Rig) -> Line:
+def judge_handedness(recording: CertifiedRecording, facing: str | None, rig: Rig) -> Line:
     """Whether the hand that the operator shows is the hand that the rig sees (freemocap#862: a mirrored rig tracks
     smoothly and is wrong)."""
     if facing is None:

@@ -18,7 +18,7 @@ from rhot_app.engine.directory import EngineDirectory, default_directory
 from rhot_app.engine.status import TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, EngineStatus, Published, decode
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, parse_rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node.files import decode_message
 
 VANISHED_S = 1.0

@@ -20,7 +20,7 @@ from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
 from rhot_app.sources.receiver import RECEIVE_BUFFER
 from rhot_app.sources.source import ObservationSource
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import Tracker
 
 _SUMMARY_NS = 500_000_000  # sorting the latencies is the dearest part of a status

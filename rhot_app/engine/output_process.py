@@ -31,7 +31,7 @@ from rhot_app.errors import OutputError
 from rhot_app.outputs.outputs import Outputs, check_output
 from rhot_app.outputs.spec import SECRET_VARIABLE, OutputStatus, as_run
 from rhot_app.project import OutputSettings, Rig, parse_rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 RESTART_S: Final = 3.0
 SETTLE_S: Final = 15.0  # a process that starts, on a busy computer

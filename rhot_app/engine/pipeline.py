@@ -23,10 +23,10 @@ from rhot_app.objects.object_file import ObjectModel
 from rhot_app.objects.observations import FiducialFrame
 from rhot_app.project import OTHER_HAND, Rig, RigNode
 from rhot_app.sources.source import ObservationSource
+from rhot_app.state import LATENCY_STAGES, HandState
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.marker_model import points_on
-from rhot_app.tracking.state import LATENCY_STAGES, HandState
-from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, feed
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, ImageTracking, Tracker, feed, may_be_due
 from rhot_node.wire.codec import decode as decode_datagram
 from rhot_node.wire.codec import encode as encode_datagram
 from rhot_node.wire.marker_table import MarkerTable
@@ -105,6 +105,9 @@ class Pipeline:
                                 "Record a log and report this.")
                 work.tracker.reset()  # it may be in any state
                 return
+            if isinstance(work.tracker, ImageTracking):
+                for request in work.tracker.requests():
+                    work.source.search(request)
             if state is not None:
                 self._after_state()
 
@@ -113,22 +116,20 @@ class Pipeline:
             self._changes = work.source.changes
             work.tracker.reset()
         markers = work.last_seen_ns.shape[1]
-        observations = [frame for frame in frames if isinstance(frame, CameraObservations)
-                        and len(frame.pixels) == markers]  # some may be of the rig before
+        frames = [frame for frame in frames if not isinstance(frame, CameraObservations)
+                  or len(frame.pixels) == markers]  # some may be of the rig before
+        observations = [frame for frame in frames if isinstance(frame, CameraObservations)]
         self.frame_count += len(observations)
-        live = work.source.live
+        live, tracker = work.source.live, work.tracker
         now_ns = time.monotonic_ns()
-        state = None
+        state, last = None, next((frame for frame in reversed(frames) if may_be_due(frame)), None)
         for frame in frames:
-            if not isinstance(frame, CameraObservations):
-                feed(work.tracker, frame)  # the next state tells of it
-                continue
-            if len(frame.pixels) != markers:
-                continue
-            work.tracker.ingest(frame)
+            feed(tracker, frame)
             # Live, only the newest instant matters to anybody; a replay leaves none out.
-            if not live or frame is observations[-1]:
-                solved = work.tracker.solve()
+            if may_be_due(frame) and (not live or frame is last):
+                if not live and isinstance(tracker, ImageTracking):
+                    tracker.wait()
+                solved = tracker.solve()
                 if solved is not None:
                     self._send(solved, live)
                     state = solved
@@ -235,6 +236,8 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
                 encode(state)
                 if extrapolator is not None:
                     extrapolator.at(state, state.t_master_ns + _PERIOD_NS)  # windows find it compiled
+    if isinstance(tracker, ImageTracking):
+        tracker.warm_up()
     tracker.reset()
     _read_one(rig)
 

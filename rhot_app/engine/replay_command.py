@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     rig = load_rig(args.rig) if args.rig is not None else reader.rig
     if args.tracker is not None:
         rig = with_tracker(rig, args.tracker)
-    if args.smooth and rig.tracker.kind != "estimator":
+    if args.smooth and not rig.tracker.smooths:
         raise RecordingError(NOT_SMOOTHED)
     if args.json:
         announce_compilation()

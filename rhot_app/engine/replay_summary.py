@@ -14,13 +14,14 @@ import numpy as np
 
 from rhot_app.engine.status import TOPIC_STATE, decode, encode
 from rhot_app.errors import EngineError, RecordingError
+from rhot_app.objects.observations import ObjectFrame
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.smoothing import SmoothedTracker
-from rhot_app.tracking.state import HandState, Knowledge
-from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker, feed
+from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker, solve_after
 
 
 class FrameSmoother(Protocol):
@@ -53,11 +54,9 @@ def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracke
         if door.changes != changes:
             changes = door.changes
             tracker.reset()
-        feed(tracker, frame)
-        if isinstance(frame, CameraObservations):
-            state = tracker.solve()
-            if state is not None:
-                yield state
+        state = solve_after(tracker, frame)
+        if state is not None:
+            yield state
 
 
 def smoothed_states(records: Iterable[Record], door: LogValidator, tracker: FrameSmoother) -> Iterator[HandState]:
@@ -73,7 +72,7 @@ def smoothed_states(records: Iterable[Record], door: LogValidator, tracker: Fram
         if isinstance(frame, CameraObservations):
             tracker.ingest(frame)
             yield from tracker.states()
-        elif isinstance(tracker, ObjectTracking):
+        elif isinstance(frame, ObjectFrame) and isinstance(tracker, ObjectTracking):
             tracker.ingest_objects(frame)
     yield from tracker.finish()
 

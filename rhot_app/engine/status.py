@@ -10,7 +10,7 @@ import numpy as np
 
 from rhot_app.errors import EngineError
 from rhot_app.outputs.spec import OutputStatus
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 Level = Literal["info", "warning", "error"]
 NodeWord = Literal["silent", "starting", "ready", "streaming", "fault"]

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Change:
+class ChangePoint:
     """`part`: the one before which the jump was, -1 for none; `before` (n,) the state just before it, `state` (n,) and
     `covariance` (n, n) at the end."""
 
@@ -27,7 +27,7 @@ class Change:
 
 
 def find_change(prior: Array, jump: Array, walk: Array, t_s: Array, matrices: Array, vectors: Array,
-                log_odds: Array) -> Change:
+                log_odds: Array) -> ChangePoint:
     """The most probable of S + 1 hypotheses: no jump, or one before each of S parts.
 
     `prior` and `jump` (n,) variances of the state about zero and of a jump, `walk` (n,) the variance that a second
@@ -52,4 +52,4 @@ def find_change(prior: Array, jump: Array, walk: Array, t_s: Array, matrices: Ar
                            + np.sum(pull * moved, axis=1) - np.sum(state * held, axis=1))
         state = moved
     best = int(np.argmax(evidence))
-    return Change(best - 1, before[best], state[best], covariance[best])
+    return ChangePoint(best - 1, before[best], state[best], covariance[best])

@@ -19,6 +19,7 @@ from scipy.linalg import cho_factor, cho_solve
 from rhot_app.estimation.residual import Process, Residual, stack
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 ITERATIONS = 3
 """Gauss-Newton steps of an update, at most."""
@@ -28,6 +29,21 @@ CONVERGED = 1e-2
 
 KNOTS = 12
 """Knots kept for observations that arrive late."""
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    """Numbers `columns` (P,) of the tangent space that an update moves by `share` of their step only.
+
+    Their errors are taken as new in every update, but last longer than one. With a share of 0 they are considered, not
+    estimated (Schmidt 1966); between, see Brink 2017, "Partial-update Schmidt-Kalman filter", eq. 15 to 19.
+    """
+
+    columns: Indices
+    share: float = 0.0
+
+
+ALL = Partial(np.empty(0, np.int64))
 
 
 @dataclass(slots=True)
@@ -47,6 +63,7 @@ class IteratedFilter:
 
     def __init__(self, process: Process, knots: int = KNOTS) -> None:
         self.process, self._most = process, knots
+        self.partial = ALL
         self.knots: list[Knot] = []
 
     @property
@@ -75,23 +92,23 @@ class IteratedFilter:
         if place == 0:
             oldest = self.knots[0]
             prior = oldest.state, oldest.covariance
-            self.knots[0] = update(self.process, oldest.t_s, prior, residuals)
+            self.knots[0] = update(self.process, oldest.t_s, prior, residuals, None, self.partial)
             place = 1
         else:
             prior = self.predict(t_s) if prediction is None else prediction
-            self.knots.insert(place, update(self.process, t_s, prior, residuals, initial))
+            self.knots.insert(place, update(self.process, t_s, prior, residuals, initial, self.partial))
             place += 1
         added = self.knots[place - 1]
         for later in range(place, len(self.knots)):
             before, knot = self.knots[later - 1], self.knots[later]
             prior = self.process.predict(before.state, before.covariance, knot.t_s - before.t_s)
-            self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals)
+            self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals, None, self.partial)
         del self.knots[:-self._most]
         return added
 
 
 def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: Sequence[Residual],
-           initial: Array | None = None) -> Knot:
+           initial: Array | None = None, partial: Partial = ALL) -> Knot:
     """The posterior of a `prior` (state, covariance) and residuals. The first step begins at the state `initial`, or at
     the prior's.
 
@@ -112,11 +129,15 @@ def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: 
             continue
         before = cost + distance
         cross, root, reached, distance, moved = _solve(covariance, jacobian, error, variances, away)
+        reached[partial.columns] *= partial.share
         last = (state, reached - away)
         state, away = process.retract(state, reached - away), reached
         if iteration and moved < CONVERGED**2:
             break
-    return Knot(t_s, state, _reduce(covariance, cross, root), list(residuals), weights)
+    posterior = _reduce(covariance, cross, root)
+    kept, block = (1.0 - partial.share) ** 2, np.ix_(partial.columns, partial.columns)
+    posterior[block] = kept * covariance[block] + (1.0 - kept) * posterior[block]
+    return Knot(t_s, state, posterior, list(residuals), weights)
 
 
 @njit(cache=True)
@@ -186,7 +207,7 @@ JITTER = 1e-9
 
 
 @dataclass(slots=True)
-class Estimate:
+class FilteredState:
     """One instant, s: a state with its covariance (n, n).
 
     `process`: leads on from here. `label`: the caller's own. A covariance may be inflated after its update: the
@@ -200,10 +221,10 @@ class Estimate:
     label: Any = None
 
 
-def smooth(filtered: Sequence[Estimate], count: int | None = None) -> list[Estimate]:
+def smooth(filtered: Sequence[FilteredState], count: int | None = None) -> list[FilteredState]:
     """The first `count` (None: all) of the filtered estimates, in ascending time, by all the observations."""
     count = len(filtered) if count is None else count
-    found: list[Estimate] = []
+    found: list[FilteredState] = []
     state, covariance = np.empty(0), np.empty((0, 0))
     for number in range(len(filtered) - 1, -1, -1):
         here = filtered[number]
@@ -216,7 +237,7 @@ def smooth(filtered: Sequence[Estimate], count: int | None = None) -> list[Estim
     return found[::-1]
 
 
-def _step_back(here: Estimate, after: Estimate, state: Array, covariance: Array) -> tuple[Array, Array]:
+def _step_back(here: FilteredState, after: FilteredState, state: Array, covariance: Array) -> tuple[Array, Array]:
     """Smoothed state and covariance at `here`; `state` and `covariance` are those at `after`.
 
     A later estimate holds no information on what a prediction resets, but a linearised gain would correct it all the
@@ -257,9 +278,9 @@ class ChunkedSmoother:
 
     def __init__(self, chunk_s: float = CHUNK_S, ahead_s: float = AHEAD_S) -> None:
         self._chunk_s, self._ahead_s = chunk_s, ahead_s
-        self._waiting: list[Estimate] = []
+        self._waiting: list[FilteredState] = []
 
-    def add(self, estimate: Estimate) -> list[Estimate]:
+    def add(self, estimate: FilteredState) -> list[FilteredState]:
         """Take the next estimate; returns those that are smoothed with it, mostly none."""
         self._waiting.append(estimate)
         begin_s = self._waiting[0].t_s
@@ -270,7 +291,7 @@ class ChunkedSmoother:
         del self._waiting[:count]
         return found
 
-    def finish(self) -> list[Estimate]:
+    def finish(self) -> list[FilteredState]:
         """The rest. The next estimate begins anew."""
         found, self._waiting = smooth(self._waiting), []
         return found

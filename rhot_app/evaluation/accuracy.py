@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from rhot_app.evaluation.score import VISIBLE_FRACTION, count_swaps, rms
-from rhot_app.evaluation.track import DISPLAY_HZ, Track
+from rhot_app.evaluation.track import DISPLAY_HZ, TrackedStates
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, TIP_ROLES
 from rhot_app.project import Rig
-from rhot_app.simulator.truth.truth import Truth
-from rhot_app.tracking.state import Knowledge
+from rhot_app.simulator.film.truth import Truth
+from rhot_app.state import Knowledge
 
 # -- errors of states --------------------------------------------------------------------------------------------------
 
@@ -61,7 +61,7 @@ class Deviations:
     measured: Mask
 
 
-def deviations(track: Track, truth: Truth, worn: WornMarkers) -> Deviations:
+def deviations(track: TrackedStates, truth: Truth, worn: WornMarkers) -> Deviations:
     """Compare a track with what was true at its times."""
     times = track.times_s
     markers = truth.markers_at(times)
@@ -129,7 +129,7 @@ class Consistency:
     within: float | None
 
 
-def squares(track: Track, off: Deviations, worn: WornMarkers) -> Squares:
+def squares(track: TrackedStates, off: Deviations, worn: WornMarkers) -> Squares:
     """The normalised squares of one run."""
     tips = track.fingertip_covariances[:, worn.tip_fingers]
     estimates = np.isfinite(track.joint_covariances).any()  # else its markers' covariances are those of raw positions
@@ -211,7 +211,7 @@ _ADDED = ("swaps",)  # over runs these add up; everything else is averaged, root
 _PLAIN = ("states_per_s", "measured_share", "predicted_3_sd_share")
 
 
-def accuracy(track: Track, off: Deviations, truth: Truth, worn: WornMarkers) -> Figures:
+def accuracy(track: TrackedStates, off: Deviations, truth: Truth, worn: WornMarkers) -> Figures:
     """The figures of one run.
 
     `tip_visible`: fingertips whose marker both cameras truly see, whatever the tracker says of them; `tip_measured`:
@@ -239,7 +239,7 @@ def accuracy(track: Track, off: Deviations, truth: Truth, worn: WornMarkers) -> 
     }
 
 
-def display_error(track: Track, truth: Truth, worn: WornMarkers) -> Array:
+def display_error(track: TrackedStates, truth: Truth, worn: WornMarkers) -> Array:
     """(D, T) m: at each tick of a display, how far the fingertips of the newest state received are from where they are
     now. No prediction: what the state says of its own instant is shown."""
     ticks = np.arange(track.receive_s[0], track.receive_s[-1], 1.0 / DISPLAY_HZ)
@@ -248,7 +248,7 @@ def display_error(track: Track, truth: Truth, worn: WornMarkers) -> Array:
     return distances(shown - truth.markers_at(ticks)[:, worn.tips])
 
 
-def predicted(track: Track, truth: Truth, worn: WornMarkers) -> tuple[Array, Array]:
+def predicted(track: TrackedStates, truth: Truth, worn: WornMarkers) -> tuple[Array, Array]:
     """What the tracker, asked at each tick of a display, says of the tick: how far off fingertips are, (K, T, 3) m, and
     their covariances (K, T, 3, 3) m^2. K is 0 when it predicts nothing."""
     if track.predicted is None:

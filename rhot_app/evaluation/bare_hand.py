@@ -32,7 +32,7 @@ from rhot_app.simulator.bare_hand.sequence import (
     bare_hand_rig,
     bare_hand_sequence,
 )
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]

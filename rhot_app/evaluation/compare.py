@@ -21,12 +21,12 @@ from rhot_app.evaluation.accuracy import (
     squares,
     worn_by,
 )
-from rhot_app.evaluation.data_sets import DataSet, Order, Told, data_set
+from rhot_app.evaluation.data_sets import DataSet, Order, Watch, data_set
 from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.progress import Progress, silent
 from rhot_app.project import TrackerSettings
-from rhot_app.simulator.nodes.node_log import CABLE, Network
+from rhot_app.simulator.film.node_log import CABLE, Network
 from rhot_app.simulator.scene.scene import Scene, make_scene
 from rhot_node.files import read_json
 
@@ -90,12 +90,12 @@ def orders(scene: Scene, motions: Iterable[str], seeds: Iterable[int], seconds: 
 
 
 def compare(wanted: Sequence[Order], folder: Path, trackers: dict[str, TrackerSettings],
-            told: Told = lambda title: None, progress: Progress = silent) -> Comparison:
+            watch: Watch = lambda title: None, progress: Progress = silent) -> Comparison:
     """Put every take through every tracker; takes that are not in `folder` are filmed. Raises RhotError."""
     runs: list[Run] = []
     outdated = 0
     for number, order in enumerate(wanted):
-        recorded = data_set(order, folder, told)
+        recorded = data_set(order, folder, watch)
         outdated += recorded.outdated
         judged = {}
         for place, (name, settings) in enumerate(trackers.items()):
@@ -316,9 +316,9 @@ def run_table(name: str, about: str, results: Results) -> str:
 def legend(trials: Iterable[Results]) -> str:
     """What the columns of these trials mean."""
     shown = {key for results in trials for figures in results.values() for key in figures}
-    told = [(key, meaning) for key, meaning in MEANINGS if key in shown]
-    width = max((len(key) for key, _ in told), default=0)
-    return "\n".join(f"  {key.ljust(width)}  {meaning}" for key, meaning in told)
+    lines = [(key, meaning) for key, meaning in MEANINGS if key in shown]
+    width = max((len(key) for key, _ in lines), default=0)
+    return "\n".join(f"  {key.ljust(width)}  {meaning}" for key, meaning in lines)
 
 
 def _form(value: float | None) -> str:

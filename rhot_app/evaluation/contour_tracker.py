@@ -12,7 +12,7 @@ from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import TrackingError
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node.detect.foreground import learn_background, skin_foreground
 
 Picture = NDArray[np.uint8]

@@ -21,12 +21,12 @@ import numpy as np
 
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.simulator.nodes.film import TRUTH_NAME, Progress, Report, for_each_camera, new_folder
-from rhot_app.simulator.nodes.node_log import CABLE, Network, NodeSender, write_node_log
-from rhot_app.simulator.nodes.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
+from rhot_app.simulator.film.film import TRUTH_NAME, Progress, Report, for_each_camera, new_folder
+from rhot_app.simulator.film.ideal_observations import ORDINARY, ideal_observations
+from rhot_app.simulator.film.node_log import CABLE, Network, NodeSender, write_node_log
+from rhot_app.simulator.film.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
+from rhot_app.simulator.film.truth import FrameTruth, Truth, load_truth, save_truth, true_object
 from rhot_app.simulator.scene.scene import Scene, node_settings
-from rhot_app.simulator.truth.ideal_observations import ORDINARY, sights
-from rhot_app.simulator.truth.truth import FrameTruth, Truth, load_truth, save_truth, true_object
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
 from rhot_node.files import resource_path
@@ -34,7 +34,7 @@ from rhot_node.wire.messages import MarkerObservation
 
 LOG_NAME: Final = "take.rhotlog"
 
-Told = Callable[[str], Progress | None]
+Watch = Callable[[str], Progress | None]
 """Says how the filming of a take goes: given what is filmed, who is told of its frames."""
 
 _SHOWN = "body", "motion", "node_log", "raycast", "recorded", "scene"
@@ -48,7 +48,7 @@ what was found in them."""
 @dataclass(frozen=True, eq=False)
 class Order:
     """What a take shall show: a motion (name or file) in a scene, for how long, and over which network it is sent.
-    `sketched`: without pictures (`rhot_app.simulator.truth.ideal_observations`), a hundred times faster. `missing`: ids
+    `sketched`: without pictures (`rhot_app.simulator.film.ideal_observations`), a hundred times faster. `missing`: ids
     of markers that the hand does not wear."""
 
     scene: Scene
@@ -79,7 +79,7 @@ class Order:
 @dataclass(frozen=True, eq=False)
 class DataSet:
     """A raw log, the rig that a perfect calibration would have found, and the truth. Scene time 0 is
-    `rhot_app.simulator.nodes.node_log.T0_MASTER_NS`. `outdated`: another detector or twin would film it today."""
+    `rhot_app.simulator.film.node_log.T0_MASTER_NS`. `outdated`: another detector or twin would film it today."""
 
     folder: Path
     rig: Rig
@@ -101,7 +101,7 @@ def data_sets_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhot" / "takes"
 
 
-def data_set(order: Order, folder: Path, told: Told = lambda title: None) -> DataSet:
+def data_set(order: Order, folder: Path, watch: Watch = lambda title: None) -> DataSet:
     """The take in `folder`, filmed unless it is there already. Raises RhotError.
 
     Filming takes about as long as what is filmed; an interrupted one leaves nothing behind.
@@ -110,7 +110,7 @@ def data_set(order: Order, folder: Path, told: Told = lambda title: None) -> Dat
     place = folder / order.name()
     if not place.exists():
         try:
-            _film(order, place, told(order.title))
+            _film(order, place, watch(order.title))
         except OSError:
             if not place.exists():  # else somebody has filmed the same meanwhile
                 raise
@@ -156,7 +156,7 @@ def _watch(rig: Rig, network: Network, shot: Shot, index: int, report: Report) -
 
 def _sketch(rig: Rig, network: Network, shot: Shot, index: int) -> Stream:
     """No pictures."""
-    seen, truth = sights(shot, index)
+    seen, truth = ideal_observations(shot, index)
     return _say(rig, network, shot, index, seen), truth
 
 

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from rhot_app.simulator.simulate_command import SECONDS_MAX, add_scene_arguments, scene_of
+from rhot_app.simulator.scene.scene_arguments import SECONDS_MAX, add_scene_arguments, scene_of
 from rhot_node.compiled import announce_compilation
 
 _OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs", "baseline")
@@ -157,7 +157,7 @@ def _compare(args: argparse.Namespace) -> int:
     from rhot_app.evaluation.data_sets import data_sets_folder
     from rhot_app.evaluation.run import SETTLE_S
     from rhot_app.progress import ProgressLine
-    from rhot_app.simulator.nodes.node_log import Network
+    from rhot_app.simulator.film.node_log import Network
 
     unseen = [name for name in _OF_PICTURES if getattr(args, name) is not None]
     if args.sketched and unseen:

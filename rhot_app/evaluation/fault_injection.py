@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import ClockReply, ClockRequest, MarkerFlag, MarkerObservation, Observations
 
@@ -151,8 +151,8 @@ def _clock_rates(records: Sequence[Record]) -> dict[int, float]:
             message = decode(record.data)
             assert isinstance(message, ClockReply)
             replies.setdefault(record.node_id, []).append(message)
-    return {node: (told[-1].t2_node_ns - told[0].t2_node_ns) / (told[-1].t1_master_ns - told[0].t1_master_ns)
-            for node, told in replies.items()}
+    return {node: (echoes[-1].t2_node_ns - echoes[0].t2_node_ns) / (echoes[-1].t1_master_ns - echoes[0].t1_master_ns)
+            for node, echoes in replies.items()}
 
 
 def _later(record: Record, master_ns: int, node_ns: int, frames: int, requests: int) -> Record:

@@ -18,13 +18,13 @@ from rhot_app.errors import EngineError, SimulatorError
 from rhot_app.evaluation.score import TrueSamples, score
 from rhot_app.progress import ProgressLine
 from rhot_app.project import Rig, save_rig
-from rhot_app.simulator.nodes.film import TRUTH_NAME, film
-from rhot_app.simulator.nodes.nodes import NodePorts, TwinNodes
+from rhot_app.simulator.film.film import TRUTH_NAME, film
+from rhot_app.simulator.film.shot import make_shot, read_shot
+from rhot_app.simulator.film.truth import load_truth
+from rhot_app.simulator.nodes.nodes import TwinNodes
 from rhot_app.simulator.nodes.proxy import Impairment, UdpProxy
-from rhot_app.simulator.nodes.shot import make_shot, read_shot
-from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
-from rhot_app.simulator.truth.truth import load_truth
-from rhot_app.tracking.state import HandState
+from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, node_settings
+from rhot_app.state import HandState
 from rhot_node.files import write_atomically
 
 Progress = Callable[[int, int], None]

@@ -23,11 +23,11 @@ from rhot_app.evaluation.accuracy import Deviations, Figures, WornMarkers, axes_
 from rhot_app.evaluation.data_sets import DataSet
 from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.evaluation.score import VISIBLE_FRACTION, count_swaps, rms
-from rhot_app.evaluation.track import Timed, Track, tracked
+from rhot_app.evaluation.track import Timed, TrackedStates, tracked
 from rhot_app.hand.skeleton import WRIST_ROLE
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.truth.truth import Truth
+from rhot_app.simulator.film.truth import Truth
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.trackers import make_tracker
@@ -220,7 +220,7 @@ def _all_states(take: DataSet, rig: Rig, records: Sequence[Record], tracker: Tra
             "seconds": float(track.times_s[-1] - track.times_s[0])}
 
 
-def _off(track: Track, take: DataSet) -> Deviations:
+def _off(track: TrackedStates, take: DataSet) -> Deviations:
     return deviations(track, take.truth, worn_by(take.rig))
 
 
@@ -256,7 +256,7 @@ _LAG_LIMITS_S = (-0.05, 0.1)
 _RISING_MPS = 0.1
 
 
-def spread(track: Track, worn: WornMarkers) -> tuple[Array, float]:
+def spread(track: TrackedStates, worn: WornMarkers) -> tuple[Array, float]:
     """Standard deviation of a still hand's fingertips about their means after SETTLED_S: per axis (3,) and in space, m;
     root mean square over the fingers."""
     tips = track.fingertip_positions[track.times_s >= SETTLED_S][:, worn.tip_fingers]
@@ -288,7 +288,7 @@ def rising(times_s: Array, truth: Truth) -> Mask:
     return np.asarray((speed_after > speed_before) & (speed_after > _RISING_MPS))
 
 
-def found_after(track: Track, truth: Truth, worn: WornMarkers, first_s: float) -> float | None:
+def found_after(track: TrackedStates, truth: Truth, worn: WornMarkers, first_s: float) -> float | None:
     """Time from the first datagram, received at scene time `first_s`, until a state has every fingertip whose marker is
     truly visible nearer than NEAR_M to the truth, s. None when there never is one."""
     off = distances(track.fingertip_positions[:, worn.tip_fingers] - truth.markers_at(track.times_s)[:, worn.tips])

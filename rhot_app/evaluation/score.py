@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.skeleton import ANGLES, TIP_ROLES, WRIST_ROLE
-from rhot_app.tracking.state import LATENCY_STAGES, HandState, Knowledge
+from rhot_app.state import LATENCY_STAGES, HandState, Knowledge
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from rhot_app.engine.replay_summary import replay_states
 from rhot_app.errors import SimulatorError
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import HandState
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.trackers import make_tracker
 
@@ -40,7 +40,7 @@ class Predicted:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class TrackedStates:
     """N states of a tracker; M markers. Rig frame, m and rad; times are scene times, s. As in `HandState`.
 
     `receive_s` (N,): when the datagram that completed the state arrived. `compute_s` (D,): per datagram, from its bytes
@@ -68,24 +68,27 @@ class Track:
     compute_s: Array  # (D,)
     predicted: Predicted | None = None
 
-    def where(self, chosen: NDArray[np.bool_]) -> Track:
+    def where(self, chosen: NDArray[np.bool_]) -> TrackedStates:
         """The states of a mask (N,) alone."""
         columns = {field.name: getattr(self, field.name) for field in fields(self)}
-        return Track(**{name: column if name in _OF_RUN else column[chosen] for name, column in columns.items()})
+        return TrackedStates(**{name: column if name in _OF_RUN else column[chosen]
+                                for name, column in columns.items()})
 
 
 _OF_RUN = "compute_s", "predicted"
-_OF_STATES = tuple(field.name for field in fields(Track) if field.name not in ("times_s", "receive_s", *_OF_RUN))
+_OF_STATES = tuple(field.name for field in fields(TrackedStates)
+                   if field.name not in ("times_s", "receive_s", *_OF_RUN))
 
 
-def track_of(states: Sequence[HandState], compute_s: Array | None = None, predicted: Predicted | None = None) -> Track:
+def track_of(states: Sequence[HandState], compute_s: Array | None = None,
+             predicted: Predicted | None = None) -> TrackedStates:
     """The columns of states of one run. Raises SimulatorError when there are fewer than two."""
     if len(states) < 2:
         raise SimulatorError(f"the tracker made {len(states)} states of the whole log; there is nothing to judge.")
     columns = {name: np.array([getattr(state, name) for state in states]) for name in _OF_STATES}
-    return Track(times_s=1e-9 * np.array([state.t_master_ns - T0_MASTER_NS for state in states]),
-                 receive_s=1e-9 * np.array([state.t_receive_ns - T0_MASTER_NS for state in states]),
-                 compute_s=np.empty(0) if compute_s is None else compute_s, predicted=predicted, **columns)
+    return TrackedStates(times_s=1e-9 * np.array([state.t_master_ns - T0_MASTER_NS for state in states]),
+                         receive_s=1e-9 * np.array([state.t_receive_ns - T0_MASTER_NS for state in states]),
+                         compute_s=np.empty(0) if compute_s is None else compute_s, predicted=predicted, **columns)
 
 
 def rig_with(rig: Rig, settings: TrackerSettings) -> Rig:
@@ -93,7 +96,7 @@ def rig_with(rig: Rig, settings: TrackerSettings) -> Rig:
     return msgspec.structs.replace(rig, tracker=settings)
 
 
-def tracked(records: Iterable[Record], rig: Rig, tracker: Tracker | None = None) -> Track:
+def tracked(records: Iterable[Record], rig: Rig, tracker: Tracker | None = None) -> TrackedStates:
     """What the rig's tracker, or another one, makes of a log's records; as fast as it can, one thread.
 
     Raises SimulatorError when it makes nothing.

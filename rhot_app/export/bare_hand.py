@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -20,12 +18,13 @@ from rhot_app.barehand.overlay import overlay
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import ExportError, RecordingError
 from rhot_app.export.export import check_place, format_of, make_writer, whole_file
+from rhot_app.export.pictures import check_pictures, whole_pictures
 from rhot_app.export.plan import Plan
 from rhot_app.export.states import BLOCK, states_of
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
-from rhot_app.recording.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.sources.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
+from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_node.detect.foreground import Foreground, foreground_map, learn_background, learn_skin, skin_foreground
 
 Image = NDArray[np.uint8]
@@ -45,7 +44,6 @@ FASTEST_M_S: Final = 4.0
 """m/s: twice the speed of the fastest motion in `resources/motions`. Chosen, not measured."""
 
 TABLES: Final = ("csv", "parquet", "npz")
-_CODECS: Final = {".avi": "MJPG", ".mp4": "mp4v"}
 _TEXT_RGB: Final = (255, 255, 255)
 
 
@@ -212,7 +210,8 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     spent: list[tuple[int, bool]] = []
     with contextlib.ExitStack() as stack:
         table = stack.enter_context(_table(rig, videos[0].path.name, out)) if out is not None else None
-        drawn = stack.enter_context(_drawn(pictures, videos)) if pictures is not None else None
+        fps = 1e9 / min(video.period_ns for video in videos)
+        drawn = stack.enter_context(whole_pictures(pictures, fps)) if pictures is not None else None
         for frames in frame_sets(videos):
             progress("tracking", min(max((frames.first_ns - first) / max(last - first, 1), 0.0), 1.0))
             state = run.step(frames)
@@ -251,16 +250,6 @@ def check_table(video: Path, target: Path, again: bool) -> None:
         raise ExportError(f"{target}: a bare hand is written as .csv, .parquet or .npz; rhot export has the other "
                           "formats for raw logs.")
     check_place(video, target, again)
-
-
-def check_pictures(video: Path, target: Path, again: bool) -> None:
-    """Refuse a film or a folder that cannot be written, before anything is tracked. Raises ExportError."""
-    if target.suffix.lower() in _CODECS:
-        check_place(video, target, again)
-    elif target.exists():
-        raise ExportError(f"{target} exists already; name a new folder for the pictures, or a film (.avi, .mp4).")
-    elif not target.absolute().parent.is_dir():
-        raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first.")
 
 
 class _Table:
@@ -303,67 +292,6 @@ def _table(rig: Rig, name: str, out: Path) -> Iterator[_Table]:
     with (whole_file(out, lambda: None) as path,
           contextlib.closing(_Table(rig, name, format_of(None, out), path)) as table):
         yield table
-
-
-class _Pictures(Protocol):
-    def add(self, picture: Image) -> None: ...
-
-
-class _Film:
-    """A film of pictures of one size."""
-
-    def __init__(self, path: Path, codec: str, fps: float) -> None:
-        self._path, self._codec, self._fps = path, codec, fps
-        self._writer: cv2.VideoWriter | None = None
-
-    def add(self, picture: Image) -> None:
-        """Take one picture (H, W, 3) RGB."""
-        if self._writer is None:
-            size = picture.shape[1], picture.shape[0]
-            self._writer = cv2.VideoWriter(str(self._path), cv2.VideoWriter.fourcc(*self._codec), self._fps, size)
-            if not self._writer.isOpened():
-                raise ExportError(f"{self._path.suffix} films cannot be written here; choose .avi or a folder.")
-        self._writer.write(np.ascontiguousarray(picture[..., ::-1]))
-
-    def close(self) -> None:
-        """Let go of the file."""
-        if self._writer is not None:
-            self._writer.release()
-
-
-class _Folder:
-    """Numbered PNG files."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._count = path, 0
-
-    def add(self, picture: Image) -> None:
-        """Take one picture (H, W, 3) RGB."""
-        path = self._path / f"{self._count:06d}.png"
-        if not cv2.imwrite(str(path), np.ascontiguousarray(picture[..., ::-1])):
-            raise ExportError(f"{path}: the picture cannot be written; is there room?")
-        self._count += 1
-
-
-@contextlib.contextmanager
-def _drawn(target: Path, videos: Sequence[CameraVideo]) -> Iterator[_Pictures]:
-    """A film or a folder that is there when it is whole."""
-    if target.suffix.lower() in _CODECS:
-        fps = 1e9 / min(video.period_ns for video in videos)
-        with (whole_file(target, lambda: None) as path,
-              contextlib.closing(_Film(path, _CODECS[target.suffix.lower()], fps)) as film):
-            yield film
-        return
-    try:
-        hidden = Path(tempfile.mkdtemp(dir=target.absolute().parent, prefix=f".{target.name}."))
-    except OSError as exc:
-        raise ExportError(f"{target}: cannot be written ({exc.strerror}).") from exc
-    try:
-        yield _Folder(hidden)
-        hidden.chmod(0o755)
-        hidden.replace(target)
-    finally:
-        shutil.rmtree(hidden, ignore_errors=True)
 
 
 def side_by_side(run: BareHandRun, frames: FrameSet, state: HandState) -> Image:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
-    from rhot_app.recording.frame_sets import CameraVideo
+    from rhot_app.sources.frame_sets import CameraVideo
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.export.bare_hand import learn_backgrounds, track_videos
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
-    from rhot_app.recording.frame_sets import FPS, checked_seconds, on_one_clock
+    from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock
     from rhot_node.compiled import announce_compilation
 
     if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
@@ -100,7 +100,7 @@ def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
 def open_all(rig: Rig, paths: dict[str, str], fps: float | None) -> list[CameraVideo]:
     """The videos of cameras, in the rig's order. Raises RecordingError."""
     from rhot_app.errors import RecordingError
-    from rhot_app.recording.frame_sets import open_video
+    from rhot_app.sources.frame_sets import open_video
 
     files = [Path(path).resolve() for path in paths.values()]
     doubled = next((path for path in files if files.count(path) > 1), None)

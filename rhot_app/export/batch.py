@@ -27,7 +27,7 @@ from rhot_app.errors import ExportError, RhotError
 from rhot_app.export.export import FORMATS, export_log
 from rhot_app.export.plan import ExportOptions, require
 from rhot_app.export.recording import TrackedLog
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_node.errors import NodeError
 from rhot_node.files import write_atomically, write_document
 
@@ -52,7 +52,7 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class JobOutcome:
     """What came of a job. `message`: why it failed, or what was lost; `unchanged`: it was done before."""
 
     log: Path
@@ -64,8 +64,8 @@ class Outcome:
     unchanged: bool = False
 
 
-Told = Callable[[Outcome], None]
-Ends = Generator[Outcome, None, None]
+Report = Callable[[JobOutcome], None]
+Ends = Generator[JobOutcome, None, None]
 
 
 def jobs_of(logs: Sequence[Path], folder: Path, format_name: str | None, rig: Path | None,
@@ -87,7 +87,7 @@ def jobs_of(logs: Sequence[Path], folder: Path, format_name: str | None, rig: Pa
     return [Job(log, folder.absolute() / f"{stem}{ending}", format_name, rig, options) for stem, log in named.items()]
 
 
-def run_job(job: Job) -> Outcome:
+def run_job(job: Job) -> JobOutcome:
     """Do one job; whatever goes wrong is in the outcome."""
     begun = time.monotonic()
     try:
@@ -98,14 +98,14 @@ def run_job(job: Job) -> Outcome:
         else:
             done = export_log(job.log, job.out, format_name=job.format, rig=job.rig, options=job.options, again=True)
             states, losses = done.states, done.losses
-        return Outcome(job.log, job.out, "losses" if losses else "done", states, time.monotonic() - begun,
-                       "; ".join(losses))
+        return JobOutcome(job.log, job.out, "losses" if losses else "done", states, time.monotonic() - begun,
+                          "; ".join(losses))
     except (RhotError, NodeError, OSError) as exc:
-        return Outcome(job.log, job.out, "failed", 0, time.monotonic() - begun, str(exc))
+        return JobOutcome(job.log, job.out, "failed", 0, time.monotonic() - begun, str(exc))
     except KeyboardInterrupt:
-        return Outcome(job.log, job.out, "interrupted", 0, time.monotonic() - begun, "interrupted")
+        return JobOutcome(job.log, job.out, "interrupted", 0, time.monotonic() - begun, "interrupted")
     except Exception as exc:  # the others must go on
-        return Outcome(job.log, job.out, "failed", 0, time.monotonic() - begun, f"{type(exc).__name__}: {exc}")
+        return JobOutcome(job.log, job.out, "failed", 0, time.monotonic() - begun, f"{type(exc).__name__}: {exc}")
 
 
 def _summarise(job: Job) -> tuple[int, tuple[str, ...]]:
@@ -176,7 +176,7 @@ class _Sums:
 
 
 def run_batch(jobs: Sequence[Job], folder: Path, *, workers: int = 1, scheduler: str | None = None, again: bool = False,
-              told: Told = lambda outcome: None) -> list[Outcome]:
+              report: Report = lambda outcome: None) -> list[JobOutcome]:
     """Do all jobs and return what came of them, in their order; `told` is called with each as it ends.
 
     `workers` processes here (1: this one), or those of a Dask cluster whose `scheduler` has this address and whose
@@ -187,12 +187,12 @@ def run_batch(jobs: Sequence[Job], folder: Path, *, workers: int = 1, scheduler:
         manifest = Manifest(folder)
     except OSError as exc:
         raise ExportError(f"{folder}: files cannot be written there ({exc.strerror}); choose another --out.") from exc
-    found: dict[Path, Outcome] = {}
+    found: dict[Path, JobOutcome] = {}
     for job in jobs:
         before = None if again else manifest.unchanged(job)
         if before is not None:
             found[job.log] = before
-            told(before)
+            report(before)
     waiting = [job for job in jobs if job.log not in found]
     orders = {job.log: (job, manifest.order(job)) for job in waiting}
     ends = (_on_cluster(waiting, scheduler) if scheduler is not None
@@ -201,7 +201,7 @@ def run_batch(jobs: Sequence[Job], folder: Path, *, workers: int = 1, scheduler:
         for outcome in ends:
             found[outcome.log] = outcome
             manifest.note(*orders[outcome.log], outcome)
-            told(outcome)
+            report(outcome)
     return [found[job.log] for job in jobs]
 
 
@@ -226,7 +226,7 @@ class Manifest:
                 "mtime_ns": max((log.st_mtime_ns for log in logs), default=0),
                 "order": hashlib.sha256(how).hexdigest()}
 
-    def unchanged(self, job: Job) -> Outcome | None:
+    def unchanged(self, job: Job) -> JobOutcome | None:
         """What came of the same job before, if its file is still there."""
         before = self._done.get(job.out.name)
         order = self.order(job)
@@ -234,10 +234,10 @@ class Manifest:
             return None
         if any(before.get(key) != value for key, value in order.items()):
             return None
-        return Outcome(job.log, job.out, "losses" if before.get("message") else "done", int(before.get("states", 0)),
-                       0.0, str(before.get("message", "")), unchanged=True)
+        return JobOutcome(job.log, job.out, "losses" if before.get("message") else "done", int(before.get("states", 0)),
+                          0.0, str(before.get("message", "")), unchanged=True)
 
-    def note(self, job: Job, order: dict[str, Any] | None, outcome: Outcome) -> None:
+    def note(self, job: Job, order: dict[str, Any] | None, outcome: JobOutcome) -> None:
         """Remember a job that was done; `order` as it was before."""
         if outcome.status not in ("done", "losses") or order is None:
             return
@@ -271,7 +271,7 @@ def _here(jobs: Sequence[Job], workers: int) -> Ends:
                 try:
                     yield from _by_pool([job], 1)
                 except BrokenProcessPool:
-                    yield Outcome(job.log, job.out, "failed", message="its process died; is there enough memory?")
+                    yield JobOutcome(job.log, job.out, "failed", message="its process died; is there enough memory?")
 
 
 def _by_pool(jobs: Sequence[Job], workers: int) -> Ends:
@@ -290,7 +290,7 @@ def _by_pool(jobs: Sequence[Job], workers: int) -> Ends:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _ended(futures: Iterable[Future[Outcome]]) -> Ends:
+def _ended(futures: Iterable[Future[JobOutcome]]) -> Ends:
     for future in as_completed(list(futures)):
         yield future.result()
 
@@ -300,7 +300,7 @@ def _deaf_to_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _interruptible(job: Job) -> Outcome:
+def _interruptible(job: Job) -> JobOutcome:
     """A job in a worker: an interrupt ends it, and it leaves nothing behind."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
@@ -322,7 +322,7 @@ def _on_cluster(jobs: Sequence[Job], scheduler: str) -> Ends:
         for future in distributed.as_completed(list(futures), loop=client.loop):
             job = futures[future]
             error = future.exception()
-            yield future.result() if error is None else Outcome(
+            yield future.result() if error is None else JobOutcome(
                 job.log, job.out, "failed", message=f"its worker failed ({type(error).__name__}: {error})")
     finally:
         client.close()

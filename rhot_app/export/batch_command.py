@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
 
 if TYPE_CHECKING:
-    from rhot_app.export.batch import Job, Outcome
+    from rhot_app.export.batch import Job, JobOutcome
 
 FAILED = 2
 
@@ -51,13 +51,13 @@ def run(args: argparse.Namespace) -> int:
     jobs = jobs_of(args.paths, args.out, name, args.rig, options)
     _compile(jobs)
     line = ProgressLine(f"{args.do}: {_logs(len(jobs))}")
-    ended: list[Outcome] = []
+    ended: list[JobOutcome] = []
 
-    def told(outcome: Outcome) -> None:
+    def report(outcome: JobOutcome) -> None:
         ended.append(outcome)
         line(len(ended), len(jobs))
 
-    outcomes = run_batch(jobs, args.out, workers=workers, scheduler=args.scheduler, again=args.again, told=told)
+    outcomes = run_batch(jobs, args.out, workers=workers, scheduler=args.scheduler, again=args.again, report=report)
     line.finish()
     print(table(outcomes))
     if any(outcome.status == "interrupted" for outcome in outcomes):
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     return READ_WITH_LOSSES if any(outcome.status == "losses" for outcome in outcomes) else 0
 
 
-def table(outcomes: list[Outcome]) -> str:
+def table(outcomes: list[JobOutcome]) -> str:
     """A line per log, and the sum."""
     width = max(len(outcome.log.name) for outcome in outcomes)
     lines = [f"{'log':{width}}  {'result':9} {'states':>7} {'s':>6}  file, or why not"]

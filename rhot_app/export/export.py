@@ -34,13 +34,13 @@ class Format:
 
 FORMATS: dict[str, Format] = {
     "csv": Format("rhot_app.export.tables:CsvWriter", (".csv",), "mm"),
-    "trc": Format("rhot_app.export.points:TrcWriter", (".trc",), "mm", uniform=True),
-    "c3d": Format("rhot_app.export.points:C3dWriter", (".c3d",), "mm", uniform=True),
-    "bvh": Format("rhot_app.export.bvh:BvhWriter", (".bvh",), "m", uniform=True),
-    "gltf": Format("rhot_app.export.gltf:GltfWriter", (".glb", ".gltf"), "m", units_free=False),
+    "trc": Format("rhot_app.export.formats.points:TrcWriter", (".trc",), "mm", uniform=True),
+    "c3d": Format("rhot_app.export.formats.points:C3dWriter", (".c3d",), "mm", uniform=True),
+    "bvh": Format("rhot_app.export.formats.bvh:BvhWriter", (".bvh",), "m", uniform=True),
+    "gltf": Format("rhot_app.export.formats.gltf:GltfWriter", (".glb", ".gltf"), "m", units_free=False),
     "npz": Format("rhot_app.export.tables:NpzWriter", (".npz",), "m"),
     "parquet": Format("rhot_app.export.tables:ParquetWriter", (".parquet",), "mm"),
-    "mcap": Format("rhot_app.export.mcap_file:McapWriter", (".mcap",), "m", units_free=False),
+    "mcap": Format("rhot_app.export.formats.mcap_file:McapWriter", (".mcap",), "m", units_free=False),
 }
 
 

@@ -9,6 +9,7 @@ from types import TracebackType
 
 import numpy as np
 
+from rhot_app.barehand.observations import ImageFrame, SliceRequest
 from rhot_app.calibration.recorded_observations import why_none
 from rhot_app.engine.replay_summary import replay_states, smoothed_states
 from rhot_app.errors import ExportError, RecordingError, take_losses
@@ -19,7 +20,7 @@ from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
-from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker
+from rhot_app.tracking.tracker import CameraObservations, ImageTracking, ObjectTracking, Tracker
 from rhot_app.tracking.trackers import make_tracker
 
 RATE_AFTER_S = 5.0
@@ -52,7 +53,7 @@ class TrackedLog:
         try:
             own = self._reader.rig if rig is None else load_rig(rig) if isinstance(rig, Path) else rig
             self.rig = own if tracker is None else with_tracker(own, tracker)
-            if smooth and self.rig.tracker.kind != "estimator":
+            if smooth and not self.rig.tracker.smooths:
                 raise ExportError(NOT_SMOOTHED)
             self.tracker = make_tracker(self.rig)
             self._frames = _FrameCount(SmoothedTracker(self.rig) if smooth else self.tracker, len(self.rig.nodes))
@@ -150,6 +151,25 @@ class _FrameCount:
         """Pass the tags of one frame on to a tracker of objects."""
         if isinstance(self._inner, ObjectTracking):
             self._inner.ingest_objects(frame)
+
+    def ingest_image(self, frame: ImageFrame) -> None:
+        """Pass edges or foreground on to a tracker that searches images."""
+        if isinstance(self._inner, ImageTracking):
+            self._inner.ingest_image(frame)
+
+    def requests(self) -> list[SliceRequest]:
+        """What such a tracker asks for."""
+        return self._inner.requests() if isinstance(self._inner, ImageTracking) else []
+
+    def warm_up(self) -> None:
+        """See `ImageTracking`."""
+        if isinstance(self._inner, ImageTracking):
+            self._inner.warm_up()
+
+    def wait(self) -> None:
+        """Until such a tracker has found what it looks for."""
+        if isinstance(self._inner, ImageTracking):
+            self._inner.wait()
 
     @property
     def rate_hz(self) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import ExportError
 from rhot_app.export.states import ARRAYS, CONDITIONS, VALIDITIES, HandStates, ObjectStates, joined
 from rhot_app.objects.state import Validity
-from rhot_app.tracking.state import Condition, Knowledge
+from rhot_app.state import Condition, Knowledge
 
 BRIDGED_PERIODS = 2.5
 """One lost frame makes an interval of two periods; the half is for jitter."""

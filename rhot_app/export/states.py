@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.objects.state import Validity
-from rhot_app.tracking.state import Condition, HandState
+from rhot_app.state import Condition, HandState
 
 if TYPE_CHECKING:
     import pandas

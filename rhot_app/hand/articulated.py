@@ -53,15 +53,19 @@ Shape = Capsule | Box
 
 
 class Root(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The body that everything hangs on, and where it is to begin with: the first seven numbers of the state."""
+    """The body that everything hangs on, and where it is to begin with: the first seven numbers of the state.
+
+    `free`: what a tracker estimates of its pose; ``none``: it stands where the file says.
+    """
 
     name: Name
     quaternion_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     translation_mm: Vector = (0.0, 0.0, 0.0)
     shape: Shape | None = None
+    free: Literal["pose", "translation", "none"] = "pose"
 
 
-class Frame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ArticulatedFrame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One row: Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha) in its parent's frame (Rehg eq. 2.2).
 
     `angle`, if any, times `sign` adds to theta. A frame with a `shape` is a body of its own.
@@ -79,11 +83,13 @@ class Frame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One state angle. The file's order of angles is that of the state."""
+    """One state angle. The file's order of angles is that of the state. A tracker keeps one that is not `free` at
+    rest."""
 
     name: Name
     limits_deg: tuple[Degrees, Degrees] = (-180.0, 180.0)
     rest_deg: Degrees = 0.0
+    free: bool = True
 
 
 class Point(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -106,7 +112,7 @@ class Articulated(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     mirror_axis: Literal["x", "y"] = "y"
     length_mm: Size | None = None
     root: Root
-    frames: tuple[Frame, ...]
+    frames: tuple[ArticulatedFrame, ...]
     angles: tuple[Angle, ...] = ()
     points: tuple[Point, ...] = ()
     couplings: tuple[Coupling, ...] = ()
@@ -136,12 +142,12 @@ def _layout(value: Any) -> str:
 
 def _terse(row: msgspec.Struct) -> dict[str, Any]:
     """The fields that say something: what is at its default need not be written."""
-    said: dict[str, Any] = {"kind": row.__struct_config__.tag} if row.__struct_config__.tag else {}
+    named: dict[str, Any] = {"kind": row.__struct_config__.tag} if row.__struct_config__.tag else {}
     for field in msgspec.structs.fields(row):
         value = getattr(row, field.name)
         if value != field.default:
-            said[field.name] = _terse(value) if isinstance(value, msgspec.Struct) else value
-    return said
+            named[field.name] = _terse(value) if isinstance(value, msgspec.Struct) else value
+    return named
 
 
 def scaled(document: Articulated, factor: float) -> Articulated:
@@ -191,9 +197,10 @@ def _tree_complaints(document: Articulated) -> Iterator[str]:
     known = {document.root.name}
     if not any(document.root.quaternion_wxyz):
         yield f'root "{document.root.name}" has a quaternion of length zero, which is no rotation'
+    parents = {frame.name: frame.parent for frame in document.frames}
     for frame in document.frames:
         if frame.parent not in known:
-            yield f'frame "{frame.name}" hangs on "{frame.parent}", which is neither the root nor an earlier frame'
+            yield _parent_complaint(frame, parents)
         if frame.name in known:
             yield f'there are two frames named "{frame.name}"'
         if frame.angle is not None and frame.angle not in angles:
@@ -206,6 +213,19 @@ def _tree_complaints(document: Articulated) -> Iterator[str]:
     for what, names in named.items():
         if len(set(names)) < len(names):
             yield f'{what}: "{max(names, key=names.count)}" occurs twice'
+
+
+def _parent_complaint(frame: ArticulatedFrame, parents: dict[str, str]) -> str:
+    """Why the parent of a frame is neither the root nor an earlier frame."""
+    way = [frame.name]
+    while way[-1] in parents and way[-1] not in way[:-1]:
+        way.append(parents[way[-1]])
+    if way[-1] not in parents:
+        known = frame.parent in parents
+        return (f'frame "{frame.name}" hangs on "{frame.parent}", which '
+                + ("comes later; put it before" if known else "is neither the root nor a frame"))
+    loop = way[way.index(way[-1]):]
+    return "frames hang on each other in a loop: " + " on ".join(f'"{name}"' for name in loop)
 
 
 # -- a hand as an articulated object -----------------------------------------------------------------------------------
@@ -236,10 +256,11 @@ def _row_names() -> tuple[str, ...]:
     return tuple(f"{name}_{row}" for name in FINGERS for row in (thumb if name == "thumb" else finger))
 
 
-def _frame(name: str, row: DhRow, names: tuple[str, ...], shapes: dict[str, Capsule]) -> Frame:
-    return Frame(name, PALM if row.parent == ROOT else names[row.parent], _degrees(row.theta), _mm(row.d), _mm(row.a),
-                 _degrees(row.alpha), None if row.angle == FIXED else ANGLES[row.angle], 1 if row.sign > 0 else -1,
-                 shapes.get(name))
+def _frame(name: str, row: DhRow, names: tuple[str, ...], shapes: dict[str, Capsule]) -> ArticulatedFrame:
+    return ArticulatedFrame(
+        name, PALM if row.parent == ROOT else names[row.parent], _degrees(row.theta), _mm(row.d), _mm(row.a),
+        _degrees(row.alpha), None if row.angle == FIXED else ANGLES[row.angle], 1 if row.sign > 0 else -1,
+        shapes.get(name))
 
 
 def _points(table: HandTable, names: tuple[str, ...]) -> tuple[Point, ...]:

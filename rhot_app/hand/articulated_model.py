@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.articulated import Articulated, Box, Capsule, Frame
+from rhot_app.hand.articulated import Articulated, ArticulatedFrame, Box, Capsule
 from rhot_app.hand.dh import FIXED, ROOT, DhArrays, DhRow, compile_table, riding_points
 from rhot_app.hand.kinematics import add_angle_columns, add_turn, empty_frames, forward_arrays
 from rhot_app.hand.model import Variant, linear_variant
@@ -108,7 +108,7 @@ def state_jacobian(model: ArticulatedModel, state: Array) -> Array:
     return out
 
 
-def _row(frame: Frame, rows: dict[str, int], angles: tuple[str, ...]) -> DhRow:
+def _row(frame: ArticulatedFrame, rows: dict[str, int], angles: tuple[str, ...]) -> DhRow:
     return DhRow(rows[frame.parent], math.radians(frame.theta_deg), 1e-3 * frame.d_mm, 1e-3 * frame.a_mm,
                  math.radians(frame.alpha_deg), FIXED if frame.angle is None else angles.index(frame.angle),
                  float(frame.sign))

@@ -1,7 +1,7 @@
 """Joint limits, and how the joints of a relaxed human hand move together.
 
-The natural pose is a Gaussian prior on the 21 angles, for joints that no marker observes. Its couplings are soft,
-because people can break all of them; the standard deviations say how readily.
+The pose prior is a Gaussian on the 21 angles, for joints that no marker observes. Its couplings are soft, because
+people can break all of them; the standard deviations say how readily.
 """
 
 from __future__ import annotations
@@ -25,34 +25,37 @@ MCP_PER_PIP = 0.7
 LIMIT_SD_RAD = math.radians(0.5)
 """rad: how far joints go beyond their passive limits."""
 
+PERSON_LIMIT_SD_RAD = math.radians(5.0)
+"""rad: how far a person's limits lie from the hand file's, which are means over people."""
 
-class NaturalPose(NamedTuple):
-    """`mean` (21,) rad and `information` (21, 21) 1/rad^2, the inverse of the covariance: what single beliefs make
-    together. `rows` (K, 21) of factors and `values` (K,) are these, in standard deviations."""
+
+class PosePrior(NamedTuple):
+    """`mean` (21,) rad, the natural pose, and `information` (21, 21) 1/rad^2, the inverse of the covariance. `rows`
+    (K, 21) of factors and `values` (K,), both over the standard deviation, are the terms that make it."""
 
     mean: Array
     information: Array
     rows: Array
     values: Array
 
-    def and_also(self, rows: Array, values: Array) -> NaturalPose:
-        """The same with more beliefs: `rows` (K, 21) of factors and `values` (K,), in standard deviations."""
-        return gathered(np.vstack([self.rows, rows]), np.concatenate([self.values, values]))
+    def with_terms(self, rows: Array, values: Array) -> PosePrior:
+        """The prior with further terms: `rows` (K, 21) of factors and `values` (K,), over the standard deviations."""
+        return prior_of(np.vstack([self.rows, rows]), np.concatenate([self.values, values]))
 
 
-def gathered(rows: Array, values: Array) -> NaturalPose:
-    """What `rows` (K, 21) of factors and `values` (K,), in standard deviations, make together."""
+def prior_of(rows: Array, values: Array) -> PosePrior:
+    """The Gaussian of K independent terms: `rows` (K, 21) of factors, `values` (K,), over the standard deviations."""
     information = rows.T @ rows
     mean = np.asarray(np.linalg.solve(information, rows.T @ values), dtype=np.float64)
-    return NaturalPose(mean, information, rows, values)
+    return PosePrior(mean, information, rows, values)
 
 
-def natural_pose() -> NaturalPose:
-    """What a relaxed hand's angles are and how they go together."""
+def pose_prior() -> PosePrior:
+    """The angles of a relaxed hand, and how they go together."""
     rows, values = [], []
 
     def expect(value_deg: float, sd_deg: float, **factors: float) -> None:
-        """Believe that the sum of factor x angle is about this many degrees."""
+        """The sum of factor x angle is Gaussian, in degrees."""
         row = np.zeros(len(ANGLES))
         for name, factor in factors.items():
             row[ANGLES.index(name)] = factor
@@ -73,7 +76,7 @@ def natural_pose() -> NaturalPose:
     for name, neighbour in pairwise(FINGERS[1:]):
         # Neighbours share tendons: one finger bends the next (RHOT 2.1.1, inter-finger constraints).
         expect(0.0, 20.0, **{f"{name}_mcp_flexion": 1.0, f"{neighbour}_mcp_flexion": -1.0})
-    return gathered(np.array(rows), np.array(values))
+    return prior_of(np.array(rows), np.array(values))
 
 
 @njit(cache=True)

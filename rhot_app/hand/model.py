@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import THESIS_COUPLINGS, Coupling, FingerAnatomy, HandAnatomy, coupling_complaints
 from rhot_app.hand.dh import ROOT, DhArrays, DhRow, compile_table, rigid_rows
-from rhot_app.hand.limits import NaturalPose, natural_pose
+from rhot_app.hand.limits import PosePrior, pose_prior
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FINGERS, HandPose
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class HandModel:
     marker: Array  # (5,) m, from the last joint along the distal bone
     chain: Array  # (5, 3) m, the bones, the last one only as far as its marker's centre
     chain_bend: Array  # (5,) rad, how much more the way to the marker's centre bends than the bone: < 0 for a nail
-    natural: NaturalPose  # of the angles, what to believe without evidence
+    pose_prior: PosePrior  # of the angles
 
 
 def build_model(anatomy: HandAnatomy) -> HandModel:
@@ -61,7 +61,7 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
         marker=marker,
         chain=np.column_stack([bones[:, :2], marker]),
         chain_bend=np.zeros(5),
-        natural=natural_pose(),
+        pose_prior=pose_prior(),
     )
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.replay_summary import replay_states
-from rhot_app.evaluation.data_sets import Order, Told, data_set, data_sets_folder
+from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
 from rhot_app.evaluation.track import Timed
 from rhot_app.hand.skeleton import TIP_ROLES
 from rhot_app.mouse.pick_scene import Ball, PickScene
@@ -25,12 +25,12 @@ from rhot_app.mouse.script import LEAD_S, Script, motion_file
 from rhot_app.mouse.target_test import EFFECTIVE, WIDTH_M, TargetTest
 from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import RecordKind
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.truth import Truth
 from rhot_app.simulator.scene.motion import Sway
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.simulator.truth.truth import Truth
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import write_document
 
@@ -85,7 +85,7 @@ class MouseRun:
 
 
 def play(script: Script, seed: int, *, settings: MouseSettings | None = None, pictures: bool = False,
-         sway: Sway | None = None, covered_s: float = math.inf, told: Told = lambda title: None) -> MouseRun:
+         sway: Sway | None = None, covered_s: float = math.inf, told: Watch = lambda title: None) -> MouseRun:
     """Play a script to the twin and its states to the mouse. `pictures`: render and detect; else the observations are
     made without pictures (`rhot_app.simulator.truth.ideal_observations`). From `covered_s` on the second camera is
     silent. Raises RhotError."""
@@ -283,7 +283,7 @@ def _random_place(rng: np.random.Generator, half: Array) -> tuple[float, float, 
     return float(x), float(y), float(rng.uniform(_CARRY_M, 0.12))
 
 
-def measures(seed: int, places: int, *, pictures: bool, told: Told) -> Figures:
+def measures(seed: int, places: int, *, pictures: bool, told: Watch) -> Figures:
     """All of it. The speeds are always from pictures, because it is the detector that loses a fast hand."""
     how = {"pictures": pictures, "told": told}
     figures: Figures = {"seed": seed, "pictures": pictures}

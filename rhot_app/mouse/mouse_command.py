@@ -97,7 +97,7 @@ def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs) -> 
     import numpy as np
 
     from rhot_app.mouse.pointer import Mouse
-    from rhot_app.tracking.state import HandState
+    from rhot_app.state import HandState
 
     mouse: Mouse | None = None
     heard, end = time.monotonic(), float("inf")

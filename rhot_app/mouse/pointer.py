@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.skeleton import FINGERS, JOINTS
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.state import Condition, HandState, Knowledge
 
 Array = NDArray[np.float64]
 

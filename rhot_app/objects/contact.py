@@ -38,7 +38,7 @@ CONTACT_KERNEL: Kernel = student(4.0)
 """A contact may be none: heavy tails, as of the markers."""
 
 _SPHERES = 3  # of a pad: the ends of its axis and its middle
-_WORLD = 12  # numbers of a state before the angles: world_from_palm (3, 4), as `tracking.hand_process`
+_WORLD = 12  # numbers of a state before the angles: world_from_palm (3, 4), as `hand.motion.hand_process`
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ class ContactResidual:
     """Touching fingertips lie on an object's surface; implements `estimation.residual.Residual`.
 
     A state begins with world_from_palm (3, 4) and the 21 angles; its tangent space of `size` numbers begins with the
-    palm's translation and rotation along the world's axes and the angles (`tracking.hand_process`). `touching` (5,);
+    palm's translation and rotation along the world's axes and the angles (`hand.motion.hand_process`). `touching` (5,);
     `sd_m` (5,) of the surface's position along its normal, without that of the pulp. The object's pose is given.
     """
 

@@ -21,7 +21,7 @@ from rhot_app.geometry.transforms import log_so3
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-POSE, SIZE, STATE, VELOCITY = 6, 12, 18, 12
+TWIST, SIZE, STATE, VELOCITY = 6, 12, 18, 12
 """Numbers of a pose's tangent space, of a state's, and of a state; where its velocity begins."""
 
 REST_ACCELERATION = 0.3, 5.0
@@ -93,14 +93,14 @@ class ObjectProcess:
         noise = np.zeros((SIZE, SIZE))
         for first, rest, start in zip((0, 3), REST_ACCELERATION, START_SPEED, strict=True):
             speed = state[VELOCITY + first:VELOCITY + first + 3]
-            spread = np.trace(covariance[POSE + first:POSE + first + 3, POSE + first:POSE + first + 3])
+            spread = np.trace(covariance[TWIST + first:TWIST + first + 3, TWIST + first:TWIST + first + 3])
             square = rest**2 + RATE**2 * (speed @ speed + min(spread, 3.0 * start**2))
             density = 2.0 / RATE * square / 3.0
             for axis in range(first, first + 3):
                 noise[axis, axis] = density * dt_s**3 / 3.0
-                noise[axis, axis + POSE] = noise[axis + POSE, axis] = density * dt_s**2 / 2.0
-                noise[axis + POSE, axis + POSE] = density * dt_s
-        moved = _retract(state, np.concatenate([dt_s * state[VELOCITY:], np.zeros(POSE)]))
+                noise[axis, axis + TWIST] = noise[axis + TWIST, axis] = density * dt_s**2 / 2.0
+                noise[axis + TWIST, axis + TWIST] = density * dt_s
+        moved = _retract(state, np.concatenate([dt_s * state[VELOCITY:], np.zeros(TWIST)]))
         return moved, move @ covariance @ move.T + noise
 
     def transition(self, state: Array, dt_s: float) -> Array:
@@ -158,7 +158,7 @@ class VelocityPrior:
     def linearise(self, state: Array) -> Rows:
         """Six rows, by standard deviations."""
         scale = 1.0 / np.repeat(START_SPEED, 3)
-        return Rows(-scale * state[VELOCITY:], np.hstack([np.zeros((POSE, POSE)), np.diag(scale)]), UNIT,
+        return Rows(-scale * state[VELOCITY:], np.hstack([np.zeros((TWIST, TWIST)), np.diag(scale)]), UNIT,
                     first=np.zeros(1, np.int64))
 
 
@@ -194,7 +194,7 @@ class PoseResidual:
         pose = state[:VELOCITY].reshape(3, 4)
         error = np.concatenate([self.world_from_object[:3, 3] - pose[:, 3],
                                 log_so3(self.world_from_object[:3, :3] @ pose[:, :3].T)])
-        return Rows(error, np.eye(POSE, SIZE), self.covariance, first=np.zeros(1, np.int64))
+        return Rows(error, np.eye(TWIST, SIZE), self.covariance, first=np.zeros(1, np.int64))
 
 
 @njit(cache=True)

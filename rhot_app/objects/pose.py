@@ -13,13 +13,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.estimation.residual import Residual, stack
+from rhot_app.estimation.least_squares import Dense, minimise
+from rhot_app.estimation.residual import Residual, Rows
 from rhot_app.geometry.camera import undistort_point, undistort_points
 from rhot_app.geometry.transforms import fit_rigid, inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
 from rhot_app.objects.motion import (
-    POSE,
     SIZE,
+    TWIST,
     VELOCITY,
     CameraArrays,
     ObjectProcess,
@@ -44,10 +45,9 @@ FLOOR_PX = 0.02
 """px: no corner is better, whatever a node states (`marker_residual.FLOOR_PX`)."""
 
 STEPS, CONVERGED = 30, 1e-4
-"""Levenberg-Marquardt steps at most; standard deviations of the last one."""
+"""Levenberg-Marquardt steps at most; standard deviations of the last one, whose square is its gain."""
 
 _STARTS = 4  # refined of all, the best by the cost of all points
-_DAMPING = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +114,8 @@ def find_modes(points: ObjectPoints, cameras: CameraArrays, views: Sequence[Obje
     residuals = [point_residual(points, cameras, view, views[0].t_ns if moving else None) for view in views]
     starts = [start for view in views for start in _tag_starts(points, cameras, view)]
     starts += _triangulated_starts(points, cameras, views)
-    size, priors = (SIZE, [VelocityPrior()]) if moving else (POSE, [])
-    ranked = sorted((_linearised(residuals, priors, state_of(start), size)[2], number)
+    size, priors = (SIZE, [VelocityPrior()]) if moving else (TWIST, [])
+    ranked = sorted((_start(residuals, priors, state_of(start), size).cost, number)
                     for number, start in enumerate(starts))
     modes: list[Mode] = []
     for _, number in ranked[:_STARTS]:
@@ -206,46 +206,33 @@ def reversed_state(points: ObjectPoints, cameras: CameraArrays, view: ObjectView
     return out
 
 
-def _linearised(residuals: Sequence[PointResidual], priors: Sequence[Residual], state: Array,
-                size: int) -> tuple[Array, Array, float]:
-    """Normal matrix (n, n) and right side (n,) of a Gauss-Newton step, and the cost: infinite with a point behind the
-    camera that sees it."""
-    rows = [residual.linearise(state) for residual in residuals]
-    missing = sum(len(one.error) for one in rows) < sum(2 * len(one.pixels) for one in residuals)
-    error, jacobian, variances, cost, _ = stack([*rows, *(one.linearise(state) for one in priors)], SIZE, weigh=True)
-    weighted = jacobian[:, :size] / variances[:, None]
-    return weighted.T @ jacobian[:, :size], weighted.T @ error, np.inf if missing else cost
+def _start(residuals: Sequence[PointResidual], priors: Sequence[Residual], state: Array, size: int) -> Dense[Array]:
+    """The state over the first `size` numbers of its tangent space; impossible with a point behind the camera that sees
+    it."""
+    def rows(state: Array) -> list[Rows] | None:
+        points = [residual.linearise(state) for residual in residuals]
+        if sum(len(one.error) for one in points) < sum(2 * len(one.pixels) for one in residuals):
+            return None
+        return [replace(one, jacobian=one.jacobian[:, :size])
+                for one in (*points, *(prior.linearise(state) for prior in priors))]
+
+    def retract(state: Array, step: Array) -> Array:
+        return ObjectProcess().retract(state, np.concatenate([step, np.zeros(SIZE - size)]))
+    return Dense(state, rows, retract, size)
 
 
 def refine(residuals: Sequence[PointResidual], priors: Sequence[Residual], state: Array, size: int) -> Mode | None:
-    """The nearest minimum of the robust cost over the first `size` numbers of the tangent space (Levenberg-Marquardt);
-    None where it is not determined."""
-    process, damping = ObjectProcess(), _DAMPING
-    normal, side, cost = _linearised(residuals, priors, state, size)
-    if not np.isfinite(cost):
+    """The nearest minimum of the robust cost over the first `size` numbers of the tangent space; None where it is not
+    determined."""
+    start = _start(residuals, priors, state, size)
+    if not np.isfinite(start.cost):
         return None
-    for _ in range(STEPS):
-        try:
-            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), side)
-        except np.linalg.LinAlgError:
-            return None
-        trial = process.retract(state, np.concatenate([step, np.zeros(SIZE - len(step))]))
-        last = float(step @ normal @ step) < CONVERGED**2
-        trial_normal, trial_side, reached = _linearised(residuals, priors, trial, size)
-        if reached <= cost:
-            state, normal, side, cost, damping = trial, trial_normal, trial_side, reached, 0.3 * damping
-        else:
-            damping *= 10.0
-        if last or damping > 1e9:
-            break
-    try:
-        covariance = np.linalg.inv(normal)
-        np.linalg.cholesky(covariance)
-    except np.linalg.LinAlgError:
+    found, _ = minimise(start, STEPS, CONVERGED**2)
+    covariance = found.covariance()
+    if covariance is None:
         return None
-    pixels = np.concatenate([one.pixels - one.predict(state)[0] for one in residuals])
-    return Mode(state, 0.5 * (covariance + covariance.T), cost, len(pixels),
-                float(np.sqrt(np.mean(np.sum(pixels**2, axis=1)))))
+    pixels = np.concatenate([one.pixels - one.predict(found.state)[0] for one in residuals])
+    return Mode(found.state, covariance, found.cost, len(pixels), float(np.sqrt(np.mean(np.sum(pixels**2, axis=1)))))
 
 
 def _add(modes: list[Mode], mode: Mode | None) -> None:
@@ -262,8 +249,8 @@ def _add(modes: list[Mode], mode: Mode | None) -> None:
 
 def same_pose(state: Array, covariance: Array, other: Array, other_covariance: Array) -> bool:
     """Whether two minima are one: nearer than SAME_POSE standard deviations of either."""
-    step = ObjectProcess().difference(state, other)[:POSE]
-    return bool(min(step @ np.linalg.solve(one[:POSE, :POSE], step)
+    step = ObjectProcess().difference(state, other)[:TWIST]
+    return bool(min(step @ np.linalg.solve(one[:TWIST, :TWIST], step)
                     for one in (covariance, other_covariance)) < SAME_POSE**2)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-POSE = 6
+TWIST = 6
 """Numbers of a pose's tangent space."""
 
 
@@ -68,5 +68,5 @@ class ObjectState:
 
 def unknown_object(name: str, t_ns: int, validity: Validity) -> ObjectState:
     """The state of an object without a pose."""
-    return ObjectState(name, t_ns, validity, np.full((4, 4), np.nan), np.full((POSE, POSE), np.nan),
-                       np.full(POSE, np.nan))
+    return ObjectState(name, t_ns, validity, np.full((4, 4), np.nan), np.full((TWIST, TWIST), np.nan),
+                       np.full(TWIST, np.nan))

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import ObjectError
 from rhot_app.geometry.transforms import log_so3, rigid, rotation_from_quaternion
-from rhot_app.objects.motion import POSE, START_SPEED, PoseResidual, state_of
+from rhot_app.objects.motion import START_SPEED, TWIST, PoseResidual, state_of
 from rhot_app.objects.pose import Mode
 from rhot_app.objects.state import ObjectState
-from rhot_app.objects.track import GATE_6, Gated, Track
+from rhot_app.objects.track import GATE_6, Gated, ObjectTrack
 from rhot_node.errors import printable
 from rhot_node.files import read_input, why
 
@@ -57,14 +57,14 @@ class PoseMeasurement:
     def modes(self) -> list[Mode]:
         """The pose itself, with an unknown velocity."""
         covariance = np.diag(np.repeat([0.0, 0.0, *np.square(START_SPEED)], 3))
-        covariance[:POSE, :POSE] = self._covariance
+        covariance[:TWIST, :TWIST] = self._covariance
         return [Mode(state_of(self._pose), covariance, 0.0, 1, 0.0)]
 
     def gate(self, state: Array, covariance: Array) -> Gated:
         """The sample, if its innovation is within GATE_6."""
         residual = PoseResidual(self._pose, self._covariance)
         error = residual.linearise(state).error
-        total = covariance[:POSE, :POSE] + self._covariance
+        total = covariance[:TWIST, :TWIST] + self._covariance
         squared = float(error @ np.linalg.solve(total, error))
         return Gated(residual if squared <= GATE_6 else None, squared + float(np.linalg.slogdet(total)[1]))
 
@@ -113,7 +113,7 @@ def noise_of(stream: PoseStream) -> Array:
 def track_stream(name: str, stream: PoseStream, covariance: Array | None = None) -> list[tuple[ObjectState, bool]]:
     """The state after every sample, and if it was accepted. `covariance`: of a sample; None: `noise_of`."""
     covariance = noise_of(stream) if covariance is None else covariance
-    track, found = Track(name), []
+    track, found = ObjectTrack(name), []
     for t_ns, pose in zip(stream.t_ns.tolist(), stream.poses, strict=True):
         accepted = track.take(PoseMeasurement(t_ns, pose, covariance))
         found.append((track.state(t_ns), accepted))

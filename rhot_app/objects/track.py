@@ -14,10 +14,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.estimation.filter import Estimate, IteratedFilter, Knot
+from rhot_app.estimation.filter import FilteredState, IteratedFilter, Knot
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.objects.motion import POSE, SIZE, VELOCITY, CameraArrays, ObjectProcess, StatePrior, pose_of
+from rhot_app.objects.motion import SIZE, TWIST, VELOCITY, CameraArrays, ObjectProcess, StatePrior, pose_of
 from rhot_app.objects.object_file import ObjectModel, require_distinct
 from rhot_app.objects.observations import FiducialFrame, MarkerPoints, ObjectPoints, ObjectView
 from rhot_app.objects.pose import (
@@ -129,8 +129,8 @@ class PointMeasurement:
         """The estimate and its reversal, if the prediction does not exclude that: a tag's tilt may be taken for the
         opposite one as it goes through the frontal pose."""
         other = reversed_state(self._points, self._cameras, self._view, state)
-        step = ObjectProcess().difference(other, prediction[0])[:POSE]
-        if step @ np.linalg.solve(prediction[1][:POSE, :POSE], step) > EXCLUDED:
+        step = ObjectProcess().difference(other, prediction[0])[:TWIST]
+        if step @ np.linalg.solve(prediction[1][:TWIST, :TWIST], step) > EXCLUDED:
             return None
         residuals = [point_residual(self._points, self._cameras, self._view, self._view.t_ns)]
         found = [refine(residuals, [StatePrior(*prediction)], start, SIZE) for start in (state, other)]
@@ -152,7 +152,7 @@ class _Hypothesis:
     log_weight: float
 
 
-class Track:
+class ObjectTrack:
     """The track of one object: it appears, is lost, and returns."""
 
     def __init__(self, name: str) -> None:
@@ -191,17 +191,17 @@ class Track:
         elif t_ns - self._accepted_ns > PREDICTED_AFTER_NS:
             validity = Validity.PREDICTED
         return ObjectState(self.name, self._epoch_ns + round(1e9 * t_s), validity, pose_of(state),
-                           covariance[:POSE, :POSE], state[VELOCITY:])
+                           covariance[:TWIST, :TWIST], state[VELOCITY:])
 
-    def estimate(self) -> tuple[int, Estimate] | None:
+    def estimate(self) -> tuple[int, FilteredState] | None:
         """Master time, ns, and the most probable hypothesis after the newest measurement, labelled by its filter; None
         without one."""
         if not self._hypotheses:
             return None
         best = self._hypotheses[0].filter
         knot = best.newest
-        return self._epoch_ns + round(1e9 * knot.t_s), Estimate(knot.t_s, knot.state, knot.covariance, self._process,
-                                                                id(best))
+        return (self._epoch_ns + round(1e9 * knot.t_s),
+                FilteredState(knot.t_s, knot.state, knot.covariance, self._process, id(best)))
 
     def _start(self, measurement: Measurement) -> bool:
         modes = measurement.modes()
@@ -285,7 +285,7 @@ class ObjectTracker:
         require_distinct(objects, [one.name for one in objects])
         self._cameras = CameraArrays.of(list(cameras))
         self._points = [ObjectPoints(one) for one in objects]
-        self._tracks = [Track(one.name) for one in objects]
+        self._tracks = [ObjectTrack(one.name) for one in objects]
         self._newest: list[dict[int, ObjectView]] = [{} for _ in objects]
 
     def take(self, frame: FiducialFrame | MarkerPoints) -> list[ObjectState]:
@@ -300,13 +300,13 @@ class ObjectTracker:
         """The state of every object at master time `t_ns`, by what has been taken."""
         return [track.state(t_ns) for track in self._tracks]
 
-    def estimates(self) -> list[tuple[int, Estimate] | None]:
+    def estimates(self) -> list[tuple[int, FilteredState] | None]:
         """Of every object, as `Track.estimate`."""
         return [track.estimate() for track in self._tracks]
 
     def reset(self) -> None:
         """Forget everything: a new session, or a node's clock was set."""
-        self._tracks = [Track(track.name) for track in self._tracks]
+        self._tracks = [ObjectTrack(track.name) for track in self._tracks]
         self._newest = [{} for _ in self._tracks]
 
     def _take(self, number: int, frame: FiducialFrame | MarkerPoints) -> ObjectState:

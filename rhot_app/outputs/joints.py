@@ -18,7 +18,7 @@ from rhot_app.hand.skeleton import JOINTS, HandPose
 from rhot_app.objects.state import ObjectState
 from rhot_app.outputs.openxr import OPENXR_JOINTS, OUR_JOINTS, openxr_hand, openxr_map
 from rhot_app.project import Rig
-from rhot_app.tracking.state import Codes, HandState
+from rhot_app.state import Codes, HandState
 
 Array = NDArray[np.float64]
 JointSet = Literal["own", "openxr", "mediapipe"]

@@ -17,7 +17,7 @@ from rhot_app.errors import OutputError
 from rhot_app.outputs.joints import JointConverter, Sample
 from rhot_app.outputs.spec import OutputStatus, OutputWord
 from rhot_app.project import OutputSettings
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 log = logging.getLogger(__name__)
 

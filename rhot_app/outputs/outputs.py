@@ -11,7 +11,7 @@ from rhot_app.outputs.joints import JointConverter, Sample
 from rhot_app.outputs.output import Output, OutputStatus, Sink
 from rhot_app.outputs.spec import as_run
 from rhot_app.project import OutputSettings, Rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node.errors import PluginError
 from rhot_node.plugins import about_plugin, load_plugin, plugin_names
 

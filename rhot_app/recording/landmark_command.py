@@ -12,7 +12,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
-    from rhot_app.tracking.state import HandState
+    from rhot_app.state import HandState
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

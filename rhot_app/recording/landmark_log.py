@@ -128,18 +128,18 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable], ti
     bound_ns = round(1e9 * time_bound_s)
     begin_ns = _BEGIN_NS + 10 * _EXCHANGE_NS
     last_ns = begin_ns + round(1e9 * (max(table.times_s[-1] for table in tables) - first_s)) + _EXCHANGE_NS
-    said = [Record(RecordKind.START, 0, _BEGIN_NS - 1, encode(Start(
+    stated = [Record(RecordKind.START, 0, _BEGIN_NS - 1, encode(Start(
         _SESSION, 0, tuple(StartEntry(node.node_id, 1, 0) for node in rig.nodes))))]
     for node, table in zip(rig.nodes, tables, strict=True):
         for sequence, t_ns in enumerate(range(_BEGIN_NS, last_ns, _EXCHANGE_NS)):
-            said += _exchange(node, sequence, t_ns, bound_ns)
+            stated += _exchange(node, sequence, t_ns, bound_ns)
         for number, t_s in enumerate(table.times_s):
-            said.append(_datagram(node, rig, number, begin_ns + round(1e9 * (t_s - first_s)),
+            stated.append(_datagram(node, rig, number, begin_ns + round(1e9 * (t_s - first_s)),
                                   _observations(node, order, table, number)))
     try:
         with replacing(path) as file:
             file.write(encode_header(rig, {}))
-            for record in sorted(said, key=lambda record: record.t_master_ns):
+            for record in sorted(stated, key=lambda record: record.t_master_ns):
                 file.write(encode_record(record))
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be written ({exc.strerror}). Choose another --out.") from exc

@@ -49,6 +49,7 @@ class RecordKind(enum.IntEnum):
     BOOKMARK = 7  # UTF-8 text about a moment (rhot_app.recording.bookmarks)
     OBJECT_POSE = 8  # of another tracker, in the rig frame (rhot_app.recording.object_poses)
     LANDMARKS = 9  # reserved
+    SLICES = 10  # sent to a node, as sent
 
 
 _KINDS = frozenset(int(kind) for kind in RecordKind) - {RecordKind.LANDMARKS}

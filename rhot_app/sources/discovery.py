@@ -264,9 +264,9 @@ def conflicts(nodes: Sequence[FoundNode]) -> tuple[str, ...]:
 
 
 def _node(seen: Sequence[Sighting]) -> FoundNode:
-    told = next((one for one in seen if one.state is not None), seen[0])
+    answering = next((one for one in seen if one.state is not None), seen[0])
     addresses = sorted((one.address for one in seen), key=is_loopback)
-    return FoundNode(told.presence, tuple(addresses), told.state)
+    return FoundNode(answering.presence, tuple(addresses), answering.state)
 
 
 def _number(count: int) -> str:

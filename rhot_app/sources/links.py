@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.key_exchange import KeyExchange
@@ -91,6 +92,13 @@ class NodeLinks:
             for link in self._links.values():
                 link.want(0, now_ns)
 
+    def search(self, link: NodeLink, request: SliceRequest) -> None:
+        """Ask a node to search its next frames. May be called by any thread."""
+        with self._lock:
+            for datagram in link.slices(request):
+                self._send(link, datagram)
+                self._note(RecordKind.SLICES, link.node.node_id, time.monotonic_ns(), datagram)
+
     def record_to(self, tap: RecordSink | None) -> None:
         """Hand every command datagram to `tap` from now on: first the running session and the last exchanges,
         without which a recording that begins now could not tell the nodes' times."""
@@ -126,7 +134,7 @@ class NodeLinks:
                 if link.wants_start(now_ns):
                     self._start_again(link, now_ns)
                 wait_ns = EAGER_NS - REQUEST_NS if link.door.clock_in_doubt else 0
-                if now_ns >= self._due_ns[node_id] + wait_ns and link.can_be_told:
+                if now_ns >= self._due_ns[node_id] + wait_ns and link.reachable:
                     self._ask(link, now_ns)
 
     def start_thread(self) -> None:
@@ -204,7 +212,7 @@ class NodeLinks:
                 for link in open_links:
                     self._send(link, datagram)
         for node_id, link in self._links.items():
-            if link.paired and link.can_be_told:
+            if link.paired and link.reachable:
                 datagram = link.encode(message([self._entries[node_id]]))
                 self._note(kind, node_id, now_ns, datagram)
                 for _ in range(times):
@@ -315,6 +323,10 @@ class UdpNodes:
         self._commands.stop()
         for link in self.links:
             link.want(0, time.monotonic_ns())
+
+    def search(self, request: SliceRequest) -> None:
+        """Ask a node to search its next frames."""
+        self._commands.search(self.links[request.camera], request)
 
     def record_to(self, tap: RecordSink | None) -> None:
         """Tap all sockets; None ends it."""

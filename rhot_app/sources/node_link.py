@@ -5,6 +5,7 @@ No sockets. Live links and replayed logs feed the same object.
 
 from __future__ import annotations
 
+from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.validation import NOBODY_YET, DatagramValidator, holder_of
@@ -56,7 +57,7 @@ class NodeLink:
         return bool(self.node.public_key)
 
     @property
-    def can_be_told(self) -> bool:
+    def reachable(self) -> bool:
         """Whether what we say to the node can have the tag that it needs."""
         return not self.paired or self._seal is not None
 
@@ -86,6 +87,14 @@ class NodeLink:
         self._pending[request.sequence] = request.t1_master_ns
         while len(self._pending) > PENDING_MAX:
             del self._pending[next(iter(self._pending))]
+
+    def slices(self, request: SliceRequest) -> list[bytes]:
+        """The datagrams that ask the node to search slices; none while it does not stream for us or has no tag."""
+        if not self.wanted or self.node.text_datagrams or not self.reachable:
+            return []
+        size = self.node.intrinsics.width, self.node.intrinsics.height
+        return [self.encode(message) for message in self.door.searches.ask(request, self.node.node_id, self.wanted,
+                                                                           size)]
 
     def take_reply(self, reply: ClockReply, t4_master_ns: int) -> bool:
         """Take a reply in that the kernel received at `t4_master_ns`. False when it answers no question of ours."""

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from rhot_app.barehand.observations import SliceRequest
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.object_poses import decode_pose
@@ -18,7 +19,7 @@ from rhot_app.sources.source import RecordSink
 from rhot_app.sources.validation import RECORDED
 from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.errors import WireError
-from rhot_node.wire.messages import ClockReply, ClockRequest, Start
+from rhot_node.wire.messages import ClockReply, ClockRequest, Slices, Start
 
 
 class LogValidator:
@@ -72,6 +73,10 @@ class LogValidator:
             for entry in message.entries:
                 if (started := self._by_id.get(entry.node_id)) is not None:
                     started.door.expect_session(message.session)
+        elif isinstance(message, Slices):
+            for camera, link in enumerate(self.links):
+                if link.node.node_id == message.node_id:
+                    link.door.searches.read(camera, message)
         elif isinstance(message, ClockRequest | ClockReply):
             asked = self._by_id.get(message.node_id)
             if asked is not None and isinstance(message, ClockRequest):
@@ -136,6 +141,9 @@ class LogReplay:
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
+
+    def search(self, request: SliceRequest) -> None:
+        """Nobody is asked."""
 
     def record_to(self, tap: RecordSink | None) -> None:
         """Raises RecordingError: a copy of the log's file is the recording."""

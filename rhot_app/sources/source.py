@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.sources.node_link import NodeLink
@@ -68,6 +69,10 @@ class ObservationSource(Protocol):
 
     def stop(self) -> None:
         """Have the nodes stop."""
+        ...
+
+    def search(self, request: SliceRequest) -> None:
+        """Ask a node to search its next frames; a log answers what it was asked when it was recorded."""
         ...
 
     def record_to(self, tap: RecordSink | None) -> None:

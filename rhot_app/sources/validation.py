@@ -11,15 +11,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.objects.observations import fiducial_frame
 from rhot_app.project import Rig, RigNode
 from rhot_app.sources.clock import ClockEstimate, NodeClockModel
+from rhot_app.sources.searches import NodeSearches
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Candidates
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import Seal, decode, decode_sealed, decode_verified, is_tagged
 from rhot_node.wire.marker_table import MarkerTable
-from rhot_node.wire.messages import Fiducials, MarkerFlag, Message, Observations
-from rhot_node.wire.sequence import SequenceWindow, Verdict
+from rhot_node.wire.messages import (
+    Fiducials,
+    ForegroundPart,
+    MarkerFlag,
+    Message,
+    Observations,
+    SliceEdges,
+)
+from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
 from rhot_node.wire.text import parse_text
 
 # -- authentication ----------------------------------------------------------------------------------------------------
@@ -54,8 +63,11 @@ RECORDED = Authentication(decode_verified, lambda data: True)
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""
 
-Verified = tuple[Observations | Fiducials, int, int, int, float] | CameraObservations
-"""A message with its row-0, send and receive times, master ns, and clock bound, s; text needs no second half."""
+Verified = tuple[Observations | Fiducials, int, int, int, float] | CameraObservations | EdgeFrame | ForegroundFrame
+"""A message with its row-0, send and receive times, master ns, and clock bound, s; what is put together from several
+datagrams, and text, need no second half."""
+
+_FrameMessage = Observations | Fiducials | SliceEdges | ForegroundPart
 
 _CLOCK_SLACK_NS = 1_000_000  # scheduling between the stamps at both ends
 
@@ -68,10 +80,13 @@ class DatagramValidator:
         self.clock = clock
         self.admission = ANYBODY
         self.sequence = SequenceWindow()  # of observations
-        self.fiducial_sequence = SequenceWindow()
+        self._sequences: dict[type, SequenceWindow] = {
+            Observations: self.sequence, Fiducials: SequenceWindow(), SliceEdges: SequenceWindow(),
+            ForegroundPart: SequenceWindow()}
+        self.searches = NodeSearches()
         self.received = 0  # datagrams of any kind
         self.accepted = 0  # observations
-        self.fiducials = 0  # accepted ones
+        self.fiducials = self.searched = 0  # accepted ones; frames with edges or a foreground map
         self.dropped: dict[str, int] = {}
         self.image_size: tuple[int, int] | None = None  # of the last refused frame of another size
         self.last_t_receive_ns = 0  # of the last accepted one
@@ -102,8 +117,9 @@ class DatagramValidator:
 
     def restart_sequences(self) -> None:
         """The node counts from a new first number."""
-        self.sequence.restart()
-        self.fiducial_sequence.restart()
+        for sequence in self._sequences.values():
+            sequence.restart()
+        self.searches.restart()
 
     def admit(self, data: bytes, t_receive_ns: int) -> CameraFrame | None:
         """The datagram as observations or fiducials, or None when it was dropped and counted."""
@@ -125,7 +141,11 @@ class DatagramValidator:
         if isinstance(verified, str):
             self.drop(verified)
             return None
-        if isinstance(verified, tuple) and isinstance(verified[0], Fiducials):
+        if verified is None:  # a part of something
+            return None
+        if isinstance(verified, EdgeFrame | ForegroundFrame):
+            self.searched += 1
+        elif isinstance(verified, tuple) and isinstance(verified[0], Fiducials):
             self.fiducials += 1
         else:
             self.accepted += 1
@@ -134,7 +154,7 @@ class DatagramValidator:
 
     def convert(self, verified: Verified) -> CameraFrame:
         """Second half of `admit`: arrays in the rig's marker order, times in master time."""
-        if isinstance(verified, CameraObservations):
+        if isinstance(verified, CameraObservations | EdgeFrame | ForegroundFrame):
             return verified
         message, t_row0_ns, t_send_ns, t_receive_ns, bound_s = verified
         if isinstance(message, Fiducials):
@@ -147,11 +167,12 @@ class DatagramValidator:
         assert self._text is not None
         return self._text.read(data, t_receive_ns)
 
-    def _verify(self, data: bytes, t_receive_ns: int) -> Verified | str:
+    def _verify(self, data: bytes, t_receive_ns: int) -> Verified | str | None:
+        """A message, what a last part completes, None of another part, or why it is dropped."""
         message = self.admission.open(data)
-        if not isinstance(message, Observations | Fiducials):
+        if not isinstance(message, _FrameMessage):
             return "kind"
-        sequence = self.sequence if isinstance(message, Observations) else self.fiducial_sequence
+        sequence = self._sequences[type(message)]
         reason = self._objection(message, sequence)
         if reason is not None:
             return reason
@@ -167,16 +188,20 @@ class DatagramValidator:
         sequence.take(message.sequence)  # also what is refused for its clock has come
         if not self._travel.believed(t_receive_ns - t_send_ns, t_receive_ns, estimate):
             return "clock_in_doubt"
+        if isinstance(message, SliceEdges | ForegroundPart):
+            parts = self.searches.add(message)
+            return None if parts is None else self.searches.frame(parts, self._camera, t_row0_ns, t_send_ns,
+                                                                  t_receive_ns)
         return message, t_row0_ns, t_send_ns, t_receive_ns, bound_s
 
-    def _objection(self, message: Observations | Fiducials, sequence: SequenceWindow) -> str | None:
+    def _objection(self, message: _FrameMessage, sequence: SequenceWindow) -> str | None:
         """Why this message is not one of the stream we asked for; None when it is."""
         if message.node_id != self._node_id:
             return "foreign_node"
         if message.session != self._session:
             return "session" if self._session else "not_started"
         verdict = sequence.judge(message.sequence)
-        if verdict is not Verdict.FRESH and verdict is not Verdict.LATE:
+        if verdict is not SequenceVerdict.FRESH and verdict is not SequenceVerdict.LATE:
             return verdict.name.lower()
         if isinstance(message, Observations) and (message.marker_checksum != self._checksum
                                                   or message.marker_count != self._count):

@@ -10,13 +10,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.landmarks import LASTING_M, NOISE_M
 from rhot_app.geometry.transforms import fit_rigid
-from rhot_app.hand.finger_ik import solve_fingers
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.landmarks import LASTING_M, NOISE_M
 from rhot_app.hand.model import neutral_pose
-from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
+from rhot_app.hand.solvers.finger_ik import solve_fingers
+from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.tracking import pairing
 from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.marker_model import MarkerModel
@@ -137,7 +137,7 @@ class Starter:
         """The pose that all markers (M, 3) m make the most plausible, by a descent from `pose`."""
         m, world, angles = self._markers, pose.world_from_palm.copy(), pose.angles.copy()
         variance = m.paint_variance + np.where(m.landmark, LASTING_M**2 + NOISE_M**2, _TARGET_SD_M**2)
-        posture = Posture(m.dh, m.limits, m.natural.mean, m.natural.information)
+        posture = Posture(m.dh, m.limits, m.pose_prior.mean, m.pose_prior.information)
         implausibility(posture, markers, np.eye(3) / variance[:, None, None], 0.0, world, angles)
         return HandPose(world, angles)
 

@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.finger_ik import FABRIK_ITERATIONS, TOLERANCE, solve_fingers_arrays
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel, build_model
-from rhot_app.hand.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
 from rhot_app.hand.places import with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, JOINT_SLICES, JOINTS, HandPose
+from rhot_app.hand.solvers.finger_ik import FABRIK_ITERATIONS, TOLERANCE, solve_fingers_arrays
 from rhot_app.hand.solvers.methods import Method, solve
+from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
 from rhot_app.hand.solvers.problem import make_problem
 from rhot_app.project import IkMethod, Rig
+from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking import locate, trust
 from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.locate import Sheet
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
@@ -239,7 +239,7 @@ def no_hand(tips: Array) -> SolvedHand:
 METHODS: dict[IkMethod, Method | None] = {
     "fabrik": None, "transpose": Method.TRANSPOSE, "pseudo_inverse": Method.PSEUDO_INVERSE, "svd": Method.SVD,
     "dls": Method.DAMPED, "newton": Method.NEWTON, "lm": Method.LEVENBERG, "closed_form": Method.CLOSED_FORM}
-"""By `ik` of the rig's tracker settings; None: the solver of `rhot_app.hand.finger_ik`."""
+"""By `ik` of the rig's tracker settings; None: the solver of `rhot_app.hand.solvers.finger_ik`."""
 
 
 class HandSolver:
@@ -279,13 +279,13 @@ class HandSolver:
     def _follow(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes,
                 palm: HandPose, dt_s: float, placed: bool) -> SolvedHand:
         """One call of compiled code: between two frames the interpreter's own code and data leave the caches."""
-        model, natural = self._model, self._model.natural
+        model, prior = self._model, self._model.pose_prior
         last = palm if self.pose is None else self.pose
         palm_world, palm_angles = palm.world_from_palm.copy(), palm.angles.copy()
         world, angles = last.world_from_palm.copy(), last.angles.copy()
         points = np.empty((len(JOINTS) + 5, 3))
         joints, known = np.empty(len(JOINTS), np.uint8), np.empty(len(ANGLES), np.uint8)
-        solved = follow(model.dh, model.limits, natural.mean, natural.information, model.mirror, model.base,
+        solved = follow(model.dh, model.limits, prior.mean, prior.information, model.mirror, model.base,
                         model.base_rotation, model.chain, model.chain_bend, wrist, tips, wrist_knowledge, tip_knowledge,
                         dt_s, self.pose is not None, placed, palm_world, palm_angles, world, angles, points, joints,
                         known)

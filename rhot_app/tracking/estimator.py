@@ -13,19 +13,19 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.landmarks import LASTING_M, LASTING_S
 from rhot_app.estimation.filter import IteratedFilter
+from rhot_app.hand.landmarks import LASTING_M, LASTING_S
+from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
+from rhot_app.state import Condition, HandState
 from rhot_app.tracking.acquisition import Located, Starter
 from rhot_app.tracking.association import GATE, MarkerAssociation, assign
 from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
-from rhot_app.tracking.hand_process import ANGLES, VELOCITY, HandProcess
 from rhot_app.tracking.hand_size import HandSize
 from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
 from rhot_app.tracking.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
-from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
@@ -57,11 +57,11 @@ class Estimator:
     def __init__(self, rig: Rig) -> None:
         """Raises RigError when a marker has no place on the hand."""
         self._rig, self._markers = compile_rig(rig), compile_markers(rig)
-        self._file_size, natural = self._markers, self._markers.natural
+        self._file_size, prior = self._markers, self._markers.pose_prior
         self._size: HandSize | None = None
         if rig.tracker.float_scale:
-            self._size = HandSize(self._markers.dh, self._markers.limits, natural, self._markers.paint_variance)
-        self._process = HandProcess.of(self._markers)
+            self._size = HandSize(self._markers.dh, self._markers.limits, prior, self._markers.paint_variance)
+        self._process = self._markers.process()
         self._filter = IteratedFilter(self._process)
         self._starter = Starter(self._rig, self._markers)
         self._association = MarkerAssociation(self._rig)  # without a prediction, by rays

@@ -10,27 +10,30 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
+from rhot_app.state import (
+    INFERRED_M,
+    INFERRED_RAD,
+    MEASURED_M,
+    MEASURED_RAD,
+    UNESTIMATED,
+    Condition,
+    HandState,
+    Knowledge,
+)
 from rhot_app.tracking import locate
 from rhot_app.tracking.association import GATE
-from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
 from rhot_app.tracking.locate import locate_all
 from rhot_app.tracking.marker_model import MarkerModel, project_marker, scaled_table
 from rhot_app.tracking.marker_residual import SIZE_S, SIZE_SD, MarkerFrame
 from rhot_app.tracking.rig_arrays import RigArrays
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-MEASURED_M, INFERRED_M = 3e-3, 12e-3
-"""m: standard deviation (root of the trace) up to which a place counts as measured, and as inferred."""
-
-MEASURED_RAD, INFERRED_RAD = math.radians(4.0), math.radians(12.0)
-"""rad: the same of angles and of the palm's rotation."""
 
 SIZE_FRAMES = 10
 """Frames in which a fingertip's size is learnt before it is used."""

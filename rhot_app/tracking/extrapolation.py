@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, VELOCITY
 from rhot_app.hand.skeleton import JOINT_SLICES
-from rhot_app.objects.motion import POSE, SIZE, ObjectProcess, pose_of
+from rhot_app.objects.motion import SIZE, TWIST, ObjectProcess, pose_of
 from rhot_app.objects.state import ObjectState
 from rhot_app.project import Rig
-from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, VELOCITY, HandProcess
+from rhot_app.state import HandState
 from rhot_app.tracking.marker_model import compile_markers, scaled_table
 from rhot_app.tracking.rig_arrays import rigs_of_hands
-from rhot_app.tracking.state import HandState
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -69,7 +69,7 @@ class _Hand:
 
     def __init__(self, rig: Rig, columns: Indices) -> None:
         self.columns, model = columns, compile_markers(rig)
-        self._limits, self._process = model.limits, HandProcess.of(model)
+        self._limits, self._process = model.limits, model.process()
         joints, markers = model.model.dh, model.dh
         self._table = joints._replace(point_row=np.concatenate([joints.point_row, markers.point_row]),
                                       point_offset=np.concatenate([joints.point_offset, markers.point_offset]))
@@ -110,11 +110,11 @@ def _later(one: ObjectState, dt_s: float) -> ObjectState:
     if not one.tracked or dt_s == 0.0:
         return one
     covariance = np.zeros((SIZE, SIZE))
-    covariance[:POSE, :POSE] = one.covariance
+    covariance[:TWIST, :TWIST] = one.covariance
     state, grown = ObjectProcess().predict(np.concatenate([one.world_from_object[:3].ravel(), one.velocity]),
                                            covariance, dt_s)
     return replace(one, t_master_ns=one.t_master_ns + round(1e9 * dt_s), world_from_object=pose_of(state),
-                   covariance=grown[:POSE, :POSE])
+                   covariance=grown[:TWIST, :TWIST])
 
 
 def _grown(covariances: Array, way_m: Array) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.limits import NaturalPose
+from rhot_app.hand.limits import PosePrior
 from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.size_evidence import Posture, implausibility
 
@@ -58,9 +58,9 @@ _ANEW_NS = 1_000_000_000
 class HandSize:
     """The logarithm of a hand's scale, from what its markers show when it moves."""
 
-    def __init__(self, dh: DhArrays, limits: Array, natural: NaturalPose, paint_variance: Array) -> None:
+    def __init__(self, dh: DhArrays, limits: Array, pose_prior: PosePrior, paint_variance: Array) -> None:
         """`dh`: the hand's table with M markers as points; `limits` (21, 2) rad; `paint_variance` (M,) m^2."""
-        self._posture = Posture(dh, limits, natural.mean, natural.information)
+        self._posture = Posture(dh, limits, pose_prior.mean, pose_prior.information)
         self._doubt = (paint_variance + _PLACE_SD_M**2)[:, None, None] * np.eye(3)
         self._pairs = np.array(list(combinations(range(len(paint_variance)), 2))).reshape(-1, 2).T
         self.reset()

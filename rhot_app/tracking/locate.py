@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from rhot_app.filters import one_euro
 from rhot_app.geometry.camera import point_rays, undistort_point
 from rhot_app.geometry.triangulate import triangulate
+from rhot_app.state import Knowledge
 from rhot_app.tracking import trust
 from rhot_app.tracking.rig_arrays import locate_by_disparity
-from rhot_app.tracking.state import Knowledge
 from rhot_app.tracking.tracks import DOUBTFUL
 
 Array = NDArray[np.float64]

@@ -9,12 +9,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.landmarks import ANATOMY_SD_M
 from rhot_app.errors import RigError
 from rhot_app.geometry.camera import CameraModel, distort
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.limits import NaturalPose
+from rhot_app.hand.landmarks import ANATOMY_SD_M, LASTING_S
+from rhot_app.hand.limits import PosePrior
 from rhot_app.hand.model import HandModel, VariantName, build_model, limit_set, make_variant
+from rhot_app.hand.motion.hand_process import BIAS_S, FASTEST, PALM_SPREAD, SLOWEST, HandProcess
 from rhot_app.hand.places import Place, place_of, with_markers
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
 from rhot_app.project import Rig
@@ -28,7 +29,7 @@ PAINT_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e
               "landmark": ANATOMY_SD_M}
 """m: standard deviation of a marker's centre about the place that the hand file gives it, by its shape: paint, its
 shading and the skin under it (`python benchmarks/sight_errors.py`). A blob is paint that nobody measured. For a
-landmark see `barehand.landmarks`."""
+landmark see `hand.landmarks`."""
 
 LASTING_PX = 0.01
 """px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/sight_errors.py`)."""
@@ -46,7 +47,7 @@ class MarkerModel:
     `dh`: the hand's table with one point per marker. `finger` (M,): the finger, -1 on the palm. `half_axes` (M, 3) m of
     their bodies along the palm's axes, zero for flat ones. `slender` (M,): visible area of a fingertip from its side
     over that from its end, less 1; negative where the size says nothing of the distance. `paint_variance` (M,) m^2.
-    `landmark` (M,) bool: landmarks, which err as `barehand.landmarks` says.
+    `landmark` (M,) bool: landmarks, which err as `hand.landmarks` says.
     `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 9) as `CameraModel`. `limits` (21, 2) rad.
     """
 
@@ -59,7 +60,7 @@ class MarkerModel:
     landmark: NDArray[np.bool_]
     poses: Array
     intrinsics: Array
-    natural: NaturalPose
+    pose_prior: PosePrior
     limits: Array
     roles: tuple[str, ...]
     places: tuple[Place, ...]
@@ -67,6 +68,12 @@ class MarkerModel:
     def scaled(self, factor: float) -> MarkerModel:
         """The markers on a hand `factor` times as large."""
         return replace(self, dh=scaled_table(self.dh, factor))
+
+    def process(self) -> HandProcess:
+        """How the hand moves, with the rates of recorded hands; paint biases are 0 until `set_bias`."""
+        covariance = np.asarray(np.linalg.inv(self.pose_prior.information), dtype=np.float64)
+        return HandProcess(self.dh, self.limits, self.pose_prior.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
+                           np.zeros((len(self.finger), 3, 3)), np.where(self.landmark, LASTING_S, BIAS_S))
 
     def marker_of(self, role: str) -> int:
         """The index of the marker with a role, -1 without."""
@@ -92,7 +99,7 @@ def compile_markers(rig: Rig) -> MarkerModel:
         np.array([marker.shape == "landmark" for marker in rig.markers.markers]),
         np.array([camera.camera_from_world[:3] for camera in cameras]),
         np.array([camera.intrinsics for camera in cameras]),
-        natural_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
+        pose_prior_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
         tuple(marker.role or "" for marker in rig.markers.markers), places)
 
 
@@ -127,13 +134,13 @@ def _slenderness(marker: Marker, model: HandModel) -> float:
     return 2.0 * apart / (math.pi * radius)
 
 
-def natural_of(model: HandModel, variant: VariantName) -> NaturalPose:
-    """The natural pose with the variant's couplings, these as good as exactly."""
+def pose_prior_of(model: HandModel, variant: VariantName) -> PosePrior:
+    """The pose prior with the variant's couplings, these as good as exactly."""
     chosen = make_variant(variant, model.anatomy.couplings)
     basis = chosen.basis
     bound = (np.eye(len(basis)) - basis @ np.linalg.pinv(basis)) / _COUPLED_SD_RAD
     bound = bound[np.abs(bound).max(axis=1) > 1e-9]
-    return model.natural.and_also(bound, bound @ chosen.mean)
+    return model.pose_prior.with_terms(bound, bound @ chosen.mean)
 
 
 @njit(cache=True)

@@ -10,10 +10,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.landmarks import COMMON_M, NOISE_M
 from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.hand.kinematics import direction_jacobian, forward_arrays, jacobian_arrays
-from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.landmarks import COMMON_M, NOISE_M
+from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
 from rhot_app.tracking.marker_model import MarkerModel, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag

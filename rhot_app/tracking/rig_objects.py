@@ -13,20 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.estimation.filter import AHEAD_S, Estimate, smooth
+from rhot_app.barehand.observations import ImageFrame, SliceRequest
+from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
-from rhot_app.objects.motion import POSE, VELOCITY, pose_of
+from rhot_app.objects.motion import TWIST, VELOCITY, pose_of
 from rhot_app.objects.observations import MarkerPoints, ObjectFrame, ObjectPose
 from rhot_app.objects.shape import shape_of
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
 from rhot_app.project import Rig
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.marker_model import scaled_table
-from rhot_app.tracking.state import HandState, Knowledge
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraObservations, ImageTracking, Tracker
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -139,6 +140,25 @@ class WithObjects:
         """Take one frame's tags, or a pose of another tracker, in."""
         self._objects.ingest_objects(frame)
 
+    def ingest_image(self, frame: ImageFrame) -> None:
+        """Take one frame's edges or foreground in, where the hand's tracker searches images."""
+        if isinstance(self._hand, ImageTracking):
+            self._hand.ingest_image(frame)
+
+    def requests(self) -> list[SliceRequest]:
+        """What the nodes shall search for the hand."""
+        return self._hand.requests() if isinstance(self._hand, ImageTracking) else []
+
+    def warm_up(self) -> None:
+        """See `ImageTracking`."""
+        if isinstance(self._hand, ImageTracking):
+            self._hand.warm_up()
+
+    def wait(self) -> None:
+        """Until the hand that is being looked for is found or not."""
+        if isinstance(self._hand, ImageTracking):
+            self._hand.wait()
+
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, of all markers, None before its first."""
         return self._hand.newest_frames() if self._markers.all_of_hand else tuple(self._markers.newest)
@@ -240,12 +260,12 @@ class _History:
 
     def __init__(self, name: str) -> None:
         self.name, self.over = name, False
-        self._filtered: list[Estimate] = []
-        self._smoothed: list[Estimate] = []
+        self._filtered: list[FilteredState] = []
+        self._smoothed: list[FilteredState] = []
         self._final_s = -math.inf
         self._first_ns: int | None = None
 
-    def add(self, t_ns: int, estimate: Estimate) -> None:
+    def add(self, t_ns: int, estimate: FilteredState) -> None:
         """Keep a newer estimate than the last one."""
         self._first_ns = t_ns if self._first_ns is None else self._first_ns
         t_s = 1e-9 * (t_ns - self._first_ns)
@@ -268,13 +288,13 @@ class _History:
             return unknown_object(self.name, t_ns, Validity.LOST)
         state, covariance = here.process.predict(here.state, here.covariance, t_s - here.t_s)
         return ObjectState(self.name, t_ns, Validity.PREDICTED if late_ns > PREDICTED_AFTER_NS else Validity.TRACKED,
-                           pose_of(state), covariance[:POSE, :POSE], state[VELOCITY:])
+                           pose_of(state), covariance[:TWIST, :TWIST], state[VELOCITY:])
 
     def _smooth(self, t_s: float) -> None:
         """Smooth what there is, one run of one hypothesis after the other."""
         first = max(bisect_right(self._filtered, t_s, key=lambda one: one.t_s) - 1, 0)
         del self._filtered[:first]
-        runs: list[list[Estimate]] = []
+        runs: list[list[FilteredState]] = []
         for one in self._filtered:
             if runs and one.label == runs[-1][-1].label and one.t_s - runs[-1][-1].t_s < 1e-9 * LOST_AFTER_NS:
                 runs[-1].append(one)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from rhot_app.calibration.check.camera_calibration import calibration_error
-from rhot_app.estimation.change_point import Change, find_change
+from rhot_app.estimation.change_point import ChangePoint, find_change
 from rhot_app.geometry.camera import CameraModel, point_rays, undistort_point
 from rhot_app.geometry.transforms import exp_so3, inverse, log_so3, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
@@ -285,7 +285,7 @@ class RigRefiner:
             weights[here] = weight
         return _Summaries(np.asarray(numbers * SEGMENT_S, dtype=np.float64), matrices, vectors, weights, segment)
 
-    def _search(self, sums: _Summaries, dispersion: float) -> Change:
+    def _search(self, sums: _Summaries, dispersion: float) -> ChangePoint:
         odds = [math.log(1.0 - KNOCKED_BEFORE), math.log(KNOCKED_BEFORE),
                 *np.log(KNOCKS_PER_S * np.diff(sums.t_s))]
         return find_change(self._prior, self._knock, self._walk, sums.t_s, sums.matrix / dispersion,

@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import TWIST, forward_arrays, jacobian_arrays, move
+from rhot_app.hand.limits import PERSON_LIMIT_SD_RAD
 from rhot_app.hand.linear import factorise, substitute
 from rhot_app.hand.skeleton import ANGLES
 
 Array = NDArray[np.float64]
-
-LIMIT_SD_RAD = math.radians(5.0)
-"""Joints go beyond their published limits by as much: those are means over people."""
 
 STEPS = 20
 """Of the descent at most; a pose found for a neighbouring size needs three or four."""
@@ -165,9 +163,9 @@ def _strain(posture: Posture, angles: Array, matrix: Array, right: Array) -> flo
     for i in range(angles.shape[0]):
         for side in range(2):
             sign = 2.0 * side - 1.0
-            beyond = sign * (angles[i] - posture.limits[i, side]) / LIMIT_SD_RAD
+            beyond = sign * (angles[i] - posture.limits[i, side]) / PERSON_LIMIT_SD_RAD
             root = math.sqrt(beyond * beyond + 1.0)
-            soft, slope = 0.5 * (beyond + root), 0.5 * (1.0 + beyond / root) / LIMIT_SD_RAD
+            soft, slope = 0.5 * (beyond + root), 0.5 * (1.0 + beyond / root) / PERSON_LIMIT_SD_RAD
             cost += 0.5 * soft * soft
             right[TWIST + i] -= sign * slope * soft
             matrix[TWIST + i, TWIST + i] += slope * slope

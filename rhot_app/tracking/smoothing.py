@@ -15,24 +15,25 @@ from typing import TypeVar
 
 import numpy as np
 
-from rhot_app.estimation.filter import ChunkedSmoother, Estimate, Knot
+from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, Knot
+from rhot_app.hand.motion.hand_process import HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.observations import ObjectFrame
 from rhot_app.project import Rig
+from rhot_app.state import Condition, HandState
 from rhot_app.tracking.acquisition import Located
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
-from rhot_app.tracking.hand_process import HandProcess
 from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.rig_arrays import without_objects
 from rhot_app.tracking.rig_objects import MarkersBeside, SmoothedObjects
-from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import TwoHands, require_estimator
 
 Kept = TypeVar("Kept")
 
-NOT_SMOOTHED = "only the estimator smooths. Choose it (tracker.kind, or --tracker estimator), or do not smooth."
+NOT_SMOOTHED = ("only the estimator smooths, and only markers and landmarks. Choose it (tracker.kind, or --tracker "
+                "estimator), or do not smooth.")
 """Why states of another tracker are not smoothed, and what to do."""
 
 _RECENT = 16  # frames: those that an estimator weighs again when it starts are fewer
@@ -54,7 +55,7 @@ class Instant:
     scale: tuple[float, float] = (1.0, math.nan)
     process: HandProcess | None = None
     filtered: Knot | None = None
-    estimate: Estimate | None = None
+    estimate: FilteredState | None = None
 
 
 class RecordingEstimator(Estimator):
@@ -165,7 +166,7 @@ class RecordingEstimator(Estimator):
         process = None if instant is None else instant.process
         if instant is not None:
             instant.filtered, instant.t_ns = knot, self._time_ns(knot.t_s)
-        self._conclude(self._smoother.add(Estimate(
+        self._conclude(self._smoother.add(FilteredState(
             knot.t_s, knot.state, knot.covariance, _copied(self._process) if process is None else process, instant)))
 
     def _smooth_buffered(self) -> None:
@@ -173,7 +174,7 @@ class RecordingEstimator(Estimator):
             self._smooth(knot)
         self._buffered = []
 
-    def _conclude(self, estimates: list[Estimate]) -> None:
+    def _conclude(self, estimates: list[FilteredState]) -> None:
         for estimate in estimates:
             if isinstance(estimate.label, Instant):
                 estimate.label.estimate = replace(estimate, label=None)
@@ -234,8 +235,8 @@ class SmoothedTracker:
     """Takes the frames of a recording in the order of arrival, and gives smoothed states in the order of time."""
 
     def __init__(self, rig: Rig) -> None:
-        """Raises RigError as `make_tracker` does; the rig's tracker must be the estimator."""
-        assert rig.tracker.kind == "estimator"
+        """Raises RigError as `make_tracker` does; the rig's tracker must be the estimator of markers."""
+        assert rig.tracker.smooths
         require_estimator(rig)
         hand, own = without_objects(rig)
         self._tracker = RecordingEstimator(hand) if rig.other_hand is None else TwoRecordingEstimators(hand)

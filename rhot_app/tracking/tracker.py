@@ -8,8 +8,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.observations import EdgeFrame, ImageFrame, SliceRequest
 from rhot_app.objects.observations import ObjectFrame
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 Array = NDArray[np.float64]
 
@@ -90,13 +91,53 @@ class ObjectTracking(Protocol):
         ...
 
 
-CameraFrame = CameraObservations | ObjectFrame
-"""What a source delivers: markers or fiducial tags of one camera's frame, or a pose of another tracker."""
+@runtime_checkable
+class ImageTracking(Protocol):
+    """A tracker that has the nodes search their images."""
+
+    def ingest_image(self, frame: ImageFrame) -> None:
+        """Take the edges or the foreground of one frame in."""
+        ...
+
+    def requests(self) -> list[SliceRequest]:
+        """What the nodes shall search now; asked for after every `solve`."""
+        ...
+
+    def warm_up(self) -> None:
+        """Have everything compiled that a search needs, then forget."""
+        ...
+
+    def wait(self) -> None:
+        """Until what is being looked for beside the frames is found or not. A replay calls it; live, nobody waits."""
+        ...
+
+
+CameraFrame = CameraObservations | ObjectFrame | ImageFrame
+"""What a source delivers: markers, fiducial tags, edges or foreground of one camera's frame, or a pose of another
+tracker."""
+
+
+def may_be_due(frame: CameraFrame) -> bool:
+    """Whether a tracker may have a state after this frame."""
+    return isinstance(frame, CameraObservations | EdgeFrame)
 
 
 def feed(tracker: Tracker, frame: CameraFrame) -> None:
-    """Have `tracker` take a frame in. Tags and poses are for those that track objects."""
+    """Have `tracker` take a frame in. Tags and poses are for those that track objects, edges and foreground for
+    those that search images."""
     if isinstance(frame, CameraObservations):
         tracker.ingest(frame)
+    elif isinstance(frame, ImageFrame):
+        if isinstance(tracker, ImageTracking):
+            tracker.ingest_image(frame)
     elif isinstance(tracker, ObjectTracking):
         tracker.ingest_objects(frame)
+
+
+def solve_after(tracker: Tracker, frame: CameraFrame) -> HandState | None:
+    """The state after one frame of a recording, if the frame completes one; nothing is left for later."""
+    feed(tracker, frame)
+    if isinstance(tracker, ImageTracking):
+        tracker.wait()
+        tracker.requests()  # nobody searches again
+    return tracker.solve() if may_be_due(frame) else None

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, estimator_obstacle
+from rhot_app.state import HandState
 from rhot_app.tracking.classic import ClassicTracker
+from rhot_app.tracking.contours.tracker import ContourEstimator
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.rig_arrays import rigs_of_hands, without_objects
 from rhot_app.tracking.rig_objects import WithObjects
-from rhot_app.tracking.state import HandState
 from rhot_app.tracking.tracker import CameraObservations, Tracker
 
 Indices = NDArray[np.intp]
@@ -102,7 +103,10 @@ def make_tracker(rig: Rig) -> Tracker:
     else:
         require_estimator(rig)
         hand, own = without_objects(rig)
-        tracker = Estimator(hand) if rig.other_hand is None else TwoHands(hand)
+        if rig.tracker.observe != "markers":
+            tracker = ContourEstimator(hand)
+        else:
+            tracker = Estimator(hand) if rig.other_hand is None else TwoHands(hand)
     return WithObjects(rig, tracker, own) if rig.objects else tracker
 
 

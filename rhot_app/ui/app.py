@@ -56,18 +56,18 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
         _require_settings_file(args.settings)
     choose_gl_platform()
     cap_software_gl()
-    from rhot_app.ui.job import workers
+    from rhot_app.ui.common.job import workers
 
     workers()
     give_way()
     from PySide6.QtCore import Qt, QTimer
     from PySide6.QtWidgets import QApplication
 
-    from rhot_app.ui.controller import Controller
+    from rhot_app.ui.common.controller import Controller
+    from rhot_app.ui.common.settings import Settings
+    from rhot_app.ui.common.theme import apply_theme, scheme_named
     from rhot_app.ui.main_window import MainWindow
     from rhot_app.ui.scene.surface import choose_format
-    from rhot_app.ui.settings import Settings
-    from rhot_app.ui.theme import apply_theme, scheme_named
 
     session = Session(args.directory)
     settings = Settings(args.settings)

@@ -8,18 +8,18 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication
 
 from rhot_app.project import Rig
+from rhot_app.state import HandState
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.state import HandState
 from rhot_app.ui.actions import CLOUD_KINDS, Actions
-from rhot_app.ui.controller import Controller
+from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.common.theme import apply_theme, scheme_named
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.advice_bar import AdviceBar
 from rhot_app.ui.scene.ellipsoid_mesh import LARGER, EllipsoidChoice
 from rhot_app.ui.screen import Screen
-from rhot_app.ui.settings import Settings
-from rhot_app.ui.theme import apply_theme, scheme_named
 
-# -- The hand as the scene shows it: where it is when it is seen, not where it was in the newest pictures --------------
+# -- The hand at display time ------------------------------------------------------------------------------------------
 
 _FRESH_NS = 500_000_000
 """A state that is older is of a recording, or of a hand that is gone: nothing is predicted of it."""
@@ -46,7 +46,7 @@ class DisplayPrediction:
         return self._extrapolator.at(newest, now_ns + round(1e9 * ahead_s)) or newest
 
 
-# -- Dark or light, names, uncertainty and prediction in the scene: the switches of the View menu, as they -------------
+# -- Switches of the View menu -----------------------------------------------------------------------------------------
 
 _LARGER = "clouds larger"
 _CLOUD_FLAGS = {"clouds": True, **{f"clouds of {kind}": True for kind, _ in CLOUD_KINDS}, _LARGER: False}

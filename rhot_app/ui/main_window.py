@@ -18,20 +18,20 @@ from PySide6.QtWidgets import (
 from rhot_app.ui.actions import Actions, MainToolBar
 from rhot_app.ui.appearance import Appearance, DisplayPrediction
 from rhot_app.ui.backend.contract import TwinChoice
-from rhot_app.ui.controller import Controller
+from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.guide import page_of
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.common.shapes import show_overflow
+from rhot_app.ui.common.theme import scheme_named
 from rhot_app.ui.dialogs.dialogs import Dialogs
-from rhot_app.ui.guide import page_of
+from rhot_app.ui.dialogs.recordings import SHOW_FOLDER, Recordings
 from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
-from rhot_app.ui.recordings import SHOW_FOLDER, Recordings
 from rhot_app.ui.replay.windows import ReplayWindows
 from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Docks, Screen
-from rhot_app.ui.settings import Settings
-from rhot_app.ui.shapes import show_overflow
 from rhot_app.ui.simulated_rig_menus import LensCaps, TwinShows
 from rhot_app.ui.status_words import RigWatch, label_of, look_of, notices_of
-from rhot_app.ui.theme import scheme_named
 from rhot_app.ui.tracked_objects import TrackedObjects
 from rhot_app.ui.welcome import WelcomePage
 from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, WIZARDS, wizard_named

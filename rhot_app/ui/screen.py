@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
 from rhot_app.project import Rig
-from rhot_app.tracking.state import Condition, HandState
+from rhot_app.state import Condition, HandState
 from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
@@ -149,7 +149,7 @@ class Screen:
         return self.pacer.cost_s
 
 
-# -- The panels around the scene as docks: where they stand at first, their keys, and all of them away at once ---------
+# -- The panels around the scene as docks ------------------------------------------------------------------------------
 
 _AREAS = {"left": Qt.DockWidgetArea.LeftDockWidgetArea, "right": Qt.DockWidgetArea.RightDockWidgetArea,
           "bottom": Qt.DockWidgetArea.BottomDockWidgetArea}

@@ -9,8 +9,8 @@ from PySide6.QtCore import QObject
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
 
-from rhot_app.ui.controller import Controller
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.job import Job
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.words import shipped_motions
 
@@ -110,7 +110,7 @@ class TwinShows(QObject):
         self._tell(Notice("error", sentence))
 
 
-# -- The menu that covers the simulated cameras' lenses, to see what is left of a hand that one camera sees ------------
+# -- Menu: cover the lenses of the simulated cameras -------------------------------------------------------------------
 
 class LensCaps(QObject):
     """An entry per camera of the simulated rig, ticked while the camera is covered; without that rig there is no menu.

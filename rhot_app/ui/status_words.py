@@ -13,7 +13,7 @@ from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, parse_rig
 from rhot_app.ui.backend.contract import TwinPace
 from rhot_app.ui.backend.live import Client
-from rhot_app.ui.controller import RESTART_ENGINE, RESTART_TWIN, Controller
+from rhot_app.ui.common.controller import RESTART_ENGINE, RESTART_TWIN, Controller
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look
@@ -33,8 +33,8 @@ def look_of(controller: Controller) -> Look:
 def notices_of(controller: Controller, passing: Sequence[Notice] = ()) -> list[Notice]:
     """The sentences of the moment: those that pass by, the app's own, then the engine's; a quiet one beside those that
     last when there is nothing else to say, so that the bar keeps its height."""
-    told = {notice.text for notice in passing}
-    notices = [*passing, *(notice for notice in _notices(controller) if notice.text not in told)]
+    passing_texts = {notice.text for notice in passing}
+    notices = [*passing, *(notice for notice in _notices(controller) if notice.text not in passing_texts)]
     if all(notice.lasting for notice in notices):
         notices.append(Notice("info", _quiet_sentence(controller, in_order=not notices)))
     return notices
@@ -110,7 +110,7 @@ def _quiet_sentence(controller: Controller, *, in_order: bool) -> str:
     return "Everything is in order." if look.tone == "good" and in_order else look.meaning
 
 
-# -- Whether the engine's rig still says what its file says, so that nobody closes the app on an unsaved ---------------
+# -- Unsaved changes of the rig ----------------------------------------------------------------------------------------
 
 LOOK_S = 1.5
 
@@ -161,7 +161,7 @@ class RigWatch:
             self._looking = True
             self._next_look = now_s + LOOK_S
             opened = self._controller.opened
-            self._controller.link.work(look_at_rig, lambda sight: self._take(sight, opened),
+            self._controller.link.work(look_at_rig, lambda found: self._take(found, opened),
                                        lambda sentence: self._rest())
 
     def save(self, tell: Callable[[Notice], None]) -> None:
@@ -176,11 +176,11 @@ class RigWatch:
         """An engine that does not answer is told of elsewhere."""
         self._looking = False
 
-    def _take(self, sight: RigObservation, asked_for: object) -> None:
+    def _take(self, found: RigObservation, asked_for: object) -> None:
         self._looking = False
         opened = self._controller.opened
         if opened is None or opened is not asked_for:
             return
-        self.edited = sight.edited
-        if sight.rig != opened.rig or sight.path != opened.rig_path:
-            self._controller.take_rig(replace(opened, rig=sight.rig, rig_path=sight.path))
+        self.edited = found.edited
+        if found.rig != opened.rig or found.path != opened.rig_path:
+            self._controller.take_rig(replace(opened, rig=found.rig, rig_path=found.path))

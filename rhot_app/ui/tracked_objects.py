@@ -15,7 +15,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
 from rhot_app.project import Rig, parse_rig, with_object
-from rhot_app.ui.controller import ClosableClient, Controller
+from rhot_app.ui.common.controller import ClosableClient, Controller
 from rhot_app.ui.models.notice import Notice
 from rhot_node.files import resource_path
 

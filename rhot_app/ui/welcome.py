@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.backend.contract import TwinChoice
+from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.words import shipped_motions
-from rhot_app.ui.theme import app_font
 from rhot_node.compiled import is_cold
 
 _TITLE_PT = 20.0

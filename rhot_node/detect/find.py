@@ -12,16 +12,16 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.detect import measure as m
 from rhot_node.detect.colour import directions, sector_table
-from rhot_node.detect.follow import learn_noise, noise_level
-from rhot_node.detect.followed import Followed
 from rhot_node.detect.gate import AREA_MIN, ColourGate, merits
 from rhot_node.detect.illuminant import Illuminant
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.outline import INTERIOR, OUTSIDE
+from rhot_node.detect.region import measure as m
+from rhot_node.detect.region.outline import INTERIOR, OUTSIDE
 from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
-from rhot_node.detect.track import (
+from rhot_node.detect.tracks.follow import learn_noise, noise_level
+from rhot_node.detect.tracks.followed import Followed
+from rhot_node.detect.tracks.track import (
     ALIVE,
     EXTENT,
     FLOOR_VARIANCE,
@@ -31,8 +31,8 @@ from rhot_node.detect.track import (
     lost_observation,
     mask_variance,
 )
-from rhot_node.detect.track import X as TRACK_X
-from rhot_node.detect.track import Y as TRACK_Y
+from rhot_node.detect.tracks.track import X as TRACK_X
+from rhot_node.detect.tracks.track import Y as TRACK_Y
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import CANDIDATES_MAX, NO_FLAGS, MarkerFlag, MarkerObservation
 

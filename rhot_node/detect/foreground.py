@@ -83,6 +83,32 @@ def skin_mask(image: Image) -> Mask:
     return np.asarray((cb >= SKIN_CB[0]) & (cb <= SKIN_CB[1]) & (cr >= SKIN_CR[0]) & (cr <= SKIN_CR[1]))
 
 
+class BackgroundSums:
+    """Sums over images of the empty scene, from which a background is learnt without keeping them."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._sum: NDArray[np.float64] = np.empty(0)
+        self._squares: NDArray[np.float64] = np.empty(0)
+
+    def add(self, image: Image) -> None:
+        """Take one image (H, W, 3) RGB. Raises ValueError when it has another size than those before."""
+        values = image.astype(np.float64)
+        if not self.count:
+            self._sum, self._squares = np.zeros_like(values), np.zeros_like(values)
+        self._sum += values
+        self._squares += values * values
+        self.count += 1
+
+    def learnt(self, model: Foreground) -> Foreground:
+        """The model with this background. Raises ValueError without images."""
+        if not self.count:
+            raise ValueError("the background needs at least one image of the scene without a hand")
+        mean = self._sum / self.count
+        sd = np.sqrt(np.maximum(self._squares / self.count - mean * mean, _LEAST_SD**2))
+        return model._replace(mean=mean.astype(np.float32), sd=sd.astype(np.float32))
+
+
 def learn_background(model: Foreground, images: Sequence[Image]) -> Foreground:
     """The model with a background from images (H, W, 3) RGB of the empty scene. Raises ValueError without images."""
     if not images:

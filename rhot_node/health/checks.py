@@ -79,18 +79,18 @@ def check_power(flags: Throttled | None) -> Check:
 def check_heat(temperature_c: float | None, flags: Throttled | None) -> Check:
     """Temperature, and whether the firmware slows the processor down because of it."""
     flags = flags or Throttled(0)
-    told = "" if temperature_c is None else f" at {temperature_c:.0f} °C"
+    heat = "" if temperature_c is None else f" at {temperature_c:.0f} °C"
     slowed = flags & (Throttled.THROTTLED | Throttled.HOT) and not flags & Throttled.UNDER_VOLTAGE
     if slowed or (temperature_c or 0.0) >= TOO_HOT_C:
-        return Check("heat", "error", f"Its processor is too hot{told} and is slowed down: frames come late.",
+        return Check("heat", "error", f"Its processor is too hot{heat} and is slowed down: frames come late.",
                      COOL_REMEDY)
     if (temperature_c or 0.0) >= HOT_C:
-        return Check("heat", "warning", f"Its processor is hot{told}; at {TOO_HOT_C:.0f} °C it is slowed down.",
+        return Check("heat", "warning", f"Its processor is hot{heat}; at {TOO_HOT_C:.0f} °C it is slowed down.",
                      COOL_REMEDY)
     if flags & Throttled.HOT_BEFORE:
-        return Check("heat", "warning", f"Its processor{told} was slowed down by heat since it was switched on.",
+        return Check("heat", "warning", f"Its processor{heat} was slowed down by heat since it was switched on.",
                      COOL_REMEDY)
-    return Check("heat", "ok", f"The processor is cool enough{told}." if told else "It does not tell its temperature.")
+    return Check("heat", "ok", f"The processor is cool enough{heat}." if heat else "It does not tell its temperature.")
 
 
 def check_memory(available_bytes: int | None) -> Check:

@@ -97,8 +97,8 @@ class Machine:
         """Whether the wall clock follows the network's."""
         if (self.root / "run/systemd/timesync").is_dir():
             return (self.root / "run/systemd/timesync/synchronized").exists()
-        told = self.run(["timedatectl", "show", "--property=NTPSynchronized", "--value"])
-        return None if told is None else told.strip() == "yes"
+        answer = self.run(["timedatectl", "show", "--property=NTPSynchronized", "--value"])
+        return None if answer is None else answer.strip() == "yes"
 
     def clock_source(self) -> str | None:
         """What the kernel's clocks count by."""
@@ -127,8 +127,8 @@ class Machine:
         return sorted(f"/{path.relative_to(self.root)}" for path in self.root.glob("dev/video*"))
 
     def _power_save(self, interface: str) -> bool | None:
-        told = self.run(["iw", "dev", interface, "get", "power_save"])
-        return None if told is None else told.strip().endswith("on")
+        answer = self.run(["iw", "dev", interface, "get", "power_save"])
+        return None if answer is None else answer.strip().endswith("on")
 
     def _number(self, name: str) -> float | None:
         try:

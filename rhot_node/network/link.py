@@ -24,9 +24,12 @@ from rhot_node.wire.messages import (
     ClockRequest,
     Fiducials,
     Find,
+    ForegroundPart,
     Message,
     NodeState,
     Observations,
+    SliceEdges,
+    Slices,
     Start,
     Stop,
 )
@@ -45,10 +48,12 @@ class UdpLink:
                  state: Callable[[], NodeState], keys: LinkKeys | None) -> None:
         """Open the ports; raises LinkError. `state` tells what a clock reply says of the node; any thread calls it.
         Only datagrams that a link of `keys` has tagged are taken; with None the node is open, and all are. Who asks
-        whether somebody is there is answered once `introduce` is set; any thread may call it."""
+        whether somebody is there is answered once `introduce` is set; any thread may call it. `take_slices` gets
+        slices and the running session, 0 for none, and returns why it drops them, or nothing."""
         self.dropped: Counter[str] = Counter()  # datagrams not acted upon, by reason
         self.clock_requests = 0
         self.introduce: Callable[[], Presence] | None = None
+        self.take_slices: Callable[[Slices, int], str] | None = None
         self._answered_s = deque([-1.0] * ANSWERS_PER_S, ANSWERS_PER_S)  # when strangers were answered
         self._node_id = settings.node_id
         self._clock = clock
@@ -73,7 +78,7 @@ class UdpLink:
         for number in self._sockets:
             self._poll.register(number, select.POLLIN)
 
-    def send(self, observations: Observations | Fiducials, stream: Stream) -> bool:
+    def send(self, observations: Observations | Fiducials | SliceEdges | ForegroundPart, stream: Stream) -> bool:
         """Send one frame's observations; False when the network refused them, which costs that frame only. Any thread
         may call it."""
         try:
@@ -133,6 +138,11 @@ class UdpLink:
             case Stop():
                 if not self._sessions.stop(message.session):
                     self.dropped["stop_of_nothing"] += 1
+            case Slices() if self.take_slices is not None:
+                stream = self._sessions.current
+                reason = self.take_slices(message, stream.session if stream else 0)
+                if reason:
+                    self.dropped[f"slices_{reason}"] += 1
             case Find() if seal is None:
                 self._say_who(message, sender)
             case _:

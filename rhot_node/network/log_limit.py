@@ -12,17 +12,18 @@ class LogLimit:
     """Counts what happens of each subject, and says when a line of it is due."""
 
     def __init__(self) -> None:
-        self._told: dict[str, tuple[float, int]] = {}  # when the last line was written, and how often since
+        self._written: dict[str, tuple[float, int]] = {}  # when the last line was written, and how often since
 
     def due(self, subject: str, now_s: float) -> int:
         """It happened: how often since the last line when one is due now, else 0. `now_s`: monotonic, s."""
-        self._told = {name: entry for name, entry in self._told.items() if now_s - entry[0] < PERIOD_S or entry[1]}
-        if subject not in self._told and len(self._told) >= _SUBJECTS_MAX:
+        self._written = {name: entry for name, entry in self._written.items()
+                         if now_s - entry[0] < PERIOD_S or entry[1]}
+        if subject not in self._written and len(self._written) >= _SUBJECTS_MAX:
             subject = "others"
-        told_s, since = self._told.get(subject, (now_s - PERIOD_S, 0))
+        written_s, since = self._written.get(subject, (now_s - PERIOD_S, 0))
         since += 1
-        if now_s - told_s < PERIOD_S:
-            self._told[subject] = told_s, since
+        if now_s - written_s < PERIOD_S:
+            self._written[subject] = written_s, since
             return 0
-        self._told[subject] = now_s, 0
+        self._written[subject] = now_s, 0
         return since

@@ -104,10 +104,10 @@ def properties_of(presence: Presence) -> dict[str, str]:
 def presence_of(properties: Mapping[str, str | None], udp_port: int | None) -> Presence | None:
     """The presence that a service tells of; None when it is not a node of this version. Anybody can announce one."""
     try:
-        told = msgspec.convert(dict(properties), _Properties, strict=False)
+        found = msgspec.convert(dict(properties), _Properties, strict=False)
     except msgspec.ValidationError:
         return None
-    if told.version != VERSION or not udp_port or not told.name.isprintable():
+    if found.version != VERSION or not udp_port or not found.name.isprintable():
         return None
-    return Presence(told.id, told.boot, told.name, udp_port, told.control, told.preview, told.pairing,
-                    TrustState[told.trust.upper()])
+    return Presence(found.id, found.boot, found.name, udp_port, found.control, found.preview, found.pairing,
+                    TrustState[found.trust.upper()])

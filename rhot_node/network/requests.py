@@ -20,6 +20,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, changed_settings, needs_restart, save_settings
 from rhot_node.errors import NodeError, SettingsError
 from rhot_node.files import decode_message
+from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.pictures import PictureBox, StillFormat, encode_still
 from rhot_node.network.session import LinkKeys, Sessions
 from rhot_node.video.recorder import READ_MAX, VideoName, VideoRecorder
@@ -112,9 +113,28 @@ class VideoDeleteRequest(_Request, frozen=True, tag="video_delete"):
     name: VideoName
 
 
+class LearnBackgroundRequest(_Request, frozen=True, tag="learn_background"):
+    """Learn the scene as it is during the next `seconds`, without a hand. Answered at once; the state tells when."""
+
+    seconds: Annotated[float, Meta(ge=0.1, le=60)] = 3.0
+
+
+class LearnSkinRequest(_Request, frozen=True, tag="learn_skin"):
+    """Learn the colours of the skin that the next picture shows."""
+
+
+class ForgetForegroundRequest(_Request, frozen=True, tag="forget_foreground"):
+    """Forget background and skin."""
+
+
+class ForegroundMaskRequest(_Request, frozen=True, tag="foreground_mask"):
+    """The foreground of the next picture, a grey PNG in a second message part: 255 is the hand."""
+
+
+ForegroundRequest = LearnBackgroundRequest | LearnSkinRequest | ForgetForegroundRequest | ForegroundMaskRequest
 VideoRequest = VideoStartRequest | VideoStopRequest | VideoListRequest | VideoReadRequest | VideoDeleteRequest
 Request = (StateRequest | CountersRequest | SettingsRequest | SetSettingsRequest | StillRequest | StartRequest
-           | LinkRequest | StopRequest | VideoRequest)
+           | LinkRequest | StopRequest | ForegroundRequest | VideoRequest)
 
 _decoder = msgspec.json.Decoder(Request)
 
@@ -148,8 +168,10 @@ class Responder:
     """Answers requests. `state` and `counters` report on the daemon from any thread."""
 
     def __init__(self, store: SettingsStore, sessions: Sessions, pictures: PictureBox, clock: NodeClock,
-                 state: Report, counters: Report, keys: LinkKeys | None, videos: VideoRecorder | None = None) -> None:
-        """`keys` None: the node is open, and no datagram is tagged. `videos` None: it records none."""
+                 state: Report, counters: Report, keys: LinkKeys | None, videos: VideoRecorder | None = None,
+                 foreground: ForegroundStore | None = None) -> None:
+        """`keys` None: the node is open, and no datagram is tagged. `videos` None: it records none.
+        `foreground` None: it learns neither background nor skin."""
         self._store = store
         self._sessions = sessions
         self._pictures = pictures
@@ -158,6 +180,7 @@ class Responder:
         self._counters = counters
         self._keys = keys
         self._videos = videos
+        self._foreground = foreground
 
     def answer(self, parts: list[bytes], master: str) -> list[bytes]:
         """The reply's message parts to a request's of the master with this public key (empty: the node is open). Never
@@ -195,6 +218,9 @@ class Responder:
                 return self._link(request, master), b""
             case StopRequest():
                 return {"ok": True, "stopped": self._sessions.stop(request.session)}, b""
+            case (LearnBackgroundRequest() | LearnSkinRequest() | ForgetForegroundRequest()
+                  | ForegroundMaskRequest()):
+                return self._learn(request)
             case _:
                 return self._video(request)
 
@@ -205,6 +231,23 @@ class Responder:
             self._sessions.stop(0)
             if self._videos is not None:
                 self._videos.stop()
+
+    def _learn(self, request: ForegroundRequest) -> tuple[dict[str, Any], bytes]:
+        store = self._foreground
+        if store is None:
+            raise NodeError("this node learns neither background nor skin.")
+        match request:
+            case LearnBackgroundRequest():
+                store.learn_background(self._pictures, request.seconds)
+                return {"ok": True}, b""
+            case LearnSkinRequest():
+                return {"ok": True, "found": store.learn_skin(self._pictures)}, b""
+            case ForgetForegroundRequest():
+                store.forget()
+                return {"ok": True}, b""
+            case ForegroundMaskRequest():
+                data, width, height = store.mask(self._pictures)
+                return {"ok": True, "format": "png", "width": width, "height": height}, data
 
     def _video(self, request: VideoRequest) -> tuple[dict[str, Any], bytes]:
         videos = self._videos

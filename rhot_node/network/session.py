@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import KEY_LENGTH, Seal, decode_verified, is_tagged
 from rhot_node.wire.messages import Message
-from rhot_node.wire.sequence import SequenceWindow, Verdict
+from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
 
 log = logging.getLogger(__name__)
 
@@ -134,7 +134,7 @@ class Link:
         """Whether the message comes for the first time; it never does again."""
         window = self._windows.setdefault(type(message), SequenceWindow(longest_jump=_ANY_JUMP))
         verdict = window.judge(message.sequence)
-        if verdict is not Verdict.FRESH and verdict is not Verdict.LATE:
+        if verdict is not SequenceVerdict.FRESH and verdict is not SequenceVerdict.LATE:
             return False
         window.take(message.sequence)
         return True

@@ -12,18 +12,21 @@ from rhot_node.errors import WireError
 from rhot_node.wire.discovery import decode_find, decode_here, encode_find, encode_here
 from rhot_node.wire.edges import decode_edges, edges_fit, encode_edges
 from rhot_node.wire.fiducials import decode_fiducials, encode_fiducials, fiducials_fit
+from rhot_node.wire.foreground_map import decode_foreground, encode_foreground, part_room
 from rhot_node.wire.marker_table import candidate_table, marker_table
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
     Fiducials,
     Find,
+    ForegroundPart,
     Here,
     MarkerFlag,
     Message,
     NodeState,
     Observations,
     SliceEdges,
+    Slices,
     Start,
     StartEntry,
     Stop,
@@ -37,6 +40,7 @@ from rhot_node.wire.plausible import (
     expect_time,
     expect_zeros,
 )
+from rhot_node.wire.slices import decode_slices, encode_slices, slices_fit
 
 # -- authentication tags -----------------------------------------------------------------------------------------------
 # Keyed BLAKE2b, 16 bytes at the end of a datagram (docs/wire.md, "Tags").
@@ -85,6 +89,8 @@ TYPE_FIND = 6
 TYPE_HERE = 7
 TYPE_FIDUCIALS = 8
 TYPE_EDGES = 9
+TYPE_SLICES = 10
+TYPE_FOREGROUND = 11
 
 MARKERS_MAX = 64
 DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
@@ -98,6 +104,8 @@ _MARKER = Struct("<HHfffffff")
 CANDIDATES_FIT = (DATAGRAM_MAX - _HEADER.size - _OBSERVATIONS.size - TAG_LENGTH) // _MARKER.size
 FIDUCIALS_FIT = fiducials_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 EDGES_FIT = edges_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
+SLICES_FIT = slices_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
+FOREGROUND_FIT = part_room(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 _CLOCK_REQUEST = Struct("<q")
 _CLOCK_REPLY = Struct("<qqqIB3s")
 _START = Struct("<B3s")
@@ -225,6 +233,11 @@ def _encode(message: Message) -> bytes:
                 raise WireError("count", f"{len(message.edges)} edges, at most {EDGES_FIT} in a datagram")
             return (_header(TYPE_EDGES, message.node_id, message.session, message.sequence)
                     + encode_edges(message))
+        case Slices():
+            return _header(TYPE_SLICES, message.node_id, message.session, message.sequence) + encode_slices(message)
+        case ForegroundPart():
+            return (_header(TYPE_FOREGROUND, message.node_id, message.session, message.sequence)
+                    + encode_foreground(message))
 
 
 def _header(kind: int, node_id: int, session: int, sequence: int, version: int = VERSION) -> bytes:
@@ -334,4 +347,6 @@ _DECODERS: dict[int, Callable[[memoryview, int, int, int], Message]] = {
     TYPE_HERE: decode_here,
     TYPE_FIDUCIALS: decode_fiducials,
     TYPE_EDGES: decode_edges,
+    TYPE_SLICES: decode_slices,
+    TYPE_FOREGROUND: decode_foreground,
 }

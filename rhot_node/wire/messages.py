@@ -235,7 +235,29 @@ class Fiducials:
 
 
 @dataclass(frozen=True, slots=True)
-class SliceEdge:
+class Slices:
+    """Master to node: short line segments across which edges are to be found in every image, and whether a foreground
+    map is wanted. In force until the next request, or for a second.
+
+    Part `part` of `parts`; `slice_count` slices in all. `width`, `height`: of the image that they are meant for, px.
+    `map_step`: every so many px of the image a foreground probability is wanted; 0: none. `records`: the slices of
+    this part as `wire.slices` packs them.
+    """
+
+    node_id: int
+    session: int
+    sequence: int
+    request: int
+    width: int
+    height: int
+    slice_count: int
+    part: int
+    parts: int
+    map_step: int
+    records: bytes
+
+
+class SliceEdge(msgspec.Struct, frozen=True, gc=False):
     """One edge on a slice, a short line segment in the image that the master asked for.
 
     `offset` px along the slice's normal from its centre, with standard deviation `sd` px. `strength`: grey levels per
@@ -273,4 +295,28 @@ class SliceEdges:
     edges: Sequence[SliceEdge]
 
 
-Message = Observations | ClockRequest | ClockReply | Start | Stop | Find | Here | Fiducials | SliceEdges
+@dataclass(frozen=True, slots=True)
+class ForegroundPart:
+    """A part of the foreground map of one frame: `data`, a piece of the compressed map (`wire.foreground_map`). Times
+    and image size are as in `Observations`; `request` is that of the `Slices` that asked for it."""
+
+    node_id: int
+    session: int
+    sequence: int
+    t_frame_node_ns: int
+    t_send_node_ns: int
+    processing_ns: int
+    exposure_ns: int
+    row_time_ns: int
+    width: int
+    height: int
+    frame_number: int
+    request: int
+    step: int
+    part: int
+    parts: int
+    data: bytes
+
+
+Message = (Observations | ClockRequest | ClockReply | Start | Stop | Find | Here | Fiducials | SliceEdges
+           | Slices | ForegroundPart)

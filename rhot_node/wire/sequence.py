@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 
 
-class Verdict(enum.Enum):
+class SequenceVerdict(enum.Enum):
     """What one sequence number says about its datagram."""
 
     FRESH = 0  # newer than all before
@@ -26,17 +26,17 @@ class SequenceWindow:
         self._seen = 0  # bit k: number newest - k has come
         self.lost = 0
 
-    def judge(self, sequence: int) -> Verdict:
+    def judge(self, sequence: int) -> SequenceVerdict:
         """What `sequence` says, without taking it in: a datagram refused for another reason must leave no trace."""
         newest = self._newest
         if newest is None:
-            return Verdict.FRESH
+            return SequenceVerdict.FRESH
         ahead = sequence - newest
         if ahead > 0:
-            return Verdict.FRESH if ahead <= self._longest_jump else Verdict.JUMP
+            return SequenceVerdict.FRESH if ahead <= self._longest_jump else SequenceVerdict.JUMP
         if -ahead >= self._size:
-            return Verdict.STALE
-        return Verdict.DUPLICATE if self._seen >> -ahead & 1 else Verdict.LATE
+            return SequenceVerdict.STALE
+        return SequenceVerdict.DUPLICATE if self._seen >> -ahead & 1 else SequenceVerdict.LATE
 
     def take(self, sequence: int) -> None:
         """Take in a number that was judged FRESH or LATE."""

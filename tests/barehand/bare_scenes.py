@@ -7,15 +7,15 @@ from functools import lru_cache
 import numpy as np
 from pictures import picture, two_cameras, wall
 
-from rhot_app.barehand.surface import Surface, surface_of
+from rhot_app.barehand.surface import SHAPE, Surface, surface_of
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.model import HandModel, build_model
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
 from rhot_app.simulator.scene.motion import load_motion
-from rhot_app.tracking.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 
@@ -50,7 +50,7 @@ def rig_of(cameras: list[CameraModel], hand: HandAnatomy) -> Rig:
 
 def state_of(pose: HandPose) -> np.ndarray:
     """The estimator's state of a hand at rest."""
-    state = np.zeros(BIAS + 3)
+    state = np.zeros(BIAS + SHAPE)
     state[:ANGLES], state[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
     return state
 

@@ -11,7 +11,7 @@ from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.residual import Rows
 from rhot_app.hand.kinematics import forward
-from rhot_app.tracking.hand_process import BIAS, MOTION
+from rhot_app.hand.motion.hand_process import BIAS, MOTION
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
 
 FPS = 60.0

@@ -10,23 +10,23 @@ from pictures import picture, two_cameras
 from rhot_app.barehand.contour_residual import ContourFrame, slices_of
 from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_points
 from rhot_app.barehand.features import feature_points
-from rhot_app.barehand.surface import Surface
+from rhot_app.barehand.surface import FOREARM_TURN, SHAPE, Surface
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.tracking.hand_process import FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
+from rhot_app.hand.motion.hand_process import BIAS, FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
 from rhot_node.detect.edges import MOST, Edges, find_edges, noise_of
 from rhot_node.detect.foreground import learn_background, skin_foreground
 
 
 def process_of(side: str = "right") -> HandProcess:
     model, surface = model_and_surface(side)
-    return HandProcess(surface.dh, model.limits, model.natural.mean, np.linalg.inv(model.natural.information),
-                       PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.zeros((1, 3, 3)), 1e3)
+    return HandProcess(surface.dh, model.limits, model.pose_prior.mean, np.linalg.inv(model.pose_prior.information),
+                       PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.zeros((SHAPE // 3, 3, 3)), 1e3)
 
 
 def frame_of(surface: Surface, state: np.ndarray, camera: CameraModel, features: bool = False) -> ContourFrame:
     source = feature_points if features else contour_points
     pose, size = camera.camera_from_world[:3].copy(), (camera.width, camera.height)
-    points = source(surface, state, np.zeros(3), pose, camera.intrinsics, size)
+    points = source(surface, state, state[BIAS:].copy(), pose, camera.intrinsics, size)
     return slices_of(surface, state, 1e-6 * np.eye(process_of().size), pose, camera.intrinsics, points, MOTION, 0.0,
                      3.0, 20.0)
 
@@ -40,7 +40,7 @@ def test_silhouette_points_lie_between_hand_and_background(side: str, motion: st
         bright = np.zeros((camera.height, camera.width, 3))
         drawn = picture(surface, pose.world_from_palm, pose.angles, camera, bright, 0, blur_px=0.0, noise=0.0)
         mask = drawn[..., 0] > 0
-        points = contour_points(surface, state_of(pose), np.zeros(3), camera.camera_from_world[:3].copy(),
+        points = contour_points(surface, state_of(pose), np.zeros(SHAPE), camera.camera_from_world[:3].copy(),
                                 camera.intrinsics, (camera.width, camera.height))
         silhouette = points.behind == SILHOUETTE
         assert np.count_nonzero(silhouette) > 80
@@ -54,6 +54,8 @@ def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> No
     _, surface = model_and_surface()
     process, pose = process_of(), poses("grasp", (0.9,))[0]
     camera, state = two_cameras()[1], state_of(pose)
+    state[BIAS:] = np.random.default_rng(0).normal(0.0, 0.05, SHAPE)
+    state[BIAS + FOREARM_TURN:] = 0.4, -0.2
     frame = frame_of(surface, state, camera, features)
     start, rows, good = frame.predict(state)
     assert good.all()
@@ -72,7 +74,7 @@ def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> No
 def test_edges_within_the_hand_are_told_from_its_silhouette() -> None:
     _, surface = model_and_surface()
     pose, camera = poses("grasp", (1.4,))[0], two_cameras()[0]
-    points = contour_points(surface, state_of(pose), np.zeros(3), camera.camera_from_world[:3].copy(),
+    points = contour_points(surface, state_of(pose), np.zeros(SHAPE), camera.camera_from_world[:3].copy(),
                             camera.intrinsics, (camera.width, camera.height))
     assert np.any(points.behind == INNER)
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rhot_app.barehand.landmark_card import landmark_set
 from rhot_app.errors import RigError
+from rhot_app.hand.landmarks import landmark_set
 from rhot_app.hand.skeleton import JOINTS
 
 CARD = """name = "other order"

@@ -12,12 +12,12 @@ import numpy as np
 
 from rhot_app.calibration.colour.colours import ColourReport, solve_colours
 from rhot_app.calibration.colour.samples import ColourSamples
-from rhot_app.simulator.nodes.shot import make_renderer, make_shot
+from rhot_app.simulator.film.scene_objects import SceneObject
+from rhot_app.simulator.film.shot import make_renderer, make_shot
 from rhot_app.simulator.render.body import SKIN_RGB, HandBody
+from rhot_app.simulator.render.camera_controls import Lamp
 from rhot_app.simulator.render.render import FrameRenderer
-from rhot_app.simulator.scene.camera_controls import Lamp
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
-from rhot_app.simulator.scene.scene_objects import SceneObject
 from rhot_node.detect.colour import box_mask, colours_of
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_i420

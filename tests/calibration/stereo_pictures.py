@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Chessboard
 from rhot_app.calibration.board.corners import BoardView, detect
-from rhot_app.calibration.board.shared_views import SharedViews, Shot
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.lens.fit import LensStart
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "stereo_chessboard"
@@ -43,7 +43,7 @@ def shared(left: list[BoardView | None], right: list[BoardView | None],
            names: tuple[str, str] = ("left", "right"), most: int = 14) -> SharedViews:
     """Shots of two lists, pair by pair; the first `most` of them."""
     pairs = list(zip(left, right, strict=False))[:most]
-    return SharedViews(names, BOARD, tuple(Shot(f"{number:02d}", pair) for number, pair in enumerate(pairs, 1)))
+    return SharedViews(names, BOARD, tuple(BoardShot(f"{number:02d}", pair) for number, pair in enumerate(pairs, 1)))
 
 
 def rough() -> list[LensStart]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board, Chessboard
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.shared_views import SharedViews, Shot
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid
@@ -43,7 +43,7 @@ class Twin:
         shots = []
         for number, world_from_board in enumerate(self.world_from_board):
             views = tuple(self._view(camera, world_from_board, rng, noise_px) for camera in range(len(self.names)))
-            shots.append(Shot(f"{number + 1:02d}", views))
+            shots.append(BoardShot(f"{number + 1:02d}", views))
         return SharedViews(self.names, self.board, tuple(shots))
 
     def _view(self, camera: int, world_from_board: Array, rng: np.random.Generator | None,

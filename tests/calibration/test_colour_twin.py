@@ -12,7 +12,7 @@ from rhot_app.calibration.check.camera_advice import FlickerWatch
 from rhot_app.calibration.colour.colours import ColourReport
 from rhot_app.calibration.verdict import Grade
 from rhot_app.simulator.render.body import SKIN_RGB
-from rhot_app.simulator.scene.camera_controls import Lamp
+from rhot_app.simulator.render.camera_controls import Lamp
 from rhot_node.detect.image import from_i420
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers

@@ -11,8 +11,8 @@ import pytest
 from colour_scenes import PAINTS, box, picture, place
 
 from rhot_app.__main__ import main
+from rhot_node.commands.detect_command import detect_all
 from rhot_node.detect.image import to_bgr
-from rhot_node.detect_command import detect_all
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

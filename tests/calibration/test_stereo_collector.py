@@ -8,7 +8,7 @@ import numpy as np
 from stereo_twin import BOARD, Twin, stereo_twin
 
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.shared_views import SharedViews, Shot
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.stereo.collector import StereoCollector, guide
 
 NAMES = ("left", "right")
@@ -65,7 +65,7 @@ def test_guidance_leads_to_a_complete_set() -> None:
 def test_views_all_alike_are_not_complete() -> None:
     (views,) = shots(stereo_twin(shots=1))
     rng = np.random.default_rng(0)
-    same = tuple(Shot(str(i), tuple(moved(view, rng.normal()) for view in views)) for i in range(20))
+    same = tuple(BoardShot(str(i), tuple(moved(view, rng.normal()) for view in views)) for i in range(20))
     guidance = guide(SharedViews(NAMES, BOARD, same))
     assert not guidance.near_and_far
     assert not guidance.complete
@@ -78,14 +78,14 @@ def test_a_tilt_counts_at_any_distance() -> None:
     tilted = replace(flat, pixels=corners * [np.cos(np.radians(35.0)), 1.0] + 100.0)
 
     def seen(view: BoardView) -> bool:
-        return guide(SharedViews(NAMES, BOARD, tuple(Shot(str(i), (view, view)) for i in range(6)))).tilted
+        return guide(SharedViews(NAMES, BOARD, tuple(BoardShot(str(i), (view, view)) for i in range(6)))).tilted
 
     assert seen(tilted) and not seen(flat)
 
 
 def test_the_pairs_that_need_views_are_those_that_link_the_cameras() -> None:
     twin = stereo_twin(shots=16)
-    three = tuple(Shot(shot.name, (*shot.views, shot.views[1] if i < 5 else None))
+    three = tuple(BoardShot(shot.name, (*shot.views, shot.views[1] if i < 5 else None))
                   for i, shot in enumerate(twin.views().shots))
     needs = guide(SharedViews((*NAMES, "third"), BOARD, three)).pairs
     assert [(need.first, need.second, need.shared, need.missing) for need in needs] in (

@@ -10,7 +10,7 @@ from patience import quickest
 from stereo_twin import BOARD, LENSES, RIGHT_FROM_LEFT, SIZE, Twin, stereo_twin, with_boards
 
 from rhot_app.calibration.board.boards import CharucoBoard, Chessboard
-from rhot_app.calibration.board.shared_views import SharedViews, Shot
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.calibrate import calibrate, solve
@@ -66,8 +66,8 @@ def test_many_cameras_stand_where_they_stand() -> None:
 
 def test_cameras_that_never_meet_are_linked_by_others() -> None:
     twin = ring()
-    shots = tuple(Shot(shot.name, (*shot.views[:2], None, None) if i % 3 == 0 else
-                       (None, *shot.views[1:3], None) if i % 3 == 1 else (None, None, *shot.views[2:]))
+    shots = tuple(BoardShot(shot.name, (*shot.views[:2], None, None) if i % 3 == 0 else
+                            (None, *shot.views[1:3], None) if i % 3 == 1 else (None, None, *shot.views[2:]))
                   for i, shot in enumerate(twin.views().shots))
     views = SharedViews(twin.names, twin.board, shots)
     assert views.shared(0, 3) == 0
@@ -79,10 +79,10 @@ def test_cameras_that_never_meet_are_linked_by_others() -> None:
 def test_cameras_without_shared_views_are_named() -> None:
     twin = ring()
     every = twin.views().shots
-    alone = tuple(Shot(shot.name, (*shot.views[:3], None)) for shot in every)
+    alone = tuple(BoardShot(shot.name, (*shot.views[:3], None)) for shot in every)
     with pytest.raises(CalibrationError, match=r"^pi3: no picture shows the board at the same moment"):
         calibrate(SharedViews(twin.names, twin.board, alone), twin.starts())
-    groups = tuple(Shot(shot.name, (*shot.views[:2], None, None) if i % 2 else (None, None, *shot.views[2:]))
+    groups = tuple(BoardShot(shot.name, (*shot.views[:2], None, None) if i % 2 else (None, None, *shot.views[2:]))
                    for i, shot in enumerate(every))
     with pytest.raises(CalibrationError, match=r"^pi2 and pi3: no shot is shared with the group of pi0"):
         calibrate(SharedViews(twin.names, twin.board, groups), twin.starts())
@@ -92,7 +92,7 @@ def test_a_camera_that_saw_another_moment_loses_only_that_view() -> None:
     twin = ring()
     views = twin.views()
     shots = list(views.shots)
-    shots[3] = Shot(shots[3].name, (shots[9].views[0], *shots[3].views[1:]))
+    shots[3] = BoardShot(shots[3].name, (shots[9].views[0], *shots[3].views[1:]))
     report = calibrate(replace(views, shots=tuple(shots)), twin.starts())
     assert [each.name for each in report.dropped] == ["04 of pi0"]
     assert np.allclose(figures(report).state.camera_from_world, twin.camera_from_world, atol=1e-7)
@@ -102,7 +102,7 @@ def test_a_camera_that_saw_another_moment_loses_only_that_view() -> None:
 def test_a_board_that_looks_the_same_turned_may_be_counted_from_either_end(board: Chessboard) -> None:
     twin = stereo_twin(board=board)
     views = twin.views()
-    shots = tuple(Shot(shot.name, (shot.views[0], shot.views[1].turned(board) if i % 2 and shot.views[1] else
+    shots = tuple(BoardShot(shot.name, (shot.views[0], shot.views[1].turned(board) if i % 2 and shot.views[1] else
                                    shot.views[1])) for i, shot in enumerate(views.shots))
     found = figures(calibrate(replace(views, shots=shots), twin.starts()))
     assert np.allclose(found.state.camera_from_world[1], RIGHT_FROM_LEFT, atol=1e-7)
@@ -114,9 +114,9 @@ def test_a_board_seen_in_part_serves() -> None:
     twin = stereo_twin(board=CharucoBoard(10, 7, 0.03, 0.022))
     rng = np.random.default_rng(4)
 
-    def part(shot: Shot) -> Shot:
+    def part(shot: BoardShot) -> BoardShot:
         kept = [np.sort(rng.choice(54, 30, replace=False)) for _ in shot.views]
-        return Shot(shot.name, tuple(replace(view, pixels=view.pixels[those], ids=view.ids[those])  # type: ignore
+        return BoardShot(shot.name, tuple(replace(view, pixels=view.pixels[those], ids=view.ids[those])  # type: ignore
                                      for view, those in zip(shot.views, kept, strict=True)))
 
     views = twin.views()
@@ -131,7 +131,7 @@ def test_a_shot_with_a_bumped_board_is_left_out() -> None:
     left, right = shots[5].views
     assert right is not None
     bumped = replace(right, pixels=right.pixels + np.array([0.0, 3.0]))  # between the exposures
-    shots[5] = Shot(shots[5].name, (left, bumped))
+    shots[5] = BoardShot(shots[5].name, (left, bumped))
     report = calibrate(replace(views, shots=tuple(shots)), twin.starts())
     assert [(each.name, each.code) for each in report.dropped] == [("06", "residual")]
     assert figures(report).noise_px == pytest.approx(0.1, rel=0.1)

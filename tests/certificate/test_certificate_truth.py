@@ -20,8 +20,8 @@ from rhot_app.certificate.recordings import FlashStep, ProtocolFile, StaticStep,
 from rhot_app.certificate.static import judge_static
 from rhot_app.evaluation.fault_injection import changed
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.simulator.nodes.node_log import write_node_log
-from rhot_app.tracking.state import LATENCY_STAGES
+from rhot_app.simulator.film.node_log import write_node_log
+from rhot_app.state import LATENCY_STAGES
 
 pytestmark = pytest.mark.timeout(600)  # eight rigs are recorded and certified before the first test
 

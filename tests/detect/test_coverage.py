@@ -5,9 +5,9 @@ import pytest
 from marker_rendering import SKIN, Canvas, capsule, disc
 from numpy.typing import NDArray
 
-from rhot_node.detect import coverage as c
-from rhot_node.detect import outline as o
 from rhot_node.detect.image import YuvImage
+from rhot_node.detect.region import coverage as c
+from rhot_node.detect.region import outline as o
 
 Array = NDArray[np.float64]
 PAINT = (205.0, 40.0, 165.0)

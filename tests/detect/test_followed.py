@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from marker_rendering import SKIN, Canvas, Rgb, disc
 
-from rhot_node.detect import contour_pixels
-from rhot_node.detect.contour_pixels import COSINES, HALF_COSINES, HALF_SINES, NODES, SINES
 from rhot_node.detect.fast import GLANCE, FastDetector
 from rhot_node.detect.illuminant import Illuminant, gains_of
 from rhot_node.detect.image import YuvImage
+from rhot_node.detect.tracks import contour_pixels
+from rhot_node.detect.tracks.contour_pixels import COSINES, HALF_COSINES, HALF_SINES, NODES, SINES
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerFlag

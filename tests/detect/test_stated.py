@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from marker_rendering import SKIN, to_yuv
 
-from rhot_node.detect import track as st
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage
+from rhot_node.detect.tracks import track as st
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerObservation

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from rhot_node.commands.detect_command import detect_all
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
-from rhot_node.detect_command import detect_all
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 from rhot_node.wire.messages import MarkerObservation

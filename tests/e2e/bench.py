@@ -20,7 +20,7 @@ from rhot_app.engine.status import NodeStatus
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.keys import load_master_keys
 from rhot_app.project import Broadcast, CameraPose, Intrinsics, Rig, RigNode, save_rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node.config import ClockSettings, NodeSettings, save_settings
 from rhot_node.files import resource_path
 from rhot_node.keys import keys_path, pair_beforehand

@@ -21,7 +21,7 @@ from patience import PATIENCE_S, eventually
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.directory import EngineDirectory
 from rhot_app.engine.process import StartedProcess, start_ticks, started_processes
-from rhot_app.tracking.state import Condition
+from rhot_app.state import Condition
 
 README_PICTURE = Path(__file__).parents[2] / "docs" / "screenshots" / "demo.png"
 GRAB = """

@@ -10,7 +10,7 @@ from bench import FPS, START_S, TEST_S, Bench, node_status, states_of, wait_unti
 from scene import PERIOD_S, Scene
 
 from rhot_app.engine.client import EngineClient
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_node.files import write_atomically
 
 SECONDS = 4.0  # of motion; the recordings hold a little more

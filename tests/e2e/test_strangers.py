@@ -20,7 +20,7 @@ from patience import PATIENCE_S
 from scene import Scene
 
 from rhot_app.engine.client import EngineClient
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_node.clock import NodeClock
 from rhot_node.keys import KeyPair, connect_with, new_key_pair
 from rhot_node.wire.codec import Seal, encode

@@ -13,7 +13,7 @@ from patience import PATIENCE_S
 from scene import Scene, project
 
 from rhot_app.engine.client import EngineClient
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 
 RATE_HZ = 40.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rhot_app.project import Rig
-from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 
 

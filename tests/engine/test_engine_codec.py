@@ -9,7 +9,7 @@ from patience import quickest
 from rhot_app.engine import status
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, Preview
 from rhot_app.errors import EngineError
-from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 
 
 def make_state(markers: int = 6, cameras: int = 2) -> HandState:

@@ -22,7 +22,7 @@ from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.links import UdpNodes
 from rhot_app.sources.replay import LogReplay, LogValidator
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node.clock import NodeClock
 
 

@@ -6,7 +6,7 @@ import pytest
 from test_engine_codec import make_state
 
 from rhot_app.engine.observer import condition_of
-from rhot_app.tracking.state import Condition
+from rhot_app.state import Condition
 
 TRACKING, PARTIAL, LOST, SEARCHING = Condition.TRACKING, Condition.PARTIAL, Condition.LOST, Condition.SEARCHING
 

@@ -18,7 +18,7 @@ from rhot_app.errors import EngineError
 from rhot_app.project import save_rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 IMPORTED = """
 import sys

@@ -23,7 +23,7 @@ from rhot_app.recording.bookmarks import Bookmark, read_bookmarks
 from rhot_app.recording.video import video_name
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.links import UdpNodes
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node.wire.messages import NodeState
 
 

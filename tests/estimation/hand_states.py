@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from synthetic_rig import WIDE, make_rig
 
 from rhot_app.hand.kinematics import forward_arrays
-from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY, HandProcess
+from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY, HandProcess
 from rhot_app.tracking.marker_model import compile_markers
 
 SPREAD = np.array([0.2, 0.6])
@@ -25,19 +25,19 @@ def markers(bodies=False):
 
 def make_process(bodies=False, slowest=SLOWEST, fastest=FASTEST):
     model = markers(bodies)
-    natural = model.natural
-    return HandProcess(model.dh, model.limits, natural.mean, np.linalg.inv(natural.information), SPREAD, slowest,
+    prior = model.pose_prior
+    return HandProcess(model.dh, model.limits, prior.mean, np.linalg.inv(prior.information), SPREAD, slowest,
                        fastest, np.tile(1e-6 * np.eye(3), (len(model.finger), 1, 1)), BIAS_S)
 
 
 def natural_state(rng, distance_m=0.6):
     """A hand at rest in a natural pose, turned any way."""
-    natural, state = markers().natural, np.zeros(BIAS + 3 * len(markers().finger))
+    prior, state = markers().pose_prior, np.zeros(BIAS + 3 * len(markers().finger))
     world = np.eye(4)
     world[:3, :3] = Rotation.random(random_state=rng).as_matrix()
     world[:3, 3] = rng.normal([0.03, 0.0, distance_m], 0.02)
     state[:ANGLES] = world[:3].ravel()
-    state[ANGLES:VELOCITY] = rng.multivariate_normal(natural.mean, np.linalg.inv(natural.information))
+    state[ANGLES:VELOCITY] = rng.multivariate_normal(prior.mean, np.linalg.inv(prior.information))
     return state
 
 

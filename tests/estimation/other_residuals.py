@@ -10,7 +10,7 @@ from hand_states import tangent_size, world_of
 from rhot_app.estimation.residual import GAUSSIAN, Kernel, Rows, student
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
-from rhot_app.tracking.hand_process import ANGLES, POSE, VELOCITY
+from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
 
 HEAVY_TAILED = student(4.0)
 

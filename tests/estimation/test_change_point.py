@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot_app.estimation.change_point import Change, find_change
+from rhot_app.estimation.change_point import ChangePoint, find_change
 
 PARTS, SIZE = 12, 2
 TIMES_S = 10.0 * np.arange(PARTS)
 ODDS = np.full(PARTS + 1, np.log(1e-3))
 
 
-def found(rng: np.random.Generator, step: np.ndarray, at: int, walk: float = 0.0) -> Change:
+def found(rng: np.random.Generator, step: np.ndarray, at: int, walk: float = 0.0) -> ChangePoint:
     """Twenty noisy observations of the state in each part; from part `at` on it is `step`."""
     matrices, vectors = np.empty((PARTS, SIZE, SIZE)), np.empty((PARTS, SIZE))
     for k in range(PARTS):

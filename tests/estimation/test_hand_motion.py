@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from rhot_app.tracking.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -96,8 +96,8 @@ def test_what_markers_leave_open_is_known_as_well_as_the_natural_pose_tells():
     state = settled(process, 5)
     covariance = process.predict(state, 1e-12 * np.eye(process.size), 1e-9)[1][:POSE, :POSE]
     free = open_directions(state)
-    natural = np.linalg.inv(free[6:].T @ markers().natural.information @ free[6:])
-    np.testing.assert_allclose(free.T @ covariance @ free, natural, atol=0.05 * np.abs(natural).max())
+    prior = np.linalg.inv(free[6:].T @ markers().pose_prior.information @ free[6:])
+    np.testing.assert_allclose(free.T @ covariance @ free, prior, atol=0.05 * np.abs(prior).max())
 
 
 def test_a_thumb_at_its_limits_is_bent_the_other_way_when_that_is_more_probable():

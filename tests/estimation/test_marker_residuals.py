@@ -14,7 +14,7 @@ from hand_states import (
     slopes,
 )
 
-from rhot_app.tracking.hand_process import BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.motion.hand_process import BIAS, MOTION, POSE, VELOCITY
 from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag

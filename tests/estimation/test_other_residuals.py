@@ -11,8 +11,8 @@ from other_residuals import Contact, ImageLine, Landmark, Pinhole
 from scipy.stats import chi2
 
 from rhot_app.estimation.filter import IteratedFilter, update
+from rhot_app.hand.motion.hand_process import POSE
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.tracking.hand_process import POSE
 from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
 

@@ -7,15 +7,15 @@ import pytest
 from linear_motion import ConstantVelocity, kalman_update, place
 
 from rhot_app.engine.replay_summary import replay_states, smoothed_states
-from rhot_app.estimation.filter import ChunkedSmoother, Estimate, IteratedFilter, smooth
+from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, IteratedFilter, smooth
 from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.data_sets import Order, data_set
 from rhot_app.project import with_tracker
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import Condition
 from rhot_app.tracking.smoothing import SmoothedTracker
-from rhot_app.tracking.state import Condition
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
@@ -32,7 +32,7 @@ def filtered(count, gap_s=0.0, noise=0.2, seed=0):
     estimate.start(0.0, np.array([0.3, -0.2]), np.diag([1.0, 0.5]))
     for k, t in enumerate(times):
         knots.append(estimate.add(t, [place(np.sin(t) + rng.normal(0.0, noise), noise**2 * (1.0 if k % 2 else 25.0))]))
-    return [Estimate(knot.t_s, knot.state, knot.covariance, PROCESS, label=k) for k, knot in enumerate(knots)]
+    return [FilteredState(knot.t_s, knot.state, knot.covariance, PROCESS, label=k) for k, knot in enumerate(knots)]
 
 
 def textbook(knots):

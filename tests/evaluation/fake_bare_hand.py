@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import TrackingError
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.simulator.bare_hand.sequence import BareHandTruth
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 
 Array = NDArray[np.float64]
 

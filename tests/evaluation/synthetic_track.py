@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from rhot_app.evaluation.accuracy import WornMarkers
-from rhot_app.evaluation.track import Track
-from rhot_app.simulator.truth.truth import FrameTruth, Truth
-from rhot_app.tracking.state import Knowledge
+from rhot_app.evaluation.track import TrackedStates
+from rhot_app.simulator.film.truth import FrameTruth, Truth
+from rhot_app.state import Knowledge
 
 WORN = WornMarkers(np.arange(5), np.arange(5), np.arange(21))
 PLACES = np.array([[0.02 * k, 0.0, 0.6] for k in range(6)])
@@ -34,7 +34,7 @@ def make_truth(way: Way = still, seconds: float = 4.0, visible: float = 1.0) -> 
 
 
 def make_track(truth: Truth, times_s: np.ndarray, *, off: np.ndarray | float = 0.0, late_s: float = 0.0,
-               knowledge: int = Knowledge.MEASURED, covariance: np.ndarray | None = None) -> Track:
+               knowledge: int = Knowledge.MEASURED, covariance: np.ndarray | None = None) -> TrackedStates:
     """States at `times_s` that show the truth of `late_s` ago, off by `off` (N, 1, 3) or a number along x, m."""
     count = len(times_s)
     offset = np.zeros((count, 1, 3))
@@ -48,7 +48,7 @@ def make_track(truth: Truth, times_s: np.ndarray, *, off: np.ndarray | float = 0
 
     def tiled(*shape: int) -> np.ndarray:
         return np.broadcast_to(block, (*shape, 3, 3)).copy()
-    return Track(
+    return TrackedStates(
         times_s=times_s, receive_s=times_s + LATE_S, marker_positions=markers, marker_raw_positions=markers,
         marker_covariances=tiled(count, 6), marker_knowledge=np.full((count, 6), knowledge, np.uint8),
         joint_positions=joints, joint_covariances=tiled(count, 21),

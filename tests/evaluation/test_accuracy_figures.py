@@ -10,16 +10,16 @@ from synthetic_track import LATE_S, WORN, make_track, make_truth
 
 from rhot_app.evaluation.accuracy import accuracy, deviations, display_error, pooled, predicted, ratio, squares, worn_by
 from rhot_app.evaluation.compare import COLUMNS, Comparison, Judged, Run, consistency_table, table
-from rhot_app.evaluation.track import Predicted, Track
+from rhot_app.evaluation.track import Predicted, TrackedStates
 from rhot_app.project import load_rig
-from rhot_app.simulator.truth.truth import Truth
-from rhot_app.tracking.state import Knowledge
+from rhot_app.simulator.film.truth import Truth
+from rhot_app.state import Knowledge
 from rhot_node.files import resource_path
 
 TIMES = np.arange(0.5, 3.5, 0.025)
 
 
-def judge(track: Track, truth: Truth) -> Judged:
+def judge(track: TrackedStates, truth: Truth) -> Judged:
     off = deviations(track, truth, WORN)
     return Judged(accuracy(track, off, truth, WORN), squares(track, off, WORN))
 

@@ -7,7 +7,7 @@ import pytest
 
 from rhot_app.evaluation.score import TrueSamples, count_swaps, jitter, score, state_ages
 from rhot_app.hand.skeleton import ANGLES, JOINTS, TIP_ROLES
-from rhot_app.tracking.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 
 ROLES = [*TIP_ROLES, "wrist"]
 IDS = ("thumb", "index", "middle", "ring", "little", "wrist")

@@ -16,9 +16,9 @@ from rhot_app.evaluation.data_sets import LOG_NAME, DataSet, Order, Stream, data
 from rhot_app.evaluation.track import tracked
 from rhot_app.project import TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.nodes.film import Report
-from rhot_app.simulator.nodes.node_log import CABLE, Network
-from rhot_app.simulator.nodes.shot import Shot
+from rhot_app.simulator.film.film import Report
+from rhot_app.simulator.film.node_log import CABLE, Network
+from rhot_app.simulator.film.shot import Shot
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.tracker import CameraObservations

@@ -11,7 +11,7 @@ from tracked_log import states_of_log
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
 from rhot_app.export.states import HandStates
 from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header, encode_record
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 GAP_NS = T0_MASTER_NS + 700_000_000, T0_MASTER_NS + 1_400_000_000

@@ -20,9 +20,9 @@ from rhot_app.export.bare_hand import lost_intervals
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, save_rig
-from rhot_app.recording.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
 from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
+from rhot_app.sources.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
 from rhot_node.detect.image import from_bgr
 from rhot_node.video.avi import Stamp, append_picture, begin_video, encode_picture, finish_video
 from rhot_node.wire.codec import encode

@@ -26,9 +26,9 @@ def random_pose(model, rng, world=None):
 
 def natural_angles(model, rng, count):
     """(count, 21) draws of the natural pose, within the limits."""
-    spread = np.linalg.cholesky(np.linalg.inv(model.natural.information))
+    spread = np.linalg.cholesky(np.linalg.inv(model.pose_prior.information))
     low, high = model.limits.T
-    return np.clip(model.natural.mean + rng.normal(size=(count, 21)) @ spread.T, low + 0.01, high - 0.01)
+    return np.clip(model.pose_prior.mean + rng.normal(size=(count, 21)) @ spread.T, low + 0.01, high - 0.01)
 
 
 def natural_motion(model, rng, frames, frames_per_pose=100):

@@ -170,6 +170,9 @@ def test_saved_files_read_back_and_the_shipped_one_is_as_saved(tmp_path):
 
 @pytest.mark.parametrize(("changes", "complaint"), [
     ({"frames": [{"name": "arm", "parent": "shade"}]}, '"arm" hangs on "shade"'),
+    ({"frames": LAMP["frames"][::-1]}, '"pole", which comes later; put it before'),
+    ({"frames": [{"name": "pole", "parent": "arm"}, {"name": "arm", "parent": "pole"}]},
+     'in a loop: "pole" on "arm" on "pole"'),
     ({"frames": [*LAMP["frames"], {"name": "arm", "parent": "foot"}]}, 'two frames named "arm"'),
     ({"frames": LAMP["frames"][:1], "points": []}, '"nod" turns no frame'),
     ({"angles": [{"name": "swing"}]}, 'turned by "nod"'),

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhot_app.hand.finger_chain import Status
 from rhot_app.hand.solvers.fabrik import solve_chain
+from rhot_app.hand.solvers.finger_chain import Status
 
 
 def published(joints, target, tolerance, iterations):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hand_samples import natural_angles, natural_motion, random_pose, random_world
 
-from rhot_app.hand.finger_chain import Status, chain_points, fabrik_finger, fabrik_thumb
-from rhot_app.hand.finger_ik import solve_finger, solve_fingers, to_finger
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.limits import clamp_angle
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.hand.solvers.fabrik import angles_from_joints
+from rhot_app.hand.solvers.finger_chain import Status, chain_points, fabrik_finger, fabrik_thumb
+from rhot_app.hand.solvers.finger_ik import solve_finger, solve_fingers, to_finger
 
 HUNDREDTH_DEGREE = np.radians(0.01)
 

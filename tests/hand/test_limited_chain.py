@@ -10,10 +10,10 @@ from hand_samples import random_pose, rotation_about
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhot_app.hand.finger_chain import Status
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import inter_finger, neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
+from rhot_app.hand.solvers.finger_chain import Status
 from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, excess, shape_knuckles, slice_flexion, swing, unswing
 from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
 from rhot_app.hand.solvers.methods import (

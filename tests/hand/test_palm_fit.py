@@ -7,11 +7,11 @@ import pytest
 from hand_samples import natural_angles, natural_motion, random_world, rotation_about
 from scipy.spatial.transform import Rotation
 
-from rhot_app.hand.finger_ik import solve_fingers
 from rhot_app.hand.kinematics import forward, rotation_vector
 from rhot_app.hand.model import neutral_pose
-from rhot_app.hand.palm_fit import fit_palm
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.hand.solvers.finger_ik import solve_fingers
+from rhot_app.hand.solvers.palm_fit import fit_palm
 
 
 def rotation_error_deg(found, true):
@@ -85,7 +85,7 @@ def test_fingers_reach_their_markers_from_the_fitted_palm(right_hand):
 
 def test_relaxed_hand_without_noise_is_found_exactly(right_hand):
     """The natural pose itself costs nothing, so nothing pulls the fit away from it."""
-    pose = HandPose(random_world(np.random.default_rng(6)), right_hand.natural.mean)
+    pose = HandPose(random_world(np.random.default_rng(6)), right_hand.pose_prior.mean)
     points = forward(right_hand, pose)
     fit = fit_palm(right_hand, points.joints[0], points.marker_centres, None, 0.0)
     assert fit is not None and fit.cost < 1e-3

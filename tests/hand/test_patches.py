@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hand_samples import random_pose
 
-from rhot_app.hand.finger_ik import solve_finger, solve_fingers
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, neutral_pose
-from rhot_app.hand.palm_fit import fit_palm
 from rhot_app.hand.places import patch_of, place_of, segment_axis, with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, HandPose
+from rhot_app.hand.solvers.finger_ik import solve_finger, solve_fingers
+from rhot_app.hand.solvers.palm_fit import fit_palm
 from rhot_node.files import resource_path
 from rhot_node.markers import Marker, MarkerSet, load_markers
 

@@ -6,9 +6,10 @@ from hand_samples import random_world
 from scipy.spatial.transform import Rotation
 
 from rhot_app.hand.kinematics import TWIST, forward, move
+from rhot_app.hand.limits import PERSON_LIMIT_SD_RAD
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.tracking.size_evidence import LIMIT_SD_RAD, Fitting, Posture, implausibility, linearise
+from rhot_app.tracking.size_evidence import Fitting, Posture, implausibility, linearise
 
 SIZE = TWIST + len(ANGLES)
 ROWS = [0, *range(len(JOINTS), len(JOINTS) + 5)]  # wrist and fingertips of the model's own points
@@ -18,7 +19,7 @@ INFORMATION = np.tile(np.eye(3) / SD_M**2, (len(ROWS), 1, 1))
 
 def posture_of(model):
     dh = model.dh._replace(point_row=model.dh.point_row[ROWS], point_offset=model.dh.point_offset[ROWS])
-    return Posture(dh, model.limits, model.natural.mean, model.natural.information)
+    return Posture(dh, model.limits, model.pose_prior.mean, model.pose_prior.information)
 
 
 def markers_of(model, pose, scale):
@@ -44,10 +45,10 @@ def curve(model, pose, true_log_scale, grid):
 
 def plain_cost(model, places, information, scale, pose):
     off = np.nan_to_num(places - markers_of(model, pose, scale))
-    away = pose.angles - model.natural.mean
-    beyond = np.stack([model.limits[:, 0] - pose.angles, pose.angles - model.limits[:, 1]]) / LIMIT_SD_RAD
+    away = pose.angles - model.pose_prior.mean
+    beyond = np.stack([model.limits[:, 0] - pose.angles, pose.angles - model.limits[:, 1]]) / PERSON_LIMIT_SD_RAD
     soft = 0.5 * (beyond + np.hypot(beyond, 1.0))
-    return 0.5 * (np.einsum("mi,mij,mj->", off, information, off) + away @ model.natural.information @ away
+    return 0.5 * (np.einsum("mi,mij,mj->", off, information, off) + away @ model.pose_prior.information @ away
                   + (soft**2).sum())
 
 
@@ -101,7 +102,7 @@ def test_a_stretched_hand_is_not_smaller_and_hardly_larger(right_hand, true):
 
 def test_a_bent_hand_says_less_than_a_stretched_one(right_hand):
     grid, world = 0.0125 * np.arange(-8, 9), random_world(np.random.default_rng(9))
-    bent = HandPose(world, np.clip(right_hand.natural.mean + np.radians(10.0), *right_hand.limits.T))
+    bent = HandPose(world, np.clip(right_hand.pose_prior.mean + np.radians(10.0), *right_hand.limits.T))
     spreads = []
     for pose in (bent, stretched(world)):
         values = curve(right_hand, pose, 0.0, grid)

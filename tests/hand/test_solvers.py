@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot_app.hand.anatomy import DIP_PER_PIP
-from rhot_app.hand.finger_chain import Status, chain_points
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.hand.solvers.fabrik import solve_chain
+from rhot_app.hand.solvers.finger_chain import Status, chain_points
 from rhot_app.hand.solvers.inverse import damped_step, svd_step
 from rhot_app.hand.solvers.methods import COARSE, EFFORT, Effort, Method, solve
 from rhot_app.hand.solvers.newton import chain_axes

@@ -13,9 +13,9 @@ NODE_BASE = ("rhot_node.errors", "rhot_node.files", "rhot_node.clock", "rhot_nod
 APP_BASE = ("rhot_node", "resources", "rhot_app.errors", "rhot_app.progress", "rhot_app.project",
             "rhot_app.rig_history", "rhot_app.keys")
 MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
-SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects", "rhot_app.barehand")
+SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
-BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.tracking", *ENGINE_SIDE)
+BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.tracking", "rhot_app.barehand", *ENGINE_SIDE)
 
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # the node
@@ -35,17 +35,21 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
                          "rhot_app.objects.object_file"),
     "rhot_app.objects.object_file": ("rhot_node", "rhot_app.errors", "rhot_app.geometry.transforms"),
     "rhot_app.geometry": APP_BASE,
+    "rhot_app.geometry.transforms": (),
     "rhot_app.filters": APP_BASE,
     "rhot_app.estimation": (),
     "rhot_app.hand": (*APP_BASE, *MODELS),
-    "rhot_app.calibration": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand.landmarks"),
+    "rhot_app.hand.anatomy": ("rhot_node", "rhot_app.errors", "rhot_app.hand.skeleton"),
+    "rhot_app.hand.skeleton": (),
+    "rhot_app.calibration": (*APP_BASE, *MODELS, "rhot_app.hand"),
     "rhot_app.calibration.commands": BELOW_ENGINE,  # they read logs
     "rhot_app.calibration.recorded_observations": BELOW_ENGINE,  # reads them for all
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),
-    "rhot_app.objects.alignment_command": BELOW_ENGINE,
-    "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.tracking.hand_process",
-                          "rhot_app.tracking.state", "rhot_app.tracking.estimator_state"),  # one process for all kinds
-    "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS),
+    "rhot_app.objects.alignment.alignment_command": BELOW_ENGINE,
+    "rhot_app.state": ("rhot_app.objects.state",),
+    "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.state"),
+    "rhot_app.articulated": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand"),
+    "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.barehand"),
     "rhot_app.recording": BELOW_ENGINE,
     "rhot_app.sources": BELOW_ENGINE,
     "rhot_app.outputs": BELOW_ENGINE,
@@ -128,17 +132,17 @@ def _forbidden(module: str, imported: str) -> str | None:
         return f"only {', '.join(rooms) or 'nobody'} may import {top}"
     if top not in ("rhot_node", "rhot_app", "resources"):
         return None
-    room = _room(module)
+    own = room(module)
     if imported == top and (top == "rhot_node" or module.startswith("rhot_app")):
         return None  # the bare package, to ask where it lies
-    allowed = MAY_IMPORT[room]
-    inside = room if "." in room else module
+    allowed = MAY_IMPORT[own]
+    inside = own if "." in own else module
     if _within(imported, inside) or _within_any(imported, allowed):
         return None
-    return f"{room} may import only {', '.join(allowed) or 'nothing of this project'}"
+    return f"{own} may import only {', '.join(allowed) or 'nothing of this project'}"
 
 
-def _room(module: str) -> str:
+def room(module: str) -> str:
     """The row of the table that decides for a module. Raises KeyError for a room the table does not know."""
     rows = [row for row in MAY_IMPORT if _within(module, row) and (row != "rhot_app" or module == "rhot_app")]
     if not rows:

@@ -11,9 +11,10 @@ import pytest
 from rhot_app import project
 from rhot_app.calibration.lens import intrinsics
 from rhot_app.hand import anatomy, articulated
-from rhot_app.objects import alignment_file, object_file
+from rhot_app.objects import object_file
+from rhot_app.objects.alignment import alignment_file
 from rhot_app.objects.state import ObjectState
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_node import config, markers
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -33,7 +34,7 @@ PAGES: tuple[tuple[str, str, int, tuple[type[msgspec.Struct], ...]], ...] = (
         object_file.SphereShape, object_file.CylinderShape)),
     ("hand.md", anatomy.FORMAT, anatomy.VERSION, (anatomy.HandAnatomy, anatomy.FingerAnatomy, anatomy.Coupling)),
     ("hand.md", articulated.FORMAT, articulated.VERSION, (
-        articulated.Articulated, articulated.Root, articulated.Frame, articulated.Angle, anatomy.Coupling,
+        articulated.Articulated, articulated.Root, articulated.ArticulatedFrame, articulated.Angle, anatomy.Coupling,
         articulated.Point, articulated.Capsule, articulated.Box)),
     ("node.md", config.FORMAT, config.VERSION, (
         config.NodeSettings, config.CameraSettings, config.TagSettings, config.ClockSettings)),

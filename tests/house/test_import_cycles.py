@@ -1,4 +1,4 @@
-"""No module needs, when it is imported, one that needs it."""
+"""No module needs, when it is imported, one that needs it, and no room a room that needs it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
-from import_rules import module_name
+from import_rules import imports_of, module_name, room
 
 ROOT = Path(__file__).parents[2]
 
@@ -40,3 +40,31 @@ def test_a_planted_circle_is_found() -> None:
     modules = {"a.b": "from a import c", "a.c": "from a.d import thing", "a.d": "import os\nimport a.b"}
     with pytest.raises(CycleError):
         TopologicalSorter(imports(modules)).prepare()
+
+
+def rooms() -> dict[str, set[str]]:
+    """By room: the rooms that its files import anywhere. Commands, which only `__main__` imports, are one room; the
+    folders of simulator and window are rooms of their own."""
+    def room_of(module: str) -> str:
+        if module.endswith("_command") or ".commands." in module:
+            return "commands"
+        found = room(module)
+        if found not in ("rhot_app.simulator", "rhot_app.ui"):
+            return found
+        return module if paths[module].name == "__init__.py" else module.rpartition(".")[0]
+    paths = {module_name(path, ROOT): path for path in (ROOT / "rhot_app").rglob("*.py")}
+    found: dict[str, set[str]] = {}
+    for module, path in paths.items():
+        own = found.setdefault(room_of(module), set())
+        for one in imports_of(path.read_text(), path, ROOT):
+            name = one.name if one.name in paths else one.name.rpartition(".")[0]
+            own |= {room_of(name)} if name in paths and name != "rhot_app" else set()
+        own.discard(room_of(module))
+    return found
+
+
+def test_no_room_needs_a_room_that_needs_it() -> None:
+    try:
+        TopologicalSorter(rooms()).prepare()
+    except CycleError as exc:
+        pytest.fail("rooms need each other: " + " <- ".join(exc.args[1]))

@@ -11,7 +11,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 from rhot_node.files import resource_path
 
 PERIOD_NS = 10_000_000

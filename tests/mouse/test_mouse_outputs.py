@@ -23,7 +23,7 @@ from rhot_app.mouse import mouse_command
 from rhot_app.mouse.pointer import MouseState
 from rhot_app.mouse.system_pointer import SystemPointer
 from rhot_app.outputs.osc import bundles, mouse_messages
-from rhot_app.tracking.state import Condition
+from rhot_app.state import Condition
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,7 +10,7 @@ import pytest
 from rhot_app.mouse.pick_scene import Ball, PickScene
 from rhot_app.mouse.pointer import MouseState
 from rhot_app.mouse.target_test import EFFECTIVE, TargetTest
-from rhot_app.tracking.state import Condition
+from rhot_app.state import Condition
 
 BALL = Ball("ball", (0.1, 0.0, 0.03), 0.03, (1, 2, 3))
 

@@ -107,7 +107,8 @@ def test_a_cache_is_cold_until_anything_was_compiled(tmp_path: Path, monkeypatch
 def test_a_program_that_loads_numba_first_uses_the_same_folder() -> None:
     folders = []
     for first in ("rhot_node", "numba"):
-        program = f"import {first}; from rhot_node.detect.position import centroid; print(centroid.stats.cache_path)"
+        program = (f"import {first}; from rhot_node.detect.region.position import centroid; "
+                   "print(centroid.stats.cache_path)")
         environment = {name: value for name, value in os.environ.items() if name != VARIABLE}
         said = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True,
                               check=True)

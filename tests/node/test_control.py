@@ -22,6 +22,7 @@ from rhot_node.config import NodeSettings, load_settings, save_settings
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import LinkError
 from rhot_node.files import resource_path
+from rhot_node.foreground_store import ForegroundStore
 from rhot_node.markers import load_markers
 from rhot_node.network.control import ControlServer
 from rhot_node.network.pairing import OfferFile, Reception
@@ -46,9 +47,11 @@ class Served:
         self.store = SettingsStore(folder / "node.json", settings)
         save_settings(self.store.path, settings)
         self.sessions = Sessions()
+        self.foreground = ForegroundStore(folder / "node.foreground.npz")
         self.server = ControlServer(settings, None)
         self.server.start(Responder(self.store, self.sessions, self.server.pictures, NodeClock(),
-                                    lambda: {"state": "ready"}, lambda: {"frames": 12}, None),
+                                    lambda: {"state": "ready"}, lambda: {"frames": 12}, None,
+                                    foreground=self.foreground),
                           Reception(None, OfferFile(folder / "offer.json"), lambda: {"name": "left"}))
         self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.client = self.context.socket(zmq.REQ)
@@ -242,3 +245,29 @@ def test_trust_is_not_changed_from_afar(served: Served) -> None:
     answer = served.ask(request="set_settings", settings={"trust": "paired"})
     assert not answer["ok"] and "settings file" in answer["error"]
     assert served.ask(request="set_settings", settings={"trust": "open", "preview_hz": 3.0})["ok"]
+
+
+def test_background_and_skin_are_learnt_over_the_channel(served: Served) -> None:
+    ending = threading.Event()
+
+    def film() -> None:
+        while not ending.wait(0.005):
+            served.server.pictures.offer(noisy_frame())
+
+    camera = threading.Thread(target=film)
+    camera.start()
+    try:
+        for seconds in (0, 61, None):
+            assert not served.ask(request="learn_background", seconds=seconds)["ok"]
+        assert served.ask(request="learn_background", seconds=0.1) == {"ok": True}
+        eventually(lambda: not served.foreground.learning)
+        assert served.foreground.report(640, 480)["background"]
+        assert served.ask(request="learn_skin") == {"ok": True, "found": False}
+        answer, png = served.ask_raw(b'{"request": "foreground_mask"}')
+        assert json.loads(answer) == {"ok": True, "format": "png", "width": 320, "height": 240}
+        assert cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_GRAYSCALE).shape == (240, 320)
+        assert served.ask(request="forget_foreground") == {"ok": True}
+        assert not served.foreground.report(640, 480)["background"]
+    finally:
+        ending.set()
+        camera.join()

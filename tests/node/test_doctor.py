@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 from machine_fake import machine
 
+import rhot_node.commands.doctor_command
 import rhot_node.compiled
-import rhot_node.doctor_command
 from rhot_node.capture.pi_camera import CameraStack
+from rhot_node.commands.doctor_command import check_camera, check_compiled, check_service, check_settings, examine, run
 from rhot_node.compiled import sources_hash
 from rhot_node.config import NodeSettings, save_settings
-from rhot_node.doctor_command import check_camera, check_compiled, check_service, check_settings, examine, run
 from rhot_node.errors import CameraError
 from rhot_node.files import resource_path
 from rhot_node.health.checks import Check, worst
@@ -47,7 +47,7 @@ def settings(tmp_path: Path) -> Path:
 
 
 def test_a_well_pi_has_nothing_to_complain_of(tmp_path: Path, settings: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rhot_node.doctor_command, "is_compiled_in", lambda _cache: True)
+    monkeypatch.setattr(rhot_node.commands.doctor_command, "is_compiled_in", lambda _cache: True)
     NodeTrust(keys_path(settings)).add(Master(new_key_pair().public_key, "desk"))
     pi = machine(tmp_path / "pi", commands=service("loaded", "active", 0))
     checks = examine(pi, settings, tmp_path, lambda: stack("imx219"))
@@ -122,7 +122,8 @@ def test_the_service(tmp_path: Path, state: tuple[str, str, int], level: str | N
 @pytest.mark.parametrize(("level", "code"), [("ok", 0), ("warning", 1), ("error", 2)])
 def test_exit_code_and_json(level: Any, code: int, monkeypatch: pytest.MonkeyPatch,
                             capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(rhot_node.doctor_command, "examine", lambda *_: [Check("heat", level, "It is so.", "Do it.")])
+    checks = [Check("heat", level, "It is so.", "Do it.")]
+    monkeypatch.setattr(rhot_node.commands.doctor_command, "examine", lambda *_: checks)
     assert run(argparse.Namespace(settings=None, json=True)) == code
     told = json.loads(capsys.readouterr().out)
     assert told == {"verdict": level,

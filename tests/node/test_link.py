@@ -26,6 +26,7 @@ from rhot_node.wire.messages import (
     Message,
     NodeState,
     Observations,
+    Slices,
     Start,
     StartEntry,
     Stop,
@@ -216,3 +217,18 @@ def test_a_broadcast_port_that_does_not_share_is_named(make_link: MakeLink) -> N
         sock.bind(("", 0))
         with pytest.raises(LinkError, match="broadcast_port"):
             make_link(broadcast_port=sock.getsockname()[1])
+
+
+def test_slices_are_handed_on_with_the_running_session(make_link: MakeLink, master: socket.socket) -> None:
+    link, taken = make_link(), []
+    slices = Slices(3, 5, 0, 1, 640, 480, 0, 0, 1, 8, b"")
+    say(master, link, slices)
+    assert link.dropped["kind"] == 1, "nobody takes them yet"
+
+    def take(message: Slices, session: int) -> str:
+        taken.append((message, session))
+        return "late" if len(taken) > 1 else ""
+    link.take_slices = take
+    say(master, link, slices, Start(5, 1, (StartEntry(3, 50001, 0),)), slices)
+    assert taken == [(slices, 0), (slices, 5)]
+    assert link.dropped["slices_late"] == 1

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rhot_app.geometry.transforms import inverse, rigid
-from rhot_app.objects.motion_stream import MotionStream
+from rhot_app.objects.alignment.motion_stream import MotionStream
 
 POINT_NOISE_M, POSE_NOISE_M, POSE_NOISE_RAD = 0.3e-3, 0.1e-3, np.radians(0.05)
 OUTLIER_M, OUTLIERS = 0.1, 0.05

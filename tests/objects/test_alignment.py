@@ -16,12 +16,12 @@ from scipy.stats import chi2
 
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import apply, exp_so3, fit_rigid, inverse, log_so3, quaternion_from_rotation, rigid
-from rhot_app.objects.alignment import align
-from rhot_app.objects.alignment_file import load_alignment, save_alignment, to_alignment
-from rhot_app.objects.alignment_model import AlignmentModel, Estimate
-from rhot_app.objects.alignment_report import calibrate_alignment
-from rhot_app.objects.drift import DriftMonitor
-from rhot_app.objects.motion_stream import MotionStream, consistent, read_stream
+from rhot_app.objects.alignment.alignment_file import load_alignment, save_alignment, to_alignment
+from rhot_app.objects.alignment.drift import DriftMonitor
+from rhot_app.objects.alignment.fit import align
+from rhot_app.objects.alignment.model import AlignmentEstimate, AlignmentModel
+from rhot_app.objects.alignment.motion_stream import MotionStream, consistent, read_stream
+from rhot_app.objects.alignment.report import calibrate_alignment
 from rhot_app.recording.qualisys import read_qualisys
 
 SEEDS = 20
@@ -73,9 +73,10 @@ def test_jacobians_are_the_finite_differences(poses, rates):
     model = AlignmentModel(scene.foreign, scene.rig)
     model.select(0.0)
     model.thin(40)
-    estimate = Estimate(exp_so3(0.05 * rng.normal(size=3)) @ scene.rig_from_foreign[:3, :3], rng.normal(size=3),
-                        0.1 * rng.normal(size=3), scene.offset_s + 0.0013,
-                        exp_so3(0.05 * rng.normal(size=3)) @ scene.tracker_from_body[:3, :3])
+    estimate = AlignmentEstimate(
+        exp_so3(0.05 * rng.normal(size=3)) @ scene.rig_from_foreign[:3, :3], rng.normal(size=3),
+        0.1 * rng.normal(size=3), scene.offset_s + 0.0013,
+        exp_so3(0.05 * rng.normal(size=3)) @ scene.tracker_from_body[:3, :3])
     _, jacobian, turned, by = model.linearise(estimate)
     for column in range(model.size):
         step = np.zeros(model.size)

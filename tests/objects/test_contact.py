@@ -18,6 +18,7 @@ from rhot_app.geometry.transforms import exp_so3, rigid
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model, neutral_pose
+from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
 from rhot_app.hand.shape import segments
 from rhot_app.hand.skeleton import ANGLES as ANGLE_NAMES
 from rhot_app.objects.contact import (
@@ -31,7 +32,6 @@ from rhot_app.objects.contact import (
     pad_points,
 )
 from rhot_app.objects.shape import Box, Cylinder, Mesh, Sphere
-from rhot_app.tracking.hand_process import ANGLES, POSE, VELOCITY
 from rhot_node.files import resource_path
 
 ALL = np.ones(5, dtype=bool)

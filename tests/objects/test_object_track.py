@@ -16,7 +16,7 @@ from rhot_app.objects.observations import FiducialFrame
 from rhot_app.objects.pose import Mode
 from rhot_app.objects.state import ObjectState, Validity
 from rhot_app.objects.stream import PoseMeasurement
-from rhot_app.objects.track import ObjectTracker, Track
+from rhot_app.objects.track import ObjectTrack, ObjectTracker
 
 CAMERAS = wide_cameras()
 START_NS = 5_000_000_000
@@ -187,7 +187,7 @@ class TwoPoses(PoseMeasurement):
 @pytest.mark.parametrize("wrong", [1, 3])
 def test_one_outlier_that_only_the_flip_explains_does_not_end_the_right_pose(wrong: int) -> None:
     right, flip = rigid(np.eye(3), [0.0, 0.0, 0.6]), rigid(exp_so3([2.0, 0.0, 0.0]), [0.0, 0.0, 0.6])
-    track = Track("tag")
+    track = ObjectTrack("tag")
     track.take(TwoPoses(0, right, flip))
     for number in range(1, 1 + wrong):
         assert track.take(PoseMeasurement(number * PERIOD_NS, flip, POSE_COVARIANCE))

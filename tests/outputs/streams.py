@@ -16,7 +16,7 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.outputs.outputs import Outputs
 from rhot_app.outputs.spec import parse_output
 from rhot_app.project import OutputSettings, Rig
-from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 
 RATE_HZ = 80.0
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.simulator.render.body import PALM_GROUP, SKIN
+from rhot_app.simulator.render.camera_controls import Controls, Lamp
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.painter import Solids
 from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.render.solids_painter import SolidsPainter
-from rhot_app.simulator.scene.camera_controls import Controls, Lamp
 from rhot_app.simulator.scene.rigid_target import RigidTarget
 
 Array = NDArray[np.float64]

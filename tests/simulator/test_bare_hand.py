@@ -33,14 +33,13 @@ from rhot_app.simulator.bare_hand.surface import (
     rest_frames,
     surface_nets,
 )
-from rhot_app.simulator.nodes.shot import make_shot
-from rhot_app.simulator.pictures import take_pictures
+from rhot_app.simulator.film.pictures import take_pictures
+from rhot_app.simulator.film.points import PointNoise, write_points
+from rhot_app.simulator.film.shot import make_shot
+from rhot_app.simulator.film.truth import load_truth
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.simulator.scene.scene_arguments import add_show_arguments, show_of
+from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_arguments, show_of
 from rhot_app.simulator.scene.scene_description import BareHandShow
-from rhot_app.simulator.simulate_command import add_scene_arguments
-from rhot_app.simulator.truth.points import PointNoise, write_points
-from rhot_app.simulator.truth.truth import load_truth
 from rhot_node.files import resource_path
 
 RIGHT = load_hand(resource_path("hands", "right.json"))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import CalibrationError, SimulatorError
+from rhot_app.simulator.film.scene_objects import make_object
 from rhot_app.simulator.scene.rigid_target import MOVE_S, STILL_S, BoardPoses
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow, RulerShow
-from rhot_app.simulator.scene.scene_objects import make_object
 
 SHOW = BoardShow()
 

@@ -10,10 +10,10 @@ import pytest
 
 from rhot_app.errors import SimulatorError
 from rhot_app.project import load_rig
-from rhot_app.simulator.nodes.film import film
-from rhot_app.simulator.nodes.shot import Shot, make_shot, read_shot
+from rhot_app.simulator.film.film import film
+from rhot_app.simulator.film.shot import Shot, make_shot, read_shot
+from rhot_app.simulator.film.truth import load_truth
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.simulator.truth.truth import load_truth
 from rhot_node.capture.yuv import YuvRecording, read_header
 from rhot_node.clock import NodeClock
 from rhot_node.config import load_settings

@@ -10,14 +10,14 @@ import pytest
 from patience import eventually
 
 from rhot_app.geometry.transforms import inverse, rigid, rotation_from_quaternion
-from rhot_app.objects.alignment_report import FAIR_M, LASTING_M, REACH_M, calibrate_alignment, coverage_of_motion
-from rhot_app.objects.motion_stream import MotionStream
+from rhot_app.objects.alignment.motion_stream import MotionStream
+from rhot_app.objects.alignment.report import FAIR_M, LASTING_M, REACH_M, calibrate_alignment, coverage_of_motion
+from rhot_app.simulator.film.scene_objects import make_object
 from rhot_app.simulator.nodes.live import TwinServer
+from rhot_app.simulator.nodes.live_scene import DELAY_S, NOISE_M, RATE_HZ, ForeignTracker, world_from_body
 from rhot_app.simulator.nodes.remote import TrackerRequest
-from rhot_app.simulator.scene.foreign_tracker import DELAY_S, NOISE_M, RATE_HZ, ForeignTracker, world_from_body
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, HandShow
-from rhot_app.simulator.scene.scene_objects import make_object
 from rhot_app.sources.poses.open_source import open_source
 
 TIMES_S = np.arange(5.0, 25.0, 1.0 / RATE_HZ)

@@ -9,10 +9,10 @@ import pytest
 from simulator_solids import NEUTRAL, OPTICS, STILL, Gliding, balls
 
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.simulator.render.camera_controls import Lamp, flicker_gain, lamp_gains, level_gain
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.render import Exposure, FrameRenderer
 from rhot_app.simulator.render.solids_painter import SolidsPainter
-from rhot_app.simulator.scene.camera_controls import Lamp, flicker_gain, lamp_gains, level_gain
 from rhot_node.detect.image import YuvImage, from_i420
 
 WIDTH, HEIGHT = 96, 64

@@ -14,11 +14,11 @@ from test_worn_markers import Shown
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.simulator.nodes.shot import make_shot
-from rhot_app.simulator.render.body import Look, build_body
+from rhot_app.simulator.film.ideal_observations import ObservationNoise, ideal_observations
+from rhot_app.simulator.film.shot import make_shot
+from rhot_app.simulator.film.truth import true_object
+from rhot_app.simulator.render.body import Appearance, build_body
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
-from rhot_app.simulator.truth.ideal_observations import ObservationNoise, sights
-from rhot_app.simulator.truth.truth import true_object
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerFlag
@@ -45,8 +45,8 @@ class Picture:
     """A still hand without shading before black; `found` (M, 2) px middles of what has each marker's own colour,
     `areas` (M,) px^2, `places` (M, 2) px where the markers' places project."""
 
-    def __init__(self, model: HandModel, markers: MarkerSet, *, back: bool, look: Look | None = None) -> None:
-        body, shown = build_body(model, markers, look=look or Look()), Shown(back=back, angles=STRAIGHT)
+    def __init__(self, model: HandModel, markers: MarkerSet, *, back: bool, look: Appearance | None = None) -> None:
+        body, shown = build_body(model, markers, look=look or Appearance()), Shown(back=back, angles=STRAIGHT)
         self.image, _, self.visible = renderer(body, shading=0.0).radiance(shown, 0.0, 0)
         self.image, self.visible = self.image.copy(), self.visible.copy()
         y, x = np.mgrid[:480, :640]
@@ -113,11 +113,11 @@ def test_a_band_of_two_colours_keeps_its_marker_in_place(model: HandModel) -> No
 
 def test_worn_paint_is_missing_in_its_share_and_uneven_paint_varies(model: HandModel) -> None:
     whole = Picture(model, RHOT6, back=False)
-    worn_off = Picture(model, RHOT6, back=False, look=Look(worn=0.4, seed=3))
-    other = Picture(model, RHOT6, back=False, look=Look(worn=0.4, seed=4))
+    worn_off = Picture(model, RHOT6, back=False, look=Appearance(worn=0.4, seed=3))
+    other = Picture(model, RHOT6, back=False, look=Appearance(worn=0.4, seed=4))
     assert 0.2 < worn_off.areas[5] / whole.areas[5] < 0.7 and worn_off.areas.min() > 0
     assert (worn_off.image != other.image).any(), "the seed says where"
-    uneven = Picture(model, RHOT6, back=False, look=Look(uneven=0.2))
+    uneven = Picture(model, RHOT6, back=False, look=Appearance(uneven=0.2))
     red = RHOT6.markers[5].display_rgb[0]
     x, y = (int(v) for v in whole.places[5])
     band = uneven.image[0, y - 5:y + 6, x - 15:x + 16]
@@ -126,7 +126,7 @@ def test_worn_paint_is_missing_in_its_share_and_uneven_paint_varies(model: HandM
 
 def test_a_glove_covers_the_hand_and_not_the_forearm(model: HandModel) -> None:
     skin = Picture(model, RHOT6, back=False)
-    glove = Picture(model, RHOT6, back=False, look=Look(glove_rgb=(60, 84, 150)))
+    glove = Picture(model, RHOT6, back=False, look=Appearance(glove_rgb=(60, 84, 150)))
     np.testing.assert_array_equal(glove.areas, skin.areas)
     assert glove.count((60, 84, 150)) > 1000 and 100 < glove.count((201, 152, 128)) < skin.count((201, 152, 128)) - 1000
 
@@ -146,7 +146,7 @@ def scene(**settings: Any) -> Scene:
 
 def test_the_truth_and_the_sketch_have_nails_where_the_hand_has_them() -> None:
     taken = make_shot(scene(facing="back"), "tap", 1.0)
-    frames, truth = sights(taken, 0, ObservationNoise(white=0.0, common=0.0, own=0.0))
+    frames, truth = ideal_observations(taken, 0, ObservationNoise(white=0.0, common=0.0, own=0.0))
     true = true_object(taken.scene_object, 1.0, (truth, truth))
     camera = taken.scene.camera(0)
     plain = 0
@@ -160,7 +160,7 @@ def test_the_truth_and_the_sketch_have_nails_where_the_hand_has_them() -> None:
             expected = camera.project(true.markers_at(np.array([t_s]))[0, marker][None])[0]
             assert (seen.x, seen.y) == pytest.approx(expected, abs=0.05)
     assert plain > 6
-    away, _ = sights(make_shot(scene(facing="palm"), "still", 0.5), 0)
+    away, _ = ideal_observations(make_shot(scene(facing="palm"), "still", 0.5), 0)
     assert all(frame[marker].flags & MarkerFlag.LOST for frame in away for marker in range(1, 5))
 
 

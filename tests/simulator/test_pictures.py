@@ -10,11 +10,11 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.board.corners import detect
-from rhot_app.simulator.nodes.shot import make_shot, read_shot
-from rhot_app.simulator.pictures import PicturesFile, picture_times, take_pictures
+from rhot_app.simulator.film.pictures import PicturesFile, picture_times, take_pictures
+from rhot_app.simulator.film.shot import make_shot, read_shot
+from rhot_app.simulator.film.truth import load_thing_truth, load_truth
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, RulerShow
-from rhot_app.simulator.truth.truth import load_thing_truth, load_truth
 
 
 def test_board_pictures_show_the_board_at_its_true_place(tmp_path: Path) -> None:

@@ -12,12 +12,12 @@ import pytest
 from rhot_app.calibration.recorded_observations import read_observations
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
-from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.points import LOG_NAME, PointNoise, write_distances, write_points
+from rhot_app.simulator.film.shot import make_shot
+from rhot_app.simulator.film.truth import load_thing_truth, load_truth
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, MarkerShow
-from rhot_app.simulator.truth.points import LOG_NAME, PointNoise, write_distances, write_points
-from rhot_app.simulator.truth.truth import load_thing_truth, load_truth
 
 
 def scene(markers: str = "rich") -> Scene:

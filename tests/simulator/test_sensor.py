@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from rhot_app.simulator.render.camera_controls import Controls, development
 from rhot_app.simulator.render.sensor import Sensor, psf_kernel
-from rhot_app.simulator.scene.camera_controls import Controls, development
 from rhot_node.detect.image import YuvImage, from_i420
 
 WIDTH, HEIGHT = 96, 64

@@ -16,6 +16,7 @@ from rhot_app.calibration.board.corners import detect
 from rhot_app.errors import CalibrationError, SimulatorError
 from rhot_app.simulator.nodes.live import TwinServer
 from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras
+from rhot_app.simulator.nodes.live_scene import LiveScene
 from rhot_app.simulator.nodes.remote import (
     CoverRequest,
     LampRequest,
@@ -24,8 +25,7 @@ from rhot_app.simulator.nodes.remote import (
     TrackerRequest,
     TwinRemote,
 )
-from rhot_app.simulator.scene.camera_controls import Lamp
-from rhot_app.simulator.scene.live_scene import LiveScene
+from rhot_app.simulator.render.camera_controls import Lamp
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow
 from rhot_node.capture.stream import HEADER_BYTES, StreamHeader, pack_settings, unpack_header

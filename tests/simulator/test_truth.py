@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.film.shot import make_shot
+from rhot_app.simulator.film.truth import FrameTruth, Truth, load_truth, save_truth, true_object
 from rhot_app.simulator.render.body import HandBody
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.simulator.truth.truth import FrameTruth, Truth, load_truth, save_truth, true_object
 
 
 def some_truth() -> Truth:

@@ -7,10 +7,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from rhot_app.simulator import pictures
-from rhot_app.simulator.nodes import shot
-from rhot_app.simulator.scene import camera_controls, motion, scene
-from rhot_app.simulator.scene import camera_controls as controls
+from rhot_app.simulator.film import pictures, shot
+from rhot_app.simulator.render import camera_controls
+from rhot_app.simulator.render import camera_controls as controls
+from rhot_app.simulator.scene import motion, scene
 from rhot_app.simulator.scene import scene_description as shows
 
 PAGE = (Path(__file__).parents[2] / "docs" / "twin.md").read_text()

@@ -6,7 +6,7 @@ import numpy as np
 from synthetic_rig import EPOCH_NS, WIDE, Preset, Sight, Trajectory, hand_trajectory, make_rig, observe, run
 
 from rhot_app.project import Rig
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.trackers import make_tracker
 
 RIG = make_rig()

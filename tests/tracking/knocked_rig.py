@@ -11,11 +11,10 @@ import numpy as np
 
 from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation, rigid, rotation_from_quaternion
 from rhot_app.project import CameraPose, Rig
-from rhot_app.simulator.nodes.nodes import NodePorts
-from rhot_app.simulator.nodes.shot import make_shot
+from rhot_app.simulator.film.ideal_observations import ORDINARY, ObservationNoise, ideal_observations
+from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.scene.motion import Key, MotionFile, Sway
-from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
-from rhot_app.simulator.truth.ideal_observations import ORDINARY, ObservationNoise, sights
+from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, make_scene, twin_defaults
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
@@ -83,7 +82,7 @@ def _frames(scene: Scene, motion: str | MotionFile, seconds: float, noise: Obser
         shot = make_shot(scene, motion, seconds)
     found = []
     for index in range(len(scene.names)):
-        observed, _ = sights(shot, index, noise)
+        observed, _ = ideal_observations(shot, index, noise)
         for t_ns, markers in zip(scene.frame_times_ns(index, seconds), observed, strict=True):
             found.append(_frame(scene, index, t_ns, markers, None if bias_px is None else bias_px[index]))
     return found

@@ -12,7 +12,7 @@ from synthetic_rig import EPOCH_NS, WIDE, Sight, Trajectory, hand_trajectory, ma
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import Rig, TrackerSettings
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path

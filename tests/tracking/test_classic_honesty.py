@@ -22,7 +22,7 @@ from synthetic_rig import (
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import JOINT_SLICES
-from rhot_app.tracking.state import Condition, Knowledge
+from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 

@@ -23,7 +23,7 @@ from synthetic_rig import (
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import FilterSettings, TrackerSettings
-from rhot_app.tracking.state import LATENCY_STAGES, Knowledge
+from rhot_app.state import LATENCY_STAGES, Knowledge
 from rhot_app.tracking.trackers import make_tracker
 
 

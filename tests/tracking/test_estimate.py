@@ -9,8 +9,8 @@ from synthetic_rig import EPOCH_NS, WIDE, Sight, hand_trajectory, make_rig, obse
 
 from rhot_app.calibration.depth.fit import depth_from_disparity, depth_from_power_law
 from rhot_app.project import CameraPose, DepthSettings
+from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.rig_arrays import disparity_law, locate_by_disparity
-from rhot_app.tracking.state import Condition, Knowledge
 from rhot_app.tracking.trackers import make_tracker
 
 THEORY = DepthSettings(mode="disparity", baseline_m=0.075, view_angle_deg=62.2)

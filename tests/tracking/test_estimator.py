@@ -13,10 +13,10 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES
 from rhot_app.simulator.scene.motion import FACING
+from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.marker_model import compile_markers
-from rhot_app.tracking.state import Condition, Knowledge
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.trackers import make_tracker
 

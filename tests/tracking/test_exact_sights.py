@@ -9,7 +9,7 @@ from modelled_hand import model_rig, moving, sights, states_of
 from synthetic_rig import Sight
 
 from rhot_app.project import TrackerSettings
-from rhot_app.tracking.state import Condition
+from rhot_app.state import Condition
 
 
 @pytest.mark.parametrize("kind", ["classic", "estimator"])

@@ -8,8 +8,8 @@ from modelled_hand import model_rig, moving, seconds, sights, states_of
 from synthetic_rig import EPOCH_NS
 
 from rhot_app.project import with_tracker
+from rhot_app.state import Condition
 from rhot_app.tracking.extrapolation import FARTHEST_AHEAD_S, GONE_AFTER_S, Extrapolator
-from rhot_app.tracking.state import Condition
 
 RIG = model_rig()
 AHEAD_NS = 20_000_000

@@ -17,15 +17,15 @@ INDEX, LITTLE = 1, 4
 
 
 def size_of_nobody():
-    return HandSize(WORN.dh, WORN.limits, WORN.natural, WORN.paint_variance)
+    return HandSize(WORN.dh, WORN.limits, WORN.pose_prior, WORN.paint_variance)
 
 
 def natural_poses(count, seed):
     """(count, 21) rad, drawn from the natural pose within the limits, about."""
     rng, poses = np.random.default_rng(seed), []
-    root = np.linalg.cholesky(np.linalg.inv(WORN.natural.information))
+    root = np.linalg.cholesky(np.linalg.inv(WORN.pose_prior.information))
     while len(poses) < count:
-        angles = WORN.natural.mean + root @ rng.normal(size=21)
+        angles = WORN.pose_prior.mean + root @ rng.normal(size=21)
         bounded = np.clip(angles, *WORN.limits.T)
         if np.abs(angles - bounded).max() < np.radians(8.0):
             poses.append(bounded)

@@ -7,7 +7,7 @@ import pytest
 from grasping_hand import GRASP, MEASURED, RIG, SIGHT, UNKNOWN, seconds
 from synthetic_rig import LOST, WIDE, altered, observe, run
 
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.trackers import make_tracker
 
 WRIST = 5

@@ -7,8 +7,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot_app.barehand.landmarks import COMMON_M
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.landmarks import COMMON_M
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.simulator.nodes.landmark_detector import (
@@ -19,7 +19,6 @@ from rhot_app.simulator.nodes.landmark_detector import (
     landmark_rig,
     moving_hand,
 )
-from rhot_app.tracking.hand_process import HandProcess
 from rhot_app.tracking.marker_model import compile_markers
 from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.trackers import make_tracker
@@ -74,7 +73,7 @@ def test_the_marker_set_has_the_joints_in_the_usual_order():
 def test_a_landmark_is_at_its_joint():
     rig = landmark_rig()
     model, truth = compile_markers(rig), moving_hand(rig, "grasp", 0.1, FPS, 1)
-    process = HandProcess.of(model)
+    process = model.process()
     state = process.start(truth.worlds[0], truth.angles[0], (0.01, 0.1))[0]
     frame = MarkerFrame(model, detected_landmarks(rig, truth, 1)[0])
     lens = CameraModel.from_rig(rig.nodes[0].intrinsics, rig.nodes[0].pose)
@@ -84,7 +83,7 @@ def test_a_landmark_is_at_its_joint():
 def test_rows_have_the_noise_that_all_landmarks_share():
     """Whitened rows give the normal equations of the full covariance, whose Jacobian is by finite differences."""
     model, truth = compile_markers(RIG), hand()
-    process, observations = HandProcess.of(model), detected_landmarks(RIG, hand(), 1)[0]
+    process, observations = model.process(), detected_landmarks(RIG, hand(), 1)[0]
     bound_s = 0.01
     frame = MarkerFrame(model, replace(observations, clock_bound_s=bound_s))
     state = process.start(truth.worlds[0], truth.angles[0], (0.01, 0.1))[0]

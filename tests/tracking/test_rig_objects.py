@@ -22,8 +22,8 @@ from rhot_app.objects.state import Validity
 from rhot_app.outputs.joints import JointConverter, json_message
 from rhot_app.outputs.osc import object_messages
 from rhot_app.project import Rig, load_rig, with_object, with_tracker
+from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.state import Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path

@@ -8,11 +8,11 @@ import pytest
 from modelled_hand import after_s, deviations, model_rig, moving, seconds, states_of
 from synthetic_rig import WIDE, Sight, observe
 
+from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.estimator_state import Sightings
 from rhot_app.tracking.marker_model import compile_markers
 from rhot_app.tracking.marker_residual import MarkerFrame
 from rhot_app.tracking.rig_arrays import compile_rig
-from rhot_app.tracking.state import Condition, Knowledge
 
 RIG = model_rig()
 SECONDS = 4.0

@@ -13,9 +13,9 @@ from rhot_app.engine.advice import hands_advice
 from rhot_app.errors import RigError
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import OTHER_HAND, Rig, TrackerSettings, parse_rig
+from rhot_app.state import Condition, HandState
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.trackers import TwoHands, make_tracker
 from rhot_node.files import resource_path
 

@@ -23,12 +23,12 @@ from PySide6.QtWidgets import QApplication, QWidget  # noqa: E402
 
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
-from rhot_app.ui.controller import Controller  # noqa: E402
+from rhot_app.ui.common.controller import Controller  # noqa: E402
+from rhot_app.ui.common.settings import Settings  # noqa: E402
+from rhot_app.ui.common.theme import apply_theme, scheme_named  # noqa: E402
 from rhot_app.ui.main_window import MainWindow  # noqa: E402
 from rhot_app.ui.models.pacing import FramePacer  # noqa: E402
 from rhot_app.ui.scene.surface import choose_format  # noqa: E402
-from rhot_app.ui.settings import Settings  # noqa: E402
-from rhot_app.ui.theme import apply_theme, scheme_named  # noqa: E402
 
 
 class Bench:

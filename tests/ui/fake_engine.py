@@ -29,7 +29,7 @@ from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
 from rhot_app.outputs.spec import OutputStatus, as_run
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode, parse_rig
 from rhot_app.rig_history import accept
-from rhot_app.tracking.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 from rhot_node.wire.messages import MarkerFlag

@@ -176,7 +176,7 @@ def test_the_mouse_tells_which_hand_a_joint_is_of(scene, state):
     scene.frame_hand()
     places = to_display(np.stack([state.joint_positions[14], state.other.joint_positions[14]]))
     pixels = pixels_of(places, scene._projection(), (scene.width(), scene.height()))
-    told = [scene.told_at(QPoint(round(x), round(y))) for x, y in pixels]
+    told = [scene.tool_tip_at(QPoint(round(x), round(y))) for x, y in pixels]
     assert told[0].startswith("right ring PIP joint") and told[1].startswith("left ring PIP joint")
 
 

@@ -13,7 +13,7 @@ from fake_engine import FakeEngine, synthetic_rig
 from PySide6.QtCore import Qt
 
 from rhot_app.project import TrackerSettings
-from rhot_app.tracking.state import Condition
+from rhot_app.state import Condition
 from rhot_app.ui.appearance import DisplayPrediction
 
 AHEAD_S = 0.02

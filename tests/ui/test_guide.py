@@ -7,7 +7,7 @@ import re
 import pytest
 from PySide6.QtCore import QPoint, Qt, QUrl
 
-from rhot_app.ui.guide import GUIDE, PAGES, anchor_of, page_of, page_path
+from rhot_app.ui.common.guide import GUIDE, PAGES, anchor_of, page_of, page_path
 
 
 @pytest.mark.parametrize("name", [name for name, _ in PAGES])

@@ -9,7 +9,7 @@ import threading
 import pytest
 
 from rhot_app.errors import RigError
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_what_a_job_starts_is_not_as_nice_as_the_window():
     program = """
 import os, subprocess, sys, threading
 from rhot_app.ui.app import NICENESS, give_way
-from rhot_app.ui.job import workers
+from rhot_app.ui.common.job import workers
 before = os.getpriority(os.PRIO_PROCESS, 0)
 workers()
 give_way()

@@ -18,8 +18,8 @@ from rhot_app.project import load_rig
 from rhot_app.sources.discovery import Search, Sighting, conflicts, together
 from rhot_app.sources.pairing import Introduction, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig
+from rhot_app.ui.common.job import CancelledError
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog, PairDialog
-from rhot_app.ui.job import CancelledError
 from rhot_app.ui.models.palette import DARK
 from rhot_node.config import NodeSettings
 from rhot_node.files import resource_path
@@ -232,11 +232,11 @@ def test_conflicts_and_an_empty_network_are_told(qtbot, themed):
     network = Network(("left", 11), ("left", 12))
     dialog = open_dialog(network, qtbot)
     qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=PATIENCE_MS)
-    assert "Two nodes are called left" in dialog.found.told.text()
+    assert "Two nodes are called left" in dialog.found.message.text()
     assert dialog.hosts[0].text() == "", "nobody can know which is meant"
     network.who = ()
     dialog.found.search()
-    qtbot.waitUntil(lambda: "No node was found" in dialog.found.told.text(), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: "No node was found" in dialog.found.message.text(), timeout=PATIENCE_MS)
     assert dialog.found.table.rowCount() == 0
 
 

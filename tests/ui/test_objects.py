@@ -15,9 +15,9 @@ from rhot_app.geometry.transforms import exp_so3, rigid
 from rhot_app.objects.object_file import CylinderShape, ObjectModel, SphereShape, cube, plate, save_object
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.project import Rig, RigObject, load_rig, with_object
+from rhot_app.ui.common.theme import scheme_named
 from rhot_app.ui.panels.objects_panel import ObjectsPanel, object_lines
 from rhot_app.ui.scene.object_actors import surface_of
-from rhot_app.ui.theme import scheme_named
 from rhot_app.ui.tracked_objects import TrackedObjects
 from rhot_node.files import resource_path
 

@@ -26,9 +26,9 @@ from rhot_app.project import OutputSettings, load_rig, save_rig
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig as streaming_rig
 from rhot_app.ui.backend.contract import Opened
+from rhot_app.ui.common.guide import page_of
 from rhot_app.ui.dialogs.output_card import qr_code
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
-from rhot_app.ui.guide import page_of
 from rhot_app.ui.models.outputs import SendRates, web_hint
 from rhot_app.ui.models.palette import DARK
 

@@ -9,7 +9,7 @@ import pytest
 from fake_engine import FakeEngine, synthetic_rig
 
 from rhot_app.project import CameraPose
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.scene import frames as stage
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice, EllipsoidMesh

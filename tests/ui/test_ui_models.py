@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fake_engine import FakeEngine
 
-from rhot_app.tracking.state import LATENCY_STAGES, Condition, Knowledge
+from rhot_app.state import LATENCY_STAGES, Condition, Knowledge
 from rhot_app.ui.models import words
 from rhot_app.ui.models.label_layout import Box, place_at_sides, place_labels
 from rhot_app.ui.models.meters import STACKED, LatencyWindow, LossMeter, RateRows, unused_frames

@@ -14,7 +14,7 @@ from PySide6.QtGui import QHelpEvent, QImage
 from PySide6.QtWidgets import QApplication, QToolButton, QToolTip
 from test_tracker_dialog import FLOATING
 
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_app.ui.models.rows import sd_number, worst_sd
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import to_display
@@ -63,10 +63,10 @@ def test_the_mouse_over_a_joint_tells_how_well_it_is_known(estimating):
     matrix, size = scene._projection(), (scene.width(), scene.height())
     x, y = pixels_of(to_display(scene._in_rig.joint_positions[14:15]), matrix, size)[0]
     at = QPoint(round(x), round(y))
-    assert scene.told_at(at).startswith("ring PIP joint: inferred\n± 4.8 mm along the worst axis (one sigma)")
+    assert scene.tool_tip_at(at).startswith("ring PIP joint: inferred\n± 4.8 mm along the worst axis (one sigma)")
     QApplication.sendEvent(scene, QHelpEvent(QHelpEvent.Type.ToolTip, at, scene.mapToGlobal(at)))
     estimating.until(lambda: QToolTip.text().startswith("ring PIP joint"))
-    assert scene.told_at(QPoint(2, 2)) == ""
+    assert scene.tool_tip_at(QPoint(2, 2)) == ""
     QToolTip.hideText()
 
 

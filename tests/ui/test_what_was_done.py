@@ -10,8 +10,8 @@ from PySide6.QtGui import QDesktopServices
 
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.backend.contract import TwinPace
+from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.models.notice import Notice, TransientNotices
-from rhot_app.ui.settings import Settings
 
 
 def test_r_records_and_says_where_the_file_is(tracking, tmp_path, monkeypatch):

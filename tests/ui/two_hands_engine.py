@@ -14,7 +14,7 @@ from rhot_app.engine.observer import condition_of
 from rhot_app.engine.status import Preview
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import OTHER_HAND, Rig, TrackerSettings
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.state import Condition, HandState, Knowledge
 from rhot_node.files import resource_path
 from rhot_node.markers import Marker
 

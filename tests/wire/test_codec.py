@@ -7,6 +7,7 @@ import math
 import re
 import struct
 import timeit
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ from wire_samples import (
 
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import Seal, asks_who_is_there, decode, decode_sealed, encode
+from rhot_node.wire.foreground_map import pack_map, unpack_map
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockRequest,
@@ -44,6 +46,7 @@ from rhot_node.wire.messages import (
     StartEntry,
     Stop,
 )
+from rhot_node.wire.slices import pack_slices, unpack_slices
 
 OBSERVATIONS = "version_1_observations_some_lost"
 
@@ -131,7 +134,7 @@ HEADER_FAULTS: list[Fault] = [
     (0, "<4s", (b"rhot",), "magic"),
     (4, "<B", (3,), "version"),
     (5, "<B", (0,), "type"),
-    (5, "<B", (10,), "type"),
+    (5, "<B", (12,), "type"),
     (6, "<H", (1,), "tag"),
     (6, "<H", (2,), "flags"),
     (6, "<H", (0x8001,), "flags"),
@@ -297,6 +300,57 @@ def test_decoding_six_markers_keeps_pace_with_a_flood() -> None:
 def test_a_fault_in_edges_is_refused_by_its_reason(offset: int, layout: str, values: tuple[float],
                                                    reason: str) -> None:
     assert refused(patched("edges_two", offset, layout, *values)) == reason
+
+
+@pytest.mark.parametrize(("offset", "layout", "values", "reason"), [
+    (12, "<Q", (0,), "header"),
+    (28, "<H", (0,), "size"),
+    (28, "<H", (638,), "range"),  # a centre at 639 px lies outside
+    (32, "<H", (1,), "count"),  # fewer in all than in this part
+    (32, "<H", (1025,), "count"),
+    (34, "<H", (1,), "length"),
+    (36, "<B", (2,), "index"),
+    (38, "<B", (3,), "range"),  # a map of every third pixel
+    (39, "<B", (1,), "reserved"),
+    (40 + 6, "<B", (0,), "range"),  # a slice without length
+])
+def test_a_fault_in_slices_is_refused_by_its_reason(offset: int, layout: str, values: tuple[float],
+                                                    reason: str) -> None:
+    assert refused(patched("slices_two", offset, layout, *values)) == reason
+
+
+@pytest.mark.parametrize(("offset", "layout", "values", "reason"), [
+    (24, "<q", (1 << 62,), "time"),
+    (64, "<H", (5,), "length"),
+    (66, "<B", (65,), "range"),
+    (67, "<B", (2,), "index"),
+    (69, "<B", (1,), "reserved"),
+])
+def test_a_fault_in_a_foreground_map_is_refused_by_its_reason(offset: int, layout: str, values: tuple[float],
+                                                              reason: str) -> None:
+    assert refused(patched("foreground_part", offset, layout, *values)) == reason
+
+
+def test_slices_come_back_within_half_a_unit() -> None:
+    turn = np.linspace(-3.1, 3.1, 200)
+    asked = np.column_stack([np.linspace(0.0, 639.0, 200), np.linspace(479.0, 0.0, 200), np.cos(turn), np.sin(turn),
+                             np.linspace(0.3, 60.0, 200)])
+    got = unpack_slices(pack_slices(asked))
+    np.testing.assert_allclose(got[:, :2], asked[:, :2], atol=1 / 8)
+    np.testing.assert_allclose(got[:, 2:4], asked[:, 2:4], atol=1e-4)
+    assert ((got[:, 4] >= asked[:, 4]) & (got[:, 4] < asked[:, 4] + 0.25)).all(), "no slice gets shorter"
+    np.testing.assert_array_equal(unpack_slices(pack_slices(got)), got)
+
+
+def test_a_foreground_map_comes_back_and_no_other_bytes_do() -> None:
+    probability = np.linspace(0.0, 1.0, 80 * 60, dtype=np.float32).reshape(60, 80)
+    packed = pack_map(probability)
+    assert len(packed) < 1000
+    np.testing.assert_allclose(unpack_map(packed, 640, 480, 8), probability, atol=1 / 30 + 1e-6)
+    for data in (packed[:-9], b"nothing", pack_map(probability[1:]), zlib.compress(bytes(10**7)),
+                 zlib.compress(bytes([16]) * 4800)):
+        with pytest.raises(WireError, match="foreground map"):
+            unpack_map(data, 640, 480, 8)
 
 
 def test_more_edges_than_a_datagram_holds_are_refused() -> None:

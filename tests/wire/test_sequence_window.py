@@ -3,12 +3,12 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhot_node.wire.sequence import SequenceWindow, Verdict
+from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
 
 
-def feed(window: SequenceWindow, sequence: int) -> Verdict:
+def feed(window: SequenceWindow, sequence: int) -> SequenceVerdict:
     verdict = window.judge(sequence)
-    if verdict in (Verdict.FRESH, Verdict.LATE):
+    if verdict in (SequenceVerdict.FRESH, SequenceVerdict.LATE):
         window.take(sequence)
     return verdict
 
@@ -16,7 +16,8 @@ def feed(window: SequenceWindow, sequence: int) -> Verdict:
 def test_gap_then_late_then_duplicate() -> None:
     window = SequenceWindow()
     assert [feed(window, k) for k in (5, 6, 9, 8, 8, 9, 7)] == [
-        Verdict.FRESH, Verdict.FRESH, Verdict.FRESH, Verdict.LATE, Verdict.DUPLICATE, Verdict.DUPLICATE, Verdict.LATE]
+        SequenceVerdict.FRESH, SequenceVerdict.FRESH, SequenceVerdict.FRESH, SequenceVerdict.LATE,
+        SequenceVerdict.DUPLICATE, SequenceVerdict.DUPLICATE, SequenceVerdict.LATE]
     assert window.lost == 0
 
 
@@ -24,9 +25,9 @@ def test_old_and_far_ahead_are_refused_without_trace() -> None:
     window = SequenceWindow(size=16, longest_jump=1000)
     for k in range(100):
         feed(window, k)
-    assert feed(window, 99 - 16) is Verdict.STALE
-    assert feed(window, 99 + 1001) is Verdict.JUMP
-    assert feed(window, 100) is Verdict.FRESH
+    assert feed(window, 99 - 16) is SequenceVerdict.STALE
+    assert feed(window, 99 + 1001) is SequenceVerdict.JUMP
+    assert feed(window, 100) is SequenceVerdict.FRESH
     assert window.lost == 0
 
 
@@ -35,7 +36,7 @@ def test_restart_keeps_the_count_of_losses() -> None:
     feed(window, 0)
     feed(window, 4)
     window.restart()
-    assert feed(window, 0) is Verdict.FRESH
+    assert feed(window, 0) is SequenceVerdict.FRESH
     assert window.lost == 3
 
 
@@ -46,8 +47,8 @@ def test_agrees_with_a_set(numbers: list[int]) -> None:
     for k in numbers:
         verdict = feed(window, k)
         if k in seen or (seen and k < numbers[0]):  # numbers before the first one count as had
-            assert verdict is Verdict.DUPLICATE
+            assert verdict is SequenceVerdict.DUPLICATE
         else:
-            assert verdict is (Verdict.FRESH if not seen or k > max(seen) else Verdict.LATE)
+            assert verdict is (SequenceVerdict.FRESH if not seen or k > max(seen) else SequenceVerdict.LATE)
             seen.add(k)
     assert window.lost == max(seen) - min(seen) + 1 - len(seen)

@@ -13,6 +13,7 @@ from rhot_node.wire.messages import (
     Fiducial,
     Fiducials,
     Find,
+    ForegroundPart,
     Here,
     MarkerFlag,
     MarkerObservation,
@@ -21,6 +22,7 @@ from rhot_node.wire.messages import (
     Observations,
     SliceEdge,
     SliceEdges,
+    Slices,
     Start,
     StartEntry,
     Stop,
@@ -72,6 +74,18 @@ def edges(found: tuple[SliceEdge, ...], part: int = 0, parts: int = 1) -> SliceE
         request=12, slice_count=232, part=part, parts=parts, edges=found)
 
 
+def slices(records: bytes, count: int, map_step: int = 0, part: int = 0, parts: int = 1) -> Slices:
+    return Slices(node_id=2, session=SESSION, sequence=3, request=12, width=640, height=480, slice_count=count,
+                  part=part, parts=parts, map_step=map_step, records=records)
+
+
+def foreground(data: bytes, part: int = 0, parts: int = 1) -> ForegroundPart:
+    return ForegroundPart(
+        node_id=2, session=SESSION, sequence=7, t_frame_node_ns=FRAME_NS, t_send_node_ns=FRAME_NS + 27_000_000,
+        processing_ns=1_500_000, exposure_ns=4_000_000, row_time_ns=48_000, width=640, height=480, frame_number=41,
+        request=12, step=8, part=part, parts=parts, data=data)
+
+
 SIX = tuple(found(i, 100.5 + 64.25 * i, 200.125 - 8.5 * i) for i in range(6))
 
 SAMPLES: dict[str, Message] = {
@@ -108,6 +122,9 @@ SAMPLES: dict[str, Message] = {
     "edges_none": edges(()),
     "edges_two": edges((SliceEdge(0, -3.5, 0.25, -12.5, 1.0, 0.0),
                         SliceEdge(231, 17.0078125, 3.0, 40.03125, 51 / 255, 1.0)), 1, 3),
+    "slices_none": slices(b"", 0, 8),
+    "slices_two": slices(bytes.fromhex("91010203004014" "fc09000000c0ff"), 232, 0, 1, 2),
+    "foreground_part": foreground(b"\x78\x9c\x03\x00", 1, 2),
 }
 
 SIXTY_FOUR = observations(tuple(found(i, 8.0 * i, 4.0 * i) for i in range(64)), 2**32 - 1)

@@ -9,7 +9,7 @@ from rhot_app.calibration.board.corners import BoardView
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class BoardShot:
     """One moment: `name` for messages, and per camera the board as it saw it, None where it did not."""
 
     name: str
@@ -27,7 +27,7 @@ class SharedViews:
 
     cameras: tuple[str, ...]
     board: Board
-    shots: tuple[Shot, ...]
+    shots: tuple[BoardShot, ...]
 
     def of_camera(self, camera: int) -> list[BoardView]:
         """All views of one camera."""

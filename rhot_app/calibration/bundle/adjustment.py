@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -27,15 +28,15 @@ from rhot_app.calibration.bundle.model import (
     residuals,
 )
 from rhot_app.errors import CalibrationError
-from rhot_app.progress import Progress, silent
+from rhot_app.estimation.least_squares import minimise
+from rhot_app.progress import Progress, silent, within
 
 HUBER = 3.0
 """Corners farther off than this many standard deviations (per axis) count less: one in ninety of Gaussian noise."""
 LEAST_NOISE_PX = 1e-3
 """No corner is trusted to better than this: keeps exact synthetic corners from dividing by zero."""
 
-_MOST_STEPS = 100
-_STILL_PX = 1e-8  # the step that changes no expected corner by more than this was the last
+_MOST_STEPS, _USUAL_STEPS = 100, 20
 _LEAST_GAIN = 1e-5  # of the cost: nothing moves by half a hundredth of its standard deviation any more
 _RAYLEIGH_MEDIAN = 1.1774100225154747  # median distance of a 2-D Gaussian, in standard deviations per axis
 
@@ -47,7 +48,7 @@ class Bundle:
     `residuals` (M, 2) px, seen minus expected, and Huber's `weights` (M,); `noise_px` the standard deviation of a
     corner per axis, and `determined` how many unknowns were taken from the corners to get it (fewer than all where
     something is known beforehand);
-    `layout` of the unknowns and their `covariance` (size, size), already times noise squared; `steps` taken.
+    `layout` of the unknowns and their `covariance` (size, size), already times noise squared.
     """
 
     state: BundleState
@@ -57,7 +58,6 @@ class Bundle:
     determined: float
     layout: Layout
     covariance: Array
-    steps: int
 
 
 def adjust(start: BundleState, seen: Observations, lenses: Sequence[LensFreedom], *,
@@ -72,11 +72,13 @@ def adjust(start: BundleState, seen: Observations, lenses: Sequence[LensFreedom]
         start = replace(start, board_errors=np.zeros((board_errors.count, POINT)))
     if 2 * len(seen) <= layout.errors_at:
         raise CalibrationError(f"{len(seen)} corners do not determine {layout.size} unknowns; add pictures.")
-    state, taken = start, 0
+    state = start
     noise = _noise(residuals(state, seen))
     for stage in range(3):
-        state, steps = _descend(state, seen, layout, noise, progress, stage)
-        taken += steps
+        stage_progress = within(progress, 0.3 * stage, 0.3 * stage + 0.3)
+        found, _ = minimise(_Iterate(state, seen, layout, noise), _MOST_STEPS, _LEAST_GAIN,
+                            watch=partial(_report, stage_progress))
+        state = found.state
         before, noise = noise, _noise(residuals(state, seen))
         if stage and abs(noise - before) < 0.02 * before:
             break
@@ -88,58 +90,40 @@ def adjust(start: BundleState, seen: Observations, lenses: Sequence[LensFreedom]
     determined = layout.size - float(np.sum((known @ covariance) * known.toarray()))  # the rest is known beforehand
     spread = _spread(off, weights, determined)
     return Bundle(state, off, weights, spread, determined, layout,
-                  _covariance(state, seen, layout, weights, spread), taken)
+                  _covariance(state, seen, layout, weights, spread))
 
 
-def _descend(state: BundleState, seen: Observations, layout: Layout, noise: float, progress: Progress,
-             stage: int) -> tuple[BundleState, int]:
-    """Minimise the Huber cost at a given noise; returns the state and the number of steps."""
-    damping, cost = 1e-4, _cost(state, seen, layout, noise)
-    for count in range(_MOST_STEPS):
-        progress("adjusting cameras and boards", min(0.9, 0.3 * stage + 0.3 * count / 20))
-        normal, side, jacobian = _normal_equations(state, seen, layout, noise)
-        while True:
-            step = _solve(normal, side, damping)
-            after = layout.moved(state, step)
-            new_cost = _cost(after, seen, layout, noise)
-            still = float(np.max(np.abs(jacobian @ step))) < _STILL_PX
-            if new_cost <= cost or still:
-                break
-            damping *= 10.0
-            if damping > 1e12:
-                return state, count
-        gained = cost - new_cost
-        if gained >= 0.0:
-            state, cost = after, new_cost
-        damping = max(damping * 0.1, 1e-12)
-        if still or gained < _LEAST_GAIN:
-            return state, count + 1
-    return state, _MOST_STEPS
+def _report(progress: Progress, taken: int) -> None:
+    progress("adjusting cameras and boards", min(1.0, taken / _USUAL_STEPS))
 
 
-def _normal_equations(state: BundleState, seen: Observations, layout: Layout,
-                      noise: float) -> tuple[Any, Array, Any]:
-    line = linearise(state, seen)
-    jacobian = layout.jacobian(line)
-    weights = np.repeat(_weights(line.residuals, noise), 2) / noise**2
-    known, off = layout.prior(state)
-    normal = jacobian.T @ jacobian.multiply(weights[:, None]).tocsr() + known.T @ known
-    return normal.tocsc(), jacobian.T @ (weights * line.residuals.ravel()) + known.T @ off, jacobian
+class _Iterate:
+    """Implements `Iterate`: cameras and boards at a given noise of the corners, with Huber's cost."""
 
+    def __init__(self, state: BundleState, seen: Observations, layout: Layout, noise: float) -> None:
+        self.state, self._seen, self._layout, self._noise = state, seen, layout, noise
+        ratio = np.linalg.norm(residuals(state, seen), axis=1) / noise
+        loss = np.where(ratio <= HUBER, 0.5 * ratio**2, HUBER * (ratio - 0.5 * HUBER))
+        total = float(np.sum(loss) + 0.5 * np.sum(np.square(layout.prior(state)[1])))
+        self.cost = total if np.isfinite(total) else np.inf  # behind a camera
 
-def _solve(normal: Any, side: Array, damping: float) -> Array:
-    diagonal = normal.diagonal()
-    if not np.all(diagonal > 0.0):
-        raise CalibrationError("the corners do not determine every unknown: a camera or a board is seen in no picture.")
-    return np.asarray(splu(normal + sparse.diags(damping * diagonal, format="csc")).solve(side))
+    def moved(self, damping: float) -> _Iterate:
+        normal, side = self._normal_equations
+        diagonal = normal.diagonal()
+        if not np.all(diagonal > 0.0):
+            raise CalibrationError("the corners do not determine every unknown: a camera or a board is seen in no "
+                                   "picture.")
+        step = np.asarray(splu(normal + sparse.diags(damping * diagonal, format="csc")).solve(side))
+        return _Iterate(self._layout.moved(self.state, step), self._seen, self._layout, self._noise)
 
-
-def _cost(state: BundleState, seen: Observations, layout: Layout, noise: float) -> float:
-    """Huber's loss summed over the corners, in units of noise squared, and the priors; infinite behind a camera."""
-    ratio = np.linalg.norm(residuals(state, seen), axis=1) / noise
-    loss = np.where(ratio <= HUBER, 0.5 * ratio**2, HUBER * (ratio - 0.5 * HUBER))
-    total = float(np.sum(loss) + 0.5 * np.sum(np.square(layout.prior(state)[1])))
-    return total if np.isfinite(total) else np.inf
+    @cached_property
+    def _normal_equations(self) -> tuple[Any, Array]:
+        line = linearise(self.state, self._seen)
+        jacobian = self._layout.jacobian(line)
+        weights = np.repeat(_weights(line.residuals, self._noise), 2) / self._noise**2
+        known, off = self._layout.prior(self.state)
+        normal = jacobian.T @ jacobian.multiply(weights[:, None]).tocsr() + known.T @ known
+        return normal.tocsc(), jacobian.T @ (weights * line.residuals.ravel()) + known.T @ off
 
 
 def _weights(off: Array, noise: float) -> Array:

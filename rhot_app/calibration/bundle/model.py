@@ -21,7 +21,7 @@ Index = NDArray[np.intp]
 
 LENS = 9
 """Parameters of a camera's lens: fx, fy, cx, cy, k1, k2, p1, p2, k3."""
-POSE = 6
+TWIST = 6
 """Parameters of a pose's change: rotation vector (rad), translation (m)."""
 POINT = 3
 """Parameters of a corner's place on the board, m."""
@@ -206,8 +206,8 @@ class Layout:
         widths = [lens.basis.shape[1] for lens in lenses]
         self.lens_at = np.concatenate([[0], np.cumsum(widths)]).astype(np.intp)
         self.camera_at = int(self.lens_at[-1])
-        self.board_at = self.camera_at + POSE * (len(lenses) - 1)
-        self.errors_at = self.board_at + POSE * shots
+        self.board_at = self.camera_at + TWIST * (len(lenses) - 1)
+        self.errors_at = self.board_at + TWIST * shots
         self.size = self.errors_at + (POINT * errors.count if errors is not None else 0)
         self._seen = seen
 
@@ -217,13 +217,13 @@ class Layout:
 
     def camera(self, camera: int) -> slice:
         """Where the pose of a camera stands; empty for the first."""
-        start = self.camera_at + POSE * (camera - 1)
-        return slice(start, start + POSE) if camera else slice(self.camera_at, self.camera_at)
+        start = self.camera_at + TWIST * (camera - 1)
+        return slice(start, start + TWIST) if camera else slice(self.camera_at, self.camera_at)
 
     def board(self, shot: int) -> slice:
         """Where the pose of the board in a shot stands."""
-        start = self.board_at + POSE * shot
-        return slice(start, start + POSE)
+        start = self.board_at + TWIST * shot
+        return slice(start, start + TWIST)
 
     @property
     def errors(self) -> slice:
@@ -238,8 +238,8 @@ class Layout:
             mine = np.flatnonzero(seen.camera == camera)
             blocks.append(_entries(mine, np.full(len(mine), self.lens(camera).start), line.by_lens[mine] @ lens.basis))
         moving = np.flatnonzero(seen.camera > 0)
-        blocks.append(_entries(moving, self.camera_at + POSE * (seen.camera[moving] - 1), line.by_camera[moving]))
-        blocks.append(_entries(np.arange(len(seen)), self.board_at + POSE * seen.shot, line.by_board))
+        blocks.append(_entries(moving, self.camera_at + TWIST * (seen.camera[moving] - 1), line.by_camera[moving]))
+        blocks.append(_entries(np.arange(len(seen)), self.board_at + TWIST * seen.shot, line.by_board))
         if self.board_errors is not None:
             assert seen.corner is not None
             blocks.append(_entries(np.arange(len(seen)), self.errors_at + POINT * seen.corner, line.by_point))

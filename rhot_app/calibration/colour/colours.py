@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.colour.identity import free_paints, identify
 from rhot_app.calibration.colour.illuminant import SAME
 from rhot_app.calibration.colour.model import Obstacles, range_of_samples, solve_models
-from rhot_app.calibration.colour.samples import PaintSamples, View
+from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
 from rhot_app.calibration.colour.separability import Separability, judge_colours
 from rhot_app.calibration.colour.surroundings import SurroundingsReport, surrounding_colours, survey_surroundings
 from rhot_app.calibration.colour.verdict import Rehearsal, judge_report, rehearse
@@ -79,7 +79,7 @@ class ColourReport:
         }
 
 
-def solve_colours(samples: Sequence[PaintSamples], views: Sequence[View], *, skin: Colours = NO_COLOURS,
+def solve_colours(samples: Sequence[PaintSamples], views: Sequence[MarkedPicture], *, skin: Colours = NO_COLOURS,
                   base: MarkerSet | None = None, given: Mapping[str, ChromaModel] | None = None,
                   before: Mapping[str, Sequence[ChromaModel]] | None = None,
                   progress: Progress = silent) -> ColourReport:

@@ -14,7 +14,7 @@ import numpy as np
 
 from rhot_app.calibration.colour.colours import NO_COLOURS
 from rhot_app.calibration.colour.paint_region import PaintRegion, Point, region_at
-from rhot_app.calibration.colour.samples import GROWN, ColourSamples, PaintSamples, View
+from rhot_app.calibration.colour.samples import GROWN, ColourSamples, MarkedPicture, PaintSamples
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import SAMPLES_MIN, Box, Colours, box_mask, colours_of, learn_chroma_from_colours
@@ -86,7 +86,7 @@ class ColourGathering:
         return tuple(_joined(own) for own in by_name.values() if own)
 
     @property
-    def views(self) -> tuple[View, ...]:
+    def views(self) -> tuple[MarkedPicture, ...]:
         """Pictures to search the room in, of the cameras in turn."""
         turns = zip_longest(*(collector.views for collector in self._collectors.values()))
         return tuple(view for turn in turns for view in turn if view is not None)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.colour.paint_region import SEED_HUE_DEG, alike, surroundings
-from rhot_app.calibration.colour.samples import PaintSamples, View
+from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
 from rhot_app.calibration.colour.surroundings import HUE_BINS, HUE_STEP_DEG
 from rhot_node.detect.colour import Colours
 from rhot_node.markers import ChromaModel
@@ -112,7 +112,7 @@ def has_hue_of_skin(colours: Colours) -> bool:
     return abs(away) <= SKIN_REACH_DEG and magnitude < SKIN_MAGNITUDE and magnitude < SKIN_SATURATION * luma
 
 
-def beside(name: str, colours: Colours, views: Sequence[View]) -> tuple[str, ...]:
+def beside(name: str, colours: Colours, views: Sequence[MarkedPicture]) -> tuple[str, ...]:
     """The other markers whose surroundings have the colour of `name`: their hand has it, too."""
     _, cb, cr = (float(part) for part in np.median(colours, axis=0))
     found: list[str] = []
@@ -125,7 +125,7 @@ def beside(name: str, colours: Colours, views: Sequence[View]) -> tuple[str, ...
     return tuple(found)
 
 
-def skin_shown(name: str, colours: Colours, views: Sequence[View]) -> str:
+def skin_shown(name: str, colours: Colours, views: Sequence[MarkedPicture]) -> str:
     """The evidence in words that a marker's colour is that of skin; empty without any."""
     luma, cb, cr = (float(part) for part in np.median(colours, axis=0))
     hue = math.degrees(math.atan2(cr, cb))
@@ -157,7 +157,7 @@ def colours_taken(now: Mapping[str, ChromaModel], before: Mapping[str, Sequence[
     return tuple(found)
 
 
-def identify(samples: Sequence[PaintSamples], views: Sequence[View], models: Mapping[str, ChromaModel],
+def identify(samples: Sequence[PaintSamples], views: Sequence[MarkedPicture], models: Mapping[str, ChromaModel],
              before: Sequence[Mapping[str, Sequence[ChromaModel]]]) -> Identity:
     """The ambiguous colours of the sampled markers.
 

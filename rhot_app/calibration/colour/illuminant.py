@@ -106,8 +106,8 @@ def _bytes(plane: NDArray[Any]) -> Plane:
 # -- drift of the illuminant -------------------------------------------------------------------------------------------
 # From the markers' own colours, before a marker is lost.
 
-SIGHTS = 20  # of every marker, of which the median counts
-SIGHTS_LEAST = 3
+OBSERVATIONS_KEPT = 20  # of every marker, of which the median counts
+OBSERVATIONS_LEAST = 3
 WARMTH_FAIR, WARMTH_POOR = 0.2, 0.6
 """A change of lamp that is worth a sentence, and one that is more than between 3000 and 6500 K."""
 LIGHT_FAIR, LIGHT_POOR = 0.4, 0.65
@@ -122,7 +122,7 @@ class MarkerDrift:
     """One marker now. `hue_deg`: how far its hue is from the learnt one, the light's share taken off, degrees.
 
     `margin`: 0..1, what is left of the hue tolerance or of the chroma above the least, whichever is less. `light`:
-    factor on its light. `luma`: grey levels. `sights`: how many pictures that rests on.
+    factor on its light. `luma`: grey levels. `observations`: how many pictures that rests on.
     """
 
     marker: str
@@ -130,7 +130,7 @@ class MarkerDrift:
     margin: float
     light: float
     luma: float
-    sights: int
+    observations: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,8 +164,8 @@ class IlluminantDrift:
         self._detector = detector or FastDetector(markers)
         self._own = detector is None
         self._learnt = np.array([paint_rgb(marker) for marker in markers.markers]) @ YCC_FROM_RGB.T
-        self._seen: list[deque[Array]] = [deque(maxlen=SIGHTS) for _ in markers.markers]
-        self._warmth: deque[float] = deque(maxlen=SIGHTS)
+        self._seen: list[deque[Array]] = [deque(maxlen=OBSERVATIONS_KEPT) for _ in markers.markers]
+        self._warmth: deque[float] = deque(maxlen=OBSERVATIONS_KEPT)
 
     def update(self, image: YuvImage, seen: Sequence[MarkerObservation] | None = None) -> None:
         """Take in a picture; `seen`: what the given detector found in it."""
@@ -179,8 +179,8 @@ class IlluminantDrift:
     def report(self) -> DriftReport:
         """How the light stands now."""
         temperature_shift = float(np.median(self._warmth)) if self._warmth else 0.0
-        drifts = tuple(self._drift(index, temperature_shift) for index, sights in enumerate(self._seen)
-                       if len(sights) >= SIGHTS_LEAST)
+        drifts = tuple(self._drift(index, temperature_shift) for index, observations in enumerate(self._seen)
+                       if len(observations) >= OBSERVATIONS_LEAST)
         light = float(np.median([drift.light for drift in drifts])) if drifts else 1.0
         return DriftReport(temperature_shift, light, drifts, _judge(temperature_shift, light, drifts))
 

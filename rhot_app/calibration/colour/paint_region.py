@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import MAGNITUDE_LEAST, SAMPLES_MIN, Box, box_mask, colours_of
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.outline import RING
+from rhot_node.detect.region.outline import RING
 
 Mask = NDArray[np.bool_]
 Point = tuple[float, float]

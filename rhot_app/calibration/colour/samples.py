@@ -59,7 +59,7 @@ class PaintSamples:
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class MarkedPicture:
     """A picture and the markers that are known in it, by name."""
 
     image: YuvImage
@@ -67,7 +67,7 @@ class View:
 
 
 @dataclass(frozen=True, slots=True)
-class _Sight:
+class _Observation:
     """One picture's share of a marker's samples."""
 
     picture: int
@@ -86,8 +86,8 @@ class ColourSamples:
     """
 
     def __init__(self) -> None:
-        self._sights: dict[str, list[_Sight]] = {}
-        self._views: list[View] = []
+        self._observations: dict[str, list[_Observation]] = {}
+        self._views: list[MarkedPicture] = []
         self._pictures = 0
         self._last: YuvImage | None = None
         self._detector: FastDetector | None = None
@@ -95,10 +95,10 @@ class ColourSamples:
     @property
     def names(self) -> tuple[str, ...]:
         """Markers that have samples, in the order in which they were named."""
-        return tuple(self._sights)
+        return tuple(self._observations)
 
     @property
-    def views(self) -> tuple[View, ...]:
+    def views(self) -> tuple[MarkedPicture, ...]:
         """Pictures that were kept to search the room in."""
         return tuple(self._views)
 
@@ -106,17 +106,18 @@ class ColourSamples:
     def samples(self) -> tuple[PaintSamples, ...]:
         """What has been gathered, one per marker."""
         return tuple(PaintSamples(
-            name=name, colours=np.concatenate([sight.colours for sight in sights]),
-            frame=np.concatenate([np.full(len(sight.colours), sight.picture, np.int32) for sight in sights]),
-            area=float(np.median([sight.area for sight in sights]))) for name, sights in self._sights.items())
+            name=name, colours=np.concatenate([one.colours for one in observations]),
+            frame=np.concatenate([np.full(len(one.colours), one.picture, np.int32) for one in observations]),
+            area=float(np.median([one.area for one in observations])))
+            for name, observations in self._observations.items())
 
     def pictures(self, name: str) -> int:
         """From how many pictures a marker's samples are."""
-        return len(self._sights.get(name, []))
+        return len(self._observations.get(name, []))
 
     def variety(self, name: str) -> float:
         """0..1: how much of a marker has been seen; 1 from FRAMES_ENOUGH pictures on that each showed something new."""
-        return min(1.0, len(self._sights.get(name, [])) / FRAMES_ENOUGH)
+        return min(1.0, len(self._observations.get(name, [])) / FRAMES_ENOUGH)
 
     def add(self, name: str, image: YuvImage, where: Box | Point | Sequence[Box]) -> PaintRegion:
         """Samples of the marker `name` at a click (x, y) or in boxes (x0, y0, x1, y1), luma px, upper ends exclusive.
@@ -140,16 +141,19 @@ class ColourSamples:
         Returns the markers of which samples were taken. Half-hidden and doubtful ones are left out; that something else
         has a marker's colour is no doubt where the size tells them apart.
         """
-        if not self._sights:
+        if not self._observations:
             return {}
         detector = self._follower()
         found, taken = detector.detect(image), {}
         for index, name in enumerate(self.names):
             seen = found[index]
-            if seen.found and len(self._sights[name]) < FRAMES_MOST and self._plain(name, index, found):
+            if seen.found and len(self._observations[name]) < FRAMES_MOST and self._plain(name, index, found):
                 inside = detector.paint_mask(image, seen)
-                if np.count_nonzero(inside) >= SAMPLES_MIN and self._adds(name, _sight(0, image, region_of(inside))):
-                    taken[name] = region_of(inside)
+                if np.count_nonzero(inside) < SAMPLES_MIN:
+                    continue
+                region = region_of(inside)
+                if self._adds(name, _observation(0, image, region)):
+                    taken[name] = region
         if taken:
             self._keep(image, taken)
         return taken
@@ -157,11 +161,11 @@ class ColourSamples:
     def keep_view(self, image: YuvImage) -> None:
         """Keep a picture to search the room in, whether or not it shows a marker that anybody named."""
         if len(self._views) < VIEWS_MOST and all(view.image is not image for view in self._views):
-            self._views.append(View(image))
+            self._views.append(MarkedPicture(image))
 
     def forget(self, name: str) -> None:
         """Drop a marker's samples."""
-        self._sights.pop(name, None)
+        self._observations.pop(name, None)
         for view in self._views:
             view.paint.pop(name, None)
         self._detector = None
@@ -182,16 +186,16 @@ class ColourSamples:
     def _plain(self, name: str, index: int, found: Sequence[MarkerObservation]) -> bool:
         """Whether the first candidate of a marker is in plain view, and the only one of about its size."""
         others = [mark for mark in found[len(self.names):] if mark.index == index]
-        expected = self._sights[name][-1].area
+        expected = self._observations[name][-1].area
         if any(1.0 / GROWN < math.pi * (0.25 * mark.diameter) ** 2 / expected < GROWN for mark in others):
             return False
         return not found[index].flags & (DOUBTFUL & ~MarkerFlag.AMBIGUOUS if others else DOUBTFUL)
 
-    def _adds(self, name: str, new: _Sight) -> bool:
-        if not 1.0 / GROWN < new.area / self._sights[name][-1].area < GROWN:
+    def _adds(self, name: str, new: _Observation) -> bool:
+        if not 1.0 / GROWN < new.area / self._observations[name][-1].area < GROWN:
             return False  # something else of that colour
         diameter = math.sqrt(4.0 / math.pi * new.area)
-        for old in self._sights[name]:
+        for old in self._observations[name]:
             near = math.hypot(new.x - old.x, new.y - old.y) < MOVED * diameter
             if near and max(new.area / old.area, old.area / new.area) < TURNED \
                     and max(new.level / old.level, old.level / new.level) < TURNED:
@@ -211,7 +215,7 @@ class ColourSamples:
             self._pictures += 1
             self._last = image
         for name, region in regions.items():
-            self._sights.setdefault(name, []).append(_sight(self._pictures, image, region))
+            self._observations.setdefault(name, []).append(_observation(self._pictures, image, region))
         self.keep_view(image)
         for view in self._views:
             if view.image is image:
@@ -224,9 +228,9 @@ def _region(image: YuvImage, where: Box | Point | Sequence[Box]) -> PaintRegion:
     return region_at(image, cast(Point, where)) if len(where) == 2 else region_in(image, [cast(Box, where)])
 
 
-def _sight(picture: int, image: YuvImage, region: PaintRegion) -> _Sight:
+def _observation(picture: int, image: YuvImage, region: PaintRegion) -> _Observation:
     colours = colours_of(image, region.sample)
     rows, columns = np.nonzero(region.sample)
     level = float(np.hypot(*np.median(colours[:, 1:], axis=0)))
-    return _Sight(picture, colours[::max(1, len(colours) // PIXELS_A_FRAME)], float(columns.mean()),
+    return _Observation(picture, colours[::max(1, len(colours) // PIXELS_A_FRAME)], float(columns.mean()),
                   float(rows.mean()), region.area, level)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.colour.paint_region import Mask, only
-from rhot_app.calibration.colour.samples import View
+from rhot_app.calibration.colour.samples import MarkedPicture
 from rhot_node.detect.colour import Colours, colours_of
 from rhot_node.detect.gate import ColourGate, merits
 from rhot_node.detect.image import YuvImage
@@ -61,7 +61,7 @@ class SurroundingColours:
     size: float
 
 
-def survey_surroundings(markers: MarkerSet, names: Sequence[str], views: Sequence[View]) -> SurroundingsReport:
+def survey_surroundings(markers: MarkerSet, names: Sequence[str], views: Sequence[MarkedPicture]) -> SurroundingsReport:
     """Search the pictures outside the markers. `names`: of the markers, in the order of the set."""
     gate = ColourGate(markers)
     histogram = np.zeros(HUE_BINS)
@@ -84,7 +84,7 @@ def hue_histogram(image: YuvImage, where: Mask) -> NDArray[np.float64]:
     return np.bincount(bins, minlength=HUE_BINS + 1)[:HUE_BINS].astype(np.float64)
 
 
-def outside(view: View) -> Mask:
+def outside(view: MarkedPicture) -> Mask:
     """(H/2, W/2) everything but the markers known in the picture."""
     room = np.ones(view.image.u.shape, dtype=np.bool_)
     for region in view.paint.values():
@@ -92,7 +92,7 @@ def outside(view: View) -> Mask:
     return room
 
 
-def surrounding_colours(views: Sequence[View], name: str) -> SurroundingColours:
+def surrounding_colours(views: Sequence[MarkedPicture], name: str) -> SurroundingColours:
     """The coloured things outside the markers, in the pictures that show `name`."""
     shown = [(view, outside(view)) for view in views if name in view.paint]
     found = [colours_of(view.image, room & (_HUE_BINS[view.image.u, view.image.v] < HUE_BINS)) for view, room in shown]
@@ -102,7 +102,7 @@ def surrounding_colours(views: Sequence[View], name: str) -> SurroundingColours:
     return SurroundingColours(colours[::step], step / pictures, max(size, 1.0))
 
 
-def _rival(gate: ColourGate, marker: Marker, index: int, view: View, picture: int, room: Mask) -> Rival | None:
+def _rival(gate: ColourGate, marker: Marker, index: int, view: MarkedPicture, picture: int, room: Mask) -> Rival | None:
     name, shape = marker.id, view.image.u.shape
     blobs = gate.blobs(only(view.image, room), [index]).copy()
     if not len(blobs):

@@ -14,7 +14,7 @@ from rhot_app.calibration.colour.identity import Identity, name_of_hue
 from rhot_app.calibration.colour.illuminant import LAMPS, SAME, Lamp, chances, relit_image
 from rhot_app.calibration.colour.model import COVERAGE
 from rhot_app.calibration.colour.paint_region import PaintRegion
-from rhot_app.calibration.colour.samples import PaintSamples, View
+from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
 from rhot_app.calibration.colour.separability import SKIN, Separability
 from rhot_app.calibration.colour.surroundings import SurroundingsReport
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
@@ -67,7 +67,7 @@ class Rehearsal:
     lost: tuple[float, ...]
 
 
-def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[View],
+def rehearse(markers: MarkerSet, names: Sequence[str], views: Sequence[MarkedPicture],
              progress: Progress = silent) -> Rehearsal:
     """Show the pictures by all lamps as unrelated stills and once again as the next frame; tell what fails.
 
@@ -114,7 +114,7 @@ def _outcome(candidates: Sequence[MarkerObservation], region: PaintRegion) -> Ou
 
 
 def _cause(outcome: Outcome, explainer: Explainer, detector: FastDetector, image: YuvImage,
-           seen: Sequence[MarkerObservation], index: int, view: View) -> Cause:
+           seen: Sequence[MarkerObservation], index: int, view: MarkedPicture) -> Cause:
     doubt = explainer.doubt(seen, index) if outcome == "doubtful" else None
     if doubt is not None:
         return doubt

@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 class _Seats:
     """Where each marker of a recording was taken to sit: `told` by a role, `guessed` by its name, or not on a hand."""
 
-    told: dict[str, str]
+    given: dict[str, str]
     guessed: dict[str, str]
     others: tuple[str, ...]
 
@@ -82,7 +82,7 @@ class _Seats:
     def to_json(self) -> dict[str, Any]:
         """Fields of the report."""
         places = {name: {"place": place, "guessed": guessed}
-                  for seats, guessed in ((self.told, False), (self.guessed, True)) for name, place in seats.items()}
+                  for seats, guessed in ((self.given, False), (self.guessed, True)) for name, place in seats.items()}
         return {"places": places, "not_on_hand": list(self.others)}
 
 

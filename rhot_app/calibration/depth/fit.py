@@ -307,7 +307,7 @@ def _range(figures: DepthFigures) -> list[Finding]:
 def _rows(figures: DepthFigures) -> list[Finding]:
     if not figures.rejected:
         return []
-    told = "; ".join(f"{row.where}: {row.reason}" for row in figures.rejected[:5])
+    reasons = "; ".join(f"{row.where}: {row.reason}" for row in figures.rejected[:5])
     more = f"; and {len(figures.rejected) - 5} more" if len(figures.rejected) > 5 else ""
-    return [Finding("rejected_rows", Grade.FAIR, f"{len(figures.rejected)} rows were not used ({told}{more}).", "",
+    return [Finding("rejected_rows", Grade.FAIR, f"{len(figures.rejected)} rows were not used ({reasons}{more}).", "",
                     "Correct them in the table or leave them out.")]

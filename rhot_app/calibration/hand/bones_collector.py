@@ -23,7 +23,7 @@ THUMB_BENT_PART = 0.9
 """A finger has bent when its tip is nearer to the palm than this part of its farthest; the thumb is shorter."""
 
 STRETCHED_PART = 0.93
-_SIGHT_PART = 0.8  # of the markers: an instant that shows fewer does not count
+_SEEN_PART = 0.8  # of the markers: an instant that shows fewer does not count
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class BonesCollector:
     def add(self, t_s: float, positions: Array) -> None:
         """Take one instant: `positions` (M, 3) m in the order of the places, NaN where a marker is not seen."""
         seen = np.isfinite(positions[:, 0])
-        if self._times and seen.mean() >= _SIGHT_PART:
+        if self._times and seen.mean() >= _SEEN_PART:
             self._together_s += min(max(t_s - self._times[-1], 0.0), 0.2)
         self._times.append(t_s)
         self._positions.append(np.array(positions, dtype=np.float64))

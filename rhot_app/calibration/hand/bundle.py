@@ -4,14 +4,15 @@ Levenberg-Marquardt; the poses are eliminated instant by instant (Schur compleme
 to solve has only the shape's unknowns. Huber's loss on each marker's distance by reweighting.
 
 Neighbouring instants err alike: skin slides over bones in the same way whenever a finger bends, and nobody's joints go
-together exactly as the natural pose says. So all instants together count only as much as `independent` ones, and what
-the natural pose says of them as `pose_prior_weight` ones.
+together exactly as the pose prior says. So all instants together count only as much as `independent` ones, and the
+pose prior on them as `pose_prior_weight` ones.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 from rhot_app.calibration.hand.bundle_model import POSE, Linearised, Poses, expected, linearise
 from rhot_app.calibration.hand.shape import BONE_COUNT, HandUnknowns
 from rhot_app.errors import CalibrationError
+from rhot_app.estimation.least_squares import minimise
 from rhot_app.hand.kinematics import TWIST
-from rhot_app.hand.limits import natural_pose
+from rhot_app.hand.limits import PERSON_LIMIT_SD_RAD, pose_prior
 from rhot_app.progress import Progress, silent
 
 # -- bias by incidental parameters -------------------------------------------------------------------------------------
@@ -29,7 +31,7 @@ from rhot_app.progress import Progress, silent
 # the outer side, and thousands of instants agree on that. Joints move towards the markers until it fits: a last
 # phalanx came out 3 to 8 mm too short at 0.2 mm of noise (incidental parameters, Neyman and Scott 1948). To second
 # order the mean of what is left of a marker is half the trace of its second derivative by the pose times the pose's
-# covariance: `bend`. Sights moved by it show the shape with little bias.
+# covariance: `bend`. Positions corrected by it show the shape with little bias.
 
 Array = NDArray[np.float64]
 
@@ -72,14 +74,13 @@ def _roots(covariances: Array) -> Array:
 HUBER = 3.0
 """Markers farther off than this many standard deviations count less."""
 
-HABITS = 3.0
+POSE_PRIOR_WEIGHT = 3.0
+"""How many independent instants all together count against the pose prior."""
 
-LIMIT_SD = np.radians(5.0)
-LIMIT_MARGIN = np.radians(10.0)
+LIMIT_MARGIN_RAD = 2.0 * PERSON_LIMIT_SD_RAD
 """Joints may go this far past the base hand's limits, which nobody measured on this hand, and then pay."""
 
 _STILL = 1e-3  # the step that makes the hand less than this more likely (logarithm) was the last
-_DAMPING_MAX = 1e8
 _INNER_STEPS = 3  # of the poses for each of the shape
 _DIAGONAL = np.arange(POSE)
 
@@ -87,30 +88,28 @@ _DIAGONAL = np.arange(POSE)
 @dataclass(frozen=True, slots=True)
 class Weights:
     """How much the terms count: `noise_m` standard deviation of a marker per axis; all instants together as
-    `independent` ones, the natural pose in `pose_prior_weight` of them; `fresh`: the part of the markers'
-    variance that is noise,
-    anew at every instant."""
+    `independent` ones, the pose prior in `pose_prior_weight` of them; `fresh`: the part of the markers' variance that
+    is noise, anew at every instant."""
 
     noise_m: float
     independent: float
-    pose_prior_weight: float = HABITS
+    pose_prior_weight: float = POSE_PRIOR_WEIGHT
     fresh: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class HandBundle:
     """The adjusted `vector` (G,) and `poses`, what is left (F, M, 3) m, seen minus expected in the world, NaN where
-    unseen; `cost` half the sum of squares; `steps` taken."""
+    unseen; `cost` half the sum of squares."""
 
     vector: Array
     poses: Poses
     residuals: Array
     cost: float
-    steps: int
 
 
 @dataclass(frozen=True, slots=True)
-class _Reduced:
+class Reduced:
     """Normal equations of the shape once the poses are eliminated: `matrix` (G, G), `right` (G,); then an instant's
     pose moves by `alone` (F, 27) less `coupled` (F, 27, G) times the shape's step."""
 
@@ -121,45 +120,29 @@ class _Reduced:
 
 
 class HandAdjustment:
-    """The cost of a hand and its poses given sights (F, M, 3) m, NaN = missing, and its descent."""
+    """The cost of a hand and its poses given marker positions (F, M, 3) m, NaN = missing, and its descent."""
 
     def __init__(self, unknowns: HandUnknowns, seen: Array, weights: Weights) -> None:
         self._unknowns = unknowns
         self._seen = seen
         self._weights = weights
-        self._limits = unknowns.limits + np.array([-LIMIT_MARGIN, LIMIT_MARGIN])
-        self._natural = natural_pose()
+        self._limits = unknowns.limits + np.array([-LIMIT_MARGIN_RAD, LIMIT_MARGIN_RAD])
+        self._pose_prior = pose_prior()
         self._prior_information = np.linalg.inv(unknowns.prior.covariance)
         count = max(len(seen), 1)
         self._data_part = min(1.0, weights.independent / count)
-        self._habit_part = min(1.0, weights.pose_prior_weight / count)
+        self._prior_part = min(1.0, weights.pose_prior_weight / count)
 
     def run(self, vector: Array, poses: Poses, steps: int, *, progress: Progress = silent) -> HandBundle:
-        """Descend from a first guess. Raises CalibrationError when the sights do not hold the hand at all.
+        """Descend from a first guess. Raises CalibrationError when the markers do not hold the hand at all.
 
         Every trial of a shape lets each instant find its own pose first: one stretched finger, whose joints hardly
         show, would else hold up the shape for all.
         """
-        cost, damping, taken = self._cost(vector, poses), 1e-3, 0
-        for taken in range(1, steps + 1):
-            progress("fitting the hand", (taken - 1) / steps)
-            reduced = self._reduce(vector, poses)
-            accepted = False
-            while damping < _DAMPING_MAX:
-                trial_vector, trial_poses = self._try(reduced, damping, vector, poses)
-                trial = self._cost(trial_vector, trial_poses)
-                if trial <= cost:
-                    accepted = True
-                    break
-                damping = max(10.0 * damping, 1e-6)
-            if not accepted:
-                break
-            gain, cost, vector, poses = cost - trial, trial, trial_vector, trial_poses
-            damping = max(0.1 * damping, 1e-9)
-            if gain < _STILL:
-                break
-        residuals = self._seen - expected(self._unknowns, vector, poses)
-        return HandBundle(vector, poses, residuals, cost, taken)
+        found, _ = minimise(_Iterate(self, vector, poses), steps, _STILL,
+                            watch=lambda taken: progress("fitting the hand", taken / steps))
+        residuals = self._seen - expected(self._unknowns, found.vector, found.poses)
+        return HandBundle(found.vector, found.poses, residuals, found.cost)
 
     def pose_covariances(self, vector: Array, poses: Poses) -> Array:
         """(F, 27, 27), how every pose scatters by the noise of its own instant."""
@@ -170,7 +153,7 @@ class HandAdjustment:
     def covariance(self, vector: Array, poses: Poses) -> Array:
         """(G, G) of the shape. Poses that scatter by their noise look like movement, which would show the joints: what
         that adds to the information is taken off again, as far as the prior, which nobody can know less than."""
-        information = self._reduce(vector, poses).matrix - self._pretended(vector, poses)
+        information = self.reduced(vector, poses).matrix - self._pretended(vector, poses)
         half = np.linalg.cholesky(self._unknowns.prior.covariance)
         values, axes = np.linalg.eigh(half.T @ information @ half)
         root = half @ axes / np.sqrt(np.maximum(values, 1.0))
@@ -193,7 +176,7 @@ class HandAdjustment:
                 break
         return poses
 
-    def _try(self, reduced: _Reduced, damping: float, vector: Array, poses: Poses) -> tuple[Array, Poses]:
+    def after_step(self, reduced: Reduced, damping: float, vector: Array, poses: Poses) -> tuple[Array, Poses]:
         """The hand after one damped step."""
         matrix = reduced.matrix.copy()
         matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
@@ -205,7 +188,8 @@ class HandAdjustment:
         better = self._instant_costs(vector, moved) <= self._instant_costs(vector, poses)
         return vector, self.settle(vector, moved.where(better, poses), _INNER_STEPS)
 
-    def _cost(self, vector: Array, poses: Poses) -> float:
+    def cost(self, vector: Array, poses: Poses) -> float:
+        """Half the sum of squares; infinite where no hand is possible."""
         if not _possible(vector):
             return np.inf
         change = vector - self._unknowns.prior.mean
@@ -216,16 +200,16 @@ class HandAdjustment:
         distance = np.linalg.norm(self._seen - expected(self._unknowns, vector, poses), axis=2) / self._weights.noise_m
         loss = np.nansum(np.where(distance <= HUBER, distance ** 2, HUBER * (2.0 * distance - HUBER)), axis=1)
         past = self._past_limits(poses.angles)[0]
-        off = poses.angles - self._natural.mean
-        pose_prior_weight = ((off @ self._natural.information) * off).sum(axis=1) + (past ** 2).sum(axis=1)
-        return np.asarray(0.5 * (self._data_part * loss + self._habit_part * pose_prior_weight))
+        off = poses.angles - self._pose_prior.mean
+        prior = ((off @ self._pose_prior.information) * off).sum(axis=1) + (past ** 2).sum(axis=1)
+        return np.asarray(0.5 * (self._data_part * loss + self._prior_part * prior))
 
     def _past_limits(self, angles: Array) -> tuple[Array, Array]:
         """How far angles (F, 21) are past their limits, in standard deviations, signed; and where they are."""
-        past = (np.maximum(angles - self._limits[:, 1], 0.0) + np.minimum(angles - self._limits[:, 0], 0.0)) / LIMIT_SD
-        return past, past != 0.0
+        past = np.maximum(angles - self._limits[:, 1], 0.0) + np.minimum(angles - self._limits[:, 0], 0.0)
+        return past / PERSON_LIMIT_SD_RAD, past != 0.0
 
-    def _reduce(self, vector: Array, poses: Poses) -> _Reduced:
+    def reduced(self, vector: Array, poses: Poses) -> Reduced:
         """The normal equations of the shape."""
         at = linearise(self._unknowns, vector, poses)
         root, gap, per_pose = self._weighed(at)
@@ -238,7 +222,7 @@ class HandAdjustment:
         matrix = flat.T @ flat + self._prior_information - tied.T @ coupled.reshape(tied.shape)
         change = vector - self._unknowns.prior.mean
         right = flat.T @ gap.ravel() - self._prior_information @ change - tied.T @ alone.ravel()
-        return _Reduced(np.asarray(matrix), np.asarray(right), alone, coupled)
+        return Reduced(np.asarray(matrix), np.asarray(right), alone, coupled)
 
     def _pretended(self, vector: Array, poses: Poses) -> Array:
         """(G, G) of the information, what comes from the scatter of the poses only."""
@@ -260,7 +244,7 @@ class HandAdjustment:
         _, gap, per_pose = self._weighed(at)
         turned = per_pose.transpose(0, 2, 1)
         matrix, right = turned @ per_pose, (turned @ gap[..., None])[..., 0]
-        self._add_habits(poses.angles, matrix, right)
+        self._add_pose_prior(poses.angles, matrix, right)
         return matrix, right
 
     def _weighed(self, at: Linearised) -> tuple[Array, Array, Array]:
@@ -275,13 +259,28 @@ class HandAdjustment:
         return (root, (root[..., None] * gap).reshape(count, -1),
                 (root[..., None, None] * at.per_pose).reshape(count, -1, POSE))
 
-    def _add_habits(self, angles: Array, matrix: Array, right: Array) -> None:
-        part, information = self._habit_part, self._natural.information
+    def _add_pose_prior(self, angles: Array, matrix: Array, right: Array) -> None:
+        part, information = self._prior_part, self._pose_prior.information
         past, outside = self._past_limits(angles)
         matrix[:, TWIST:, TWIST:] += part * information
-        matrix[:, np.arange(TWIST, POSE), np.arange(TWIST, POSE)] += part * outside / LIMIT_SD ** 2
+        matrix[:, np.arange(TWIST, POSE), np.arange(TWIST, POSE)] += part * outside / PERSON_LIMIT_SD_RAD ** 2
         matrix[:, np.arange(TWIST), np.arange(TWIST)] += 1e-3
-        right[:, TWIST:] -= part * ((angles - self._natural.mean) @ information + past / LIMIT_SD)
+        right[:, TWIST:] -= part * ((angles - self._pose_prior.mean) @ information + past / PERSON_LIMIT_SD_RAD)
+
+
+class _Iterate:
+    """Implements `Iterate`: a hand and its poses."""
+
+    def __init__(self, adjustment: HandAdjustment, vector: Array, poses: Poses) -> None:
+        self._adjustment, self.vector, self.poses = adjustment, vector, poses
+        self.cost = adjustment.cost(vector, poses)
+
+    def moved(self, damping: float) -> _Iterate:
+        return _Iterate(self._adjustment, *self._adjustment.after_step(self._reduced, damping, self.vector, self.poses))
+
+    @cached_property
+    def _reduced(self) -> Reduced:
+        return self._adjustment.reduced(self.vector, self.poses)
 
 
 def _possible(vector: Array) -> bool:

@@ -69,7 +69,7 @@ def fit_hand(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = si
     seen = as_right(smoothed.positions[instants], base.side)
     progress("looking at the side of the hand", 0.0)
     some = seen[np.linspace(0, len(seen) - 1, min(_SIDE_INSTANTS, len(seen))).astype(int)]
-    costs = [_begin(unknowns, sights, 15).cost for sights in (some, as_right(some, "left"))]
+    costs = [_begin(unknowns, positions, 15).cost for positions in (some, as_right(some, "left"))]
     bundle = _begin(unknowns, seen, 30)
     bundle, covariance, model_error_m = _adjust_by_error(unknowns, seen, bundle, smoothed, progress)
     return HandFit(unknowns, bundle, covariance, instants, smoothed.raw_noise_m, model_error_m, costs[1] / costs[0])

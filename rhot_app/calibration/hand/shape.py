@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rhot_app.barehand.landmarks import ANATOMY_SD_M
 from rhot_app.calibration.hand.marker_places import (
     BASE_SD_M,
     BASE_TURN_SD,
@@ -32,6 +31,7 @@ from rhot_app.calibration.hand.marker_places import (
 )
 from rhot_app.geometry.transforms import skew
 from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.landmarks import ANATOMY_SD_M
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import FINGERS, JOINTS, WRIST_ROLE
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.shared_views import SharedViews, Shot
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class StereoCollector:
     def __init__(self, cameras: Sequence[str], board: Board) -> None:
         self._cameras = tuple(cameras)
         self._board = board
-        self._shots: list[Shot] = []
+        self._shots: list[BoardShot] = []
         self._before: tuple[BoardView | None, ...] = (None,) * len(self._cameras)
 
     def offer(self, views: Sequence[BoardView | None], *, still: bool = False) -> Offer:
@@ -88,7 +88,7 @@ class StereoCollector:
         diagonal = max(float(np.hypot(*view.size)) for view in views if view is not None)
         if any(self._alike(shot, views, diagonal) for shot in self._shots):
             return Offer(False, f"This view is there already. {self.guidance().advice or 'There is enough.'}")
-        self._shots.append(Shot(f"{len(self._shots) + 1}", tuple(views)))
+        self._shots.append(BoardShot(f"{len(self._shots) + 1}", tuple(views)))
         return Offer(True, f"Taken: {len(self._shots)}.")
 
     def discard_last(self) -> None:
@@ -105,7 +105,7 @@ class StereoCollector:
         return guide(self.views())
 
     @staticmethod
-    def _alike(shot: Shot, views: Sequence[BoardView | None], diagonal: float) -> bool:
+    def _alike(shot: BoardShot, views: Sequence[BoardView | None], diagonal: float) -> bool:
         """Whether a kept shot shows the board at the same place to all cameras that see it now."""
         return all(_moved(kept, view) < _NEW_PLACE * diagonal
                    for kept, view in zip(shot.views, views, strict=True) if view is not None)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.shared_views import Dropped, SharedViews, Shot
+from rhot_app.calibration.board.shared_views import BoardShot, Dropped, SharedViews
 from rhot_app.calibration.lens.views import (
     Read,
     drop_other_sizes,
@@ -53,7 +53,7 @@ def read_shared(files: Mapping[str, Sequence[Path]], board: Board, *, progress: 
             raise CalibrationError(no_board(name, reads, board))
         dropped += [Dropped(_name(each.path, name), each.trouble, each.code)
                     for each in reads if each.path and each.trouble]
-    shots = tuple(Shot(shot.name, tuple(each.view for each in row))
+    shots = tuple(BoardShot(shot.name, tuple(each.view for each in row))
                   for shot, row in zip(matched.shots, rows, strict=True))
     size = size_of([each for row in rows for each in row], board)
     return ReadPictures(SharedViews(tuple(files), board, shots), tuple(dropped), size)

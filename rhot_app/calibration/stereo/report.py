@@ -15,7 +15,7 @@ from rhot_app.calibration.board.shared_views import Dropped
 from rhot_app.calibration.bundle.adjustment import Bundle
 from rhot_app.calibration.bundle.model import (
     LENS,
-    POSE,
+    TWIST,
     BundleState,
     Layout,
     LensFreedom,
@@ -186,8 +186,8 @@ class Certainty:
         return np.asarray(np.sqrt(np.diag(slope @ self.pose_covariance(camera)[:3, :3] @ slope.T)))
 
     def _rows(self, camera: int) -> Array:
-        start = camera * (LENS + POSE)
-        return self.factor[start:start + LENS + POSE]
+        start = camera * (LENS + TWIST)
+        return self.factor[start:start + LENS + TWIST]
 
 
 def certainty(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -> Certainty:
@@ -209,7 +209,7 @@ def certainty(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -
     for camera, freedom in enumerate(layout.lenses):
         of_given = np.hstack([np.zeros((LENS, own.shape[1])), given[camera * LENS:(camera + 1) * LENS]])
         rows.append(freedom.basis @ columns[layout.lens(camera)] + of_given)
-        rows.append(columns[layout.camera(camera)] if camera else np.zeros((POSE, columns.shape[1])))
+        rows.append(columns[layout.camera(camera)] if camera else np.zeros((TWIST, columns.shape[1])))
     return Certainty(np.vstack(rows), apart)
 
 
@@ -283,7 +283,7 @@ def _pixels(points: Array, state: BundleState) -> Array:
 
 def _moved(state: BundleState, change: Array) -> BundleState:
     """`state` with each camera's lens and pose changed by `change` (C * 15,)."""
-    parts = change.reshape(len(state.lenses), LENS + POSE)
+    parts = change.reshape(len(state.lenses), LENS + TWIST)
     poses = state.camera_from_world.copy()
     for pose, part in zip(poses, parts, strict=True):
         pose[:3, :3] = exp_so3(part[LENS:LENS + 3]) @ pose[:3, :3]

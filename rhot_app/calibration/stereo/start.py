@@ -14,6 +14,8 @@ from rhot_app.calibration.board.poses import PosedView, pose_view
 from rhot_app.calibration.bundle.model import BundleState, Observations, linearise
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
+from rhot_app.estimation.least_squares import Dense, minimise
+from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.geometry.transforms import apply, exp_so3, inverse, log_so3, rigid
 
 # -- relative pose of two cameras by consensus -------------------------------------------------------------------------
@@ -188,7 +190,7 @@ TABLE_FROM_BOARD: Array = rigid(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
 
 _LEVEL_RAD = np.radians(20.0)  # a camera that is rolled more than this against the table was not mounted by a person
 _SIMILAR_POSES = 2.0  # another tilt of the board whose error is below this many times the best one's cannot be excluded
-_STEPS = 10
+_STEPS, _LEAST_GAIN_SQ_PX = 10, 1e-9  # of all corners' squared distances
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,13 +251,14 @@ def _refined_board(posed: Sequence[PosedView | None], state: BundleState, start:
     seen = Observations(np.repeat([camera for camera, _ in rows], [len(each) for each in points]),
                         np.zeros(sum(len(each) for each in points), np.intp), np.concatenate(points),
                         np.concatenate([each.view.pixels for _, each in rows]))
-    pose = start.copy()
-    for _ in range(_STEPS):
+    def corners(pose: Array) -> list[Rows]:
         line = linearise(BundleState(state.lenses, state.camera_from_world, pose[None]), seen)
-        step = np.linalg.lstsq(line.by_board.reshape(-1, 6), line.residuals.ravel(), rcond=None)[0]
-        pose[:3, :3] = exp_so3(step[:3]) @ pose[:3, :3]
-        pose[:3, 3] += step[3:]
-    return pose, float(np.sqrt(np.mean(np.sum(np.square(line.residuals), axis=1))))
+        return [Rows(line.residuals.ravel(), line.by_board.reshape(-1, 6), UNIT)]
+
+    def retract(pose: Array, step: Array) -> Array:
+        return rigid(exp_so3(step[:3]) @ pose[:3, :3], pose[:3, 3] + step[3:])
+    found, _ = minimise(Dense(start, corners, retract, 6), _STEPS, _LEAST_GAIN_SQ_PX)
+    return found.state, float(np.sqrt(found.cost / len(seen)))
 
 
 def _stance(name: str, world_from_camera: Array) -> CameraStance:

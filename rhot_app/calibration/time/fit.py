@@ -54,7 +54,7 @@ class OffsetSearch:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class TimeFit:
     """Times with their covariance (2 C, 2 C) s^2; what is left of the misses (E,) px, misalignment taken off, and their
     derivatives (E, 2 C) px/s."""
 
@@ -95,7 +95,7 @@ def search(model: TimeModel, reference: int = 0) -> tuple[Times, tuple[OffsetSea
 
 
 def fit(model: TimeModel, start: Times, *, reference: int = 0, hold_rows: bool = False,
-        progress: Progress = silent) -> Fit:
+        progress: Progress = silent) -> TimeFit:
     """Improve `start`. `hold_rows`: the nodes' row times are taken for true, only offsets are sought."""
     priors = np.concatenate([np.full(len(model.cameras), _OFFSET_PRIOR_S),
                              np.full(len(model.cameras), _HELD_S if hold_rows else ROW_PRIOR_S)])
@@ -116,7 +116,7 @@ def fit(model: TimeModel, start: Times, *, reference: int = 0, hold_rows: bool =
     system = _System(model, Times.of(vector), nuisance, priors, middle)
     step = system.step()
     left = system.found.miss_px + nuisance @ step[free:]
-    return Fit(Times.of(vector), system.covariance()[:free, :free], left, system.found.miss_slopes)
+    return TimeFit(Times.of(vector), system.covariance()[:free, :free], left, system.found.miss_slopes)
 
 
 class _System:
@@ -125,16 +125,16 @@ class _System:
     def __init__(self, model: TimeModel, times: Times, nuisance: Array, priors: Array, middle: Array) -> None:
         self.found = found = model.residuals(times)
         unknowns = found.miss_slopes.shape[1] + nuisance.shape[1]
-        seen, told = np.isfinite(found.miss_px), np.isfinite(found.breath_m)
-        groups = model.breath_group[told]
+        seen, known = np.isfinite(found.miss_px), np.isfinite(found.breath_m)
+        groups = model.breath_group[known]
         aligned = np.linalg.lstsq(nuisance[seen], -found.miss_px[seen], rcond=None)[0]
         scale = _spread(found.miss_px[seen] + nuisance[seen] @ aligned)
-        scales = np.array([_spread(found.breath_m[told][groups == k]) for k in range(len(model.marker_pairs))])[groups]
-        residuals = np.concatenate([found.miss_px[seen] / scale, found.breath_m[told] / scales])
+        scales = np.array([_spread(found.breath_m[known][groups == k]) for k in range(len(model.marker_pairs))])[groups]
+        residuals = np.concatenate([found.miss_px[seen] / scale, found.breath_m[known] / scales])
         self._jacobian = np.zeros((len(residuals), unknowns))
         count = int(seen.sum())
         self._jacobian[:count] = np.column_stack([found.miss_slopes[seen], nuisance[seen]]) / scale
-        self._jacobian[count:, :found.breath_slopes.shape[1]] = found.breath_slopes[told] / scales[:, None]
+        self._jacobian[count:, :found.breath_slopes.shape[1]] = found.breath_slopes[known] / scales[:, None]
         still = residuals.copy()
         still[:count] += nuisance[seen] @ aligned / scale
         self._weights = np.square(np.clip(1.0 - np.square(still / _TUKEY), 0.0, None))
@@ -145,7 +145,7 @@ class _System:
         self._prior[:len(priors)] = 1.0 / np.square(priors)
         self._pull = np.zeros(unknowns)
         self._pull[:len(priors)] = self._prior[:len(priors)] * (times.vector - middle)
-        self._blocks = np.concatenate([model.miss_times_s[seen], model.breath_times_s[told]]) // _BLOCK_S
+        self._blocks = np.concatenate([model.miss_times_s[seen], model.breath_times_s[known]]) // _BLOCK_S
         self._normal = (self._jacobian * self._weights[:, None]).T @ self._jacobian + np.diag(self._prior)
 
     def step(self) -> Array:

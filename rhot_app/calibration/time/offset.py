@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.observations import ObservationTable
-from rhot_app.calibration.time.fit import Fit, OffsetSearch, fit, search
+from rhot_app.calibration.time.fit import OffsetSearch, TimeFit, fit, search
 from rhot_app.calibration.time.model import TimeModel, Times
 from rhot_app.calibration.time.tracks import build_tracks
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
@@ -99,17 +99,17 @@ def _require_geometry(rig: Rig) -> None:
                                "geometry first, times come after it.")
 
 
-def _rows_agree(model: TimeModel, free: Fit) -> bool:
+def _rows_agree(model: TimeModel, free: TimeFit) -> bool:
     """Whether the nodes' row times may be true: within 3 standard deviations, all together, or too near to matter."""
     cameras = len(model.cameras)
     away = free.times.row_times_s - np.array([camera.row_time_s for camera in model.cameras])
     if np.abs(away).max() < 1e-6:
         return True
-    surprise = float(away @ np.linalg.solve(free.covariance[cameras:, cameras:], away))
-    return surprise < 9.0 + 2.0 * cameras
+    mahalanobis_sq = float(away @ np.linalg.solve(free.covariance[cameras:, cameras:], away))
+    return mahalanobis_sq < 9.0 + 2.0 * cameras
 
 
-def _camera(model: TimeModel, index: int, free: Fit, held: Fit, agree: bool) -> CameraTime:
+def _camera(model: TimeModel, index: int, free: TimeFit, held: TimeFit, agree: bool) -> CameraTime:
     across = _across(model, held, index)
     used, speed = held if agree else free, _rms(across)
     return CameraTime(
@@ -122,7 +122,7 @@ def _camera(model: TimeModel, index: int, free: Fit, held: Fit, agree: bool) -> 
         samples=int(np.count_nonzero(across)), direction=_direction(model, index))
 
 
-def _across(model: TimeModel, found: Fit, index: int) -> Array:
+def _across(model: TimeModel, found: TimeFit, index: int) -> Array:
     """Speeds across the epipolar lines of all samples that tell this camera's time, px/s."""
     slopes = found.slopes[:, index]
     return slopes[np.isfinite(found.left_px) & (slopes != 0.0)]
@@ -136,7 +136,7 @@ def _direction(model: TimeModel, index: int) -> str:
     return "up and down" if abs(line[1]) >= abs(line[0]) else "left and right"
 
 
-def _plot(model: TimeModel, found: OffsetSearch, used: Fit, before: Array) -> TimePlot:
+def _plot(model: TimeModel, found: OffsetSearch, used: TimeFit, before: Array) -> TimePlot:
     slopes = used.slopes[:, found.camera]
     rows = np.flatnonzero(np.isfinite(before) & np.isfinite(used.left_px) & (slopes != 0.0))
     parts = (model.miss_times_s[rows] // _PART_S).astype(int)
@@ -217,9 +217,9 @@ class TimeFigures:
 
 def judge_times(figures: TimeFigures) -> Verdict:
     """The verdict on a time calibration."""
-    told = ", ".join(f"{camera.name} {1e3 * camera.correction_s:+.2f} ± {1e3 * camera.sd_s:.2f} ms"
-                     for camera in figures.cameras if not camera.reference)
-    summary = (f"against {figures.cameras[0].name}, times are to be corrected by {told}; markers then miss their "
+    offsets = ", ".join(f"{camera.name} {1e3 * camera.correction_s:+.2f} ± {1e3 * camera.sd_s:.2f} ms"
+                        for camera in figures.cameras if not camera.reference)
+    summary = (f"against {figures.cameras[0].name}, times are to be corrected by {offsets}; markers then miss their "
                f"epipolar lines by {figures.rms_px:.2f} px rms instead of {figures.rms_before_px:.2f}.")
     findings = [finding for index, camera in enumerate(figures.cameras) if not camera.reference
                 for finding in (*_movement(camera), *_search(camera, figures.rivals[index]),
@@ -273,14 +273,14 @@ def _row_times(figures: TimeFigures) -> list[Finding]:
             Finding("row_time_not_seen", Grade.GOOD, f"The row times of {', '.join(unseen)} were not seen; they are "
                     "taken as the nodes say.", "", "Two markers on a stiff thing (or a stiff hand), one above the "
                     "other, waved fast, show them.")]
-    told = ", ".join(f"{camera.name} {1e6 * camera.row_time_s:.1f} ± {1e6 * camera.row_time_sd_s:.1f} µs (it says "
-                     f"{1e6 * camera.row_time_node_s:.1f})" for camera in figures.cameras)
+    row_times = ", ".join(f"{camera.name} {1e6 * camera.row_time_s:.1f} ± {1e6 * camera.row_time_sd_s:.1f} µs (it says "
+                          f"{1e6 * camera.row_time_node_s:.1f})" for camera in figures.cameras)
     seen = all(camera.row_time_observed for camera in figures.cameras)
     remedy = ("Set camera.row_time_us of these nodes, then record and run this again: a camera that says another row "
               "time may also say other times." if seen else
               "Record again with two markers on a stiff thing, one above the other, waved fast: then each row time "
               "shows, not only their difference.")
-    return [Finding("row_time", Grade.FAIR, f"Row times: {told}.", "The nodes' row times are not those of their "
+    return [Finding("row_time", Grade.FAIR, f"Row times: {row_times}.", "The nodes' row times are not those of their "
                     "cameras; the offsets written are a compromise in the middle of the pictures.", remedy)]
 
 

@@ -23,7 +23,7 @@ LONGEST_PERIODS = 1.6
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class MarkerTrack:
     """K samples in the order of their frames. `start_s` (K,) of row 0; `rows` (K,) raw px; `rays` (K, 2) undistorted
     normalised coordinates; `joined` (K,): the sample continues the one before it."""
 
@@ -43,7 +43,7 @@ class CameraTracks:
 
     name: str
     model: CameraModel
-    tracks: tuple[Track, ...]
+    tracks: tuple[MarkerTrack, ...]
     period_s: float
     row_time_s: float
     clock_bound_s: float
@@ -91,13 +91,13 @@ def _camera(table: CameraTable, model: CameraModel, epoch_ns: int) -> CameraTrac
     return CameraTracks(table.name, model, tracks, period_s, 1e-9 * row_time_ns, bound_s)
 
 
-def _track(table: CameraTable, marker: int, start_s: Array, model: CameraModel, longest_s: float) -> Track:
+def _track(table: CameraTable, marker: int, start_s: Array, model: CameraModel, longest_s: float) -> MarkerTrack:
     pixels = table.pixels[:, marker]
     rays = model.undistort(pixels) if len(pixels) else np.empty((0, 2))
     kept = ((table.flags[:, marker] & DOUBTFUL) == 0) & np.isfinite(rays).all(axis=1)
     acquired = (table.flags[kept, marker] & int(MarkerFlag.ACQUIRED)) != 0
     gaps = np.diff(start_s[kept], prepend=-np.inf)
-    return Track(start_s[kept], pixels[kept, 1], rays[kept], (gaps <= longest_s) & ~acquired)
+    return MarkerTrack(start_s[kept], pixels[kept, 1], rays[kept], (gaps <= longest_s) & ~acquired)
 
 
 # -- smoothed tracks and their noise -----------------------------------------------------------------------------------

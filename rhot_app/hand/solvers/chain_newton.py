@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import distance
 from rhot_app.hand.linear import solve_in_box
+from rhot_app.hand.solvers.finger_chain import distance
 from rhot_app.hand.solvers.joint_shapes import HINGE, clamp_joint
 from rhot_app.hand.solvers.problem import assign
 

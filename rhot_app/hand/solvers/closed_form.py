@@ -19,14 +19,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import DIP_PER_PIP
-from rhot_app.hand.finger_chain import miss, status_of
 from rhot_app.hand.limits import clamp_angle, wrap
+from rhot_app.hand.solvers.finger_chain import miss, status_of
 from rhot_app.hand.solvers.problem import assign, clamp, norm
 
 Array = NDArray[np.float64]
 
 IP_PER_MCP = 1.0
-"""Flexion of the thumb's IP joint per flexion of its MCP joint (`limits.natural_pose`)."""
+"""Flexion of the thumb's IP joint per flexion of its MCP joint (`limits.pose_prior`)."""
 
 SLACK = 1e-9
 """A root this far beyond a limit, rad, is rounding."""

@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from rhot_app.hand.finger_chain import Status, within_reach
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, JOINT_SLICES
+from rhot_app.hand.solvers.finger_chain import Status, within_reach
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import fold_abduction
 from rhot_app.hand.limits import clamp_angle
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
+from rhot_app.hand.solvers.finger_chain import fold_abduction
 from rhot_app.hand.solvers.problem import Problem
 
 Array = NDArray[np.float64]

@@ -15,7 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from rhot_app.hand.finger_chain import (
+from rhot_app.hand.solvers.chain_newton import finish_arrays, lay_out
+from rhot_app.hand.solvers.finger_chain import (
     EXHAUSTED,
     GAIN,
     LIMITED,
@@ -27,7 +28,6 @@ from rhot_app.hand.finger_chain import (
     distance,
     within_reach,
 )
-from rhot_app.hand.solvers.chain_newton import finish_arrays, lay_out
 from rhot_app.hand.solvers.joint_shapes import BOX, CONE, HINGE, Shape, clamp_joint, direction_angles, excess
 from rhot_app.hand.solvers.problem import assign
 

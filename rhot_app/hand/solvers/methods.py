@@ -17,7 +17,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import (
+from rhot_app.hand.linear import solve_in_box
+from rhot_app.hand.model import inter_finger
+from rhot_app.hand.solvers import inverse, newton
+from rhot_app.hand.solvers.closed_form import solve_coupled
+from rhot_app.hand.solvers.fabrik import plane_angles, solve_chain_arrays, thumb_angles
+from rhot_app.hand.solvers.finger_chain import (
     EXHAUSTED,
     MISSING,
     REACHED,
@@ -30,11 +35,6 @@ from rhot_app.hand.finger_chain import (
     status_of,
     within_reach,
 )
-from rhot_app.hand.linear import solve_in_box
-from rhot_app.hand.model import inter_finger
-from rhot_app.hand.solvers import inverse, newton
-from rhot_app.hand.solvers.closed_form import solve_coupled
-from rhot_app.hand.solvers.fabrik import plane_angles, solve_chain_arrays, thumb_angles
 from rhot_app.hand.solvers.inverse import follow_jacobian
 from rhot_app.hand.solvers.newton import STEP_MAX, solve_exactly
 from rhot_app.hand.solvers.problem import Problem, Solution, assign, clamp, linearise, norm

@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import REACHED, UNREACHABLE, status_of
 from rhot_app.hand.linear import solve_in_box
 from rhot_app.hand.solvers.closed_form import solve_coupled
+from rhot_app.hand.solvers.finger_chain import REACHED, UNREACHABLE, status_of
 from rhot_app.hand.solvers.inverse import DAMPED, follow_jacobian
 from rhot_app.hand.solvers.problem import assign, clamp, linearise, norm
 

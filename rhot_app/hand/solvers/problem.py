@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.finger_chain import chain_points, distance
-from rhot_app.hand.finger_ik import to_finger
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.hand.solvers.finger_chain import chain_points, distance
+from rhot_app.hand.solvers.finger_ik import to_finger
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.simulator.bare_hand.rasterise import SAMPLES, accumulate, unshadowed, vertex_normals
 from rhot_app.simulator.bare_hand.surface import BONES, FOREARM, Surface
+from rhot_app.simulator.render.camera_controls import level_gain
 from rhot_app.simulator.render.exposure_samples import NODES, FrameTime, power_series
 from rhot_app.simulator.render.painter import Box, Image, PoseSource
 from rhot_app.simulator.render.rays import LIGHT
-from rhot_app.simulator.scene.camera_controls import level_gain
 
 Array = NDArray[np.float64]
 

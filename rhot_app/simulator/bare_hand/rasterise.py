@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import distort
+from rhot_app.simulator.render.exposure_samples import STILL_PX
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -22,7 +23,6 @@ Image = NDArray[np.float32]
 SAMPLES: Final = 16
 _STEP_Y, _STEP_T = 5, 7  # of the rank-1 lattice (1, 5, 7) / 16 in x, y and time, as in `render.rays`
 NEAREST_M: Final = 0.05
-STILL_PX: Final = 0.02  # what moves less while exposed is taken to stand still, as in `render.edges`
 _OUTSIDE_PX: Final = 64.0  # rays that the lens model is asked for beyond the picture's edge
 
 

@@ -29,15 +29,14 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import FINGERS, HandPose
 from rhot_app.project import CameraCalibration, CameraPose, Rig, RigNode
-from rhot_app.simulator.bare_hand.kept_painter import KeptPainter
 from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter, light_of
 from rhot_app.simulator.bare_hand.skin import skin_colours
 from rhot_app.simulator.bare_hand.surface import build_surface
+from rhot_app.simulator.render.camera_controls import Controls, Lamp
 from rhot_app.simulator.render.exposure_samples import Shutter
-from rhot_app.simulator.render.painter import PoseSource
+from rhot_app.simulator.render.painter import KeptPainter, PoseSource
 from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.scene.background import background_image
-from rhot_app.simulator.scene.camera_controls import Controls, Lamp
 from rhot_app.simulator.scene.motion import BACK_FACING, FACING, load_motion
 from rhot_app.simulator.scene.scene import Background, make_scene, twin_defaults
 from rhot_node.detect.image import from_i420, to_bgr

@@ -1,1 +1,1 @@
-"""Simulated cameras and nodes: films, live pictures, logs and bad networks."""
+"""Simulated cameras and nodes: real daemons, live pictures and bad networks."""

@@ -14,11 +14,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.landmarks import ANATOMY_SD_M, COMMON_M, LASTING_M, LASTING_S, NOISE_M
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.landmarks import ANATOMY_SD_M, COMMON_M, LASTING_M, LASTING_S, NOISE_M
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings
@@ -38,7 +38,7 @@ _DEGREES = 4.0  # of freedom of a landmark's own error
 
 @dataclass(frozen=True, slots=True)
 class LandmarkErrors:
-    """Standard deviations per axis, m at the hand; see `barehand.landmarks`. `painted_px`: of painted markers, px."""
+    """Standard deviations per axis, m at the hand; see `hand.landmarks`. `painted_px`: of painted markers, px."""
 
     anatomy: float = ANATOMY_SD_M
     lasting: float = LASTING_M

@@ -24,15 +24,14 @@ import zmq
 
 from rhot_app.errors import RhotError, SimulatorError
 from rhot_app.project import save_rig
+from rhot_app.simulator.film.scene_objects import write_held
 from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras, Pace
-from rhot_app.simulator.nodes.nodes import READY_TIMEOUT_S, NodePorts, TwinNode, settings_path
+from rhot_app.simulator.nodes.live_scene import LiveScene
+from rhot_app.simulator.nodes.nodes import READY_TIMEOUT_S, TwinNode, settings_path
 from rhot_app.simulator.nodes.remote import SERVER_NAME, Request, decode_request, refusal, server_address
-from rhot_app.simulator.scene.live_scene import LiveScene
-from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
-from rhot_app.simulator.scene.scene_arguments import add_show_arguments, show_of
+from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, node_settings
+from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_arguments, scene_of, show_of
 from rhot_app.simulator.scene.scene_description import Show
-from rhot_app.simulator.scene.scene_objects import write_held
-from rhot_app.simulator.simulate_command import add_scene_arguments, scene_of
 from rhot_node.config import load_settings
 from rhot_node.errors import NodeError, SettingsError
 

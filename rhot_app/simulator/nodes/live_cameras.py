@@ -15,11 +15,11 @@ import msgspec
 from numpy.typing import NDArray
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.nodes.shot import renderer_of
+from rhot_app.simulator.film.shot import renderer_of
+from rhot_app.simulator.nodes.live_scene import LiveScene, Setting
+from rhot_app.simulator.render.camera_controls import controls_of
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.render import FrameRenderer
-from rhot_app.simulator.scene.camera_controls import controls_of
-from rhot_app.simulator.scene.live_scene import LiveScene, Setting
 from rhot_app.simulator.scene.scene import Scene
 from rhot_node.capture.camera import available_delay_ns, sleep_until
 from rhot_node.capture.stream import StreamHeader, pack_header, take_settings
@@ -53,16 +53,16 @@ class FrameSocket:
     def hear(self) -> CameraSettings | None:
         """Let in a node that waits, and return what a node has told its camera since the last call; None: nothing."""
         self._accept()
-        told = None
+        wanted = None
         if self._peer is not None:
             try:
                 if select.select([self._peer], [], [], 0.0)[0]:
                     self._received += self._peer.recv(_BUFFER_BYTES)
                 while (settings := take_settings(self._received)) is not None:
-                    told = settings
+                    wanted = settings
             except (OSError, CameraError):
                 self._drop()
-        return told
+        return wanted
 
     def send(self, header: StreamHeader, frame: NDArray[Any]) -> bool:
         """Send one packed I420 frame to the node that `hear` has let in; False when there is none to take it."""
@@ -145,9 +145,9 @@ class LiveCameras:
         cost = 0.0
         for index in sorted(range(len(self._sockets)), key=lambda index: self._scene.phases_s[index]):
             began = time.thread_time()
-            told = self._sockets[index].hear()
-            if told is not None:
-                self._obey(self._renderers[index], told)
+            wanted = self._sockets[index].hear()
+            if wanted is not None:
+                self._obey(self._renderers[index], wanted)
             cost += self._expose(index, began)
         self._cost_s += (cost - self._cost_s) * (1.0 if self._number == 0 else _SMOOTHING)
         self._number += 1
@@ -185,11 +185,11 @@ class LiveCameras:
             self._stage.playing = setting.scene_object, self._began_ns
         self._setting = setting
 
-    def _obey(self, renderer: FrameRenderer, told: CameraSettings) -> None:
+    def _obey(self, renderer: FrameRenderer, wanted: CameraSettings) -> None:
         """As a sensor does what its driver says. No exposure outlasts a frame; size and rate are the preset's."""
-        exposure_s = min(1e-6 * told.exposure_us, 1.0 / self._scene.preset.fps)
+        exposure_s = min(1e-6 * wanted.exposure_us, 1.0 / self._scene.preset.fps)
         shutter = Shutter(exposure_s, renderer.exposure.shutter.row_time_s)
-        renderer.expose(replace(renderer.exposure, shutter=shutter, controls=controls_of(told)))
+        renderer.expose(replace(renderer.exposure, shutter=shutter, controls=controls_of(wanted)))
 
 
 # -- frame rate check --------------------------------------------------------------------------------------------------

@@ -11,12 +11,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from rhot_app.errors import SimulatorError
 from rhot_app.keys import load_master_keys
+from rhot_app.simulator.scene.scene import NodePorts
 from rhot_node.config import NodeSettings, save_settings
 from rhot_node.keys import keys_path, pair_beforehand
 
@@ -25,17 +25,6 @@ READY_TIMEOUT_S = 300.0
 
 _END_TIMEOUT_S = 3.0
 _CLOSING_S = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class NodePorts:
-    """The ports that a daemon said it listens on, and its public key if it is paired with this master."""
-
-    udp_port: int
-    control_port: int
-    preview_port: int
-    pairing_port: int = 0
-    public_key: str = ""
 
 
 class TwinNode:

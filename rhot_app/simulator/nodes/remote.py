@@ -27,7 +27,7 @@ import msgspec
 import zmq
 
 from rhot_app.errors import SimulatorError
-from rhot_app.simulator.scene.camera_controls import Controls, Lamp
+from rhot_app.simulator.render.camera_controls import Controls, Lamp
 from rhot_app.simulator.scene.scene_description import Show
 from rhot_node.files import decode_message
 

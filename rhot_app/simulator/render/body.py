@@ -133,7 +133,7 @@ class HandBody:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Appearance:
     """How paint and skin look. `worn`: share of the paint that has come off; `uneven`: share by which its brightness
     varies; `glove_rgb`: the hand's colour in a glove, None: skin; `seed` of what is random."""
 
@@ -157,7 +157,7 @@ class _Solid:
 
 
 def build_body(model: HandModel, markers: MarkerSet, hidden: frozenset[str] = frozenset(),
-               look: Look = Look()) -> HandBody:
+               look: Appearance = Appearance()) -> HandBody:
     """Dress the hand in `markers`; ids in `hidden` stay unpainted skin.
 
     Raises RigError when a marker names no place on the hand, or `hidden` no marker.
@@ -199,7 +199,7 @@ def _margin(solid: _Solid) -> float:
     return TIP_MARGIN if solid.kind == CAPSULE else BAND_MARGIN
 
 
-def _paint_row(solid: _Solid, look: Look) -> Array:
+def _paint_row(solid: _Solid, look: Appearance) -> Array:
     row = np.zeros(PAINT_FIELDS)
     bounds = solid.bounds
     if solid.marker != SKIN and (look.worn > 0.0 or look.uneven > 0.0):

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 NODES = 5
 """Coefficients of a polynomial over one frame: a hand at full speed strays from it by less than 1 um."""
 
+STILL_PX = 0.02
+"""px: what moves less while exposed is taken to stand still."""
+
 _PLACES = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
 _FIT = np.linalg.inv(np.vander(_PLACES, increasing=True))
 

@@ -89,8 +89,8 @@ class HeldPainter:
         return box, visible
 
     def _faces_camera(self, world_from_sheet: Array) -> bool:
-        sight = world_from_sheet[:3, 3] - self._camera.centre
-        return bool(world_from_sheet[:3, 2] @ sight > 0.0)
+        line_of_sight = world_from_sheet[:3, 3] - self._camera.centre
+        return bool(world_from_sheet[:3, 2] @ line_of_sight > 0.0)
 
 
 def _object_from_tag(tag: Tag) -> Array:

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter
-from rhot_app.simulator.render.painter import Box, Image, Painter, PoseSource
-from rhot_app.simulator.render.sensor import Sensor
-from rhot_app.simulator.scene.camera_controls import (
+from rhot_app.simulator.render.camera_controls import (
     Controls,
     Development,
     Lamp,
@@ -19,6 +16,9 @@ from rhot_app.simulator.scene.camera_controls import (
     lamp_gains,
     level_gain,
 )
+from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter
+from rhot_app.simulator.render.painter import Box, Image, Painter, PoseSource
+from rhot_app.simulator.render.sensor import Sensor
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.simulator.scene.camera_controls import Development
+from rhot_app.simulator.render.camera_controls import Development
 
 Image = NDArray[np.float32]
 Bytes = NDArray[np.uint8]

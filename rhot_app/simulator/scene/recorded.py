@@ -185,7 +185,7 @@ def _start_pose(landmarks: Landmarks, model: HandModel) -> HandPose:
     """A relaxed hand laid over the first frame with enough landmarks (least squares, Kabsch)."""
     seen = np.asarray(np.isfinite(landmarks.points).all(axis=2))
     frame = int(np.argmax(seen.sum(axis=1) >= min(8, seen.sum(axis=1).max())))
-    relaxed = HandPose(np.eye(4), np.clip(model.natural.mean, model.limits[:, 0], model.limits[:, 1]))
+    relaxed = HandPose(np.eye(4), np.clip(model.pose_prior.mean, model.limits[:, 0], model.limits[:, 1]))
     source = _landmark_points(model, relaxed, landmarks)[seen[frame]]
     target = landmarks.points[frame][seen[frame]]
     rotation, _ = Rotation.align_vectors(target - target.mean(axis=0), source - source.mean(axis=0))
@@ -230,8 +230,8 @@ def _fit_frame(model: HandModel, landmarks: Landmarks, frame: int, before: HandP
             gap = (landmarks.rigid[frame, k] - transform[:3, 3] - lever) / RIGID_SD_M
             information[:TWIST, :TWIST] += rigid_rows.T @ rigid_rows
             gradient[:TWIST] += rigid_rows.T @ gap
-        information[TWIST:, TWIST:] += model.natural.information
-        gradient[TWIST:] += model.natural.information @ (model.natural.mean - angles)
+        information[TWIST:, TWIST:] += model.pose_prior.information
+        gradient[TWIST:] += model.pose_prior.information @ (model.pose_prior.mean - angles)
         step = np.linalg.solve(information, gradient)
         step *= min(1.0, 0.3 / np.abs(step[3:]).max())
         transform = transform.copy()

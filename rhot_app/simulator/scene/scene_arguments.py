@@ -1,17 +1,100 @@
-"""Command line arguments that choose what stands before the simulated cameras."""
+"""Command line arguments that choose the simulated scene and what stands before its cameras."""
 
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, SQUARE_MM
 
 if TYPE_CHECKING:
+    from rhot_app.simulator.scene.scene import Scene
     from rhot_app.simulator.scene.scene_description import Show
+
+SECONDS_MAX = 86_400.0
+"""s: of a simulation."""
+
+_SETTING_OPTIONS = {"distance_m": "distance", "lamp.brightness": "lamp", "lamp.kelvin": "kelvin",
+                    "lamp.mains_hz": "mains", "worn_paint": "worn", "uneven_paint": "uneven", "glove_rgb": "glove"}
+"""The options that choose fields of the twin's settings."""
 
 _OPTION_OF = {"tone": "--tone", "length_mm": "--ruler-mm", "square_mm": "--square-mm", "marker_mm": "--marker-mm",
               "distance_m": "--distance"}
+
+
+def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments that choose the scene; shared by every command that simulates."""
+    parser.add_argument("--motion", default="grasp", metavar="M",
+                        help="name of a motion (still, rest, wave, grasp, pinch, point, spread, tap, fast, sweep, "
+                             "cross), a motion file (.json), or a recording (Qualisys .tsv, Leap Motion .csv); "
+                             "default grasp")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of all that is random (default 1)")
+    parser.add_argument("--preset", default=None, choices=("wide", "fast"),
+                        help="camera preset: wide (62.2 degrees, 40 fps) or fast (26.5 degrees, 120 fps)")
+    parser.add_argument("--distance", type=float, default=None, metavar="M",
+                        help="distance of the hand from the cameras in metres (default 0.6)")
+    parser.add_argument("--background", default=None, choices=("cloth", "clutter", "skin"),
+                        help="what stands behind the hand: cloth (default), clutter, or skin, clutter with things of "
+                        "skin's colours")
+    parser.add_argument("--markers", "--marker-set", default=None, metavar="SET",
+                        help="which markers the hand wears: rhot6 (default), rhot8, rich, nails6, or a marker file "
+                             "(.json)")
+    parser.add_argument("--back", action="store_const", const="back", default=None,
+                        help="the back of the hand faces the cameras (default: the palm does)")
+    parser.add_argument("--worn", type=float, default=None, metavar="P",
+                        help="share 0..0.9 of the paint that has come off, in pieces of 2 mm (default 0)")
+    parser.add_argument("--uneven", type=float, default=None, metavar="P",
+                        help="share 0..0.9 by which the paint's brightness varies over the patch (default 0)")
+    parser.add_argument("--glove", default=None, metavar="R,G,B",
+                        help="a glove of this colour, 0..255 each, instead of skin (default: none)")
+    parser.add_argument("--lamp", type=float, default=None, metavar="F",
+                        help="brightness of the lamp, a factor on its light (default 1)")
+    parser.add_argument("--kelvin", type=float, default=None, metavar="K",
+                        help="colour temperature of the lamp; 6500, the default, is neutral, 3000 a warm bulb")
+    parser.add_argument("--mains", type=float, default=None, metavar="HZ",
+                        help="let the lamp flicker with mains of 50 or 60 Hz (default: steady)")
+
+
+def scene_of(args: argparse.Namespace) -> Scene:
+    """The scene that the arguments describe. Raises RigError, SimulatorError."""
+    import msgspec
+
+    from rhot_app.errors import SimulatorError
+    from rhot_app.simulator.scene.scene import TwinSettings, make_scene, twin_defaults
+
+    if args.seed < 0:
+        raise SimulatorError(f"--seed is 0 or more, not {args.seed}.")
+    chosen = {"preset": args.preset, "distance_m": args.distance, "background": args.background,
+              "markers": args.markers, "facing": args.back, "worn_paint": args.worn, "uneven_paint": args.uneven,
+              "glove_rgb": None if args.glove is None else _numbers(args.glove)}
+    lamp = {"brightness": args.lamp, "kelvin": args.kelvin, "mains_hz": args.mains}
+    merged = _with(msgspec.to_builtins(twin_defaults()), chosen)
+    merged["lamp"] = _with(merged["lamp"], lamp)
+    try:
+        return make_scene(msgspec.convert(merged, TwinSettings), args.seed)
+    except msgspec.ValidationError as exc:
+        raise SimulatorError(_setting_objection(str(exc), args)) from exc
+
+
+def _numbers(text: str) -> list[int | str]:
+    """Whole numbers that commas part; anything else stays text, for the settings to object to."""
+    return [int(part) if part.strip().isdigit() else part for part in text.split(",")]
+
+
+def _setting_objection(problem: str, args: argparse.Namespace) -> str:
+    """What msgspec says of a field, said of the option that chose it."""
+    for path, option in _SETTING_OPTIONS.items():
+        if f"`$.{path}" in problem:
+            what = problem.split(" - at ")[0].replace("Expected `float`", "expected a number")
+            if path == "glove_rgb":
+                what = "three whole numbers from 0 to 255 with commas between them make a colour"
+            return f"--{option} {getattr(args, option)}: {what}."
+    return f"the scene cannot be: {problem}"
+
+
+def _with(fields: dict[str, Any], chosen: dict[str, Any]) -> dict[str, Any]:
+    """The fields, changed where something was chosen."""
+    return fields | {key: value for key, value in chosen.items() if value is not None}
 
 
 def add_show_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import RhotError
 from rhot_app.geometry.transforms import rigid, rotation_from_quaternion, skew
-from rhot_app.objects.alignment_file import Alignment, load_alignment
+from rhot_app.objects.alignment.alignment_file import Alignment, load_alignment
 from rhot_app.objects.observations import ObjectPose
 from rhot_app.objects.pose import Validity
 from rhot_app.project import ObjectPoses, Rig

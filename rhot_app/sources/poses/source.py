@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.objects.pose import Validity
 from rhot_app.objects.stream import PoseMeasurement, PoseStream, noise_of, read_pose_stream
-from rhot_app.objects.track import ObjectState, Track
+from rhot_app.objects.track import ObjectState, ObjectTrack
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ class PoseGate:
     """Rejects outliers by the innovation gate of tracked objects (`objects.track`), and filters the others."""
 
     def __init__(self, name: str) -> None:
-        self._track = Track(name)
+        self._track = ObjectTrack(name)
         self.offered = self.rejected = 0
 
     def take(self, pose: ForeignPose) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, Preview
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.meters import STACKED, JitterWindow, LatencyWindow, LossMeter, RateRows, rate_names
 from rhot_app.ui.models.series import Series
 
@@ -62,7 +62,7 @@ class Live:
         self.state_count = 0
         self.preview_count = 0
         self.heard_at_s = time.monotonic()
-        self.sights: deque[tuple[int, Array, NDArray[np.uint16]]] = deque(maxlen=256)
+        self.observations: deque[tuple[int, Array, NDArray[np.uint16]]] = deque(maxlen=256)
         self.jitter = Series(())
         self.latency = Series(LATENCY_COLUMNS)
         self.rates = Series(("states", LOST))
@@ -93,7 +93,7 @@ class Live:
         self._state_at_ns = time.monotonic_ns()
         self._jitter_window.add(state)
         self._latency_window.add(state)
-        self.sights.append((state.t_master_ns, state.camera_pixels, state.camera_flags))
+        self.observations.append((state.t_master_ns, state.camera_pixels, state.camera_flags))
 
     def _take_status(self, status: EngineStatus) -> None:
         self.status = status
@@ -121,7 +121,7 @@ class Live:
 
         A preview is older than the newest state; drawn with the newest pixels, marks would run ahead of the picture.
         """
-        if not self.sights:
+        if not self.observations:
             return None
-        nearest = min(self.sights, key=lambda sight: abs(sight[0] - t_master_ns))
+        nearest = min(self.observations, key=lambda one: abs(one[0] - t_master_ns))
         return nearest[1:] if abs(nearest[0] - t_master_ns) < 250_000_000 else None

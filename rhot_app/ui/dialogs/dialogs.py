@@ -23,15 +23,15 @@ from PySide6.QtWidgets import (
 
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
-from rhot_app.ui.controller import Controller
+from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
+from rhot_app.ui.dialogs.recordings import recordings_folder
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
-from rhot_app.ui.guide import GuideViewer
 from rhot_app.ui.models.palette import Scheme, hex_of
 from rhot_app.ui.mouse.window import MouseWindow
-from rhot_app.ui.recordings import recordings_folder
 
 
 class Dialogs:

@@ -31,7 +31,7 @@ from rhot_app.export.resample import MOST_HZ
 from rhot_app.export.states import HandStates
 from rhot_app.export.tables import columns
 from rhot_app.hand.skeleton import FINGERS
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
 
 ROWS = 8
 LOOK_MS = 300  # a choice is looked at when it has stood for a while

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.progress import Progress
 from rhot_app.sources.discovery import FoundNode, Search
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
 from rhot_node.wire.messages import TrustState
 
 Find = Callable[[Progress], Search]
@@ -68,9 +68,9 @@ class FoundNodes(QWidget):
         policy = self.progress_bar.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         self.progress_bar.setSizePolicy(policy)
-        self.told = QLabel("")
-        self.told.setTextFormat(Qt.TextFormat.PlainText)  # names come from anybody
-        self.told.setWordWrap(True)
+        self.message = QLabel("")
+        self.message.setTextFormat(Qt.TextFormat.PlainText)  # names come from anybody
+        self.message.setWordWrap(True)
         buttons = QHBoxLayout()
         for button in self.side_buttons:
             buttons.addWidget(button)
@@ -81,14 +81,14 @@ class FoundNodes(QWidget):
         layout.setSpacing(8)
         layout.addWidget(self.table)
         layout.addLayout(buttons)
-        layout.addWidget(self.told)
+        layout.addWidget(self.message)
 
     def search(self) -> None:
         """Search anew in a worker; what was found before stays in sight until then."""
         if self._job is None:
             self.again.setEnabled(False)
             self.progress_bar.show()
-            self.told.setText("Looking for nodes …")
+            self.message.setText("Looking for nodes …")
             self._job = Job(lambda progress: self._find(progress.report), self._show, self._show_error,
                             self._show_progress, self).start()
 
@@ -118,13 +118,13 @@ class FoundNodes(QWidget):
                                            state)):
                 self.table.setItem(row, column, QTableWidgetItem(text))
         sentences = [*([] if found.nodes else [NOBODY]), *found.conflicts, *found.notes]
-        self.told.setText("\n".join(sentences))
+        self.message.setText("\n".join(sentences))
         self._show_whether_chosen()
         self.searched.emit()
 
     def _show_error(self, sentence: str) -> None:
         self._rest()
-        self.told.setText(sentence)
+        self.message.setText(sentence)
 
     def _show_progress(self, text: str, fraction: float) -> None:
         self.progress_bar.setValue(round(100 * fraction))

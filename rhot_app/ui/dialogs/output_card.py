@@ -20,9 +20,9 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.project import OutputSettings
+from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.outputs import OutputRow
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.shapes import ShapeMark
 
 _QR_PX = 132
 _QUIET = 3  # modules of white around the code, besides the one of OpenCV: ISO/IEC 18004 wants four

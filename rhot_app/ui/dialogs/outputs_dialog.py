@@ -27,8 +27,8 @@ from rhot_app.outputs.outputs import output_plugins
 from rhot_app.outputs.spec import OPENXR_ONLY
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.ui.backend.contract import Asker, Opened
+from rhot_app.ui.common.job import Job
 from rhot_app.ui.dialogs.output_card import OutputCard
-from rhot_app.ui.job import Job
 from rhot_app.ui.models.outputs import (
     EMPTY,
     JOINT_SETS,

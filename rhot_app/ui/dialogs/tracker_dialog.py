@@ -23,9 +23,10 @@ from PySide6.QtWidgets import (
 
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
+from rhot_app.ui.models.proposal import RigChange
 from rhot_app.ui.models.words import (
     IK_METHODS,
     KINDS,
@@ -36,7 +37,6 @@ from rhot_app.ui.models.words import (
     size_settled,
     size_text,
 )
-from rhot_app.ui.wizards.models.proposal import RigChange
 
 LOOK_MS = 150
 _WIDTH_PX = 460

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, NodeStatus
-from rhot_app.tracking.state import LATENCY_STAGES, HandState
+from rhot_app.state import LATENCY_STAGES, HandState
 
 Array = NDArray[np.float64]
 

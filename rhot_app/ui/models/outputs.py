@@ -14,8 +14,8 @@ from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import OutputError
 from rhot_app.outputs.spec import OPENXR_ONLY, WEB_PORT, OutputStatus, as_run, host_and_port, parse_output, web_settings
 from rhot_app.project import OutputSettings, Rig, parse_rig
+from rhot_app.ui.models.proposal import Command, set_rig
 from rhot_app.ui.models.words import Look
-from rhot_app.ui.wizards.models.proposal import Command, set_rig
 
 WINDOW_NS: Final = 3_000_000_000
 """A rate is counted over the last 3 s: statuses come in steps of 0.2 s."""
@@ -34,7 +34,7 @@ JOINT_SETS: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class OutputKind:
     """A kind of output: its name, who listens, what its target means, and one that works on this computer."""
 
     title: str
@@ -46,18 +46,18 @@ class Kind:
 
 _LISTEN: Final = "[HOST:]PORT to listen on. 127.0.0.1 is this computer only; 0.0.0.0 lets others in"
 KINDS: Final = {
-    "osc": Kind("OSC", "Messages by UDP, for Unity, Blender, Unreal, TouchDesigner, Max, Pure Data.",
-                "HOST:PORT of the program that listens.", "127.0.0.1:9000"),
-    "vmc": Kind("VMC", "Finger bones for avatars: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace.",
-                "HOST:PORT of the program that listens; most take 39539.", "127.0.0.1:39539"),
-    "ws": Kind("JSON over WebSocket", "Programs connect to this port and get every state as JSON.",
-               f"{_LISTEN}, unencrypted.", "127.0.0.1:9001", "on"),
-    "web": Kind("Web view", "A page that shows the hand in browsers and headsets.", f"{_LISTEN}, by HTTPS.",
-                f"127.0.0.1:{WEB_PORT}", "on"),
-    "lsl": Kind("Lab Streaming Layer", "LabRecorder and others find the streams by name.",
-                "Name of the streams; RHOT when empty.", "", "as"),
-    "zenoh": Kind("Zenoh", "JSON under the key rhot/state, for robots and ROS 2.",
-                  "HOST:PORT of a router; when empty, whoever is found on the network.", "", "by"),
+    "osc": OutputKind("OSC", "Messages by UDP, for Unity, Blender, Unreal, TouchDesigner, Max, Pure Data.",
+                      "HOST:PORT of the program that listens.", "127.0.0.1:9000"),
+    "vmc": OutputKind("VMC", "Finger bones for avatars: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace.",
+                      "HOST:PORT of the program that listens; most take 39539.", "127.0.0.1:39539"),
+    "ws": OutputKind("JSON over WebSocket", "Programs connect to this port and get every state as JSON.",
+                     f"{_LISTEN}, unencrypted.", "127.0.0.1:9001", "on"),
+    "web": OutputKind("Web view", "A page that shows the hand in browsers and headsets.", f"{_LISTEN}, by HTTPS.",
+                      f"127.0.0.1:{WEB_PORT}", "on"),
+    "lsl": OutputKind("Lab Streaming Layer", "LabRecorder and others find the streams by name.",
+                      "Name of the streams; RHOT when empty.", "", "as"),
+    "zenoh": OutputKind("Zenoh", "JSON under the key rhot/state, for robots and ROS 2.",
+                        "HOST:PORT of a router; when empty, whoever is found on the network.", "", "by"),
 }
 _HOSTS: Final = {"osc": None, "vmc": None, "ws": "127.0.0.1", "zenoh": None}
 """Kinds whose target is HOST:PORT; the host that a port alone means."""
@@ -115,9 +115,9 @@ class SendRates:
         return 1e9 * (last - first) / (end_ns - begin_ns)
 
 
-def kind_of(name: str) -> Kind:
+def kind_of(name: str) -> OutputKind:
     """The words for a kind; a plug-in has its own name."""
-    return KINDS.get(name) or Kind(name, f"The installed plug-in {name}.")
+    return KINDS.get(name) or OutputKind(name, f"The installed plug-in {name}.")
 
 
 def title_of(settings: OutputSettings) -> str:
@@ -142,41 +142,41 @@ def draft(kind: str, target: str, joints: str, rate_hz: float, others: tuple[Out
 
 def rows(outputs: tuple[OutputSettings, ...], status: EngineStatus | None, rates: SendRates) -> list[OutputRow]:
     """A row for each output of the rig, in its order; then those of the engine's command line."""
-    told = {one.spec: one for one in status.outputs} if status is not None else {}
-    found = [_row(settings, told.get(as_run(settings).spec) if settings.enabled else None, status, rates)
+    reported = {one.spec: one for one in status.outputs} if status is not None else {}
+    found = [_row(settings, reported.get(as_run(settings).spec) if settings.enabled else None, status, rates)
              for settings in outputs]
-    return found + [_row(parse_output(one.spec), one, status, rates) for one in told.values() if one.fixed]
+    return found + [_row(parse_output(one.spec), one, status, rates) for one in reported.values() if one.fixed]
 
 
-def _row(settings: OutputSettings, told: OutputStatus | None, status: EngineStatus | None,
+def _row(settings: OutputSettings, reported: OutputStatus | None, status: EngineStatus | None,
          rates: SendRates) -> OutputRow:
     run = as_run(settings)
     detail = f"{run.joints} joints, {'every state' if run.rate_hz is None else f'at most {run.rate_hz:g} states/s'}"
-    fixed = told is not None and told.fixed
+    fixed = reported is not None and reported.fixed
     if fixed:
         detail += "; asked for when the engine was started"
-    if told is None:
+    if reported is None:
         replay = settings.enabled and status is not None and bool(status.replaying)
         look = OFF if not settings.enabled else _LEFT_OUT if replay else _STARTING
         return OutputRow(title_of(settings), detail, look, look.word, look.meaning if replay else "", look.meaning, "",
                          fixed)
-    look, words = _going(told, status is not None and status.running, rates.of(told.spec))
-    counts = f"{told.sent} states sent, {told.dropped} dropped."
-    return OutputRow(title_of(settings), detail, look, words, told.message or web_hint(told.url), f"{look.meaning}\n"
-                     f"{counts}", told.url if told.state == "running" else "", fixed)
+    look, words = _going(reported, status is not None and status.running, rates.of(reported.spec))
+    counts = f"{reported.sent} states sent, {reported.dropped} dropped."
+    return OutputRow(title_of(settings), detail, look, words, reported.message or web_hint(reported.url),
+                     f"{look.meaning}\n{counts}", reported.url if reported.state == "running" else "", fixed)
 
 
-def _going(told: OutputStatus, running: bool, rate_hz: float) -> tuple[Look, str]:
+def _going(reported: OutputStatus, running: bool, rate_hz: float) -> tuple[Look, str]:
     """Look and words of an output that the engine tells of."""
-    if told.state == "failed":
+    if reported.state == "failed":
         return _FAILED, _FAILED.word
-    if told.state != "running":
+    if reported.state != "running":
         return _STARTING, _STARTING.word
-    if told.message:
+    if reported.message:
         return _SLOW, _SLOW.word
-    if told.clients == 0:
-        return _WAITING, "waits for a browser" if told.kind == "web" else "waits for a client"
-    clients = "" if told.clients is None else f", {told.clients} client{'s' if told.clients > 1 else ''}"
+    if reported.clients == 0:
+        return _WAITING, "waits for a browser" if reported.kind == "web" else "waits for a client"
+    clients = "" if reported.clients is None else f", {reported.clients} client{'s' if reported.clients > 1 else ''}"
     if rate_hz > 0.0:
         return _SENDING, f"sending {rate_hz:.0f} states/s{clients}"
     return _WAITING, ("waits for a hand" if running else "waits for Start") + clients

@@ -13,10 +13,10 @@ from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, Calibra
 from rhot_app.engine.status import NodeStatus
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.ui.models.meters import unused_frames
+from rhot_app.ui.models.proposal import Row
 from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look, settings_text
-from rhot_app.ui.wizards.models.proposal import Row
 
 # -- standard deviation along the worst axis ---------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 Every state has a word, a shape and a tone. Colour is never alone: every state also has its own shape.
 
-Shapes are names that `rhot_app.ui.shapes` draws; tones are names of `palette.Scheme` colours.
+Shapes are names that `rhot_app.ui.common.shapes` draws; tones are names of `palette.Scheme` colours.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import RigError
 from rhot_app.hand.anthropometry import hand_length
 from rhot_app.project import Rig, TrackerSettings
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.state import Condition, HandState, Knowledge
 from rhot_node.files import read_json, resource_path
 from rhot_node.wire.messages import MarkerFlag
 
@@ -82,7 +82,7 @@ def condition_look(condition: str) -> Look:
 
 
 def marker_look(state: HandState, marker: int) -> Look:
-    """State of one marker in words: which camera misses it, or what is wrong with the sight of it."""
+    """State of one marker in words: which camera misses it, or what is wrong with its observation."""
     flags = state.camera_flags[:, marker]
     seen = (flags & int(MarkerFlag.LOST)) == 0
     seen &= np.isfinite(state.camera_pixels[:, marker, 0])

@@ -18,16 +18,16 @@ from rhot_app.mouse.pick_scene import PickScene
 from rhot_app.mouse.pointer import BUTTONS, Mouse, MouseSettings, MouseState
 from rhot_app.mouse.target_test import TargetTest
 from rhot_app.project import Rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Listener
 from rhot_app.ui.backend.live import SILENCE_S
+from rhot_app.ui.common.shapes import shape_pixmap
+from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import NO_RIG, condition_look
 from rhot_app.ui.mouse.scene import MouseView
 from rhot_app.ui.panels.state_badge import StateBadge
-from rhot_app.ui.shapes import shape_pixmap
-from rhot_app.ui.theme import app_font
 
 TICK_MS: Final = 16
 TOLD_S: Final = 6.0

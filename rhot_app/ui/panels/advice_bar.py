@@ -18,9 +18,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.shapes import ShapeMark
 
 LOOKS: dict[str, tuple[str, str]] = {"info": ("info", "accent"), "warning": ("half", "caution"),
                                      "error": ("octagon", "fault")}

@@ -13,11 +13,11 @@ from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
 from rhot_app.ui.backend.live import Live
+from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.panels.empty_state import EmptyState
-from rhot_app.ui.shapes import paint_tag
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -219,10 +219,10 @@ class CameraPanel(QWidget):
     def _mark(self, view: CameraView, camera: int, preview: Preview, live: Live) -> None:
         assert self._rig is not None
         markers = self._rig.markers
-        sight = live.observation_at(preview.t_master_ns)
-        if sight is None or len(sight[0]) <= camera or sight[0].shape[1] != len(markers.ids):
+        observation = live.observation_at(preview.t_master_ns)
+        if observation is None or len(observation[0]) <= camera or observation[0].shape[1] != len(markers.ids):
             return
         colours = [visible_on(hex_of(marker.display_rgb), "#000000", 3.0) for marker in markers.markers]
-        view.show_marks(sight[0][camera], sight[1][camera], markers.ids, colours)
+        view.show_marks(observation[0][camera], observation[1][camera], markers.ids, colours)
         if live.state is not None and live.state.t_master_ns >= preview.t_master_ns:
             self._unmarked.discard(view.name)

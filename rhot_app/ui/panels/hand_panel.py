@@ -21,11 +21,11 @@ from PySide6.QtWidgets import (
 from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.project import Rig
-from rhot_app.tracking.state import Condition, HandState, Knowledge
+from rhot_app.state import Condition, HandState, Knowledge
+from rhot_app.ui.common.shapes import ShapeMark, shape_icon
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, angle_text, palm_text
 from rhot_app.ui.models.words import KNOWLEDGE, Look, condition_look, each_hand, hand_names, scale_text, size_known, tip
-from rhot_app.ui.shapes import ShapeMark, shape_icon
 
 FINGER_HEADS = (("spread", "abduction"), ("MCP", "MCP"), ("PIP", "PIP"), ("DIP", "DIP"))
 THUMB_HEADS = (("spread", "abduction"), ("CMC", "CMC"), ("turn", "abduction"), ("MCP", "MCP"), ("IP", "IP"))

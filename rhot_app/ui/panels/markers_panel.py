@@ -8,12 +8,12 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWi
 
 from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
+from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.palette import Scheme, hex_of
 from rhot_app.ui.models.rows import MarkerRow, marker_rows, short_name
 from rhot_app.ui.models.words import Look, tip
 from rhot_app.ui.panels.empty_state import EmptyState
-from rhot_app.ui.shapes import ShapeMark
 
 _IDLE = Look("not tracking", "square", "neutral", "The nodes do not stream. Press Start.")
 _UNSEEN = Look("not seen", "ring", "neutral", "Nothing has been seen of it for a second.")

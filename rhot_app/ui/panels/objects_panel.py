@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.objects.state import ObjectState, Validity
 from rhot_app.project import Rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.palette import Scheme
 
 WORDS = {Validity.SEARCHING: "SEARCHING", Validity.TRACKED: "TRACKING", Validity.AMBIGUOUS: "AMBIGUOUS",

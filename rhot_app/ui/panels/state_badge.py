@@ -6,10 +6,10 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from rhot_app.ui.common.shapes import shape_pixmap
+from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import CONDITIONS, NO_RIG, Look, tip
-from rhot_app.ui.shapes import shape_pixmap
-from rhot_app.ui.theme import app_font
 
 WORD_PT = 22.0
 _SHAPE_PX = 26

@@ -58,7 +58,7 @@ class JitterPlot(PlotPanel):
         self._fit(seconds, [Line(entry.name, entry.colour, rows[:, k]) for k, entry in enumerate(self.legend.entries)])
 
 
-# -- Latency by stage: stacked medians as bands, p50 and p99 of the whole way as lines, and the budget -----------------
+# -- Latency by stage --------------------------------------------------------------------------------------------------
 
 def _in_a_row(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """`known` (n,) without single values between gaps: they have no width, and a fill would pair the wrong edges."""
@@ -130,7 +130,7 @@ class LatencyPlot(PlotPanel):
                             Line("p99 of all", self._scheme.text, p99[:, -1])])
 
 
-# -- Rates of states and nodes as lines, lost datagrams per second as bars at the foot ---------------------------------
+# -- Rates and lost datagrams ------------------------------------------------------------------------------------------
 
 class RatePlot(PlotPanel):
     """Columns: states, one per node, and last the losses per second."""

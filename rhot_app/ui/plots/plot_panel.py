@@ -15,7 +15,7 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.series import Peak, Series, peaks_above, round_top, to_csv, usual_top
 from rhot_app.ui.models.words import tip
 
-# -- Triangles at the upper edge of a plot: here a line leaves the axis, and the tooltip says how far ------------------
+# -- Marks of values above a plot's axis -------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ class OverflowMarks:
         return f"{data[0]}: {data[1]:.3g} {self._unit}, above the axis"
 
 
-# -- The column beside a plot: line sample, name and newest value, so that colour is never the only key ----------------
+# -- Legend: line sample, name and newest value ------------------------------------------------------------------------
 
 _SAMPLE_PX = 18
 
@@ -146,7 +146,7 @@ class Legend(QWidget):
             painter.drawLine(0, round(y), _SAMPLE_PX, round(y))
 
 
-# -- What every plot has: title, named axes in units, legend, pause, reset, copy as CSV; time runs left to -------------
+# -- What every plot has: axes, legend, pause, reset, copy -------------------------------------------------------------
 
 SPAN_S = 30.0
 _OLD_S = 1.5  # a figure older than this is not the present one any more

@@ -22,7 +22,7 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import videos_of
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.trackers import make_tracker
-from rhot_app.ui.recordings import LOG_SUFFIX
+from rhot_app.ui.dialogs.recordings import LOG_SUFFIX
 from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, being_recorded, condition_bins
 from rhot_node.errors import NodeError
 from rhot_node.files import write_document

@@ -19,11 +19,11 @@ from rhot_app.keys import load_master_keys
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import Collected, collect_videos
-from rhot_app.ui.job import Job, Progress
+from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.dialogs.recordings import recordings_folder
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.panels.empty_state import EmptyState
-from rhot_app.ui.recordings import recordings_folder
 from rhot_app.ui.replay.library import Entry, Library
 from rhot_app.ui.replay.library_table import RecordingTable
 from rhot_app.ui.replay.summaries import Summaries

@@ -29,8 +29,8 @@ from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import Condition, HandState
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
-from rhot_app.tracking.state import Condition, HandState
 from rhot_app.tracking.trackers import make_tracker
 from rhot_app.ui.models.meters import JitterWindow
 
@@ -76,7 +76,7 @@ def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress:
     Raises RecordingError when the log is none, holds nothing that can be tracked, or the rig's tracker does not smooth;
     RigError as the tracker does.
     """
-    if smooth and rig.tracker.kind != "estimator":
+    if smooth and not rig.tracker.smooths:
         raise RecordingError(NOT_SMOOTHED)
     reader = LogReader(log)
     try:

@@ -21,11 +21,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from rhot_app.ui.job import CancelledError, Job, Progress
+from rhot_app.ui.backend.solver import Solver, StoppedError
+from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.replay.run import Run, Tracked, new_run_path, track_log
-from rhot_app.ui.replay.session import Choice, Comparison
-from rhot_app.ui.wizards.framework.solver import Solver, StoppedError
+from rhot_app.ui.replay.session import Comparison, TrackerChoice
 
 _TRACKERS = (("as the rig says", ""), ("classic", "classic"), ("estimator", "estimator"))
 _WIDTH_PX = 480
@@ -65,7 +65,7 @@ class FileChoice(QWidget):
 
 
 class RunDialog(QDialog):
-    """`chosen` gives the `Choice`. `beside`: it will be compared with the run that is shown."""
+    """`chosen` gives the `TrackerChoice`. `beside`: it will be compared with the run that is shown."""
 
     chosen = Signal(object)
 
@@ -107,12 +107,12 @@ class RunDialog(QDialog):
         layout.addLayout(buttons)
 
     def _choose(self) -> None:
-        self.chosen.emit(Choice(self.tracker_box.currentData(), self.rig_choice.path, self.hand_choice.path,
-                                self._beside, self.smooth_box.isChecked()))
+        self.chosen.emit(TrackerChoice(self.tracker_box.currentData(), self.rig_choice.path, self.hand_choice.path,
+                                       self._beside, self.smooth_box.isChecked()))
         self.accept()
 
 
-# -- Tracks a recording in a process of its own while the window goes on: progress, remaining time, cancel -------------
+# -- Tracking of a recording in its own process ------------------------------------------------------------------------
 
 _COUNT = itertools.count()
 
@@ -125,8 +125,8 @@ def states_folder() -> Path:
 
 
 class TrackingWork(QObject):
-    """One recording at a time. `done` gives the log's path, the `Run`, its `Choice` and the `Comparison` that was asked
-    for or None; `failed` a sentence; `changed` after every report and at the end."""
+    """One recording at a time. `done` gives the log's path, the `Run`, its `TrackerChoice` and the `Comparison` that
+    was asked for or None; `failed` a sentence; `changed` after every report and at the end."""
 
     done = Signal(object, object, object, object)
     failed = Signal(str)
@@ -155,7 +155,7 @@ class TrackingWork(QObject):
         """Remaining time in words."""
         return self._remaining.text(time.monotonic())
 
-    def start(self, log: Path, choice: Choice, other: Tracked | None = None) -> None:
+    def start(self, log: Path, choice: TrackerChoice, other: Tracked | None = None) -> None:
         """Track `log`; what was under way is given up. `other`: the run that stays, to be compared with."""
         self.cancel()
         self.text = "Reading the recording …"
@@ -177,7 +177,7 @@ class TrackingWork(QObject):
         self.cancel()
         self.solver.stop()
 
-    def _track(self, log: Path, choice: Choice, progress: Progress) -> Run:
+    def _track(self, log: Path, choice: TrackerChoice, progress: Progress) -> Run:
         rig = choice.rig_for(log)
         out = new_run_path(self._folder, next(_COUNT))
         try:
@@ -195,7 +195,7 @@ class TrackingWork(QObject):
         return run
 
     @staticmethod
-    def _compared(run: Run, choice: Choice, other: Tracked | None) -> tuple[Run, Comparison | None]:
+    def _compared(run: Run, choice: TrackerChoice, other: Tracked | None) -> tuple[Run, Comparison | None]:
         """Here and not in the window's thread, because long runs take a tenth of a second."""
         if other is None:
             return run, None
@@ -206,7 +206,7 @@ class TrackingWork(QObject):
         self._remaining.report(fraction, time.monotonic())
         self.changed.emit()
 
-    def _finish(self, log: Path, choice: Choice, run: Run, comparison: Comparison | None) -> None:
+    def _finish(self, log: Path, choice: TrackerChoice, run: Run, comparison: Comparison | None) -> None:
         self._job = None
         self.changed.emit()
         self.done.emit(log, run, choice, comparison)

@@ -12,7 +12,9 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
 from rhot_app.hand.skeleton import FINGERS
-from rhot_app.tracking.state import Condition, HandState
+from rhot_app.state import Condition, HandState
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
 from rhot_app.ui.panels.hand_panel import HandPanel
@@ -22,8 +24,6 @@ from rhot_app.ui.plots.plot_panel import DASHES, LegendEntry, Line, PlotPanel, n
 from rhot_app.ui.replay.session import SPEEDS, Comparison, Replay
 from rhot_app.ui.replay.timeline import Timeline
 from rhot_app.ui.scene.view import SceneView
-from rhot_app.ui.settings import Settings
-from rhot_app.ui.shapes import shape_pixmap
 
 PANEL_S = 0.1
 PLOT_S = 0.25

@@ -15,11 +15,11 @@ from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, load_rig, with_tracker
 from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.series import RecordedSeries
 from rhot_app.ui.replay.run import Codes, Run, Tracked, condition_bins
 
-# -- Two runs of one recording side by side: how far apart their fingertips are at the same instants. No Qt ------------
+# -- Two runs of one recording side by side (no Qt) --------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def nearest(wanted_ns: NDArray[np.int64], given_ns: NDArray[np.int64]) -> NDArra
     return np.where(nearer_before, before, after)
 
 
-# -- Which state of a run is shown: position, speed, steps and the range that is repeated. No Qt, no clock of ----------
+# -- Player: position, speed, steps and range (no Qt) ------------------------------------------------------------------
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Times real time."""
@@ -183,13 +183,13 @@ def time_text(seconds: float) -> str:
     return f"{minutes}:{rest // 100:02d}.{rest % 100:02d}"
 
 
-# -- One recording that is open: its run, a second run beside it, the player, the bookmarks. No Qt ---------------------
+# -- One open recording (no Qt) ----------------------------------------------------------------------------------------
 
 _PLOT_SPACING_NS = 50_000_000  # thirty seconds of a plot are 600 rows then
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class TrackerChoice:
     """How a recording is to be tracked: as it was recorded, or with another tracker, rig file or hand file."""
 
     tracker: Literal["", "classic", "estimator"] = ""
@@ -222,21 +222,21 @@ class Choice:
 class Replay:
     """What is shown of a recording. Positions are s since the first state of the run; `second` is compared with it."""
 
-    def __init__(self, path: Path, run: Run, choice: Choice) -> None:
+    def __init__(self, path: Path, run: Run, choice: TrackerChoice) -> None:
         self.path = path
         self.run = run
         self.choice = choice
         self.player = Player(run.times_s)
         self.bookmarks: list[Bookmark] = list(run.tracked.bookmarks)
         self.second: Run | None = None
-        self.second_choice = Choice()
+        self.second_choice = TrackerChoice()
         self.comparison: Comparison | None = None
         self.differences: RecordedSeries | None = None  # between both runs, mm
         self.jitter = _jitter(run)
 
     # -- runs ------------------------------------------------------------------------------------------------------
 
-    def use(self, run: Run, choice: Choice, comparison: Comparison | None = None) -> None:
+    def use(self, run: Run, choice: TrackerChoice, comparison: Comparison | None = None) -> None:
         """Another run in the first one's place; the moment that is shown stays. `comparison`: with the second run."""
         at_ns = self.position_ns
         self.run.close()
@@ -248,11 +248,12 @@ class Replay:
         self.player.seek(self.seconds_of(at_ns))
         self._compare(comparison)
 
-    def compare(self, run: Run | None, choice: Choice | None = None, comparison: Comparison | None = None) -> None:
+    def compare(self, run: Run | None, choice: TrackerChoice | None = None,
+                comparison: Comparison | None = None) -> None:
         """Another run beside the first one, with its `comparison`; None for none."""
         if self.second is not None:
             self.second.close()
-        self.second, self.second_choice = run, choice or Choice()
+        self.second, self.second_choice = run, choice or TrackerChoice()
         self._compare(comparison)
 
     def _compare(self, comparison: Comparison | None) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from rhot_app.ui.job import CancelledError, Job, Progress
+from rhot_app.ui.backend.solver import Solver, StoppedError
+from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.replay.library import Entry, Library, Summary, summarise_log
-from rhot_app.ui.wizards.framework.solver import Solver, StoppedError
 
 
 class Summaries(QObject):

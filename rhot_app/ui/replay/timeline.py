@@ -118,11 +118,11 @@ class Timeline(QWidget):
     def event(self, event: QEvent) -> bool:
         """The mouse has been held still: which moment that is."""
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
-            QToolTip.showText(event.globalPos(), self.told_at(float(event.pos().x())), self)
+            QToolTip.showText(event.globalPos(), self.tool_tip_at(float(event.pos().x())), self)
             return True
         return bool(super().event(event))
 
-    def told_at(self, x: float) -> str:
+    def tool_tip_at(self, x: float) -> str:
         """Time, condition and bookmark at a place in the widget."""
         if self._replay is None or self.codes is None or not len(self.codes):
             return ""

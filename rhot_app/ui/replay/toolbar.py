@@ -7,10 +7,10 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
+from rhot_app.ui.dialogs.recordings import BookmarkDialog
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
-from rhot_app.ui.recordings import BookmarkDialog
 from rhot_app.ui.replay.session import Replay
 
 _NAME_PX = 240
@@ -83,7 +83,7 @@ class ReplayToolBar(QToolBar):
         self.menu.addAction(self.remove)
 
 
-# -- Asks for a few words about a moment and has a worker write them into the recording; removes a bookmark ------------
+# -- Bookmarks of a recording ------------------------------------------------------------------------------------------
 
 class BookmarkWriter(QObject):
     """`written` after the recording has another bookmark, or one less; `failed` says why it has not."""

@@ -19,19 +19,19 @@ from PySide6.QtWidgets import (
 
 from rhot_app.engine.observer import condition_of
 from rhot_app.recording.bookmarks import Bookmark
-from rhot_app.ui.guide import GuideViewer
+from rhot_app.ui.common.guide import GuideViewer
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.models.notice import Level, Notice, TransientNotices
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Look, condition_look
 from rhot_app.ui.panels.advice_bar import AdviceBar
-from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.replay.run import Run
 from rhot_app.ui.replay.run_dialog import RunDialog, TrackingWork
 from rhot_app.ui.replay.screen import ReplayScreen
-from rhot_app.ui.replay.session import Choice, Comparison, Replay
+from rhot_app.ui.replay.session import Comparison, Replay, TrackerChoice
 from rhot_app.ui.replay.toolbar import BookmarkWriter, ReplayToolBar
 from rhot_app.ui.replay.work_strip import WorkStrip
-from rhot_app.ui.settings import Settings
 
 TICK_MS = 16
 _SIZE = (1280, 800)
@@ -132,7 +132,7 @@ class ReplayWindow(QMainWindow):
 
     def open(self, path: Path) -> None:
         """Track a recording as it was recorded, and show it."""
-        self.work.start(path, Choice())
+        self.work.start(path, TrackerChoice())
 
     def follow(self, before: Path, after: Path) -> None:
         """The file of the recording has another name now."""
@@ -162,7 +162,7 @@ class ReplayWindow(QMainWindow):
             self.replay.compare(None)
             self._show_run()
 
-    def _take_run(self, path: Path, run: Run, choice: Choice, comparison: Comparison | None) -> None:
+    def _take_run(self, path: Path, run: Run, choice: TrackerChoice, comparison: Comparison | None) -> None:
         if choice.beside and self.replay is not None and self.replay.path == path:
             self.replay.compare(run, choice, comparison)
         elif self.replay is not None and self.replay.path == path:

@@ -8,11 +8,11 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from rhot_app.project import Rig
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.replay.library_window import LibraryWindow
 from rhot_app.ui.replay.window import ReplayWindow
-from rhot_app.ui.settings import Settings
 
 
 class ReplayWindows:

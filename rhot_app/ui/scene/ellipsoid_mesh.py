@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.skeleton import JOINTS, TIP_ROLES
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.ui.models.palette import Scheme, rgb_of
 from rhot_app.ui.scene.frames import to_display
 from rhot_app.ui.scene.hand_mesh import TIPS, PosedMesh

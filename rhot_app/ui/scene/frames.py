@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.project import CameraPose, Intrinsics
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
-# -- What stands still in the scene, as arrays: floor grid, axes with ticks in mm, and their labels --------------------
+# -- Floor grid and axes -----------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 

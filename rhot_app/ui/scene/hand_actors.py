@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import JOINTS, TIP_ROLES
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.ui.models.palette import Scheme, rgb_of
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice, EllipsoidMesh
 from rhot_app.ui.scene.frames import FLOOR_M, to_display

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import FINGERS, JOINTS
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.ui.models.palette import Scheme, rgb_of
 from rhot_app.ui.scene.frames import to_display
 from rhot_app.ui.scene.meshes import Faces, Mesh, capsule_template, hull_of_spheres, pose_capsules, repeat_faces
@@ -139,7 +139,7 @@ class SkeletonMesh:
         return PosedMesh(vertices, normals, np.repeat(bone_knowledge(state.joint_knowledge, near, far), count))
 
 
-# -- The look of knowledge in the scene: measured is solid, inferred translucent, guessed hatched grey -----------------
+# -- Measured, inferred, guessed: how each looks -----------------------------------------------------------------------
 
 Colours = NDArray[np.uint8]
 

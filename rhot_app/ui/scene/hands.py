@@ -13,7 +13,7 @@ from rhot_app.calibration.check.camera_calibration import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND, Rig
-from rhot_app.tracking.state import HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.ui.models.rows import position_text, sd_text, short_name, total_sd
 from rhot_app.ui.models.words import KNOWLEDGE, each_hand
 from rhot_app.ui.scene.hand_mesh import TIPS
@@ -73,7 +73,7 @@ def _unknown(state: HandState) -> HandState:
                    palm_knowledge=Knowledge.UNKNOWN)
 
 
-# -- What lies under the mouse in the scene, and what is known of it in numbers ----------------------------------------
+# -- Tool tips of joints and ellipsoids --------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QMatrix4x4, QPainter, QPen, QPixmap
 
-from rhot_app.tracking.state import Knowledge
+from rhot_app.state import Knowledge
 from rhot_app.ui.models.label_layout import place_labels
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import KNOWLEDGE
@@ -114,7 +114,7 @@ def _draw(text: str, style: TextStyle, font: QFont, ratio: float) -> QPixmap:
     return picture
 
 
-# -- The scene's key: which tracker, what solid, translucent and hatched mean, and how large ellipsoids are ------------
+# -- The scene's key ---------------------------------------------------------------------------------------------------
 
 KINDS = (Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED)
 

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 
 from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.models.words import KINDS, each_hand, hand_names
@@ -182,11 +182,11 @@ class SceneView(GLViewWidget):
     def event(self, event: QEvent) -> bool:
         """The mouse has been held still: what lies there, or nothing."""
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
-            QToolTip.showText(event.globalPos(), self.told_at(event.pos()), self)
+            QToolTip.showText(event.globalPos(), self.tool_tip_at(event.pos()), self)
             return True
         return bool(super().event(event))
 
-    def told_at(self, at: QPoint) -> str:
+    def tool_tip_at(self, at: QPoint) -> str:
         """What is known of the marker or joint nearest to a place in the widget, "" when none is near."""
         found = spots(self._in_rig, hand_names(self._rig)) if self._in_rig is not None else []
         if not found:

@@ -6,12 +6,13 @@ from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushBu
 
 from rhot_app.errors import EngineError
 from rhot_app.ui.backend.contract import Asker
-from rhot_app.ui.job import Job
-from rhot_app.ui.wizards.framework.feed import StateFeed
+from rhot_app.ui.backend.feed import StateFeed
+from rhot_app.ui.backend.pose_feed import PoseFeed
+from rhot_app.ui.common.job import Job
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Memory, Plan
-from rhot_app.ui.wizards.framework.pose_feed import PoseFeed
-from rhot_app.ui.wizards.models.alignment_steps import (
+from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
+from rhot_app.ui.wizards.steps.alignment_steps import (
     KINDS,
     AlignmentSolver,
     SourceStep,
@@ -19,8 +20,6 @@ from rhot_app.ui.wizards.models.alignment_steps import (
     charts_of,
     simulated_kind,
 )
-from rhot_app.ui.wizards.models.proposal import AcceptStep
-from rhot_app.ui.wizards.models.step import SolveStep, StepView
 
 _KIND, _DETAIL, _TRACKER = "pose source", "pose source detail", "pose tracker"  # as they are remembered
 
@@ -43,7 +42,7 @@ def make_plan(kit: Kit) -> Plan:
 
     pages = (SourcePage(source, kit.memory), TogetherPage(together, states, kit), ChartPage(solve, kit.scheme),
              AcceptPage(accept, kit.scheme, "The alignment in use can be brought back here until this window closes."))
-    return Plan("Another tracker", pages, solver="rhot_app.ui.wizards.models.alignment_steps", put_back=end)
+    return Plan("Another tracker", pages, solver="rhot_app.ui.wizards.steps.alignment_steps", put_back=end)
 
 
 class SourcePage(Page):

@@ -24,9 +24,8 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.movement_page import Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.bones_steps import SECONDS, EntryStep, HandStep, knowledge_of, make_coach, propose
-from rhot_app.ui.wizards.models.proposal import AcceptStep
-from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.bones_steps import SECONDS, EntryStep, HandStep, knowledge_of, make_coach, propose
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -12,13 +12,13 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScro
 
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.contract import Asker
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
+from rhot_app.ui.models.proposal import NodeChange
 from rhot_app.ui.wizards.framework.control_row import ControlRow
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.camera_steps import CONTROLS, CameraChoices, Control, SettingsStep, Value
-from rhot_app.ui.wizards.models.proposal import AcceptStep, NodeChange
-from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, Control, SettingsStep, Value
 
 
 def make_plan(kit: Kit) -> Plan:
@@ -93,7 +93,7 @@ class CameraPage(Page):
         buttons.addWidget(self.undo_button)
         self.column.addLayout(buttons)
         self.which.currentIndexChanged.connect(self._choose)
-        tryout.told.connect(self._told)
+        tryout.answered.connect(self._answered)
         self.first_field = self.which
         self.pickable = True
 
@@ -127,8 +127,8 @@ class CameraPage(Page):
         """Something grey."""
         self._settings.mark_grey(camera, (round(x), round(y), round(x + width), round(y + height)))
 
-    def _told(self, problem: str) -> None:
-        self._settings.note_told(time.monotonic_ns())
+    def _answered(self, problem: str) -> None:
+        self._settings.note_sent(time.monotonic_ns())
         self.problem.setText(problem)
 
     def show_view(self, view: StepView) -> None:
@@ -143,7 +143,7 @@ class CameraPage(Page):
         for row in self.rows.values():
             values = {choices.value(node_id, row.control) for node_id in self.chosen}
             row.fill(choices.value(self.chosen[0], row.control) if self.chosen else None)
-            row.told.setText(row.control.name if len(values) < 2 else f"{row.control.name} (they differ)")
+            row.check_box.setText(row.control.name if len(values) < 2 else f"{row.control.name} (they differ)")
         self.undo_button.setEnabled(choices.undoable)
 
 
@@ -155,7 +155,7 @@ Settings = dict[str, Any]
 class Tryout(QObject):
     """`want` as often as you like; at most one request is under way. `told` with "" or with what went wrong."""
 
-    told = Signal(str)
+    answered = Signal(str)
 
     def __init__(self, connect: Callable[[], Asker], parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -192,12 +192,12 @@ class Tryout(QObject):
 
     def _sent(self, _: None) -> None:
         self._job = None
-        self.told.emit("")
+        self.answered.emit("")
         self._begin()
 
     def _failed(self, sentence: str) -> None:
         self._job = None
-        self.told.emit(sentence)
+        self.answered.emit(sentence)
         self._begin()
 
     def put_back(self, before: dict[int, Settings]) -> None:

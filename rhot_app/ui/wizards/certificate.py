@@ -14,12 +14,14 @@ from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QLabel, QW
 
 from rhot_app.certificate.latency import flash_edges
 from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.framework.feed import StateFeed
 from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.certificate_steps import (
+from rhot_app.ui.wizards.models.movement import QuietCoach
+from rhot_app.ui.wizards.models.step import SolveStep, StepView
+from rhot_app.ui.wizards.steps.certificate_steps import (
     CertificateStep,
     KeepStep,
     RulerDistances,
@@ -29,8 +31,6 @@ from rhot_app.ui.wizards.models.certificate_steps import (
     task_of,
     verdict_of,
 )
-from rhot_app.ui.wizards.models.movement import QuietCoach
-from rhot_app.ui.wizards.models.step import SolveStep, StepView
 
 _FLASH_STEP_MS = 4  # a quarter of a 60 Hz screen's frame
 _SEED = 7

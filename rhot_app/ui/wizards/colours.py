@@ -20,17 +20,16 @@ from PySide6.QtWidgets import (
 from rhot_app.calibration.colour.colours import ColourReport
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.colour.verdict import OVERLAP
+from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.theme import app_font
 from rhot_app.ui.wizards.framework.colour_list import PaintList, PaintRow
 from rhot_app.ui.wizards.framework.control_row import ControlRow
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartView, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.camera_steps import Control, Value
-from rhot_app.ui.wizards.models.colour_pick import PickStep
-from rhot_app.ui.wizards.models.colour_result import BOUNDS, ApartStep, BoundsStep, matrix_cells, propose
-from rhot_app.ui.wizards.models.proposal import AcceptStep
-from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.camera_steps import Control, Value
+from rhot_app.ui.wizards.steps.colour_pick import PickStep
+from rhot_app.ui.wizards.steps.colour_result import BOUNDS, ApartStep, BoundsStep, matrix_cells, propose
 
 
 def make_plan(kit: Kit) -> Plan:
@@ -114,7 +113,7 @@ class ApartPage(Page):
         return item
 
 
-# -- the pages on which colours are picked and their bounds moved, beside the live mask --------------------------------
+# -- Pages: pick colours and move their bounds -------------------------------------------------------------------------
 
 _SHOWN = (("all", "Mask of all markers"), ("chosen", "Mask of the chosen marker"), ("none", "Picture without mask"))
 

@@ -17,12 +17,11 @@ from PySide6.QtWidgets import (
 
 from rhot_app.calibration.depth.table import DepthRow
 from rhot_app.errors import EngineError
-from rhot_app.ui.wizards.framework.feed import StateFeed
+from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.depth_steps import DistanceStep, LawStep, propose
-from rhot_app.ui.wizards.models.proposal import AcceptStep
-from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.depth_steps import DistanceStep, LawStep, propose
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -18,12 +18,14 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.framework.feed import StateFeed
 from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.filter_steps import (
+from rhot_app.ui.wizards.models.movement import MovementStep
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.filter_steps import (
     FAST_S,
     STILL_S,
     FastCoach,
@@ -32,9 +34,6 @@ from rhot_app.ui.wizards.models.filter_steps import (
     TuneStep,
     propose,
 )
-from rhot_app.ui.wizards.models.movement import MovementStep
-from rhot_app.ui.wizards.models.proposal import AcceptStep
-from rhot_app.ui.wizards.models.step import StepView
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -19,14 +19,14 @@ from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, parse_rig
 from rhot_app.rig_history import Version
 from rhot_app.ui.backend.contract import Asker, Listener
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.shapes import shape_icon
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.proposal import Proposal, age_text, in_force, set_rig
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.shapes import shape_icon
 from rhot_app.ui.wizards.framework.page import RowTable
 from rhot_app.ui.wizards.framework.plan import WIZARDS, Kit, Memory, Wizard
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models.proposal import Proposal, age_text, in_force, set_rig
 
 _END_S = 5.0
 
@@ -156,7 +156,7 @@ def _node_settings(asker: Asker, rig: Rig) -> dict[int, dict[str, Any]]:
     return found
 
 
-# -- earlier versions of the rig file, what was different in them, and a button that brings one back -------------------
+# -- Earlier versions of the rig file ----------------------------------------------------------------------------------
 
 class VersionsDialog(QDialog):
     """`rig_used` gives the rig that was brought back. Bringing back keeps what was there, so it can be undone here."""

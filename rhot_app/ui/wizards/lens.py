@@ -5,14 +5,14 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QCheckBox, QComboBox, QHeaderView, QTableWidget, QTableWidgetItem
 
+from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Memory, Plan
 from rhot_app.ui.wizards.models.board_form import fields_from
-from rhot_app.ui.wizards.models.lens_steps import LensBoardStep, LensShowStep, LensSolveStep, lens_proposal
-from rhot_app.ui.wizards.models.proposal import AcceptStep, Proposal
-from rhot_app.ui.wizards.models.step import StepView
-from rhot_app.ui.wizards.models.stereo_steps import chosen_nodes
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.lens_steps import LensBoardStep, LensShowStep, LensSolveStep, lens_proposal
+from rhot_app.ui.wizards.steps.stereo_steps import chosen_nodes
 
 LAST = "lens camera"
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.proposal import AcceptStep, Proposal
-from rhot_app.ui.wizards.models.refined_steps import MoveStep, RefinedFeed, propose
+from rhot_app.ui.wizards.models.step import AcceptStep
+from rhot_app.ui.wizards.steps.refined_steps import MoveStep, RefinedFeed, propose
 
 TITLE = "Use refined calibration"
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
 
+from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.board_form import BoardStep, fields_from
-from rhot_app.ui.wizards.models.known_step import KnownStep
-from rhot_app.ui.wizards.models.proposal import AcceptStep, Proposal
-from rhot_app.ui.wizards.models.step import StepView
-from rhot_app.ui.wizards.models.stereo_steps import (
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.known_step import KnownStep
+from rhot_app.ui.wizards.steps.stereo_steps import (
     ShowStep,
     SolveStep,
     TableStep,
@@ -36,7 +36,7 @@ def make_plan(kit: Kit) -> Plan:
 
     accept = AcceptPage(AcceptStep(propose), kit.scheme)
     return Plan("Put the cameras together", (BoardPage(board, kit.memory), Page(show), KnownPage(known), Page(solve),
-                                             Page(table), accept), solver="rhot_app.ui.wizards.models.stereo_steps")
+                                             Page(table), accept), solver="rhot_app.ui.wizards.steps.stereo_steps")
 
 
 # -- the fields of the second known length, and clicks on the ruler's ends ---------------------------------------------

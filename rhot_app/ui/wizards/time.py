@@ -5,9 +5,8 @@ from __future__ import annotations
 from rhot_app.ui.wizards.framework.movement_page import Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.proposal import AcceptStep
-from rhot_app.ui.wizards.models.step import SolveStep, Task
-from rhot_app.ui.wizards.models.time_steps import SECONDS, WaveCoach, charts_of, propose, solve_log
+from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, Task
+from rhot_app.ui.wizards.steps.time_steps import SECONDS, WaveCoach, charts_of, propose, solve_log
 
 
 def make_plan(kit: Kit) -> Plan:

@@ -14,7 +14,7 @@ from patience import eventually
 
 from rhot_app.errors import RecordingError, RigError, SourceError
 from rhot_app.geometry.transforms import exp_so3, log_so3, quaternion_from_rotation, rigid
-from rhot_app.objects.alignment_file import Alignment, RigidTransform, save_alignment
+from rhot_app.objects.alignment.alignment_file import Alignment, RigidTransform, save_alignment
 from rhot_app.objects.object_file import ObjectModel, SphereShape, cube, save_object
 from rhot_app.objects.observations import ObjectPose
 from rhot_app.objects.pose import Validity

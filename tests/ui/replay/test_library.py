@@ -117,7 +117,7 @@ def test_a_summary_is_made_once(themed, log, tmp_path, monkeypatch):
         raise RecordingError("made again")
 
     Library(log.parent, tmp_path / "cache").keep_summary(log, summarise_log(log))
-    monkeypatch.setattr("rhot_app.ui.wizards.framework.solver.Solver.run", never)
+    monkeypatch.setattr("rhot_app.ui.backend.solver.Solver.run", never)
     shelf = Shelf(log.parent, tmp_path / "cache")
     shelf.until(lambda: shelf.text(0, LENGTH) == "0:04")
     shelf.window.close()

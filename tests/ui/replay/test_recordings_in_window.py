@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QLineEdit
 
 from rhot_app.errors import EngineError
-from rhot_app.ui.wizards.framework.solver import Solver
+from rhot_app.ui.backend.solver import Solver
 
 
 def test_length_and_size_are_told_while_recording(tracking):

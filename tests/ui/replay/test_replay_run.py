@@ -12,10 +12,10 @@ from rhot_app.errors import RecordingError
 from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
-from rhot_app.tracking.state import Condition
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
+from rhot_app.state import Condition
 from rhot_app.ui.replay.run import LOST, NO_STATE, PARTIAL, TRACKING, Run, condition_bins, new_run_path, track_log
-from rhot_app.ui.replay.session import Choice, Comparison, Replay, nearest
+from rhot_app.ui.replay.session import Comparison, Replay, TrackerChoice, nearest
 
 
 def rig_of(log: Path) -> Rig:
@@ -142,12 +142,12 @@ def test_a_disk_without_room_for_the_states_is_said(grasp_log):
 def test_runs_are_exchanged_and_compared_anew(grasp_log, tmp_path):
     rig = rig_of(grasp_log)
     first, second, third = (tracked(grasp_log, rig, tmp_path / name) for name in "abc")
-    replay = Replay(grasp_log, first, Choice())
+    replay = Replay(grasp_log, first, TrackerChoice())
     made = Comparison(first.tracked, second.tracked)
-    replay.compare(second, Choice("estimator"), made)
+    replay.compare(second, TrackerChoice("estimator"), made)
     assert replay.comparison is made and replay.differences is not None
     replay.player.seek(1.0)
-    replay.use(third, Choice(), made)
+    replay.use(third, TrackerChoice(), made)
     assert replay.comparison is not made and replay.comparison.of == (third.tracked, second.tracked)
     assert abs(replay.player.position_s - 1.0) < 1e-6
     state, partner = replay.shown()

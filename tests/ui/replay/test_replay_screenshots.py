@@ -17,11 +17,11 @@ from rhot_app.evaluation.fault_injection import silent
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
 from rhot_app.recording.raw_log import LogReader, encode_header, encode_record
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.replay.library_window import LibraryWindow
-from rhot_app.ui.replay.session import Choice
+from rhot_app.ui.replay.session import TrackerChoice
 from rhot_app.ui.replay.window import ReplayWindow
-from rhot_app.ui.settings import Settings
 
 
 def until(condition: Any) -> None:
@@ -56,7 +56,7 @@ def test_the_replay(themed, recordings, tmp_path):
     log = recordings / "two cups.rhotlog"
     window.open(log)
     until(lambda: window.replay is not None)
-    window.work.start(log, Choice("estimator", beside=True))
+    window.work.start(log, TrackerChoice("estimator", beside=True))
     until(lambda: window.replay.second is not None)
     window.seek(9.5)
     window._loop("end")

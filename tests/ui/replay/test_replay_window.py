@@ -17,11 +17,11 @@ from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark, read_bookmarks
+from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.replay.timeline import FLAG_PX
 from rhot_app.ui.replay.window import ReplayWindow
-from rhot_app.ui.settings import Settings
 from rhot_node.files import resource_path
 
 
@@ -114,7 +114,7 @@ def test_a_recording_is_shown_with_its_name(desk):
     assert desk.window.parts.transport.place.text().startswith("0:00.00 of 0:03.9")
     assert not list(desk.states.iterdir()), "the states' file has no name any more"
     assert window.parts.timeline.codes is not None and len(window.parts.timeline.codes) > 500
-    assert "tracking" in window.parts.timeline.told_at(window.parts.timeline.x_of(2.0))
+    assert "tracking" in window.parts.timeline.tool_tip_at(window.parts.timeline.x_of(2.0))
 
 
 def test_space_plays_and_pauses(desk):
@@ -214,7 +214,7 @@ def test_a_bookmark_is_set_found_and_removed(desk):
     assert abs(desk.position_s - at_s) < 1e-6 and "0:0" in window.toolbar.menu.actions()[0].text()
     desk.press(Qt.Key.Key_Home)
     line = window.parts.timeline
-    assert "thumb behind the palm" in line.told_at(line.x_of(at_s) + 2)
+    assert "thumb behind the palm" in line.tool_tip_at(line.x_of(at_s) + 2)
     desk.click(line, QPoint(round(line.x_of(at_s)) + 3, 5))
     assert abs(desk.position_s - at_s) < 1e-6, "a click on a flag meets it exactly"
     desk.until(window.toolbar.remove.isEnabled)

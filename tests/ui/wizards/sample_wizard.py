@@ -8,11 +8,11 @@ import slow_work
 from PySide6.QtWidgets import QSpinBox
 
 from rhot_app.calibration.verdict import Finding, Grade, judge
+from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Tag
-from rhot_app.ui.wizards.models.proposal import AcceptStep, Proposal, RigChange, Row
-from rhot_app.ui.wizards.models.step import Bar, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import AcceptStep, Bar, Step, StepView, Task
 
 
 class FormStep(Step):

@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtCore import Qt
 
 from rhot_app.geometry.transforms import inverse
-from rhot_app.objects.alignment_file import alignment_path, load_alignment
-from rhot_app.simulator.scene.foreign_tracker import DELAY_S, ForeignTracker
+from rhot_app.objects.alignment.alignment_file import alignment_path, load_alignment
+from rhot_app.simulator.nodes.live_scene import DELAY_S, ForeignTracker
 from rhot_app.simulator.scene.scene_description import HandShow
 from rhot_app.ui.backend.contract import TwinChoice
 

@@ -18,9 +18,9 @@ from wizard_rig import FakeMemory
 
 from rhot_app.calibration.verdict import Grade
 from rhot_app.geometry.transforms import inverse
-from rhot_app.objects.alignment_file import alignment_path, load_alignment
+from rhot_app.objects.alignment.alignment_file import alignment_path, load_alignment
 from rhot_app.project import save_rig
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards import alignment
 from rhot_app.ui.wizards.framework.plan import Kit
@@ -148,7 +148,7 @@ def test_an_alignment_that_holds_no_longer_is_called_stale(make_hands):
     x, y, z = saved.rig_from_foreign.translation_m
     from msgspec.structs import replace as changed
 
-    from rhot_app.objects.alignment_file import save_alignment
+    from rhot_app.objects.alignment.alignment_file import save_alignment
     save_alignment(hands.path, changed(saved, rig_from_foreign=changed(
         saved.rig_from_foreign, translation_m=(x + 0.02, y, z))))
     hands.window.end().wait(8.0)

@@ -17,8 +17,8 @@ from wizard_rig import FakeMemory
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.boards import STANDARD_BOARD, CharucoBoard, Chessboard
 from rhot_app.calibration.board.size_check import Beyond
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
-from rhot_app.ui.wizards.framework.feed import Picture
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep, fields_from, remembered_fields
 from rhot_app.ui.wizards.models.drawing import Dots
 

@@ -24,9 +24,9 @@ from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.bones import make_plan
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models.bones_steps import SweepCoach, make_coach
 from rhot_app.ui.wizards.models.movement import QuietCoach
 from rhot_app.ui.wizards.models.step import Bar
+from rhot_app.ui.wizards.steps.bones_steps import SweepCoach, make_coach
 
 SECONDS = 8.0
 SIZE = 1.06

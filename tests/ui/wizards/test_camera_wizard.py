@@ -12,13 +12,13 @@ from PySide6.QtWidgets import QMessageBox
 from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.camera import make_plan
-from rhot_app.ui.wizards.framework.feed import Picture
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models.camera_steps import CONTROLS, CameraChoices, CameraEye
 from rhot_app.ui.wizards.models.drawing import Layer
+from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, CameraEye
 from rhot_node.config import CameraSettings
 
 EXPOSURE, RED = CONTROLS[0], CONTROLS[5]
@@ -155,13 +155,13 @@ def test_one_camera_alone_undo_and_a_slider(hands, asker):
 
 
 def test_a_setting_is_left_to_the_camera_or_told(hands, asker):
-    told = row(hands, "gain").told
+    told = row(hands, "gain").check_box
     assert not told.isChecked() and not row(hands, "gain").box.isEnabled()
     told.setChecked(True)
     hands.until(lambda: asker.settings[1].camera.gain == 1.0)
     told.setChecked(False)
     hands.until(lambda: asker.settings[1].camera.gain is None)
-    assert not row(hands, "exposure_us").told.isEnabled(), "a camera must be told how long to expose"
+    assert not row(hands, "exposure_us").check_box.isEnabled(), "a camera must be told how long to expose"
 
 
 def test_grey_paper_balances_the_colours(hands, asker):

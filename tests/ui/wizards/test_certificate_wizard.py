@@ -18,7 +18,7 @@ from rhot_app.certificate.document import read_certificate
 from rhot_app.certificate.recordings import read_protocol
 from rhot_app.certificate.simulated import record_flash
 from rhot_app.project import save_rig
-from rhot_app.simulator.nodes.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards import certificate as certificate_wizard

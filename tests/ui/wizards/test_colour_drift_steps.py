@@ -14,9 +14,9 @@ from paint_scene import PaintScene
 from rhot_app.calibration.colour.colours import solve_colours
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import Rig
-from rhot_app.ui.wizards.framework.feed import Picture
-from rhot_app.ui.wizards.models.colour_pick import MaskMaker, PickStep
-from rhot_app.ui.wizards.models.colour_result import ApartStep, BoundsStep, propose
+from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.wizards.steps.colour_pick import MaskMaker, PickStep
+from rhot_app.ui.wizards.steps.colour_result import ApartStep, BoundsStep, propose
 from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import to_bgr
 

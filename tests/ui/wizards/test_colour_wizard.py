@@ -16,14 +16,14 @@ from wizard_rig import FakeMemory, FakeRigAsker
 
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.project import load_rig, save_rig
+from rhot_app.ui.common.theme import apply_theme
 from rhot_app.ui.models.palette import DARK, SCHEMES, contrast
-from rhot_app.ui.theme import apply_theme
 from rhot_app.ui.wizards.colours import MaskChoice, make_plan
 from rhot_app.ui.wizards.framework.picture_painter import callout_boxes
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models.colour_result import hue_chart
 from rhot_app.ui.wizards.models.drawing import Callout, Layer
+from rhot_app.ui.wizards.steps.colour_result import hue_chart
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 

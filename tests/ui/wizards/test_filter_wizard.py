@@ -23,7 +23,7 @@ from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.filters import make_plan
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models.filter_steps import FastCoach, LiveMeters, StillCoach
+from rhot_app.ui.wizards.steps.filter_steps import FastCoach, LiveMeters, StillCoach
 
 SECONDS = 5.0
 LAZY = FilterSettings(pixel=OneEuroSettings(0.3, 0.0001, 1.0), position=OneEuroSettings(0.3, 0.001, 1.0))

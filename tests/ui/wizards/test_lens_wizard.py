@@ -20,7 +20,7 @@ from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_app.ui.wizards.lens import LAST, make_plan
 from rhot_app.ui.wizards.models.drawing import Cells, Line
-from rhot_app.ui.wizards.models.lens_steps import straightened
+from rhot_app.ui.wizards.steps.lens_steps import straightened
 
 TRUE_F = 530.0
 PLACES = [((0.0, 0.0, 0.0), (0.0, 0.0, 0.417)), ((0.0, 0.0, 0.0), (-0.142, -0.083, 0.417)),

@@ -19,7 +19,7 @@ from rhot_app.ui.status_words import _advice_notice
 from rhot_app.ui.wizards import refined
 from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models.refined_steps import propose
+from rhot_app.ui.wizards.steps.refined_steps import propose
 
 
 class RefiningAsker(FakeRigAsker):

@@ -16,11 +16,11 @@ from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.check.checks import check_rig
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig, save_rig
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.feed import Picture
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models.known_step import KnownStep
+from rhot_app.ui.wizards.steps.known_step import KnownStep
 from rhot_app.ui.wizards.stereo import make_plan
 
 TRUE_BASELINE_M = 0.075

@@ -77,8 +77,8 @@ def test_closing_while_it_records_ends_the_recording(hands):
 def test_a_wrong_row_time_is_told_to_its_node():
     from rhot_app.calibration.observations import ObservationCollector
     from rhot_app.calibration.time.offset import calibrate_times
-    from rhot_app.ui.wizards.models.proposal import NodeChange
-    from rhot_app.ui.wizards.models.time_steps import propose
+    from rhot_app.ui.models.proposal import NodeChange
+    from rhot_app.ui.wizards.steps.time_steps import propose
 
     rig = synthetic_rig()
     collector = ObservationCollector(tuple(node.name for node in rig.nodes), rig.markers.ids)

@@ -16,8 +16,8 @@ from patience import PATIENCE_S, eventually, settled
 from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import CalibrationError
-from rhot_app.ui.wizards.framework.feed import LiveFeed
-from rhot_app.ui.wizards.framework.solver import Solver, StoppedError
+from rhot_app.ui.backend.feed import LiveFeed
+from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.wizards.framework.work import PictureWorker
 from rhot_app.ui.wizards.models.step import Step
 
@@ -180,6 +180,6 @@ def test_work_runs_in_another_process_that_gives_way(solver):
 
 
 def test_the_solving_process_imports_no_qt():
-    module = "rhot_app.ui.wizards.framework.solver_process"
+    module = "rhot_app.ui.backend.solver_process"
     code = f"import {module}, sys; sys.exit(any('PySide6' in m for m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

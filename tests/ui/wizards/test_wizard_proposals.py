@@ -13,8 +13,9 @@ from rhot_app import rig_history
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.errors import EngineError, RigError
 from rhot_app.project import load_rig, save_rig
+from rhot_app.ui.models.proposal import NodeChange, Proposal, RigChange, Row, age_text, in_force
 from rhot_app.ui.models.words import Remaining
-from rhot_app.ui.wizards.models.proposal import AcceptStep, NodeChange, Proposal, RigChange, Row, age_text, in_force
+from rhot_app.ui.wizards.models.step import AcceptStep
 
 
 @pytest.fixture

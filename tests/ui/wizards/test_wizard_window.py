@@ -15,7 +15,7 @@ from wizard_rig import FakeMemory, FakeRigAsker
 
 from rhot_app import rig_history
 from rhot_app.project import load_rig, save_rig
-from rhot_app.ui.guide import page_path
+from rhot_app.ui.common.guide import page_path
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.framework.plan import WIZARDS, Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow

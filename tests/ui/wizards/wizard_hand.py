@@ -9,7 +9,7 @@ import numpy as np
 from fake_engine import FakeEngine
 from wizard_rig import FakeRigAsker
 
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 
 
 class HeldMarker:

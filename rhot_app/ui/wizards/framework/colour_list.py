@@ -8,8 +8,8 @@ from PySide6.QtCore import QRect, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
+from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.shapes import shape_pixmap
 
 Rgb = tuple[int, int, int]
 

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QGridLayout, QSlider, QWidget
 
-from rhot_app.ui.wizards.models.camera_steps import Control, Value
+from rhot_app.ui.wizards.steps.camera_steps import Control, Value
 
 _STEPS = 400
 
@@ -23,14 +23,14 @@ class ControlRow(QWidget):
         self.control = control
         self._filling = False
         self._moving = False
-        self.told = QCheckBox(control.name)
-        self.told.setToolTip(f"{control.meaning}\nUntick it to leave it to the camera." if control.optional
+        self.check_box = QCheckBox(control.name)
+        self.check_box.setToolTip(f"{control.meaning}\nUntick it to leave it to the camera." if control.optional
                              else control.meaning)
         if not control.optional:  # a name, not a choice
-            self.told.setStyleSheet("QCheckBox { spacing: 0 } QCheckBox::indicator { width: 0; height: 0 }")
-            palette = self.told.palette()
+            self.check_box.setStyleSheet("QCheckBox { spacing: 0 } QCheckBox::indicator { width: 0; height: 0 }")
+            palette = self.check_box.palette()
             palette.setColor(QPalette.ColorGroup.Disabled, QPalette.ColorRole.WindowText, palette.windowText().color())
-            self.told.setPalette(palette)
+            self.check_box.setPalette(palette)
         self.box = QDoubleSpinBox()
         self.box.setRange(control.least, control.most)
         self.box.setDecimals(control.decimals)
@@ -45,10 +45,10 @@ class ControlRow(QWidget):
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setVerticalSpacing(0)
-        grid.addWidget(self.told, 0, 0)
+        grid.addWidget(self.check_box, 0, 0)
         grid.addWidget(self.box, 0, 1, alignment=Qt.AlignmentFlag.AlignRight)
         grid.addWidget(self.slider, 1, 0, 1, 2)
-        self.told.toggled.connect(self._toggle)
+        self.check_box.toggled.connect(self._toggle)
         self.box.valueChanged.connect(self._type)
         self.slider.valueChanged.connect(self._slide)
         self.slider.sliderReleased.connect(self._release)
@@ -57,8 +57,8 @@ class ControlRow(QWidget):
         """Show a value without telling anybody."""
         self._filling = True
         shown = self.control.neutral if value is None else value
-        self.told.setChecked(value is not None)
-        self.told.setEnabled(self.control.optional)
+        self.check_box.setChecked(value is not None)
+        self.check_box.setEnabled(self.control.optional)
         self.box.setValue(shown)
         if not self.slider.isSliderDown():
             self.slider.setValue(self._to_step(shown))

@@ -18,15 +18,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.ui.common.shapes import ShapeMark, paint_shape
+from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.shapes import ShapeMark, paint_shape
-from rhot_app.ui.theme import app_font
 from rhot_app.ui.wizards.framework.page import Page, VerdictView
 from rhot_app.ui.wizards.framework.picture_view import PictureWall
 from rhot_app.ui.wizards.framework.plan import Plan
 from rhot_app.ui.wizards.framework.work import Work
-from rhot_app.ui.wizards.models.proposal import AcceptStep
-from rhot_app.ui.wizards.models.step import Bar, Step, StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, Bar, Step, StepView
 
 SENTENCE_PT = 21.0
 """Letters 5 mm high on a usual screen: readable from two metres."""

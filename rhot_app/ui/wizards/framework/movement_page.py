@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QLabel, QPushButton
 
 from rhot_app.errors import EngineError
 from rhot_app.ui.backend.contract import Asker
-from rhot_app.ui.job import Job
-from rhot_app.ui.wizards.framework.feed import StateFeed
+from rhot_app.ui.backend.feed import StateFeed
+from rhot_app.ui.common.job import Job
 from rhot_app.ui.wizards.framework.page import Page
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.models.movement import Coach, MovementStep, Request
@@ -82,7 +82,7 @@ class MovementPage(Page):
         self.changed.emit()
 
 
-# -- What every wizard with recorded movements needs: the states, a folder for the logs, and an end that ---------------
+# -- Movements recorded for a wizard -----------------------------------------------------------------------------------
 
 PageT = TypeVar("PageT", bound=MovementPage)
 StepT = TypeVar("StepT", bound=MovementStep)

@@ -20,13 +20,13 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.calibration.verdict import Finding, Verdict
+from rhot_app.ui.common.shapes import ShapeMark
+from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme, visible_on
+from rhot_app.ui.models.proposal import Row
 from rhot_app.ui.models.words import GRADES
-from rhot_app.ui.shapes import ShapeMark
-from rhot_app.ui.theme import app_font
 from rhot_app.ui.wizards.framework.colour_list import swatch
-from rhot_app.ui.wizards.models.proposal import AcceptStep, Row
-from rhot_app.ui.wizards.models.step import Chart, ChartedStep, Curve, Step, StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, Chart, ChartedStep, Curve, Step, StepView
 
 
 class Page(QWidget):
@@ -61,7 +61,7 @@ class Page(QWidget):
         """A person has clicked or dragged in a picture; px of the frame, a click has no size."""
 
 
-# -- The last page of every wizard: figures before and after side by side, and the way back ----------------------------
+# -- Last page of every wizard: before and after -----------------------------------------------------------------------
 
 HEADS = ("", "before", "after")
 KEPT = ("What is there now is kept, and can be brought back at any time with Calibrate, Bring back an earlier "
@@ -253,7 +253,7 @@ class ChartPage(Page):
         self.charts.show_charts(self._charted.charts)
 
 
-# -- A calibration's verdict: the grade as shape, colour and word, the sentence, each finding with cause and -----------
+# -- A calibration's verdict with its findings -------------------------------------------------------------------------
 
 _SENTENCE_PT = 14.0
 

@@ -8,9 +8,9 @@ import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF
 
+from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import Box, place_at_sides
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.shapes import paint_tag
 from rhot_app.ui.wizards.models.drawing import Array, Callout, Cells, Dots, Layer, Line, Mark, Overlay, Tag
 
 _CELL_ALPHA = 60
@@ -20,7 +20,7 @@ _PAINT_PX = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FramePlacement:
     """Where the frame of `width` x `height` px lies on the widget."""
 
     target: QRectF
@@ -44,15 +44,15 @@ class Place:
         return min(max(x, 0.0), self.width - 1.0), min(max(y, 0.0), self.height - 1.0)
 
 
-def fit(width: int, height: int, into: QRectF) -> Place:
+def fit(width: int, height: int, into: QRectF) -> FramePlacement:
     """The largest place for the frame in the middle of `into`."""
     scale = min(into.width() / width, into.height() / height)
     target = QRectF(0, 0, width * scale, height * scale)
     target.moveCenter(into.center())
-    return Place(target, width, height)
+    return FramePlacement(target, width, height)
 
 
-def paint_overlay(painter: QPainter, overlay: Overlay, place: Place, scheme: Scheme) -> None:
+def paint_overlay(painter: QPainter, overlay: Overlay, place: FramePlacement, scheme: Scheme) -> None:
     """Paint every mark of `overlay`, the first one undermost."""
     painter.save()
     painter.setClipRect(place.target)
@@ -62,14 +62,14 @@ def paint_overlay(painter: QPainter, overlay: Overlay, place: Place, scheme: Sch
     painter.restore()
 
 
-def callout_boxes(callouts: list[Callout], place: Place, metrics: QFontMetricsF) -> list[Box]:
+def callout_boxes(callouts: list[Callout], place: FramePlacement, metrics: QFontMetricsF) -> list[Box]:
     """Where the words stand, from the picture's upper left corner: at its sides, none over another."""
     anchors = [((mark.x + 0.5) * place.scale, (mark.y + 0.5) * place.scale) for mark in callouts]
     sizes = [(metrics.horizontalAdvance(mark.text) + 8, metrics.height() + 2) for mark in callouts]
     return place_at_sides(anchors, sizes, (place.target.width(), place.target.height()), _SIDE_PX)
 
 
-def _paint_callouts(painter: QPainter, callouts: list[Callout], place: Place) -> None:
+def _paint_callouts(painter: QPainter, callouts: list[Callout], place: FramePlacement) -> None:
     if not callouts:
         return
     corner = place.target.topLeft()
@@ -85,7 +85,7 @@ def _paint_callouts(painter: QPainter, callouts: list[Callout], place: Place) ->
         paint_tag(painter, corner + QPointF(box.x, box.y), mark.text)
 
 
-def _paint(painter: QPainter, mark: Mark, place: Place, scheme: Scheme) -> None:
+def _paint(painter: QPainter, mark: Mark, place: FramePlacement, scheme: Scheme) -> None:
     match mark:
         case Dots():
             _paint_dots(painter, mark, place, scheme)
@@ -105,7 +105,7 @@ def _paint(painter: QPainter, mark: Mark, place: Place, scheme: Scheme) -> None:
                 paint_tag(painter, corner[0], mark.text)
 
 
-def _paint_dots(painter: QPainter, dots: Dots, place: Place, scheme: Scheme) -> None:
+def _paint_dots(painter: QPainter, dots: Dots, place: FramePlacement, scheme: Scheme) -> None:
     colour = _colour(dots.colour, scheme)
     places = place.to_widget(dots.points)
     for pen, width in ((QColor("#000000"), 3.5), (colour, 1.6)):
@@ -115,7 +115,7 @@ def _paint_dots(painter: QPainter, dots: Dots, place: Place, scheme: Scheme) -> 
             painter.drawEllipse(at, dots.radius, dots.radius)
 
 
-def _paint_line(painter: QPainter, line: Line, place: Place, scheme: Scheme) -> None:
+def _paint_line(painter: QPainter, line: Line, place: FramePlacement, scheme: Scheme) -> None:
     colour = _colour(line.colour, scheme)
     polygon = QPolygonF(place.to_widget(line.points))
     shade = QColor(colour)
@@ -130,7 +130,7 @@ def _paint_line(painter: QPainter, line: Line, place: Place, scheme: Scheme) -> 
             painter.drawPolyline(polygon)
 
 
-def _paint_cells(painter: QPainter, cells: Cells, place: Place, scheme: Scheme) -> None:
+def _paint_cells(painter: QPainter, cells: Cells, place: FramePlacement, scheme: Scheme) -> None:
     rows, columns = cells.strength.shape
     width, height = place.target.width() / columns, place.target.height() / rows
     painter.setPen(Qt.PenStyle.NoPen)

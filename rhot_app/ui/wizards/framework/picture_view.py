@@ -9,10 +9,10 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from rhot_app.ui.backend.feed import LiveFeed, Picture
+from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.shapes import paint_tag
-from rhot_app.ui.wizards.framework.feed import LiveFeed, Picture
-from rhot_app.ui.wizards.framework.picture_painter import Place, fit, paint_overlay
+from rhot_app.ui.wizards.framework.picture_painter import FramePlacement, fit, paint_overlay
 from rhot_app.ui.wizards.models.drawing import Callout, Overlay
 from rhot_app.ui.wizards.models.step import StepView
 
@@ -90,7 +90,7 @@ class PictureView(QWidget):
             self._flash_until = 0.0
             self.update()
 
-    def _place(self) -> Place:
+    def _place(self) -> FramePlacement:
         width, height = (self._image.width(), self._image.height()) if not self._image.isNull() else (640, 480)
         return fit(width, height, QRectF(self.rect()))
 
@@ -121,7 +121,7 @@ class PictureView(QWidget):
         self.setMaximumSize(*(_SMALL_PX if small else (_ANY_PX, _ANY_PX)))
         self.setToolTip("A click shows this picture large." if small else "")
 
-    def _paint_frames(self, painter: QPainter, place: Place) -> None:
+    def _paint_frames(self, painter: QPainter, place: FramePlacement) -> None:
         painter.setBrush(Qt.BrushStyle.NoBrush)
         if self._flash_until:
             painter.setPen(QPen(QColor(self._scheme.good), _FLASH_PX))

@@ -13,10 +13,10 @@ from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.page import Page
 
-# -- What wizards remember between runs, by name: the board, the camera chosen last ------------------------------------
+# -- What wizards remember between runs --------------------------------------------------------------------------------
 
 class Memory(Protocol):
-    """`rhot_app.ui.settings.Settings` is one."""
+    """`rhot_app.ui.common.settings.Settings` is one."""
 
     def remembered(self, name: str) -> str:
         """What was remembered by this name, "" for nothing."""
@@ -59,7 +59,7 @@ class Plan:
     put_back: Callable[[], None] | None = None
 
 
-# -- All wizards in the order in which a new rig needs them. Cheap to import: a wizard's own module comes as -----------
+# -- All wizards, in the order in which a new rig needs them -----------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
 class Wizard:

@@ -9,15 +9,14 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QLineEdit, QMessageBox, QWidget
 
-from rhot_app.ui.guide import GuideViewer
-from rhot_app.ui.job import Job
-from rhot_app.ui.wizards.framework.feed import LiveFeed, Picture
+from rhot_app.ui.backend.feed import LiveFeed, Picture
+from rhot_app.ui.common.guide import GuideViewer
+from rhot_app.ui.common.job import Job
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.page import AcceptPage
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.framework.work import PictureWorker, Work
-from rhot_app.ui.wizards.models.proposal import AcceptStep, State
-from rhot_app.ui.wizards.models.step import Step
+from rhot_app.ui.wizards.models.step import AcceptStep, State, Step
 
 TICK_MS = 16
 SHOW_S = 0.1

@@ -10,10 +10,10 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from rhot_app.errors import CalibrationError
-from rhot_app.ui.job import CancelledError, Job, Progress
+from rhot_app.ui.backend.feed import LiveFeed, Picture
+from rhot_app.ui.backend.solver import Solver, StoppedError
+from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.models.words import Remaining
-from rhot_app.ui.wizards.framework.feed import LiveFeed, Picture
-from rhot_app.ui.wizards.framework.solver import Solver, StoppedError
 from rhot_app.ui.wizards.models.step import Step, Task
 
 CANCELLED = "Stopped. Go on with Solve again, or go back."
@@ -117,7 +117,7 @@ class Work(QObject):
         self.changed.emit()
 
 
-# -- A thread that looks at the newest pictures for a step and hands over what it has found. No Qt ---------------------
+# -- Thread that has a step look at the newest pictures (no Qt) --------------------------------------------------------
 
 log = logging.getLogger(__name__)
 

@@ -1,1 +1,1 @@
-"""What the wizards know and decide, without Qt."""
+"""What the steps of all wizards share, without Qt."""

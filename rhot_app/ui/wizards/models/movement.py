@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
 
-from rhot_app.tracking.state import HandState
+from rhot_app.state import HandState
 from rhot_app.ui.wizards.models.step import Bar, Step, StepView
 
 Phase = Literal["waiting", "beginning", "recording", "ending", "recorded"]

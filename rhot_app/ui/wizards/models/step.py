@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.verdict import Verdict
-from rhot_app.ui.wizards.framework.feed import Picture
+from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.models.proposal import Command, Proposal
 from rhot_app.ui.wizards.models.drawing import Overlay
 
 Pictures = Mapping[str, Picture]
@@ -157,7 +158,7 @@ class ChartedStep(Step):
     charts: tuple[Chart, ...] = ()
 
 
-# -- The step in which the computer works: one task, its report's verdict and charts -----------------------------------
+# -- Step: solve -------------------------------------------------------------------------------------------------------
 
 class SolveStep(ChartedStep):
     """Asks `make_task` for its work whenever it is entered with other input than before; `report` is the result."""
@@ -205,3 +206,83 @@ class SolveStep(ChartedStep):
         verdict = self._verdict_of(self.report)
         sentence = "Look at the result, then go on." if verdict.acceptable else "Read what is wrong, then go back."
         return StepView(sentence, done=True, verdict=verdict)
+
+
+# -- Step: accept or restore, the last of every wizard -----------------------------------------------------------------
+
+State = Literal["proposed", "under way", "used", "restored"]
+
+
+class AcceptStep(Step):
+    """Shows what `propose` gives when the step is entered. `apply` and `take_back` wait: call them in a worker, between
+    `begin` and `finish`."""
+
+    title = "Before and after"
+    use_label = "Use this calibration"
+
+    def __init__(self, propose: Callable[[], Proposal | None], missing: str = "There is no result yet.") -> None:
+        """`missing` is shown while `propose` gives None."""
+        self._propose = propose
+        self._missing = missing
+        self.proposal: Proposal | None = None
+        self.state: State = "proposed"
+        self.problem = ""
+
+    def enter(self) -> None:
+        """Another result may have come since."""
+        proposal = self._propose()
+        if proposal != self.proposal:
+            self.proposal, self.state, self.problem = proposal, "proposed", ""
+
+    @property
+    def usable(self) -> bool:
+        """Whether it may be put into force now."""
+        return (self.proposal is not None and self.proposal.verdict.acceptable
+                and self.state in ("proposed", "restored"))
+
+    @property
+    def restorable(self) -> bool:
+        """Whether the old state can be brought back now."""
+        return self.state == "used"
+
+    @property
+    def keeps(self) -> bool:
+        """A result that was neither used nor refused would be lost."""
+        return self.usable and self.state == "proposed"
+
+    def begin(self) -> None:
+        """Something is being put into force or taken back."""
+        self.state, self.problem = "under way", ""
+
+    def finish(self, state: State, problem: str = "") -> None:
+        """It has ended so."""
+        self.state, self.problem = state, problem
+
+    def apply(self, command: Command) -> None:
+        """Put the proposal into force; raises RhotError."""
+        assert self.proposal is not None
+        self.proposal.use(command)
+
+    def take_back(self, command: Command) -> None:
+        """Bring back what was before; raises RhotError."""
+        assert self.proposal is not None
+        self.proposal.restore(command)
+
+    def view(self) -> StepView:
+        """One sentence for each state."""
+        verdict = self.proposal.verdict if self.proposal is not None else None
+        afterwards = self.proposal.afterwards if self.proposal is not None and self.state == "used" else ""
+        return StepView(self._sentence(), done=self.state == "used", hint=self.problem or afterwards, verdict=verdict)
+
+    def _sentence(self) -> str:
+        if self.proposal is None:
+            return self._missing
+        if self.state == "under way":
+            return "One moment."
+        if self.state == "used":
+            return "It is in use and saved."
+        if self.state == "restored":
+            return "The old one is back."
+        if not self.proposal.verdict.acceptable:
+            return "This must not be used: go back and mend what the verdict says."
+        return "Compare, then use this calibration or go back."

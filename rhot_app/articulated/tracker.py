@@ -1,0 +1,140 @@
+"""Tracks any articulated object by layered templates, in images of one or more calibrated cameras (Rehg 1995, 4.4.1).
+
+At every instant: predict; sort the links by visibility before each camera; compare the templates with the images,
+smoothed first more and then less; estimate. What is then seen from a new side becomes a further template.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.articulated.bodies import ANGLES, Bodies, Placed, camera_rays, place, root_of
+from rhot_app.articulated.layered import LayeredFrame
+from rhot_app.articulated.outline import outline_of
+from rhot_app.articulated.process import AngleLimits, ConstantVelocity
+from rhot_app.articulated.templates import Filtered, Image, Kind, TemplateSet, filtered
+from rhot_app.articulated.visibility import Visibility, segment, visibility
+from rhot_app.errors import TrackingError
+from rhot_app.estimation.filter import IteratedFilter, Knot, update
+from rhot_app.estimation.residual import Residual
+from rhot_app.geometry.camera import CameraModel
+from rhot_node.detect.edges import noise_of
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+START_SD = 1e-3, 0.01, 0.02
+"""m, rad and rad: how well a start is known from which templates are taken. They show it no better."""
+
+
+@dataclass(eq=False, slots=True)
+class View:
+    """One camera of a tracker. `background`: the filtered scene without the object, by smoothing; None: unknown.
+    `visibility` of the last image, and its `frame`."""
+
+    camera: CameraModel
+    pose: Array
+    rays: Array
+    background: list[Filtered] | None = None
+    noise: float = 0.0
+    visibility: Visibility | None = None
+    frame: LayeredFrame | None = None
+
+
+class LayeredTracker:
+    """One articulated object before some cameras."""
+
+    def __init__(self, bodies: Bodies, limits: Array, process: ConstantVelocity, cameras: Sequence[CameraModel], *,
+                 kind: Kind = "raw", layered: bool = True, outline: bool = True,
+                 backgrounds: Sequence[Image] | None = None) -> None:
+        """`limits` (A, 2) rad. `kind`: how images are filtered; outlines need ``raw``. `layered` False: every template
+        is taken for visible. `backgrounds`: each camera's image (H, W, 3) RGB without the object."""
+        self.bodies, self.process, self.layered = bodies, process, layered
+        self.outline = outline and kind == "raw"
+        self.templates = TemplateSet(kind)
+        self.views = [View(camera, np.ascontiguousarray(camera.camera_from_world[:3]), camera_rays(camera))
+                      for camera in cameras]
+        for view, background in zip(self.views, backgrounds or (), strict=False):
+            view.background = self.templates.images(background)
+        self.filter = IteratedFilter(process)
+        self._limits = AngleLimits(limits)
+        self._epoch_ns = 0
+
+    def start(self, root: Array, angles: Array, images: Mapping[int, Image], t_ns: int,
+              sd: tuple[float, float, float] = START_SD) -> None:
+        """Begin at `root` (4, 4) and `angles` (A,) rad, known to `sd` m, rad and rad, and take the first templates of
+        what `images` (H, W, 3) RGB show, by camera."""
+        self._epoch_ns = t_ns
+        self.filter.start(0.0, *self.process.start(root, angles, sd))
+        self._take(images, self.filter.newest.state, anchor=True)
+
+    def see(self, images: Mapping[int, Image], t_ns: int, extra: Sequence[Residual] = ()) -> Knot:
+        """Weigh the images of some cameras at one instant, and other residuals of the same state.
+
+        Raises TrackingError before `start`."""
+        if not self.filter.knots:
+            raise TrackingError("the object has no start; give one by start(root, angles, images, t_ns)")
+        t_s = 1e-9 * (t_ns - self._epoch_ns)
+        prediction = self.filter.predict(t_s)
+        state, initial, residuals = prediction[0], None, list(extra)
+        for level, sigma in enumerate(self.templates.sigmas_px):
+            frames = [self._frame(self.views[c], filtered(image, self.templates.kind, sigma), image, state,
+                                  prediction[1] * 0.25**level, level)
+                      for c, image in images.items()]
+            residuals = [*frames, self._limits, *extra]
+            if level < len(self.templates.sigmas_px) - 1:
+                initial = state = update(self.process, t_s, prediction, residuals, initial).state
+        knot = self.filter.add(t_s, residuals, prediction, initial)
+        self._take(images, knot.state, anchor=False)
+        return knot
+
+    def _frame(self, view: View, smooth: Filtered, image: Image, state: Array, covariance: Array,
+               level: int) -> LayeredFrame:
+        """What the templates should be compared with in one image, for an object near `state`."""
+        if not view.noise:
+            view.noise = noise_of(image)
+        placed = self._placed(state)
+        view.visibility = visibility(self.bodies, placed, view.pose)
+        chosen = [one for layer in range(len(self.bodies.layer_row))
+                  if (one := self.templates.choose(layer, self._direction(view, placed, layer))) is not None]
+        outline, order = None, view.visibility.order if self.layered else np.empty(0, np.int64)
+        if self.outline:
+            outline = outline_of(self.bodies, placed, order, view.pose, view.camera.intrinsics,
+                                 (view.camera.width, view.camera.height))
+        view.frame = LayeredFrame(
+            self.bodies, order, view.pose, view.camera.intrinsics, smooth, chosen, self.templates.kind,
+            self.templates.sigmas_px[level], level, view.noise,
+            np.ascontiguousarray(covariance[:self.process.pose, :self.process.pose]), outline,
+            None if view.background is None else view.background[level])
+        return view.frame
+
+    def _placed(self, state: Array) -> Placed:
+        return place(self.bodies, root_of(state), state[ANGLES:ANGLES + self.process.pose - 6])
+
+    def _direction(self, view: View, placed: Placed, layer: int) -> Array:
+        """(3,) unit, from the layer's frame to the camera, in that frame."""
+        base = placed.root if self.bodies.layer_row[layer] < 0 else placed.frames[self.bodies.layer_row[layer]]
+        away = base[:3, :3].T @ (view.camera.centre - base[:3, 3])
+        return np.asarray(away / np.linalg.norm(away))
+
+    def _take(self, images: Mapping[int, Image], state: Array, anchor: bool) -> None:
+        """Take templates of the layers that are seen from a new side."""
+        placed = self._placed(state)
+        for c, image in images.items():
+            view = self.views[c]
+            wanted = [layer for layer in range(len(self.bodies.layer_row))
+                      if self.templates.wants(layer, self._direction(view, placed, layer))]
+            if not wanted:
+                continue
+            if not view.noise:
+                view.noise = noise_of(image)
+            order = visibility(self.bodies, placed, view.pose).order
+            labels = segment(self.bodies, placed, order, view.pose, view.camera.intrinsics, view.rays)
+            smooth = self.templates.images(image)
+            for layer in wanted:
+                self.templates.take(layer, smooth, labels, self.bodies, placed, view.pose, view.rays, view.noise,
+                                    anchor)

@@ -1,0 +1,68 @@
+"""What nodes tell of images without markers: edges along slices, and foreground maps; and what they are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_node.detect.edges import MOST, Edges
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SliceRequest:
+    """What one camera's node shall search from its next frame on. `slices` (N, 5) as `find_edges` takes them, rounded
+    as `wire.slices` rounds them. `map_step`: px of a foreground map; 0: none. `expected`: the asker's own."""
+
+    camera: int
+    slices: Array
+    map_step: int = 0
+    expected: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeFrame:
+    """The edges of one frame of one camera on the slices of `request`, in master time; times are as in
+    `CameraObservations`."""
+
+    camera: int
+    t_row0_master_ns: int
+    row_time_ns: int
+    t_receive_ns: int
+    detect_s: float
+    network_s: float
+    request: SliceRequest
+    edges: Edges
+
+
+@dataclass(frozen=True, slots=True)
+class ForegroundFrame:
+    """Foreground probabilities (h, w) of every `step`-th pixel of one frame of one camera, in master time."""
+
+    camera: int
+    t_row0_master_ns: int
+    row_time_ns: int
+    t_receive_ns: int
+    step: int
+    probability: NDArray[np.float32]
+
+
+ImageFrame = EdgeFrame | ForegroundFrame
+"""What is observed of a frame beside markers and tags."""
+
+
+def edges_of(count: int, indices: NDArray[np.int64], values: Array) -> Edges:
+    """The edges of `count` slices from those that were found on any: `indices` (K,) of their slices, `values` (K, 5)
+    offset px, sd px, strength, inside and outside. Of more than MOST on a slice, the first are kept."""
+    order = np.argsort(indices, kind="stable")
+    indices, values = indices[order], values[order]
+    rank = np.arange(len(indices)) - np.searchsorted(indices, indices)
+    kept = rank < MOST
+    columns = [np.zeros((count, MOST)) for _ in range(5)]
+    for number, column in enumerate(columns):
+        column[indices[kept], rank[kept]] = values[kept, number]
+    return Edges(np.minimum(np.bincount(indices, minlength=count), MOST), *columns)

@@ -1,0 +1,54 @@
+"""The errors of image landmarks: 21 joints of a bare hand as a detector reports them, each an observation of its joint.
+
+A landmark is a marker at a joint (`hand.places.LANDMARK_ROLES`) that errs more, and otherwise. Its mean place is not
+the joint's centre of the kinematic hand, in all cameras alike. Each camera's detector has an error that lasts for a
+while. Each frame has an error that is common to all its landmarks, and each landmark an error of its own. A detector
+errs in proportion to the hand's size in the image, so all these are lengths at the hand, per axis.
+
+`python benchmarks/landmarks.py` measures them on a recorded hand.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+
+from rhot_app.errors import RigError
+from rhot_app.hand.skeleton import JOINTS
+from rhot_node.files import resource_path
+from rhot_node.keypoints.card import load_card
+from rhot_node.markers import MarkerSet, load_markers
+
+ANATOMY_SD_M = 3e-3
+"""m: standard deviation of a landmark's mean place about its joint."""
+
+LASTING_M = 2e-3
+"""m: standard deviation of the error of one camera's detector that lasts."""
+
+LASTING_S = 0.3
+"""s: correlation time of that error."""
+
+COMMON_M = 1e-3
+"""m: standard deviation of the error that all landmarks of a frame have in common."""
+
+NOISE_M = 1.3e-3
+"""m: standard deviation of a landmark's own error in a frame, beside what its detector states."""
+
+
+def landmark_set(card: Path) -> MarkerSet:
+    """The landmarks of a card's network as a marker set, in the order of its points.
+
+    Raises KeypointError for what is no card, and RigError when its `anatomy` does not name a joint for each point.
+    """
+    read = load_card(card)
+    joints = read.anatomy.get("joints")
+    if not isinstance(joints, list) or len(joints) != read.points.count:
+        raise RigError(f"{card}: anatomy.joints must name the joint of each of the {read.points.count} points.")
+    for joint in joints:
+        if joint not in JOINTS or joints.count(joint) > 1:
+            what = "twice" if joint in JOINTS else "which is no joint"
+            raise RigError(f"{card}: anatomy.joints names {joint!r}, {what}; joints are {', '.join(JOINTS)}.")
+    shipped = load_markers(resource_path("markers", "landmarks21.json"))
+    return msgspec.structs.replace(shipped, name=read.name,
+                                   markers=tuple(shipped.markers[JOINTS.index(joint)] for joint in joints))

@@ -1,0 +1,100 @@
+"""What one node was asked to search in its images, and its answers, put together from their datagrams. No sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest, edges_of
+from rhot_node.errors import WireError
+from rhot_node.wire.codec import SLICES_FIT
+from rhot_node.wire.edges import EdgeTable
+from rhot_node.wire.foreground_map import unpack_map
+from rhot_node.wire.messages import ForegroundPart, SliceEdges, Slices
+from rhot_node.wire.slices import SLICES_MAX, pack_slices, unpack_slices
+
+REMEMBERED = 64
+"""Requests whose answers may still come: a second of 60 Hz."""
+
+FRAMES = 4
+"""Frames of which some parts have come and others may follow."""
+
+U32 = 0xFFFFFFFF
+
+Answer = SliceEdges | ForegroundPart
+_Key = tuple[type, int]
+
+
+class NodeSearches:
+    """Requests to one node and answers of it. Requests are made by one thread at a time, answers are taken by one."""
+
+    def __init__(self) -> None:
+        self._requests: dict[int, SliceRequest] = {}
+        self._records: dict[int, dict[int, Slices]] = {}  # of a log, not whole yet
+        self._parts: dict[_Key, dict[int, Answer]] = {}
+        self._number = self._sequence = 0
+
+    def restart(self) -> None:
+        """Another session: what is on its way is of none."""
+        self._parts.clear()
+
+    def ask(self, request: SliceRequest, node_id: int, session: int, size: tuple[int, int]) -> list[Slices]:
+        """The messages of a request, which is remembered; slices beyond SLICES_MAX must not be asked for."""
+        assert len(request.slices) <= SLICES_MAX
+        self._number = (self._number + 1) & U32
+        self._remember(self._number, request)
+        parts = max(1, -(-len(request.slices) // SLICES_FIT))
+        found = []
+        for part in range(parts):
+            own = request.slices[part * SLICES_FIT:(part + 1) * SLICES_FIT]
+            self._sequence = (self._sequence + 1) & U32
+            found.append(Slices(node_id, session, self._sequence, self._number, *size, len(request.slices), part, parts,
+                                request.map_step, pack_slices(own)))
+        return found
+
+    def read(self, camera: int, message: Slices) -> None:
+        """Take a recorded message in: its answers follow in the log."""
+        parts = self._records.setdefault(message.request, {})
+        parts[message.part] = message
+        if len(parts) == message.parts:
+            records = b"".join(parts[part].records for part in sorted(parts))
+            self._remember(message.request, SliceRequest(camera, unpack_slices(records), message.map_step))
+            self._records.clear()
+
+    def add(self, message: Answer) -> list[Answer] | None:
+        """All parts of a frame's answer once this one completes it. Raises WireError 'request' when nobody asked."""
+        if message.request not in self._requests:
+            raise WireError("request", f"an answer to the request {message.request}, which was not made of late")
+        key = type(message), message.frame_number
+        parts = self._parts.setdefault(key, {})
+        parts[message.part] = message
+        while len(self._parts) > 2 * FRAMES:
+            del self._parts[next(iter(self._parts))]
+        if len(parts) < message.parts:
+            return None
+        del self._parts[key]
+        return [parts[part] for part in sorted(parts)]
+
+    def frame(self, parts: Sequence[Answer], camera: int, t_row0_ns: int, t_send_ns: int,
+              t_receive_ns: int) -> EdgeFrame | ForegroundFrame:
+        """The frame of a whole answer. Raises WireError 'count' or 'range' when the parts do not make one."""
+        last = parts[-1]
+        request = self._requests.get(last.request)
+        if isinstance(last, ForegroundPart):
+            data = b"".join(part.data for part in parts if isinstance(part, ForegroundPart))
+            return ForegroundFrame(camera, t_row0_ns, last.row_time_ns, t_receive_ns, last.step,
+                                   unpack_map(data, last.width, last.height, last.step))
+        if request is None or last.slice_count != len(request.slices):
+            raise WireError("count", f"edges of {last.slice_count} slices, which were not asked for so")
+        columns = [part.edges.columns() for part in parts if isinstance(part, SliceEdges)
+                   and isinstance(part.edges, EdgeTable)]
+        indices = np.concatenate([one for one, _ in columns])
+        values = np.concatenate([one for _, one in columns])
+        return EdgeFrame(camera, t_row0_ns, last.row_time_ns, t_receive_ns, 1e-9 * last.processing_ns,
+                         1e-9 * (t_receive_ns - t_send_ns), request, edges_of(len(request.slices), indices, values))
+
+    def _remember(self, number: int, request: SliceRequest) -> None:
+        self._requests[number] = request
+        while len(self._requests) > REMEMBERED:
+            del self._requests[next(iter(self._requests))]

@@ -1,0 +1,124 @@
+"""Looks for a bare hand in foreground maps, in a thread: that takes a second, and frames go on meanwhile."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.barehand.silhouette import Silhouettes, search, silhouettes
+from rhot_app.barehand.start import STEP, find_in_maps
+from rhot_app.barehand.surface import SHAPE
+from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.hand.skeleton import HandPose
+
+Array = NDArray[np.float64]
+
+log = logging.getLogger(__name__)
+
+MOVED_M, TURNED = 0.05, 0.4
+"""m and rad: how far a hand that is being looked for moves while it is, at most: it is held still, more or less."""
+
+_DRAWS = 150, 5, 10  # of the search about what was found, in the newest maps
+
+
+@dataclass(frozen=True, slots=True)
+class Maps:
+    """Foreground probabilities of every STEP-th pixel of each camera about `t_ns`, None of one without a picture."""
+
+    t_ns: int
+    probabilities: list[NDArray[np.float32] | None]
+
+    def silhouettes(self, hand: BareHandTracker) -> Silhouettes:
+        """The same as log odds, of the cameras that have a picture."""
+        used = [c for c, one in enumerate(self.probabilities) if one is not None]
+        return silhouettes([one for one in self.probabilities if one is not None], STEP, [hand.poses[c] for c in used],
+                           [hand.cameras[c].intrinsics for c in used])
+
+
+class Finder:
+    """`look` and `relocate` begin a search, `found` and `moved` give what came of it, once. One search at a time; all
+    belong to the tracker's thread."""
+
+    def __init__(self, hand: BareHandTracker) -> None:
+        self._hand = hand
+        self._rng = np.random.default_rng(0)
+        self._thread: threading.Thread | None = None
+        self._newest: Maps | None = None
+        self._found: tuple[HandPose, int] | None = None
+        self._moved: Array | None = None
+        self._run = 0
+
+    def reset(self) -> None:
+        """What is being looked for is not wanted any more."""
+        self._run += 1
+        self._found = self._newest = self._moved = None
+
+    def look(self, maps: Maps) -> None:
+        """Look for a hand in these maps, or, while another search goes on, follow what it finds into them."""
+        self._newest = maps
+        self._begin(self._look, maps, self._run)
+
+    def relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float) -> None:
+        """See whether a hand in `state` may have gone elsewhere in `dt_s` (`BareHandTracker.relocate`)."""
+        self._begin(self._relocate, maps, state.copy(), covariance.copy(), dt_s, self._run)
+
+    def found(self) -> tuple[HandPose, int] | None:
+        """A pose and its time, master ns, if one was found since it was asked for last."""
+        found, self._found = self._found, None
+        return found
+
+    def moved(self) -> Array | None:
+        """The state where the hand may be, if it was found since it was asked for last."""
+        moved, self._moved = self._moved, None
+        return moved
+
+    def wait(self) -> None:
+        """Until the search is over."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def _begin(self, search_for: Callable[..., None], *arguments: Any) -> None:
+        if self._thread is None or not self._thread.is_alive():
+            self._thread = threading.Thread(target=_logged, args=(search_for, *arguments), name="find", daemon=True)
+            self._thread.start()
+
+    def _look(self, maps: Maps, run: int) -> None:
+        hand, size = self._hand, np.zeros(SHAPE)
+        found = find_in_maps(maps.probabilities, hand.cameras, hand.model, hand.surface, size, self._rng, 1)
+        if not found or run != self._run:
+            return
+        pose, newest = found[0].pose, self._newest
+        if newest is not None and newest is not maps:
+            pose, maps = self._followed(pose, newest), newest
+        if run == self._run:
+            self._found = pose, maps.t_ns
+
+    def _relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, run: int) -> None:
+        moved = self._hand.relocate(maps.silhouettes(self._hand), (state, covariance), dt_s)
+        if run == self._run:
+            self._moved = moved
+
+    def _followed(self, pose: HandPose, maps: Maps) -> HandPose:
+        """The pose in later maps, near to where it was."""
+        hand = self._hand
+        seen = maps.silhouettes(hand)
+        natural = np.linalg.inv(hand.model.pose_prior.information + np.eye(21) / TURNED**2)
+        covariance = np.diag(np.repeat(np.square([MOVED_M, TURNED, TURNED]), (3, 3, 21)))
+        covariance[6:, 6:] = natural
+        world, angles, _ = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,
+                                  np.zeros(SHAPE), seen, self._rng, *_DRAWS)
+        return HandPose(world, angles)
+
+
+def _logged(search_for: Callable[..., None], *arguments: Any) -> None:
+    """A search that fails is told in the log; the next maps are searched anew."""
+    try:
+        search_for(*arguments)
+    except Exception:
+        log.exception("the search for a hand failed")

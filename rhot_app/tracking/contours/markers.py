@@ -1,0 +1,103 @@
+"""Markers or landmarks beside the contours of one hand: residuals of the same state, and a start where they are enough.
+
+The state of a bare hand has its size behind the motion; the lasting errors of the markers follow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.barehand.surface import SHAPE
+from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.estimation.filter import IteratedFilter
+from rhot_app.estimation.residual import Rows
+from rhot_app.hand.landmarks import LASTING_M, LASTING_S
+from rhot_app.hand.motion.hand_process import BIAS, BIAS_S, FASTEST, MOTION, PALM_SPREAD, HandProcess
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.project import Rig
+from rhot_app.tracking.acquisition import Starter
+from rhot_app.tracking.association import MarkerAssociation
+from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
+from rhot_app.tracking.marker_residual import MarkerFrame, triangulation_covariance
+from rhot_app.tracking.rig_arrays import compile_rig
+from rhot_app.tracking.tracker import CameraObservations
+
+Array = NDArray[np.float64]
+
+
+class MarkersOfHand:
+    """The markers of a rig's hand, whose contours a `BareHandTracker` follows."""
+
+    def __init__(self, rig: Rig, hand: BareHandTracker) -> None:
+        """Gives the tracker a state with the markers' lasting errors. Raises RigError when one has no place."""
+        arrays, self._markers = compile_rig(rig), compile_markers(rig)
+        self._starter, self._association = Starter(arrays, self._markers), MarkerAssociation(arrays)
+        count, prior, self._shape = len(self._markers.finger), hand.model.pose_prior, hand.shape_covariance
+        lasting = np.where(self._markers.landmark, LASTING_S, BIAS_S)
+        self._process = HandProcess(
+            hand.surface.dh, hand.model.limits, prior.mean, np.asarray(np.linalg.inv(prior.information)),
+            PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.concatenate([self._shape, np.zeros((count, 3, 3))]),
+            np.concatenate([hand.shape_s, lasting]))
+        hand.process, hand.filter = self._process, IteratedFilter(self._process)
+
+    def reset(self) -> None:
+        """Forget the frames."""
+        self._starter.reset()
+        self._association.reset()
+
+    def locate(self, frame: CameraObservations) -> tuple[HandPose, int] | None:
+        """The pose of a hand that the markers of the last frames show alone, and its time, master ns."""
+        self._starter.ingest(self._association.select(frame))
+        located = self._starter.locate()
+        pose = None if located is None else self._starter.pose_of(located.positions)
+        return None if located is None or pose is None else (pose, located.t_ns)
+
+    def begin(self, hand: BareHandTracker) -> None:
+        """The tracker has started: the markers' lasting errors are those at its pose."""
+        self._note(hand.filter.newest.state)
+        knot = hand.filter.newest
+        own = slice(MOTION + SHAPE, None)
+        knot.covariance[own, own] = self._process.stationary[own, own]
+        self.reset()
+
+    def weigh(self, frame: CameraObservations, hand: BareHandTracker, epoch_ns: int) -> bool:
+        """Weigh the markers of one frame; False when it shows none. Raises LinAlgError when they contradict all."""
+        markers = MarkerFrame(self._markers, frame)
+        t_s = 1e-9 * (markers.t_ns - epoch_ns)
+        if not markers.seen.any() or t_s < hand.filter.knots[0].t_s:
+            return False
+        hand.take((), t_s)
+        prediction = hand.filter.predict(t_s)
+        markers.add_landmark_noise(without_size(prediction[0]))
+        self._note(prediction[0])
+        hand.filter.add(t_s, [BesideContours(markers), hand.limits], prediction)
+        return True
+
+    def _note(self, state: Array) -> None:
+        m = self._markers
+        bias = np.empty((len(m.finger), 3, 3))
+        triangulation_covariance(without_size(state), m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
+                                 np.where(m.landmark, LASTING_M, 0.0), m.paint_variance, bias)
+        self._process.set_bias(np.concatenate([self._shape, bias]))
+
+
+class BesideContours:
+    """Implements `Residual`: a `MarkerFrame` on a state that has the hand's size before the markers' errors. The size
+    is taken as it is: the markers do not change it."""
+
+    def __init__(self, markers: MarkerFrame) -> None:
+        self._markers = markers
+
+    def linearise(self, state: Array) -> Rows:
+        """See `Residual`."""
+        rows = self._markers.linearise(without_size(state))
+        jacobian = np.insert(rows.jacobian, [MOTION] * SHAPE, 0.0, axis=1)
+        return replace(rows, jacobian=jacobian)
+
+
+def without_size(state: Array) -> Array:
+    """The state as `marker_residual` knows it."""
+    return np.concatenate([state[:BIAS], state[BIAS + SHAPE:]])

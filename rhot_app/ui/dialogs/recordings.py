@@ -1,0 +1,120 @@
+"""Recordings as the person at the screen makes them: a new file each, and a word about it when it is finished."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from platformdirs import user_documents_path
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QInputDialog, QWidget
+
+from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.models.notice import Level, Notice
+from rhot_app.ui.models.rows import bytes_text
+
+# -- Bookmarks of a recording ------------------------------------------------------------------------------------------
+
+NO_WORDS = "bookmark"
+"""What a bookmark says when nothing was typed: hands full of paint type nothing."""
+
+
+class BookmarkDialog(QInputDialog):
+    """Asks once; `taken` hears the words. Nothing waits for it."""
+
+    def __init__(self, taken: Callable[[str], None], parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Bookmark")
+        self.setLabelText("What happens here?")
+        self.textValueSelected.connect(lambda text: taken(text.strip() or NO_WORDS))
+        self.open()
+
+
+# -- Recordings and their files ----------------------------------------------------------------------------------------
+
+LOG_SUFFIX = ".rhotlog"
+LOG_FILTER = f"Recordings (*{LOG_SUFFIX});;All files (*)"
+SHOW_FOLDER = "show the recording's folder"
+
+
+def recordings_folder() -> Path:
+    """Where recordings are made; it may not exist yet."""
+    return user_documents_path() / "RHOT"
+
+
+class Recordings:
+    """`tell` takes the sentences that are to be shown for a while."""
+
+    def __init__(self, controller: Controller, tell: Callable[[Notice], None]) -> None:
+        self._controller = controller
+        self._tell = tell
+        self._log_path = ""
+        self._finished = Path()
+        self._video = False  # whether what is recorded has video
+        self.dialog: BookmarkDialog | None = None
+
+    def begin_or_end(self, *, video: bool = False) -> None:
+        """Begin a log in the documents folder, named by date and time; or end the one that is being written. `video`:
+        the nodes record their frames, too."""
+        if self._controller.recording:
+            self._controller.stop_recording()
+            return
+        self._video = video
+        folder = recordings_folder()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as exc:
+            self._say("error", f"{folder}: cannot be made ({exc.strerror}), so nothing is recorded.")
+            return
+        self._controller.record(folder / f"{datetime.now():%Y-%m-%d_%H-%M-%S}{LOG_SUFFIX}", video=video)
+
+    def ask_for_bookmark(self, window: QWidget) -> None:
+        """Ask for a few words about this moment, and have the engine write them into the log."""
+        if not self._controller.recording:
+            self._say("info", "Nothing is being recorded, so there is nothing to put a bookmark into. R records.")
+            return
+        if self.dialog is not None:
+            return
+        at_ns = time.monotonic_ns()  # the engine's clock too: it runs on this computer
+        self.dialog = BookmarkDialog(lambda text: self._set_bookmark(text, at_ns), window)
+        self.dialog.finished.connect(self._forget_dialog)
+
+    def _set_bookmark(self, text: str, at_ns: int) -> None:
+        self._controller.link.work(lambda client: client.command("bookmark", text=text, t_master_ns=at_ns),
+                                   lambda answer: self._say("info", f"Bookmark “{text}” is set."))
+
+    def _forget_dialog(self) -> None:
+        if self.dialog is not None:
+            self.dialog.deleteLater()
+            self.dialog = None
+
+    def step(self) -> None:
+        """Watch the engine's log; whoever ended it, and however, the person hears where the file is."""
+        status = self._controller.live.status
+        if status is None or status.log_path == self._log_path:
+            return
+        finished, self._log_path = self._log_path, status.log_path
+        if finished:
+            self._confirm(Path(finished))
+
+    def _confirm(self, path: Path) -> None:
+        self._finished = path
+        try:
+            size = bytes_text(path.stat().st_size)
+        except OSError as exc:
+            self._say("error", f"{path}: the recording cannot be found ({exc.strerror}).")
+            return
+        video = " The cameras keep its videos until Rig, Recordings collects them." if self._video else ""
+        self._tell(Notice("info", f"Recorded {size} to {path}.{video}", "Show in folder", SHOW_FOLDER))
+
+    def show_folder(self) -> None:
+        """Open the folder of the last recording in the desktop's own file manager."""
+        folder = self._finished.parent
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+            self._say("info", f"This desktop opens no folders. The recording lies in {folder}.")
+
+    def _say(self, level: Level, sentence: str) -> None:
+        self._tell(Notice(level, sentence))

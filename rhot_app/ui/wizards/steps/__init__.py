@@ -1,0 +1,1 @@
+"""The steps of each wizard without widgets: what they ask for, collect and find."""

@@ -1,0 +1,313 @@
+"""The step in which a person shows which paint is which marker, and moves the hand until enough of it was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.colour.cause import Cause, Explainer
+from rhot_app.calibration.colour.gathering import ColourGathering
+from rhot_app.calibration.colour.identity import Identity, identify
+from rhot_app.calibration.colour.illuminant import DriftReport, IlluminantDrift, drift_findings
+from rhot_app.calibration.colour.separability import SKIN
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
+from rhot_app.errors import CalibrationError
+from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.wizards.models.drawing import Callout, Dots, Layer, Overlay
+from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
+from rhot_node.detect.colour import learn_chroma_from_colours
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import YuvImage, from_bgr
+from rhot_node.markers import MarkerSet
+from rhot_node.wire.messages import MarkerObservation
+
+# -- Live detection with masks -----------------------------------------------------------------------------------------
+
+_DIMMED = 150  # alpha of the black over everything that is taken for no marker
+_FAINT = 70  # alpha of a marker's colour where it was not asked for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MaskedPicture:
+    """One camera's picture as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none; `drift`:
+    how the light of the last pictures stands to the one that the marker set was learnt in; `causes`: by index, why the
+    markers that were asked for are not found, or found in doubt."""
+
+    image: YuvImage
+    labels: NDArray[np.uint8]
+    seen: tuple[MarkerObservation, ...]
+    drift: DriftReport
+    causes: Mapping[int, Cause]
+
+    def why(self, index: int) -> str:
+        """In words, why a marker is not found or in doubt; empty for one in plain view."""
+        cause = self.causes.get(index)
+        return "" if cause is None else f"{'doubtful' if self.seen[index].found else 'not found'}. {cause.sentence}"
+
+
+MaskedPictures = dict[str, MaskedPicture]
+
+
+class MaskMaker:
+    """Detectors of all cameras for one marker set after the other. One thread only."""
+
+    def __init__(self) -> None:
+        self._markers: MarkerSet | None = None
+        self._detectors: dict[str, FastDetector] = {}
+        self._drifts: dict[str, IlluminantDrift] = {}
+        self._explainer: Explainer | None = None
+
+    def look(self, pictures: Pictures, markers: MarkerSet, asked: Sequence[str] = ()) -> MaskedPictures:
+        """What every camera's detector finds with `markers`, and why it does not find those that are `asked` for."""
+        if markers is not self._markers:
+            self._markers, self._detectors, self._drifts, self._explainer = markers, {}, {}, None
+        masked = {}
+        for name, picture in pictures.items():
+            detector = self._detectors.setdefault(name, FastDetector(markers))
+            image = from_bgr(picture.bgr)
+            seen = detector.detect(image)
+            drift = self._drifts.setdefault(name, IlluminantDrift(markers, detector))
+            drift.update(image, seen)
+            causes = self._causes(detector, image, seen, [marker for marker in asked if marker in markers.ids])
+            masked[name] = MaskedPicture(image, detector.labels(image), seen, drift.report(), causes)
+        return masked
+
+    def _causes(self, detector: FastDetector, image: YuvImage, seen: tuple[MarkerObservation, ...],
+                asked: Sequence[str]) -> dict[int, Cause]:
+        """Why those of the markers `asked` for that are not in plain view are not, by index."""
+        assert self._markers is not None
+        causes: dict[int, Cause] = {}
+        for index in map(self._markers.ids.index, asked):
+            if seen[index].found:
+                cause = Explainer.doubt(seen, index)
+            else:
+                self._explainer = self._explainer or Explainer(self._markers)
+                cause = self._explainer.why_lost(detector, image, seen, index)
+            if cause is not None:
+                causes[index] = cause
+        return causes
+
+
+def drift_of(masked: MaskedPictures) -> tuple[Finding, ...]:
+    """What is to be said of the light."""
+    return drift_findings({name: picture.drift for name, picture in masked.items()})
+
+
+def mask_overlay(picture: MaskedPicture, markers: MarkerSet, chosen: int | None) -> Overlay:
+    """The mask over a dimmed picture, every marker in its own colour, those found with a ring and their name.
+
+    `chosen`: the only marker that is shown in full; None shows all so.
+    """
+    palette = np.zeros((len(markers.markers) + 1, 4), np.uint8)
+    palette[0, 3] = _DIMMED
+    for index, marker in enumerate(markers.markers):
+        palette[index + 1] = (*marker.display_rgb, 255 if chosen in (None, index) else _FAINT)
+    marks: list[Layer | Dots | Callout] = [Layer(palette[picture.labels])]
+    for number, mark in enumerate(picture.seen):
+        if mark.found and chosen in (None, mark.index):
+            marks.append(Dots(np.array([[mark.x, mark.y]]), "text", radius=3.0))
+            further = "" if number < len(markers.markers) else "?"  # something else of the marker's colour
+            marks.append(Callout(mark.x, mark.y, markers.ids[mark.index] + further))
+    return tuple(marks)
+
+
+# -- Step: gather the paints -------------------------------------------------------------------------------------------
+
+Show = Literal["all", "chosen", "none"]
+"""Whose mask lies over the pictures."""
+
+_CLICK_PX = 5.0  # a drag that is smaller was a click
+_PARTS = 10  # of a marker's variety after which its colour is learnt anew
+
+
+class PickStep(Step):
+    """Every marker of the set in turn: choose it, click its paint. Space holds the pictures, to click in them."""
+
+    title = "Pick the colours"
+    watches = captures = True
+
+    def __init__(self, markers: MarkerSet, cameras: tuple[str, ...]) -> None:
+        self.cameras = cameras
+        self.base = markers
+        self.gathering = ColourGathering(cameras)
+        self.chosen = markers.ids[0]
+        self.show: Show = "all"
+        self.problem = ""
+        self.held: dict[str, Picture] = {}
+        self._live: Pictures = {}
+        self._masked: MaskedPictures = {}
+        self._maker = MaskMaker()
+        self._markers = markers
+        self._learnt: dict[str, tuple[int, int]] = {}
+        self.identity = Identity((), {}, ())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What can be picked: the markers and, for comparison, bare skin."""
+        return (*self.base.ids, SKIN)
+
+    @property
+    def markers(self) -> MarkerSet:
+        """The set whose mask is shown: new colours where there are samples, the old ones elsewhere."""
+        return self._markers
+
+    @property
+    def keeps(self) -> bool:
+        """Picking takes a person a minute."""
+        return bool(self.gathering.names)
+
+    def see(self, pictures: Pictures) -> tuple[Pictures, MaskedPictures]:
+        """The mask; the detectors are the looker's own."""
+        return pictures, self._maker.look(self.held or pictures, self._markers, tuple(self._learnt))
+
+    def take(self, seen: tuple[Pictures, MaskedPictures]) -> None:
+        """Gather where markers show something new."""
+        self._live, self._masked = seen
+        if not self.held:
+            self.gathering.follow({name: picture.image for name, picture in self._masked.items()})
+        self._learn()
+
+    def capture(self) -> bool:
+        """Hold the pictures, or let them go on."""
+        self.held = {} if self.held else dict(self._live)
+        return bool(self.held)
+
+    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> bool:
+        """The chosen marker's paint is there, px of the frame; whether it could be taken. The next one is chosen."""
+        picture = self._masked.get(camera)
+        if picture is None:
+            return False
+        click = max(width, height) < _CLICK_PX
+        where = (x, y) if click else (round(x), round(y), round(x + width) + 1, round(y + height) + 1)
+        try:
+            self.gathering.pick(self.chosen, camera, picture.image, where)
+        except CalibrationError as exc:
+            self.problem = str(exc)
+            return False
+        self.problem = ""
+        self._learn()
+        self._identify()
+        self._choose_next()
+        return True
+
+    def undo(self) -> bool:
+        """Take the last pick back, and choose what it was for."""
+        name = self.gathering.take_back()
+        if name is None:
+            return False
+        self.chosen, self.problem = name, ""
+        self._learn()
+        self._identify()
+        return True
+
+    @property
+    def undoable(self) -> bool:
+        """Whether there is a pick to take back."""
+        return bool(self.gathering.names) or bool(len(self.gathering.skin))
+
+    def _choose_next(self) -> None:
+        """The next line, whether or not it was picked already: who clicks on in order goes on in order."""
+        self.chosen = self.names[min(self.names.index(self.chosen) + 1, len(self.names) - 1)]
+
+    def _learn(self) -> None:
+        """A quick model of every marker, renewed as samples come."""
+        parts = {name: (self.gathering.last_pick(name), int(_PARTS * self.gathering.variety(name)))
+                 for name in self.gathering.names}
+        if parts == self._learnt:
+            return
+        self._learnt = parts
+        samples = {one.name: one for one in self.gathering.samples}
+        self._markers = msgspec.structs.replace(self.base, markers=tuple(
+            marker if marker.id not in samples else msgspec.structs.replace(
+                marker, chroma=learn_chroma_from_colours(samples[marker.id].colours),
+                display_rgb=samples[marker.id].rgb)
+            for marker in self.base.markers))
+
+    def _identify(self) -> None:
+        """Whose colour is whose, among the markers picked so far."""
+        gathering = self.gathering
+        models = {marker.id: marker.chroma for marker in self._markers.markers if marker.id in gathering.names}
+        rig = {marker.id: (marker.chroma,) for marker in self.base.markers}
+        self.identity = identify(gathering.samples, gathering.views, models, (gathering.earlier, rig))
+
+    def doubt(self, name: str) -> str:
+        """In a few words, what is wrong with a marker's colour; empty when nothing is."""
+        if name in self.identity.skin:
+            return "as skin"
+        same = [pair for pair in self.identity.same if name in pair[:2]]
+        if same:
+            return f"as {same[0][1] if same[0][0] == name else same[0][0]}"
+        return next((f"was {other}'s" for marker, other in self.identity.taken if marker == name), "")
+
+    def _verdict(self) -> Verdict | None:
+        """What is wrong with the colours picked so far; None when nothing is."""
+        again = "Click the right paint; Ctrl+Z takes the last click back."
+        findings = [Finding("skin", Grade.POOR, f"{name} has the colour of skin: {shown}.", "", again)
+                    for name, shown in self.identity.skin.items()]
+        findings += [Finding("same-colour", Grade.POOR, f"{first} and {second} have one colour: their hues are "
+                             f"{apart:.0f}° apart.", "", again) for first, second, apart in self.identity.same]
+        if self.identity.exchanged:
+            findings.append(Finding("exchanged", Grade.FAIR, self.identity.exchanged, "",
+                                    "If the hand does not wear them so, click these again."))
+        doubtful = [name for name in self.base.ids if self.doubt(name)]
+        return judge(f"look at {', '.join(doubtful)} again.", findings) if findings else None
+
+    @property
+    def _wrong(self) -> str:
+        """The first marker whose colour cannot stay; empty when there is none."""
+        wrong = {*self.identity.skin, *(name for pair in self.identity.same for name in pair[:2])}
+        return next((name for name in self.base.ids if name in wrong), "")
+
+    def view(self) -> StepView:
+        """Which paint to show next, and how much has been seen of those named."""
+        names, gathering = self.gathering.names, self.gathering
+        seen = sum(gathering.variety(name) for name in names) / len(names) if names else 0.0
+        bars = (Bar("picked", len(names) / len(self.base.ids), f"{len(names)} of {len(self.base.ids)} markers"),
+                Bar("seen moving", seen, "places and angles at which the markers were seen so far"))
+        return StepView(self._sentence(),
+                        done=gathering.enough and len(names) == len(self.base.ids) and not self._wrong,
+                        passable=bool(names), hint=self.problem or self._hint(), bars=bars, verdict=self._verdict(),
+                        overlays=self._overlays(), pictures=self.held)
+
+    def _sentence(self) -> str:
+        if self.held:
+            return f"Click {self._paint()} in the held picture."
+        if len(self.gathering.names) < len(self.base.ids):
+            return f"Click {self._paint()}, or drag over it."
+        if self._wrong:
+            return f"Choose {self._wrong} and click its paint."
+        if not self.gathering.enough:
+            return "Move and turn the hand slowly, near and far."
+        return "Enough: press Next."
+
+    def _paint(self) -> str:
+        return "bare skin" if self.chosen == SKIN else f"the paint of {self.chosen}"
+
+    def _hint(self) -> str:
+        if self._wrong:
+            return f"{self._wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z."
+        if self.gathering.names and not len(self.gathering.skin):
+            return "Pick bare skin too: then it is said whether a marker looks like it."
+        drift = () if self.gathering.names else drift_of(self._masked)
+        if drift:
+            return f"By the rig's colours: {drift[0].figure}"
+        if not self.gathering.names:
+            return "Space holds the pictures, if your hands are full."
+        unseen = [f"{camera} has not seen {name}: {picture.why(self.base.ids.index(name))}"
+                  for camera, picture in self._masked.items() for name in self.gathering.unseen_by(camera)
+                  if picture.why(self.base.ids.index(name))]
+        if unseen:
+            return unseen[0]
+        missing = [name for name in self.gathering.names if self.gathering.variety(name) < 1.0]
+        return f"Still to be seen in other places: {', '.join(missing)}." if missing else ""
+
+    def _overlays(self) -> dict[str, tuple]:
+        if self.show == "none":
+            return {}
+        chosen = self.base.ids.index(self.chosen) if self.show == "chosen" and self.chosen != SKIN else None
+        return {name: mask_overlay(picture, self._markers, chosen) for name, picture in self._masked.items()}

@@ -1,0 +1,146 @@
+"""``rhot-node doctor``: looks at everything that a node needs, and says what to do."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+from rhot_node.capture.pi_camera import CameraStack, load_stack
+from rhot_node.capture.sensors import PRESETS
+from rhot_node.compiled import is_compiled_in
+from rhot_node.config import NodeSettings, load_settings
+from rhot_node.errors import CameraError, NodeError, TrustError
+from rhot_node.health.checks import (
+    LEVELS,
+    Check,
+    check_clock,
+    check_heat,
+    check_memory,
+    check_memory_limit,
+    check_network,
+    check_power,
+    check_speed,
+    worst,
+)
+from rhot_node.health.machine import Machine
+from rhot_node.keys import NodeTrust, keys_path
+from rhot_node.service.install import NAME, STATE_FOLDER
+
+SUMMARY = ("Look at everything that a node needs: power, heat, memory, clock, network, camera, compiled code, pairing "
+           "and the service. Exit code 0: all is well; 1: something could be better; 2: something is wrong.")
+SERVICE_CACHE = Path("var/cache") / STATE_FOLDER.name
+
+LoadStack = Callable[[], CameraStack]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The command's options."""
+    parser.add_argument("--settings", type=Path, metavar="FILE",
+                        help=f"settings of the node (default: the service's, {STATE_FOLDER}/node.json, if there)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print all checks; returns the exit code."""
+    from platformdirs import user_cache_path
+    checks = examine(Machine(), options.settings, user_cache_path())
+    level = worst(checks)
+    if options.json:
+        print(json.dumps({"verdict": level, "checks": [asdict(check) for check in checks]}, indent=1))
+    else:
+        for check in checks:
+            print(f"{check.level:<8} {check.code:<15} {check.sentence}")
+    return LEVELS.index(level)
+
+
+def examine(machine: Machine, settings: Path | None, user_cache: Path, load: LoadStack = load_stack) -> list[Check]:
+    """All checks, in the order in which a node needs the things. `settings` None: the service's, if it has any."""
+    flags = machine.throttled()
+    model = machine.model()
+    return [
+        Check("machine", "ok", f"{model or 'Not a Raspberry Pi'}."),
+        check_power(flags), check_heat(machine.temperature_c(), flags), check_memory(machine.available_bytes()),
+        check_speed(machine.governor()), check_clock(machine.ntp_synchronised(), machine.clock_source()),
+        *check_network(machine), check_camera(machine, model is not None and model.startswith("Raspberry"), load),
+        check_compiled([user_cache, machine.root / SERVICE_CACHE]), *check_settings(machine, settings),
+        *check_service(machine)]
+
+
+def check_camera(machine: Machine, is_pi: bool, load: LoadStack) -> Check:
+    """Cameras that a node could open. A Pi has video devices even without a camera, so picamera2 decides there."""
+    try:
+        found = load().picamera2.Picamera2.global_camera_info()
+    except CameraError as exc:
+        devices = machine.video_devices()
+        if devices and not is_pi:
+            return Check("camera", "ok", f"Webcams: {', '.join(devices)}.")
+        if is_pi:
+            return Check("camera", "error", "No Pi camera can be used:", f"{exc}")
+        return Check("camera", "error", "There is no camera.", "Plug one in.")
+    if not found:
+        return Check("camera", "error", "picamera2 finds no camera.", "Switch the Pi off and seat the ribbon cable "
+                     "anew, contacts the right way round; `rpicam-hello --list-cameras` must then show it.")
+    names = []
+    for info in found:
+        presets = ", ".join(preset.name for preset in PRESETS if str(info["Model"]).startswith(preset.sensor))
+        names.append(f"{info['Model']} ({f'presets {presets}' if presets else 'no presets'})")
+    return Check("camera", "ok", f"Pi cameras: {', '.join(names)}.")
+
+
+def check_compiled(caches: list[Path]) -> Check:
+    """Whether the next start has to compile."""
+    if any(is_compiled_in(cache) for cache in caches):
+        return Check("compiled", "ok", "The numerical code is compiled: the node starts within seconds.")
+    return Check("compiled", "warning", "The numerical code is not compiled yet: the next start takes minutes, once.",
+                 "Start the node and wait until it is ready; `rhot-node install` does so.")
+
+
+def check_settings(machine: Machine, path: Path | None) -> list[Check]:
+    """The settings file, and whom the node trusts."""
+    if path is None:
+        path = machine.root / (STATE_FOLDER / "node.json").relative_to("/")
+        if not path.exists():
+            return []
+    try:
+        settings = load_settings(path)
+    except NodeError as exc:
+        return [Check("settings", "error", f"{exc}")]
+    return [Check("settings", "ok", f"{path}: node {settings.node_id}, {settings.name}."),
+            _check_trust(path, settings)]
+
+
+def check_service(machine: Machine) -> list[Check]:
+    """The system service, where systemd knows of one."""
+    shown = machine.run(["systemctl", "show", NAME, "--property=LoadState,ActiveState,NRestarts"]) or ""
+    state = dict(line.split("=", 1) for line in shown.splitlines() if "=" in line)
+    if state.get("LoadState") != "loaded":
+        return []
+    active, restarts = state.get("ActiveState", "unknown"), state.get("NRestarts", "0")
+    look = f"`journalctl -u {NAME} -n 50` has its words."
+    if active != "active":
+        service = Check("service", "error", f"The service is {active}, restarted {restarts} times.", look)
+    elif restarts != "0":
+        service = Check("service", "warning", f"The service runs, but had to be restarted {restarts} times.", look)
+    else:
+        service = Check("service", "ok", "The service runs.")
+    return [service, check_memory_limit(machine.limits_memory())]
+
+
+def _check_trust(path: Path, settings: NodeSettings) -> Check:
+    pair = f"`rhot-node pair --settings {path}` shows a code; enter it in the app."
+    if settings.trust == "open":
+        return Check("pairing", "warning", "The node is open: whoever reaches it may see its pictures and steer it.",
+                     'Set "trust" to "paired", restart the node, and pair it.')
+    if not keys_path(path).exists():
+        return Check("pairing", "warning", "The node is not paired with a master yet.", pair)
+    try:
+        masters = NodeTrust(keys_path(path)).masters
+    except TrustError as exc:
+        return Check("pairing", "warning", f"{exc}", "A service's keys are its own: "
+                     "`sudo -u rhot-node /opt/rhot/bin/rhot-node doctor`.")
+    if not masters:
+        return Check("pairing", "warning", "The node is not paired with a master yet.", pair)
+    return Check("pairing", "ok", f"Paired with {', '.join(master.name for master in masters)}.")

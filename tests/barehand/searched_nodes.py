@@ -1,0 +1,59 @@
+"""Nodes that search drawn pictures for a tracker, as slice_search does, without sockets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
+from rhot_app.state import HandState
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, ImageTracking, Tracker, solve_after
+from rhot_node.detect.edges import find_edges, noise_of
+from rhot_node.detect.foreground import Foreground, foreground_map
+
+PERIOD_NS = 33_333_333
+FIRST_NS = 10**9
+
+
+class SearchedNodes:
+    """Hands the frames of some cameras to a tracker, and does what it asks for; with `forget`, it gives requests back
+    as a log has them."""
+
+    def __init__(self, tracker: Tracker, foreground: list[Foreground], markers: int, *, forget: bool = False) -> None:
+        assert isinstance(tracker, ImageTracking)
+        tracker.warm_up()
+        self.tracker, self.foreground, self.markers, self.forget = tracker, foreground, markers, forget
+        self.asked: list[SliceRequest | None] = [None] * len(foreground)
+        self.states: list[HandState] = []
+
+    def step(self, number: int, images: list[np.ndarray | None], pixels: list[np.ndarray] | None = None) -> None:
+        """One frame of each camera, None of one that gives none; `pixels` (M, 2) of its markers."""
+        t_ns = FIRST_NS + number * PERIOD_NS
+        for camera, image in enumerate(images):
+            if image is None:
+                continue
+            request, known = self.asked[camera], self.foreground[camera]
+            seen = np.full((self.markers, 2), np.nan) if pixels is None else pixels[camera]
+            lost = np.isnan(seen[:, 0])
+            self.give(CameraObservations(
+                camera, t_ns, 0, 1e-4, t_ns + 9_000_000, 0.004, 0.001, seen,
+                np.tile(0.01 * np.eye(2), (len(seen), 1, 1)),
+                np.full(len(seen), 12.0), np.ones(len(seen)), lost.astype(np.uint16)))
+            if request is None:
+                continue
+            if len(request.slices):
+                found = find_edges(image, request.slices, known, noise_of(image))
+                told = replace(request, expected=None) if self.forget else request
+                self.give(EdgeFrame(camera, t_ns, 0, t_ns + 9_000_000, 0.004, 0.001, told, found))
+            if request.map_step:
+                self.give(ForegroundFrame(camera, t_ns, 0, t_ns + 9_000_000, request.map_step,
+                                          foreground_map(image, known, request.map_step)))
+
+    def give(self, frame: CameraFrame) -> None:
+        assert isinstance(self.tracker, ImageTracking)
+        state = solve_after(self.tracker, frame)
+        if state is not None:
+            self.states.append(state)
+        for request in self.tracker.requests():
+            self.asked[request.camera] = request

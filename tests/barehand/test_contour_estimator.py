@@ -1,0 +1,135 @@
+"""The bare hand live, with nodes that search drawn pictures: found, followed, lost, replayed, beside landmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+import pytest
+from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene
+from searched_nodes import SearchedNodes
+
+from rhot_app.errors import RigError
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.project import Rig, TrackerSettings, with_tracker
+from rhot_app.state import Condition, HandState
+from rhot_app.tracking.trackers import make_tracker
+from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+
+TIMES = tuple(k / 30.0 for k in range(14))
+STILL = 4  # pictures of the hand before it moves
+
+
+@pytest.fixture(scope="module")
+def film() -> list[tuple[list, list, list]]:
+    return [scene(pose, k) for k, pose in enumerate(poses("grasp", TIMES))]
+
+
+def bare_rig(cameras: list[CameraModel], observe: str = "contours", markers: str = "rhot6") -> Rig:
+    rig = msgspec.structs.replace(rig_of(cameras, right_hand()), markers=load_markers(resource_path(
+        "markers", f"{markers}.json")))
+    return msgspec.structs.replace(rig, tracker=TrackerSettings("estimator", observe=observe))
+
+
+def known(film: list[tuple[list, list, list]]) -> list[Foreground]:
+    return [learn_background(skin_foreground(), [empty]) for empty in film[0][2]]
+
+
+def error_mm(state: HandState, pose: HandPose) -> float:
+    truth = forward(model_and_surface()[0], pose).joints
+    return 1e3 * float(np.median(np.linalg.norm(state.joint_positions - truth, axis=1)))
+
+
+def follow(nodes: SearchedNodes, film: list[tuple[list, list, list]]) -> int:
+    """An empty scene, a hand that waits until it is found, then the whole motion; returns the next frame's number."""
+    for number in range(3):
+        nodes.step(number, film[0][2])
+    assert nodes.states and not any(state.tracked for state in nodes.states)
+    number = 3
+    while not nodes.states[-1].tracked:
+        assert number < 40, "the hand was not found"
+        nodes.step(number, film[0][1])
+        number += 1
+    for _, images, _ in film:
+        nodes.step(number, images)
+        number += 1
+    return number
+
+
+@pytest.mark.parametrize("forget", [False, True], ids=["live", "from a log"])
+def test_a_hand_is_found_followed_and_lost(film, forget: bool) -> None:
+    rig = bare_rig(film[0][0])
+    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids), forget=forget)
+    number = follow(nodes, film)
+    last, pose = nodes.states[-1], poses("grasp", TIMES)[-1]
+    assert last.tracked and error_mm(last, pose) < 5.0
+    assert last.t_receive_ns - last.t_master_ns == pytest.approx(9_000_000, abs=1000)
+    assert last.marker_ids == rig.markers.ids and np.isnan(last.marker_positions).all()
+    for _ in range(20):
+        nodes.step(number, film[0][2])
+        number += 1
+    assert nodes.states[-1].condition is Condition.LOST and np.isnan(nodes.states[-1].joint_positions).all()
+
+
+def test_slices_lie_across_the_contour_of_the_next_frame(film) -> None:
+    rig = bare_rig(film[0][0])
+    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    follow(nodes, film)
+    _, images, _ = film[-1]
+    for camera, request in enumerate(nodes.asked):
+        assert request is not None and len(request.slices) > 50
+        assert (request.slices[:, 4] < 30.0).all()
+        difference = np.abs(film[-1][2][camera].astype(float) - images[camera]).max(axis=2)
+        inner, outer = (difference[tuple(np.clip(np.round(end[:, ::-1]).astype(int), 0, [[479, 639]]).T)] > 15.0
+                        for end in (request.slices[:, :2] + side * request.slices[:, 2:4] for side in (-5.0, 5.0)))
+        assert np.mean(inner) > 0.9, "normals point from the hand outwards"
+        assert 0.4 < np.mean(~outer) < 0.95, "most contours are outlines, some lie within the hand"
+
+
+def test_one_camera_goes_on_alone(film) -> None:
+    rig = bare_rig(film[0][0])
+    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    number = follow(nodes, film)
+    before = len(nodes.states)
+    for _ in range(8):
+        nodes.step(number, [film[-1][1][0], None])
+        number += 1
+    assert len(nodes.states) > before + 3 and nodes.states[-1].tracked
+
+
+def test_landmarks_begin_and_contours_go_on(film) -> None:
+    rig = bare_rig(film[0][0], "both", "landmarks21")
+    nodes = SearchedNodes(make_tracker(rig), known(film), 21)
+    model = model_and_surface()[0]
+
+    def pixels(pose: HandPose) -> list[np.ndarray]:
+        joints = forward(model, pose).joints
+        return [camera.project(joints) for camera in film[0][0]]
+    moving = poses("grasp", TIMES)
+    for number in range(12):
+        nodes.step(number, film[0][1], pixels(moving[0]))
+    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], moving[0]) < 5.0
+    for number, (_, images, _) in enumerate(film, 12):
+        nodes.step(number, images)  # its detector has lost it
+    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], moving[-1]) < 6.0
+
+
+@pytest.mark.parametrize(("change", "sentence"), [
+    (lambda rig: with_tracker(rig, "classic"), ""),
+    (lambda rig: msgspec.structs.replace(rig, depth=msgspec.structs.replace(rig.depth, mode="disparity")),
+     "needs calibrated cameras"),
+])
+def test_what_cannot_be_is_a_sentence(film, change: Callable[[Rig], Rig], sentence: str) -> None:
+    rig = change(bare_rig(film[0][0]))
+    if sentence:
+        with pytest.raises(RigError, match=sentence):
+            make_tracker(rig)
+    else:
+        assert rig.tracker.observe == "markers", "the classic tracker knows markers only"
+    with pytest.raises(ValueError, match="knows markers only"):
+        TrackerSettings("classic", observe="both")
