@@ -156,23 +156,23 @@ def coupling(seed: int, **how: Any) -> list[Figures]:
     axis, mm."""
     script = Script()
     script.move((0.0, 0.0, 0.08), 0.5)
-    spans = []
+    phases = []
     for name, away in (("right", (0.12, 0.0, 0.08)), ("forward", (0.0, 0.12, 0.08)), ("height", (0.0, 0.0, 0.18))):
         script.wait(0.4)
         begin_s = script.end_s
         script.move(away, 0.6)
         script.move((0.0, 0.0, 0.08), 0.6)
-        spans.append((name, begin_s, script.end_s))
+        phases.append((name, begin_s, script.end_s))
     for button in ("thumb", "little"):
         script.wait(0.4)
         begin_s = script.end_s
         script.click(button, 0.3)
         script.wait(0.2)
-        spans.append((button, begin_s, script.end_s))
+        phases.append((button, begin_s, script.end_s))
     run = play(script, seed, **how)
     off = run.cursor - run.true_cursor
     figures = []
-    for name, begin_s, end_s in spans:
+    for name, begin_s, end_s in phases:
         inside = run.during(begin_s, end_s)
         strays = off[inside] - off[inside][0]
         figures.append({"moved": name, "rms": _axes(np.sqrt(np.square(strays).mean(axis=0))),

@@ -119,6 +119,7 @@ class MainWindow(QMainWindow):
         a.recordings.triggered.connect(self.replays.list)
         a.outputs.triggered.connect(lambda: self.dialogs.show_outputs(
             c, lambda: self.appearance.scheme, [a.save_rig, a.guide], self.rig_watch.look_soon))
+        a.mouse.triggered.connect(lambda: self.dialogs.show_mouse(c, self.appearance.scheme))
         a.save_rig.triggered.connect(lambda: self.rig_watch.save(self.tell))
         a.close_rig.triggered.connect(c.close_rig)
         a.quit.triggered.connect(self.close)
@@ -146,6 +147,7 @@ class MainWindow(QMainWindow):
         c.busy_changed.connect(self._show_busy)
         c.failed.connect(self._show_failure)
         self.appearance.scheme_changed.connect(self._recolour_buttons)
+        self.appearance.scheme_changed.connect(lambda: self.dialogs.set_scheme(self.appearance.scheme))
         self.appearance.scheme_changed.connect(lambda: self.replays.set_scheme(self.appearance.scheme))
         self.docks.docks[2].visibilityChanged.connect(c.set_preview)
 
