@@ -7,12 +7,11 @@ import contextlib
 from PySide6.QtWidgets import QPushButton
 
 from rhot_app.errors import RhotError
-from rhot_app.ui.job import Job
+from rhot_app.ui.common.job import Job
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.foreground_steps import EmptyStep, LearningStep, SkinStep, ask_node, propose
-from rhot_app.ui.wizards.models.proposal import AcceptStep
-from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, LearningStep, SkinStep, ask_node, propose
 
 _KEPT = "Each node keeps what it had, and Restore the old one brings it back."
 

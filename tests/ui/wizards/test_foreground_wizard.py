@@ -14,8 +14,8 @@ from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.foreground import make_plan
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
-from rhot_app.ui.wizards.models import foreground_steps
-from rhot_app.ui.wizards.models.foreground_steps import findings_of, mask_of
+from rhot_app.ui.wizards.steps import foreground_steps
+from rhot_app.ui.wizards.steps.foreground_steps import findings_of, mask_of
 from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.pictures import PictureBox
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import EngineError, RhotError
+from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.drawing import Layer, Overlay
-from rhot_app.ui.wizards.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
 
 REASON = "background and skin"
