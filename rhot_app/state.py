@@ -106,6 +106,23 @@ class HandState:
         return self.condition in (Condition.TRACKING, Condition.PARTIAL)
 
 
+@dataclass(frozen=True, slots=True)
+class SeenContour:
+    """What was seen of a bare hand in one image of a camera, for people to look at; places px, raw.
+
+    `contour` (N, 2): where the estimated hand's contour crosses the slices; `outline` (N,): before the background, not
+    within the hand. `slices` (N, 4): their ends, x and y twice. `edges` (M, 2), `of_hand` (M,): which are the hand's.
+    """
+
+    camera: str
+    t_master_ns: int
+    contour: Array
+    outline: NDArray[np.bool_]
+    slices: Array
+    edges: Array
+    of_hand: NDArray[np.bool_]
+
+
 def no_hand(t_ns: int, condition: Condition, cameras: tuple[str, ...] = (), filter_s: float = 0.0) -> HandState:
     """The state of master time `t_ns` without a hand or markers. `filter_s`: what it took."""
     unknown, nothing = int(Knowledge.UNKNOWN), np.empty((0, 3))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -10,28 +9,12 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import SILHOUETTE
+from rhot_app.state import SeenContour
 
 Array = NDArray[np.float64]
 
 NEAR_SD = 3.0
 """Standard deviations from the contour within which an edge is shown as the hand's."""
-
-
-@dataclass(frozen=True, slots=True)
-class SeenContour:
-    """One image of one camera at master time `t_master_ns`; all places px, raw image.
-
-    `contour` (N, 2): where the estimated hand's contour crosses the slices; `outline` (N,): before the background, not
-    within the hand. `slices` (N, 4): their ends, x and y twice. `edges` (M, 2), `of_hand` (M,): which are the hand's.
-    """
-
-    camera: str
-    t_master_ns: int
-    contour: Array
-    outline: NDArray[np.bool_]
-    slices: Array
-    edges: Array
-    of_hand: NDArray[np.bool_]
 
 
 @runtime_checkable
