@@ -33,8 +33,8 @@ PLACES = 20
 MOTION = "mouse"
 """Of resources/motions; the hand carries the balls of the app's page about."""
 
-TRACKED_S = 60.0
-"""The first start of all compiles the numerical code."""
+TRACKED_S = 360.0
+"""The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
