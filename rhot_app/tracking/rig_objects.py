@@ -26,9 +26,8 @@ from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
 from rhot_app.project import Rig
 from rhot_app.state import HandState, Knowledge, SeenContour
-from rhot_app.tracking.contours.seen import ShowsContours
 from rhot_app.tracking.markers.marker_model import scaled_table
-from rhot_app.tracking.tracker import CameraObservations, ImageTracking, Tracker
+from rhot_app.tracking.tracker import CameraObservations, ImageTracking, ShowsContours, Tracker
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
