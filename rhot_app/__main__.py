@@ -28,7 +28,7 @@ APP = "rhot_app.ui.app"
 SUBCOMMANDS = {
     "demo": Subcommand("rhot_app.ui.demo_command", "open the app on the simulated rig"),
     "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
-    "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
+    "replay": Subcommand("rhot_app.engine.offline.replay_command", "feed a raw log through the tracker"),
     "video": Subcommand("rhot_app.recording.video_command", "fetch the videos that nodes recorded beside a log"),
     "landmarks": Subcommand("rhot_app.recording.landmark_command", "make a raw log of landmark tables of a bare hand"),
     "bare-hand": Subcommand("rhot_app.export.bare_hand_command", "track a hand without markers in recorded videos"),
@@ -42,12 +42,13 @@ SUBCOMMANDS = {
     "check": Subcommand("rhot_app.calibration.commands.check", "check a rig file for what cannot be"),
     "certify": Subcommand("rhot_app.certificate.certify_command", "measure a rig as the thesis does, with intervals"),
     "hand": Subcommand("rhot_app.hand.hand_command", "look at a hand file, or make one of a given length"),
+    "layers": Subcommand("rhot_app.export.layers_command", "draw which link of a hand or object hides which"),
     "object": Subcommand("rhot_app.objects.object_command", "check an object file, or find the object in still images"),
     "poses": Subcommand("rhot_app.sources.poses.poses_command", "listen to another tracker's poses and record them"),
     "nodes": Subcommand("rhot_app.sources.nodes_command", "look for nodes on the network"),
     "pair": Subcommand("rhot_app.sources.pair_command", "pair with a node by the code that it shows"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),
-    "report": Subcommand("rhot_app.engine.report_command", "collect what somebody needs who looks for a fault"),
+    "report": Subcommand("rhot_app.engine.offline.report_command", "collect what somebody needs who looks for a fault"),
     "mouse": Subcommand("rhot_app.mouse.mouse_command", "work a 3-D cursor and two buttons with the hand"),
     "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "play a simulated run and compare with its truth"),
 }

@@ -43,7 +43,7 @@ class Bodies(NamedTuple):
     `row` (N,): that carries a body, ROOT: the root. `kind` (N,): CAPSULE or BOX. `ends` (N, 2, 3) and `radii` (N, 2)
     m of capsules; `box` (N, 3, 4) row_from_box and `half` (N, 3) m of boxes. `layer` (N,), ascending.
     `layer_row` (L,): as `row`; `carrier` (L,): the layer on which a layer hangs, -1; `hinge` (L,): the row whose angle
-    turns it last, -1; `number` (L,): of its bodies.
+    turns it last, -1; `first` (L + 1,): its first body, and that of the next.
     """
 
     dh: DhArrays
@@ -57,7 +57,7 @@ class Bodies(NamedTuple):
     layer_row: Indices
     carrier: Indices
     hinge: Indices
-    number: Indices
+    first: Indices
 
 
 class Placed(NamedTuple):
@@ -125,7 +125,7 @@ def _layered(dh: DhArrays, row: Indices, kind: Indices, ends: Array, radii: Arra
                 carrier[k] = of_row[at]
                 break
     return Bodies(dh, row.astype(np.int64), kind, ends.copy(), radii.copy(), box, half, layer, layer_row, carrier,
-                  hinge, np.bincount(layer, minlength=count))
+                  hinge, np.searchsorted(layer, np.arange(count + 1)))
 
 
 def root_of(state: Array) -> Array:
@@ -175,9 +175,7 @@ def _bisect(bodies, placed, layer, plane):
     joint, sides = joint_of(bodies, placed, layer), np.zeros((2, 3))
     for side in range(2):
         which, far = layer if side == 0 else bodies.carrier[layer], 0.0
-        for k in range(bodies.layer.shape[0]):
-            if bodies.layer[k] != which:
-                continue
+        for k in range(bodies.first[which], bodies.first[which + 1]):
             if bodies.kind[k] != CAPSULE:
                 return
             for end in range(2):
@@ -231,11 +229,10 @@ def hit(bodies, placed, k, ox, oy, oz, ux, uy, uz, margin):
 def hit_layer(bodies, placed, layer, ox, oy, oz, ux, uy, uz, margin):
     """As `hit`, of all bodies of a layer: the nearest, on the layer's side of its joints."""
     best = -1.0
-    for k in range(bodies.layer.shape[0]):
-        if bodies.layer[k] == layer:
-            t = hit(bodies, placed, k, ox, oy, oz, ux, uy, uz, margin)
-            if t > 0.0 and (best < 0.0 or t < best):
-                best = t
+    for k in range(bodies.first[layer], bodies.first[layer + 1]):
+        t = hit(bodies, placed, k, ox, oy, oz, ux, uy, uz, margin)
+        if t > 0.0 and (best < 0.0 or t < best):
+            best = t
     if best > 0.0:
         x, y, z = ox + best * ux, oy + best * uy, oz + best * uz
         for other in range(bodies.carrier.shape[0]):
@@ -245,7 +242,8 @@ def hit_layer(bodies, placed, layer, ox, oy, oz, ux, uy, uz, margin):
                 if other == layer:
                     if beyond < -margin:
                         return -1.0
-                elif beyond > margin and (bodies.number[layer] == 1 or _in_joint(bodies, placed, other, x, y, z)):
+                elif beyond > margin and (bodies.first[layer + 1] == bodies.first[layer] + 1
+                                          or _in_joint(bodies, placed, other, x, y, z)):
                     return -1.0
     return best
 
@@ -254,11 +252,8 @@ def hit_layer(bodies, placed, layer, ox, oy, oz, ux, uy, uz, margin):
 def _in_joint(bodies, placed, layer, x, y, z):
     """Whether a point lies within the thickness of a link from its joint: of a palm, only that is the link's."""
     joint = joint_of(bodies, placed, layer)
-    for k in range(bodies.layer.shape[0]):
-        if bodies.layer[k] == layer:
-            reach = FLESH * bodies.radii[k, 0]
-            return (x - joint[0, 3]) ** 2 + (y - joint[1, 3]) ** 2 + (z - joint[2, 3]) ** 2 < reach * reach
-    return False
+    reach = FLESH * bodies.radii[bodies.first[layer], 0]
+    return (x - joint[0, 3]) ** 2 + (y - joint[1, 3]) ** 2 + (z - joint[2, 3]) ** 2 < reach * reach
 
 
 @njit(cache=True)
@@ -266,9 +261,7 @@ def normal_at(bodies, placed, layer, px, py, pz, out):
     """Fill `out` (3,), the outward normal of a layer's surface at the point p on it."""
     best = 1e9
     v = np.empty(3)
-    for k in range(bodies.layer.shape[0]):
-        if bodies.layer[k] != layer:
-            continue
+    for k in range(bodies.first[layer], bodies.first[layer + 1]):
         if bodies.kind[k] == CAPSULE:
             a, b = placed.ends[k, 0], placed.ends[k, 1]
             length = dot = 0.0

@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.articulated.bodies import ANGLES, POSE, Bodies, place, root_of
+from rhot_app.articulated.bodies import ANGLES, POSE, Bodies, Placed, place, root_of
 from rhot_app.articulated.outline import Outline
 from rhot_app.articulated.templates import Filtered, Kind, Template, noise_gain
 from rhot_app.articulated.visibility import NONE, front_layer
@@ -54,7 +54,8 @@ class LayeredFrame:
     `level`: of the templates' smoothings, that of `image` (H, W). `noise`: of a pixel, of 255. `outline`: None for
     regions only. `background` (H, W): the same filter of the scene without the object, None: nothing is known of it.
     `spread` (P, P): covariance of root and angles before the image was looked at, whose errors are no outliers.
-    `used` (L,): template points that were compared, when last linearised; `reasons`: by layer, why there were none.
+    `used` (L,): template points that were compared, and `held` (L,) of them within three
+    standard deviations, when last linearised; `reasons`: by layer, why there were none.
     """
 
     bodies: Bodies
@@ -71,6 +72,7 @@ class LayeredFrame:
     outline: Outline | None = None
     background: Filtered | None = None
     used: Indices = field(default_factory=lambda: np.empty(0, np.int64))
+    held: Indices = field(default_factory=lambda: np.empty(0, np.int64))
     reasons: dict[int, str] = field(default_factory=dict)
 
     def linearise(self, state: Array) -> Rows:
@@ -81,7 +83,7 @@ class LayeredFrame:
         placed = place(self.bodies, root_of(state), state[ANGLES:ANGLES + angles])
         information, pull = np.zeros((pose_size, pose_size)), np.zeros(pose_size)
         layers = len(self.bodies.layer_row)
-        self.used, self.reasons = np.zeros(layers, np.int64), {}
+        self.used, self.held, self.reasons = np.zeros(layers, np.int64), np.zeros(layers, np.int64), {}
         noise = 2.0 * (self.noise * noise_gain(self.kind, self.sigma_px)) ** 2  # of image and template
         light = np.array([BRIGHTNESS_SD, CONTRAST_SD])
         shown, offset, cost = [], np.zeros((layers, 2)), 0.0
@@ -89,11 +91,12 @@ class LayeredFrame:
             values = one.values[self.level]
             chosen = np.isfinite(values)
             points, normals = one.points[chosen], one.normals[chosen]
-            seen = np.zeros((len(points), 3))  # px, px, and whether it is seen
+            seen = np.zeros((len(points), 3))  # px, px, and 0: not seen, 1: seen, 2: within 3 sd
             cost += _region(self.bodies, placed, self.order, self.pose, self.intrinsics, self.image, one.layer, points,
                             normals, values[chosen], noise, light, one.spacing_m, self.spread, information, pull, seen,
                             offset[one.layer])
-            self.used[one.layer] += int(seen[:, 2].sum())
+            self.used[one.layer] += np.count_nonzero(seen[:, 2])
+            self.held[one.layer] += np.count_nonzero(seen[:, 2] > 1.0)
             shown.append(np.column_stack([np.full(len(points), one.layer), seen, values[chosen]]))
             if not seen[:, 2].any():
                 self.reasons[one.layer] = "it is hidden, turned away, or outside of the picture"
@@ -101,7 +104,8 @@ class LayeredFrame:
             cost += self._boundary(placed, np.vstack(shown), offset, noise, information, pull)
         return compressed(information, pull, cost, len(state) - ANGLES + POSE)
 
-    def _boundary(self, placed, shown: Array, offset: Array, noise: float, information: Array, pull: Array) -> float:
+    def _boundary(self, placed: Placed, shown: Array, offset: Array, noise: float, information: Array,
+                  pull: Array) -> float:
         assert self.outline is not None
         spread = np.zeros(len(self.bodies.layer_row))
         for one in self.templates:
@@ -159,6 +163,14 @@ def point_row(bodies, placed, layer, px, py, pz, g, row):
         at = parent
 
 
+def layer_covariance(bodies: Bodies, placed: Placed, layer: int, point: Array, covariance: Array) -> Array:
+    """(3, 3) m^2, world: of a `point` (3,) of a layer, world, by that of root and angles (P, P)."""
+    rows = np.empty((3, len(covariance)))
+    for axis, direction in enumerate(np.eye(3)):
+        point_row(bodies, placed, layer, point[0], point[1], point[2], direction, rows[axis])
+    return np.asarray(rows @ covariance @ rows.T)
+
+
 @njit(cache=True)
 def _form(matrix, row):
     """Of a `row` (P,): row matrix row^T."""
@@ -173,8 +185,8 @@ def _form(matrix, row):
 @njit(cache=True)
 def _region(bodies, placed, order, pose, intrinsics, image, layer, points, normals, values, noise, light, spacing_m,
             expected, information, pull, seen, offset):
-    """Add the information of a template; fill `seen` (K, 3) px, px, 0 or 1, and `offset` (2,): brightness and contrast
-    in this image. Returns the cost."""
+    """Add the information of a template; fill `seen` (K, 3) px, px, 0 to 2 as above, and `offset` (2,):
+    brightness and contrast in this image. Returns the cost."""
     count, size = points.shape[0], pull.shape[0]
     base = placed.root[:3] if bodies.layer_row[layer] < 0 else placed.frames[bodies.layer_row[layer]]
     rows, error, variance, wide = np.zeros((count, size)), np.zeros(count), np.ones(count), np.ones(count)
@@ -233,6 +245,8 @@ def _region(bodies, placed, order, pose, intrinsics, image, layer, points, norma
         left = error[k] + offset[0] + offset[1] * v
         square = left * left / wide[k]
         cost += (DEGREES + 1.0) * math.log(1.0 + square / DEGREES)
+        if square < 9.0:
+            seen[k, 2] = 2.0
         w = (DEGREES + 1.0) / (DEGREES + square) / variance[k]
         a00 += w
         a01 += w * v

@@ -22,6 +22,9 @@ AMPLITUDE, PACE_HZ = (0.1, 0.8, 0.9), 1.5
 """m, rad and rad of the root's translation and rotation and of the angles, and 1/s: the harmonic motion that is
 expected, whose speeds and accelerations the process has. A hand that waves, turns and closes quickly."""
 
+START_SD = 1e-3, 0.01, 0.02
+"""m, rad and rad: how well a start is known from which templates are taken. They show it no better."""
+
 
 class ConstantVelocity:
     """Implements `estimation.residual.Process`. `free` (6 + A,): what moves. `density` (6 + A,): of the white
@@ -41,7 +44,7 @@ class ConstantVelocity:
         """(6 + A,): values of translation, rotation and angles, 0 where nothing moves."""
         return np.repeat(values, [3, 3, self.pose - POSE]) * self.free
 
-    def start(self, root: Array, angles: Array, sd: tuple[float, float, float]) -> tuple[Array, Array]:
+    def start(self, root: Array, angles: Array, sd: tuple[float, float, float] = START_SD) -> tuple[Array, Array]:
         """State and covariance at `root` (4, 4) and `angles` (A,), known to `sd`: m, rad and rad."""
         state = np.concatenate([root[:3].ravel(), angles, np.zeros(self.pose)])
         return state, np.diag(np.concatenate([self._each(sd), self.speed]) ** 2)

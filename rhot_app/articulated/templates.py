@@ -30,8 +30,9 @@ SIGMAS_PX = (4.0, 2.0, 1.0)
 """px: smoothing of images and templates, one after the other: the first widens the range of convergence, the last is
 what lenses and demosaicing smooth anyway."""
 
-SPACING_PX = 2
-"""px between template points: twice the least smoothing, where noise is nearly independent."""
+SPACING_PX, SPACING_M = 2, 2e-3
+"""px and m between template points, at least: twice the least smoothing, where noise is nearly independent, and half of
+the length over which a surface errs alike (`contours.STEP_M`)."""
 
 FACING = 0.5
 """Cosine of the steepest view of a surface at which a template point is taken, 60 degrees: there a pixel is two."""
@@ -120,11 +121,17 @@ class TemplateSet:
         """Take a template of a layer from the filtered images of a camera with `pose` (3, 4) and `rays` (H, W, 3), in
         which `labels` (H, W) says where the layer is seen. `noise`: of a pixel, of 255. False: `refused` says why."""
         mask = (labels == layer).astype(np.uint8)
-        rows, columns = np.nonzero(mask[::SPACING_PX, ::SPACING_PX])
-        if len(rows) < LEAST_POINTS:
+        if mask.sum() < LEAST_POINTS * SPACING_PX**2:
             self.refused[layer] = "it is hidden, or outside of the picture"
             return False
-        rows, columns = SPACING_PX * rows, SPACING_PX * columns
+        base = placed.root if bodies.layer_row[layer] < 0 else placed.frames[bodies.layer_row[layer]]
+        centre = np.empty(3)
+        camera_centre(np.ascontiguousarray(pose), centre)
+        row, column = (int(np.median(one)) for one in np.nonzero(mask))
+        steep = float(np.linalg.norm(rays[row, column] - rays[row, column - 1 if column else 1]))  # rad per px
+        spacing = max(SPACING_PX, round(SPACING_M / (steep * float(np.linalg.norm(centre - base[:3, 3])))))
+        rows, columns = np.nonzero(mask[::spacing, ::spacing])
+        rows, columns = spacing * rows, spacing * columns
         points, normals, good = np.empty((len(rows), 3)), np.empty((len(rows), 3)), np.empty(len(rows), np.bool_)
         _lift(bodies, placed, layer, np.ascontiguousarray(pose), rays[rows, columns], points, normals, good)
         rows, columns, points, normals = rows[good], columns[good], points[good], normals[good]
@@ -134,15 +141,11 @@ class TemplateSet:
         inside = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, 5)[1:-1, 1:-1][rows, columns]
         values = np.array([np.where(inside > sigma + 0.5, image[rows, columns], np.nan)
                            for image, sigma in zip(images, self.sigmas_px, strict=True)], np.float64)
-        base = placed.root if bodies.layer_row[layer] < 0 else placed.frames[bodies.layer_row[layer]]
-        centre = np.empty(3)
-        camera_centre(np.ascontiguousarray(pose), centre)
         view = centre - points.mean(axis=0)
         depth = float(np.linalg.norm(view))
         turn = base[:3, :3]
-        steep = float(np.linalg.norm(rays[rows[0], columns[0]] - rays[rows[0], columns[0] - 1 if columns[0] else 1]))
         made = Template(layer, (points - base[:3, 3]) @ turn, normals @ turn, values, turn.T @ view / depth,
-                        SPACING_PX * depth * steep, anchor)
+                        spacing * depth * steep, anchor)
         if np.isfinite(values[-1]).sum() < LEAST_POINTS:
             self.refused[layer] = "too little of it is seen"
             return False

@@ -12,23 +12,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.articulated.bodies import ANGLES, Bodies, Placed, camera_rays, place, root_of
-from rhot_app.articulated.layered import LayeredFrame
+from rhot_app.articulated.bodies import ANGLES, CAPSULE, POSE, Bodies, Placed, camera_rays, place, root_of
+from rhot_app.articulated.layered import LayeredFrame, layer_covariance
 from rhot_app.articulated.outline import outline_of
-from rhot_app.articulated.process import AngleLimits, ConstantVelocity
-from rhot_app.articulated.templates import Filtered, Image, Kind, TemplateSet, filtered
+from rhot_app.articulated.process import AngleLimits
+from rhot_app.articulated.templates import LEAST_POINTS, Filtered, Image, Kind, TemplateSet, filtered
 from rhot_app.articulated.visibility import Visibility, segment, visibility
+from rhot_app.barehand.contour_residual import SHAPE_SD_M
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
-from rhot_app.estimation.residual import Residual
+from rhot_app.estimation.residual import Process, Residual
 from rhot_app.geometry.camera import CameraModel
 from rhot_node.detect.edges import noise_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-START_SD = 1e-3, 0.01, 0.02
-"""m, rad and rad: how well a start is known from which templates are taken. They show it no better."""
+HELD = 0.8
+"""Part of a template's points that agree with the image where its link is: 99.7 % would, but for light and creases."""
 
 
 @dataclass(eq=False, slots=True)
@@ -48,11 +49,13 @@ class View:
 class LayeredTracker:
     """One articulated object before some cameras."""
 
-    def __init__(self, bodies: Bodies, limits: Array, process: ConstantVelocity, cameras: Sequence[CameraModel], *,
+    def __init__(self, bodies: Bodies, limits: Array, process: Process, cameras: Sequence[CameraModel], *,
                  kind: Kind = "raw", layered: bool = True, outline: bool = True,
                  backgrounds: Sequence[Image] | None = None) -> None:
-        """`limits` (A, 2) rad. `kind`: how images are filtered; outlines need ``raw``. `layered` False: every template
-        is taken for visible. `backgrounds`: each camera's image (H, W, 3) RGB without the object."""
+        """`limits` (A, 2) rad. `process`: a state begins with world_from_root (3, 4) and the angles, its tangent space
+        with the root's translation, rotation and the angles. `kind`: how images are filtered; outlines
+        need ``raw``. `layered` False: every template is taken for visible. `backgrounds`: each camera's image (H, W, 3)
+        RGB without the object."""
         self.bodies, self.process, self.layered = bodies, process, layered
         self.outline = outline and kind == "raw"
         self.templates = TemplateSet(kind)
@@ -62,22 +65,21 @@ class LayeredTracker:
             view.background = self.templates.images(background)
         self.filter = IteratedFilter(process)
         self._limits = AngleLimits(limits)
-        self._epoch_ns = 0
+        self._pose, self._epoch_ns = POSE + len(limits), 0
 
-    def start(self, root: Array, angles: Array, images: Mapping[int, Image], t_ns: int,
-              sd: tuple[float, float, float] = START_SD) -> None:
-        """Begin at `root` (4, 4) and `angles` (A,) rad, known to `sd` m, rad and rad, and take the first templates of
-        what `images` (H, W, 3) RGB show, by camera."""
+    def start(self, state: Array, covariance: Array, images: Mapping[int, Image], t_ns: int) -> None:
+        """Begin in a state that is known with this covariance, and take the first templates of what `images` (H, W, 3)
+        RGB show, by camera."""
         self._epoch_ns = t_ns
-        self.filter.start(0.0, *self.process.start(root, angles, sd))
-        self._take(images, self.filter.newest.state, anchor=True)
+        self.filter.start(0.0, state, covariance)
+        self._take(images, self.filter.newest, anchor=True)
 
     def see(self, images: Mapping[int, Image], t_ns: int, extra: Sequence[Residual] = ()) -> Knot:
         """Weigh the images of some cameras at one instant, and other residuals of the same state.
 
         Raises TrackingError before `start`."""
         if not self.filter.knots:
-            raise TrackingError("the object has no start; give one by start(root, angles, images, t_ns)")
+            raise TrackingError("the object has no start; give one by start(state, covariance, images, t_ns)")
         t_s = 1e-9 * (t_ns - self._epoch_ns)
         prediction = self.filter.predict(t_s)
         state, initial, residuals = prediction[0], None, list(extra)
@@ -89,7 +91,7 @@ class LayeredTracker:
             if level < len(self.templates.sigmas_px) - 1:
                 initial = state = update(self.process, t_s, prediction, residuals, initial).state
         knot = self.filter.add(t_s, residuals, prediction, initial)
-        self._take(images, knot.state, anchor=False)
+        self._take(images, knot, anchor=False)
         return knot
 
     def _frame(self, view: View, smooth: Filtered, image: Image, state: Array, covariance: Array,
@@ -108,12 +110,12 @@ class LayeredTracker:
         view.frame = LayeredFrame(
             self.bodies, order, view.pose, view.camera.intrinsics, smooth, chosen, self.templates.kind,
             self.templates.sigmas_px[level], level, view.noise,
-            np.ascontiguousarray(covariance[:self.process.pose, :self.process.pose]), outline,
+            np.ascontiguousarray(covariance[:self._pose, :self._pose]), outline,
             None if view.background is None else view.background[level])
         return view.frame
 
     def _placed(self, state: Array) -> Placed:
-        return place(self.bodies, root_of(state), state[ANGLES:ANGLES + self.process.pose - 6])
+        return place(self.bodies, root_of(state), state[ANGLES:ANGLES + self._pose - POSE])
 
     def _direction(self, view: View, placed: Placed, layer: int) -> Array:
         """(3,) unit, from the layer's frame to the camera, in that frame."""
@@ -121,13 +123,29 @@ class LayeredTracker:
         away = base[:3, :3].T @ (view.camera.centre - base[:3, 3])
         return np.asarray(away / np.linalg.norm(away))
 
-    def _take(self, images: Mapping[int, Image], state: Array, anchor: bool) -> None:
-        """Take templates of the layers that are seen from a new side."""
-        placed = self._placed(state)
+    def _held(self, layer: int) -> bool:
+        """Whether the last images agree with the templates of a layer."""
+        used, held = np.sum([[view.frame.used[layer], view.frame.held[layer]] for view in self.views
+                             if view.frame is not None], axis=0)
+        return bool(held >= LEAST_POINTS and held > HELD * used)
+
+    def _sd_m(self, knot: Knot, placed: Placed, layer: int) -> float:
+        """m: standard deviation of the far end of a layer."""
+        body = int(np.flatnonzero(self.bodies.layer == layer)[-1])
+        end = placed.ends[body, 1] if self.bodies.kind[body] == CAPSULE else placed.box[body, :, 3]
+        covariance = layer_covariance(self.bodies, placed, layer, end, knot.covariance[:self._pose, :self._pose])
+        return float(np.sqrt(np.trace(covariance)))
+
+    def _take(self, images: Mapping[int, Image], knot: Knot, anchor: bool) -> None:
+        """Take templates of the layers that are seen from a new side. What is known worse than the surface itself, or
+        not held by the templates that it has, is left alone, unless it is to be the `anchor`."""
+        placed = self._placed(knot.state)
+        known = [anchor or (self._held(layer) and self._sd_m(knot, placed, layer) < SHAPE_SD_M)
+                 for layer in range(len(self.bodies.layer_row))]
         for c, image in images.items():
             view = self.views[c]
             wanted = [layer for layer in range(len(self.bodies.layer_row))
-                      if self.templates.wants(layer, self._direction(view, placed, layer))]
+                      if known[layer] and self.templates.wants(layer, self._direction(view, placed, layer))]
             if not wanted:
                 continue
             if not view.noise:

@@ -88,9 +88,7 @@ def rectangle(bodies, placed, pose, layer, margin, out):
     """Fill `out` (4,): x0, y0, x1, y1 of a layer in normalised image coordinates. False when it is not before the
     camera."""
     out[0], out[1], out[2], out[3] = 1e9, 1e9, -1e9, -1e9
-    for k in range(bodies.layer.shape[0]):
-        if bodies.layer[k] != layer:
-            continue
+    for k in range(bodies.first[layer], bodies.first[layer + 1]):
         capsule = bodies.kind[k] == CAPSULE
         for corner in range(2 if capsule else 8):
             if capsule:
@@ -128,16 +126,13 @@ def _relate(bodies, placed, pose, margin, weight, depth):
     camera_centre(pose, o)
     for layer in range(count):
         shown[layer] = rectangle(bodies, placed, pose, layer, margin, boxes[layer])
-        number = 0
-        for k in range(bodies.layer.shape[0]):
-            if bodies.layer[k] == layer:
-                number += 1
-                for i in range(3):
-                    if bodies.kind[k] == CAPSULE:
-                        middle[layer, i] += 0.5 * (placed.ends[k, 0, i] + placed.ends[k, 1, i])
-                    else:
-                        middle[layer, i] += placed.box[k, i, 3]
-        middle[layer] /= max(number, 1)
+        for k in range(bodies.first[layer], bodies.first[layer + 1]):
+            for i in range(3):
+                if bodies.kind[k] == CAPSULE:
+                    middle[layer, i] += 0.5 * (placed.ends[k, 0, i] + placed.ends[k, 1, i])
+                else:
+                    middle[layer, i] += placed.box[k, i, 3]
+        middle[layer] /= bodies.first[layer + 1] - bodies.first[layer]
         depth[layer] = (pose[2, 3] + pose[2, 0] * middle[layer, 0] + pose[2, 1] * middle[layer, 1]
                         + pose[2, 2] * middle[layer, 2])
     weight[:] = 0.0
@@ -148,7 +143,8 @@ def _relate(bodies, placed, pose, margin, weight, depth):
             if not shown[a] or not shown[b]:
                 continue
             link, carrier = (a, b) if bodies.carrier[a] == b else (b, a)
-            if bodies.carrier[link] == carrier and bodies.number[carrier] == 1 and np.any(placed.plane[link] != 0.0):
+            single = bodies.first[carrier + 1] == bodies.first[carrier] + 1
+            if bodies.carrier[link] == carrier and single and np.any(placed.plane[link] != 0.0):
                 base = joint_of(bodies, placed, link)
                 for i in range(3):
                     joint[i], axis[i] = base[i, 3], base[i, 2]

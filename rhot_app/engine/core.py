@@ -30,8 +30,8 @@ from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
 from rhot_app.sources.source import ObservationSource, same_network
-from rhot_app.tracking.contours.seen import SeenContour, ShowsContours
-from rhot_app.tracking.tracker import Tracker
+from rhot_app.state import SeenContour
+from rhot_app.tracking.tracker import ShowsContours, Tracker
 
 MakeSource = Callable[[Rig], ObservationSource]
 MakeTracker = Callable[[Rig], Tracker]

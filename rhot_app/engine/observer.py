@@ -90,8 +90,8 @@ class Observer:
         bare = self.rig.tracker.observe == "contours"  # nobody wears the markers
         nowhere = [] if bare else no_marker_advice(facts, running)
         marker_ids = self.rig.markers.ids
-        sight = not (nowhere or bare)
-        found = [advice for one in facts for advice in node_advice(one, marker_ids, running, sight=sight)]
+        visibility = not (nowhere or bare)
+        found = [advice for one in facts for advice in node_advice(one, marker_ids, running, visibility=visibility)]
         if running:
             self.rig_watch.take(self._pipeline.recent)
             stale = self.rig_watch.advice(now_ns)

@@ -10,8 +10,7 @@ import numpy as np
 
 from rhot_app.errors import EngineError
 from rhot_app.outputs.spec import OutputStatus
-from rhot_app.state import HandState
-from rhot_app.tracking.contours.seen import SeenContour
+from rhot_app.state import HandState, SeenContour
 
 Level = Literal["info", "warning", "error"]
 NodeWord = Literal["silent", "starting", "ready", "streaming", "fault"]

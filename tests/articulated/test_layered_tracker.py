@@ -37,7 +37,7 @@ def test_fingers_that_cross_are_told_apart_by_layers():
     images, empty = filmed(model, crossing, [camera], 16, 15.0)
     tracker = LayeredTracker(bodies, model.limits, ConstantVelocity(free_of(model), pace_hz=PACE_HZ), [camera],
                              backgrounds=empty)
-    tracker.start(rest_of(model)[0], np.radians(crossing(0.0)), images[0], 0)
+    tracker.start(*tracker.process.start(rest_of(model)[0], np.radians(crossing(0.0))), images[0], 0)
     errors, orders = [], set()
     for k in range(1, 16):
         state = tracker.see(images[k], round(1e9 * k / 15.0)).state
@@ -63,7 +63,7 @@ def test_a_box_is_followed_as_it_moves_and_opens():
         return {c: picture(model, meshes, *truth(k), camera, walls[c], k) for c, camera in enumerate(cameras)}
 
     tracker = LayeredTracker(bodies, model.limits, ConstantVelocity(free_of(model)), cameras, outline=False)
-    tracker.start(*truth(0), images(0), 0)
+    tracker.start(*tracker.process.start(*truth(0)), images(0), 0)
     for k in range(1, 9):
         state = tracker.see(images(k), round(1e9 * k / 60.0)).state
     root, angles = truth(8)
@@ -85,7 +85,7 @@ def test_without_anything_to_see_it_predicts():
     camera = look_at(np.array([0.05, 0.01, -0.4]), np.array([0.05, 0.0, 0.0]), width=160, height=120, focal=150.0)
     tracker = LayeredTracker(bodies, model.limits, ConstantVelocity(free_of(model)), [camera])
     empty = {0: np.full((120, 160, 3), 80, np.uint8)}
-    tracker.start(*rest_of(model), empty, 0)
+    tracker.start(*tracker.process.start(*rest_of(model)), empty, 0)
     for k in range(1, 4):
         knot = tracker.see(empty, k * 10**8)
     assert np.isfinite(knot.state).all() and np.isfinite(knot.covariance).all()

@@ -16,7 +16,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState
-from rhot_app.tracking.contours.seen import ShowsContours
+from rhot_app.tracking.tracker import ShowsContours
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 from rhot_node.files import resource_path

@@ -12,7 +12,7 @@ from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene
 from bench import START_S, TEST_S, Bench, node_status, states_of, wait_until
 
 from rhot_app.engine.client import EngineClient
-from rhot_app.engine.replay_summary import replay_states
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.hand.kinematics import forward
 from rhot_app.project import TrackerSettings
 from rhot_app.recording.raw_log import LogReader, RecordKind

@@ -15,7 +15,8 @@ APP_BASE = ("rhot_node", "resources", "rhot_app.errors", "rhot_app.progress", "r
 MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
-BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.tracking", "rhot_app.barehand", *ENGINE_SIDE)
+BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.tracking", "rhot_app.barehand",
+                "rhot_app.articulated", *ENGINE_SIDE)
 
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # the node

@@ -21,6 +21,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot refine": ("LOG", "--rig", "--out", "--use", "--no-scale", "--json"),
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),
+    "rhot layers": ("FILE", "--angle", "--from", "--out", "--json"),
     "rhot recover": ("LOG", "--out", "--rig"),
     "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json"),
     "rhot bare-hand": ("--rig", "--video", "--background", "--background-seconds", "--fps", "--offset-s",

@@ -13,7 +13,7 @@ from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.motion.hand_process import MOTION
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.tracking.contours.seen import SeenContour
+from rhot_app.state import SeenContour
 from rhot_node.wire.slices import pack_slices, unpack_slices
 
 Array = NDArray[np.float64]

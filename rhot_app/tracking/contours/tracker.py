@@ -33,13 +33,12 @@ from rhot_app.estimation.residual import Residual
 from rhot_app.hand.motion.hand_process import BIAS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
-from rhot_app.state import Condition, HandState
+from rhot_app.state import Condition, HandState, SeenContour, no_hand
 from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand, seen_contour
 from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.markers import MarkersOfHand
-from rhot_app.tracking.contours.seen import SeenContour
-from rhot_app.tracking.contours.states import no_hand, published
-from rhot_app.tracking.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
+from rhot_app.tracking.contours.states import published
+from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.slices import SLICES_MAX
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, Preview, Published
-from rhot_app.state import HandState
-from rhot_app.tracking.contours.seen import SeenContour
+from rhot_app.state import HandState, SeenContour
 from rhot_app.ui.models.meters import STACKED, JitterWindow, LatencyWindow, LossMeter, RateRows, rate_names
 from rhot_app.ui.models.series import Series
 

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
-from rhot_app.tracking.contours.seen import SeenContour
+from rhot_app.state import SeenContour
 from rhot_app.ui.backend.live import Live
 from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import place_at_sides
