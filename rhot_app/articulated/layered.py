@@ -167,7 +167,7 @@ def layer_covariance(bodies: Bodies, placed: Placed, layer: int, point: Array, c
     """(3, 3) m^2, world: of a `point` (3,) of a layer, world, by that of root and angles (P, P)."""
     rows = np.empty((3, len(covariance)))
     for axis, direction in enumerate(np.eye(3)):
-        point_row(bodies, placed, layer, *point, direction, rows[axis])
+        point_row(bodies, placed, layer, point[0], point[1], point[2], direction, rows[axis])
     return np.asarray(rows @ covariance @ rows.T)
 
 
