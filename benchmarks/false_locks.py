@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from twin_frames import twin_scene
 
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import replay_states
 from rhot_app.evaluation.data_sets import DataSet, Order, data_set
 from rhot_app.evaluation.track import rig_with
 from rhot_app.project import TrackerSettings

@@ -5,7 +5,7 @@
 Each person has a size (10 % about the file's), bones that differ by a share of their length, each for itself, and a
 mean pose that is some standard deviations of the natural pose off it; the shapes scatter about that mean, within the
 joints' limits. Markers are located to 0.5 mm. The true size is that of the mean length of all fingers with their
-metacarpals. Printed: how far `tracking.hand_size` is off, and what it states.
+metacarpals. Printed: how far `tracking.markers.hand_size` is off, and what it states.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.project import Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
-from rhot_app.tracking.acquisition import Located
-from rhot_app.tracking.hand_size import GRID, USUAL_SD, HandSize
-from rhot_app.tracking.marker_model import MarkerModel, compile_markers
+from rhot_app.tracking.markers.acquisition import Located
+from rhot_app.tracking.markers.hand_size import GRID, USUAL_SD, HandSize
+from rhot_app.tracking.markers.marker_model import MarkerModel, compile_markers
 
 Array = NDArray[np.float64]
 

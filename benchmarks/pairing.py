@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "tracking"))
 
-from synthetic_rig import FAST, WIDE, Preset, Sight, compare, hand_trajectory, make_rig, observe, run
+from synthetic_rig import FAST, WIDE, Preset, Viewing, compare, hand_trajectory, make_rig, observe, run
 
 from rhot_app.evaluation.score import rms
 from rhot_app.project import FilterSettings, Rig
@@ -75,7 +75,7 @@ WAYS = {"by arrival": by_arrival, "by time": by_time, "by rows": iter}
 def exact(rig: Rig, motion: str, preset: Preset, distance_m: float, seconds: float) -> dict[str, float]:
     """Marker error, mm rms, of each way, with exact image positions."""
     trajectory = hand_trajectory(rig, motion, seconds, distance_m)
-    frames = observe(rig, preset, trajectory, seconds, Sight(noise_px=0.0))
+    frames = observe(rig, preset, trajectory, seconds, Viewing(noise_px=0.0))
     return {name: compare(rig, run(make_tracker(rig), list(way(frames))), trajectory).raw_mm
             for name, way in WAYS.items()}
 

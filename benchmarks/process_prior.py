@@ -1,4 +1,4 @@
-"""How fast hands move, in recordings: the rates and spreads of the estimator's process (`tracking/estimator.py`).
+"""How fast hands move, in recordings: the rates and spreads of the estimator's process (`hand/motion/hand_process.py`).
 
     python benchmarks/process_prior.py FILE [FILE ...]
 

@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "tracking
 
 from knocked_rig import filmed, rig_of, scene_of, volume_motion
 
-from rhot_app.tracking.refined_rig import Refinement
-from rhot_app.tracking.rig_refinement import RigRefiner
+from rhot_app.tracking.refinement.refined_rig import Refinement
+from rhot_app.tracking.refinement.rig_refinement import RigRefiner
 from rhot_app.tracking.tracker import CameraObservations
 
 KNOCK_S, AFTER_S, EVERY_S = 60.0, 120.0, 10.0

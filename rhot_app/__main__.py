@@ -28,7 +28,7 @@ APP = "rhot_app.ui.app"
 SUBCOMMANDS = {
     "demo": Subcommand("rhot_app.ui.demo_command", "open the app on the simulated rig"),
     "engine": Subcommand("rhot_app.engine.command", "track without a screen and serve the states"),
-    "replay": Subcommand("rhot_app.engine.replay_command", "feed a raw log through the tracker"),
+    "replay": Subcommand("rhot_app.engine.offline.replay_command", "feed a raw log through the tracker"),
     "video": Subcommand("rhot_app.recording.video_command", "fetch the videos that nodes recorded beside a log"),
     "landmarks": Subcommand("rhot_app.recording.landmark_command", "make a raw log of landmark tables of a bare hand"),
     "bare-hand": Subcommand("rhot_app.export.bare_hand_command", "track a hand without markers in recorded videos"),
@@ -48,7 +48,7 @@ SUBCOMMANDS = {
     "nodes": Subcommand("rhot_app.sources.nodes_command", "look for nodes on the network"),
     "pair": Subcommand("rhot_app.sources.pair_command", "pair with a node by the code that it shows"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),
-    "report": Subcommand("rhot_app.engine.report_command", "collect what somebody needs who looks for a fault"),
+    "report": Subcommand("rhot_app.engine.offline.report_command", "collect what somebody needs who looks for a fault"),
     "mouse": Subcommand("rhot_app.mouse.mouse_command", "work a 3-D cursor and two buttons with the hand"),
     "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "play a simulated run and compare with its truth"),
 }

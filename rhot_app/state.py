@@ -20,7 +20,7 @@ class Knowledge(enum.IntEnum):
     """How a value came to be known; shown alike everywhere (solid, translucent, hatched)."""
 
     MEASURED = 0  # seen by enough cameras at this instant
-    INFERRED = 1  # follows from measured values through the model, or from a half-hidden sight
+    INFERRED = 1  # follows from measured values through the model, or from a half-occluded observation
     GUESSED = 2  # the images do not determine it; prior or last value
     UNKNOWN = 3  # nothing to say; the value is NaN
 
@@ -104,3 +104,34 @@ class HandState:
     def tracked(self) -> bool:
         """Whether there is a hand."""
         return self.condition in (Condition.TRACKING, Condition.PARTIAL)
+
+
+@dataclass(frozen=True, slots=True)
+class SeenContour:
+    """What was seen of a bare hand in one image of a camera, for people to look at; places px, raw.
+
+    `contour` (N, 2): where the estimated hand's contour crosses the slices; `outline` (N,): before the background, not
+    within the hand. `slices` (N, 4): their ends, x and y twice. `edges` (M, 2), `of_hand` (M,): which are the hand's.
+    """
+
+    camera: str
+    t_master_ns: int
+    contour: Array
+    outline: NDArray[np.bool_]
+    slices: Array
+    edges: Array
+    of_hand: NDArray[np.bool_]
+
+
+def no_hand(t_ns: int, condition: Condition, cameras: tuple[str, ...] = (), filter_s: float = 0.0) -> HandState:
+    """The state of master time `t_ns` without a hand or markers. `filter_s`: what it took."""
+    unknown, nothing = int(Knowledge.UNKNOWN), np.empty((0, 3))
+    return HandState(
+        sequence=0, t_master_ns=t_ns, t_receive_ns=t_ns, condition=condition, marker_ids=(), marker_positions=nothing,
+        marker_raw_positions=nothing, marker_covariances=np.empty((0, 3, 3)), marker_knowledge=np.empty(0, np.uint8),
+        camera_names=cameras, camera_pixels=np.empty((len(cameras), 0, 2)),
+        camera_flags=np.empty((len(cameras), 0), np.uint16), joint_positions=np.full((21, 3), np.nan),
+        joint_knowledge=np.full(21, unknown, np.uint8), fingertip_positions=np.full((5, 3), np.nan),
+        angles=np.full(21, np.nan), angle_knowledge=np.full(21, unknown, np.uint8),
+        world_from_palm=np.full((4, 4), np.nan), palm_knowledge=Knowledge.UNKNOWN, epipolar_error_px=np.empty(0),
+        **UNESTIMATED | {"hand_scale": np.nan}, latency_s={"filter": filter_s})

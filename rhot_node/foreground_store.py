@@ -95,21 +95,49 @@ class ForegroundStore:
         """Whether a background is being learnt."""
         return self._thread is not None and self._thread.is_alive()
 
-    def learn_background(self, pictures: PictureBox, seconds: float) -> None:
-        """Begin to learn the scene as it is during the next seconds. Raises NodeError while that goes on already."""
+    def learn_background(self, pictures: PictureBox, seconds: float, *, save: bool = True) -> None:
+        """Begin to learn the scene as it is during the next seconds; with `save` False it is in force until the node
+        ends or `revert`. Raises NodeError while that goes on already."""
         if self.learning:
             raise NodeError("the background is being learnt already; wait for its end.")
         self._failure, self._until_s = "", time.monotonic() + seconds
-        self._thread = threading.Thread(target=self._learn, args=(pictures,), name="background", daemon=True)
+        self._thread = threading.Thread(target=self._learn, args=(pictures, save), name="background",
+                                        daemon=True)
         self._thread.start()
 
-    def learn_skin(self, pictures: PictureBox) -> bool:
+    def learn_skin(self, pictures: PictureBox, *, save: bool = True) -> bool:
         """Learn the skin's colours from the next picture. False when it shows no skin; generic colours are then used.
-        Raises NodeError without a picture, or when the file cannot be written."""
+        `save` as in `learn_background`. Raises NodeError without a picture, or when the file cannot be written."""
         image = self._picture(pictures)
         model = self.of_size(image.shape[1], image.shape[0])
-        self._use(learn_skin(image, model))
+        self._use(learn_skin(image, model), save=save)
         return _skin_of(self.current) == "learnt"
+
+    def save(self) -> None:
+        """Keep what is in force; what was kept before can be brought back by `revert`. Raises NodeError."""
+        if self.learning:
+            raise NodeError("the background is being learnt; wait for its end.")
+        if self.path is not None and self.path.exists():
+            try:
+                write_atomically(self._before(), self.path.read_bytes())
+            except OSError as exc:
+                raise NodeError(f"{self._before()}: cannot be written ({exc.strerror}); nothing was changed.") from exc
+        self._use(self.current, save=True)
+
+    def revert(self, *, earlier: bool = False) -> None:
+        """Use what is in the file again; `earlier`: what was there before the last `save`. Raises NodeError."""
+        if self.learning:
+            raise NodeError("the background is being learnt; wait for its end.")
+        if earlier and self.path is not None:
+            kept = self._before()
+            self._use(load_foreground(kept) if kept.exists() else _FLAT, save=True)
+            return
+        known = self.path is not None and self.path.exists()
+        self.current, self._failure = load_foreground(self.path) if known and self.path is not None else _FLAT, ""
+
+    def _before(self) -> Path:
+        assert self.path is not None
+        return self.path.with_suffix(".before.npz")
 
     def forget(self) -> None:
         """Know nothing any more. Raises NodeError while a background is being learnt, or when the file cannot be
@@ -138,14 +166,15 @@ class ForegroundStore:
         if self._thread is not None:
             self._thread.join()
 
-    def _learn(self, pictures: PictureBox) -> None:
+    def _learn(self, pictures: PictureBox, save: bool) -> None:
         sums = BackgroundSums()
         try:
             while time.monotonic() < self._until_s or sums.count < PICTURES_MIN:
                 if self._ending.is_set():
                     return
                 sums.add(self._picture(pictures))
-            self._use(sums.learnt(self.current if _skin_of(self.current) != "none" else _GENERIC))
+            self._use(sums.learnt(self.current if _skin_of(self.current) != "none" else _GENERIC),
+                      save=save)
             log.info("the background was learnt from %d pictures", sums.count)
         except (NodeError, ValueError) as exc:
             self._failure = f"The background was not learnt: {exc}"
@@ -157,10 +186,10 @@ class ForegroundStore:
             raise NodeError(f"no frame came within {PICTURE_S:.0f} s; ask for the state to see what the camera does.")
         return rgb_of(picture.image)
 
-    def _use(self, model: Foreground) -> None:
-        """Keep the model, then use it as it will be read. Raises NodeError when the file cannot be written."""
+    def _use(self, model: Foreground, *, save: bool) -> None:
+        """Keep the model if `save`, then use it as it is read. Raises NodeError when the file cannot be written."""
         halved = model._replace(mean=model.mean.astype(np.float16), sd=model.sd.astype(np.float16))
-        if self.path is not None:
+        if save and self.path is not None:
             file = io.BytesIO()
             np.savez(file, format=_FORMAT, **halved._asdict())
             try:

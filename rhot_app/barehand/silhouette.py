@@ -33,6 +33,13 @@ RING_M = 0.012
 ARM_M, ARM_SPREAD = 0.5, 0.35
 """m, and radius per m: the cone behind the wrist in which a forearm may lie, about 20 degrees to every side."""
 
+FOREARM_M, FOREARM_SPREAD = 0.25, 0.07
+"""m, and radius per m: a forearm from wrist to elbow, which is there 1.6 times as thick (ANSUR II: 263 mm; girths 175
+and 280 mm)."""
+
+BENDS = np.array([[0.0, 0.0], [0.6, 0.0], [-0.6, 0.0], [0.0, 0.35], [0.0, -0.35]])
+"""rad: flexion and deviation of the wrist that are tried (`tracker.FOREARM_SD`)."""
+
 
 class Silhouettes(NamedTuple):
     """Log odds (C, h, w) of every `step`-th pixel of C images; `poses` (C, 3, 4), `intrinsics` (C, 9) of the cameras.
@@ -83,6 +90,36 @@ def _paint(c0, c1, r0, r1, pose, intrinsics, step, mask, value, a, b, slope):
 
 
 @njit(cache=True)
+def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, slope):
+    """Log odds of the forearm behind a wrist that is bent by `bend` (2,), where the hand does not hide it."""
+    along, p = np.empty(3), np.empty(3)
+    x, y, z = -np.cos(bend[0]) * np.cos(bend[1]), -np.sin(bend[1]), np.sin(bend[0])
+    for i in range(3):
+        along[i] = world[i, 0] * x + world[i, 1] * y + world[i, 2] * z
+    total, known, count = 0.0, False, 16
+    for k in range(count + 1):
+        s = FOREARM_M * k / count
+        depth = pose[2, 3]
+        for i in range(3):
+            p[i] = wrist[i] + s * along[i]
+            depth += pose[2, i] * p[i]
+        if not project(p[0], p[1], p[2], pose, intrinsics, a, slope):
+            break
+        u, v = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
+        if known:
+            du, dv = u - b[0], v - b[1]
+            length = np.sqrt(du * du + dv * dv)
+            wide = intrinsics[0] * (thick + s * FOREARM_SPREAD) / depth / step
+            for j in range(-2, 3):
+                across = 0.4 * j * wide / max(length, 1e-9)
+                row, column = int(v + across * du + 0.5), int(u - across * dv + 0.5)
+                if 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column] != 1:
+                    total += 0.4 * wide * length * odds[row, column]
+        b[0], b[1], known = u, v, True
+    return total
+
+
+@njit(cache=True)
 def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, parts):
     """Log odds of a pose; `parts` (C, 3): of each camera the sum of log odds on the hand, its pixels, and the sum of
     log odds in the ring about it."""
@@ -92,7 +129,7 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
     place_capsules(surface, world, angles, size, frames, centres, radii)
     a, b, slope = np.empty(2), np.empty(2), np.empty((2, 3))
     wrist, elbow = world[:3, 3].copy(), world[:3, 3] - ARM_M * world[:3, 0]
-    thick, total = 0.0, 0.0
+    thick, total, arms = 0.0, 0.0, np.zeros(BENDS.shape[0])
     for k in range(count):
         if surface.group[k] == FOREARM:
             thick = max(thick, radii[k, 0])
@@ -117,6 +154,9 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
             if surface.group[k] != FOREARM:
                 _paint(centres[k, 0], centres[k, 1], radii[k, 0] + RING_M, radii[k, 1] + RING_M, poses[camera],
                        intrinsics[camera], step, mask, 3, a, b, slope)
+        for n in range(BENDS.shape[0]):
+            arms[n] += _arm(world, wrist, thick, BENDS[n], odds[camera], step, poses[camera], intrinsics[camera], mask,
+                            a, b, slope)
         own = ring = area = 0.0
         for row in range(mask.shape[0]):
             for column in range(mask.shape[1]):
@@ -129,7 +169,7 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
                     ring += o
         parts[camera, 0], parts[camera, 1], parts[camera, 2] = own, area, ring
         total += own - ring
-    return total
+    return total + max(arms.max(), 0.0)  # a sleeve is no foreground
 
 
 def score(surface: Surface, world: Array, angles: Array, size: Array, images: Silhouettes) -> tuple[float, Array]:

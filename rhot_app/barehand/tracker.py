@@ -75,13 +75,14 @@ an edge may be."""
 
 SIZE_SD = 0.1, 0.05, 0.08
 """Standard deviations of the logarithms of a hand's size, of its fingers' part of it, and of its thickness beyond that,
-in adults, where they are unknown (`tracking.hand_size`; Buryanov and Kotiuk 2010)."""
+in adults, where they are unknown (`tracking.markers.hand_size`; Buryanov and Kotiuk 2010)."""
 
 LENGTH_SD, RADIUS_SD = 0.05, 0.08
 """The same of a phalanx's own length and radius."""
 
 MEASURED_SD = 0.02
-"""The same of a hand whose file describes it (`python benchmarks/bones.py`, with noise)."""
+"""The same of a phalanx's length where the bones were measured (`python benchmarks/bones.py`, with noise). Nothing
+measures radii."""
 
 FOREARM_SD = 0.2, 0.5, 0.25
 """Standard deviations of the logarithm of the forearm's radius, with or without a sleeve, and, rad, of the wrist's
@@ -149,10 +150,8 @@ class BareHandTracker:
         self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
         prior = self.model.pose_prior
-        if known_size:
-            size, phalanges = (0.0, 0.0, MEASURED_SD), np.full(30, MEASURED_SD)
-        else:
-            size, phalanges = SIZE_SD, np.repeat((LENGTH_SD, RADIUS_SD), 15)
+        size = (0.0, 0.0, SIZE_SD[2]) if known_size else SIZE_SD
+        phalanges = np.repeat((MEASURED_SD if known_size else LENGTH_SD, RADIUS_SD), 15)
         spread = np.concatenate([size, phalanges, FOREARM_SD]).reshape(-1, 3)
         self.shape_covariance = np.square(spread)[:, :, None] * np.eye(3)
         self.shape_s = np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S)

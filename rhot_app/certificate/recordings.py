@@ -252,8 +252,8 @@ def read_latencies(path: Path, rig: Rig) -> Latencies:
 
     Raises CertificateError when it makes no state.
     """
+    from rhot_app.engine.offline.replay_summary import replay_states
     from rhot_app.engine.pipeline import warm_up
-    from rhot_app.engine.replay_summary import replay_states
 
     rig = rig if rig.tracker.kind == "classic" else with_tracker(rig, "classic")
     try:

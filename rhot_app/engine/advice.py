@@ -77,18 +77,18 @@ def disk_advice(folder: str, seconds_left: float) -> list[Advice]:
                    "this recording, which then ends. Make room, or stop the recording.")]
 
 
-def node_advice(facts: NodeFacts, marker_ids: Sequence[str], running: bool, *, sight: bool = True) -> list[Advice]:
-    """All sentences about one node; `sight` False leaves out what its camera does not see."""
+def node_advice(facts: NodeFacts, marker_ids: Sequence[str], running: bool, *, visibility: bool = True) -> list[Advice]:
+    """All sentences about one node; `visibility` False leaves out what its camera does not see."""
     found = [*_state_advice(facts, running), *_buffer_advice(facts)]
     if facts.status.state == "streaming":
         found += [*_refusal_advice(facts), *_link_advice(facts, running)]
-        if running and sight and facts.recent.accepted:
-            found += _sight_advice(facts, marker_ids)
+        if running and visibility and facts.recent.accepted:
+            found += _visibility_advice(facts, marker_ids)
     return found
 
 
 def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool) -> list[Advice]:
-    """The one sentence that replaces all others about sight when no camera sees anything; none while a picture is
+    """The one sentence that replaces all others about visibility when no camera sees anything; none while a picture is
     black, which is said of each camera."""
     if any(facts.black for facts in all_facts):
         return []
@@ -210,7 +210,7 @@ def calibration_advice(rig: Rig) -> list[Advice]:
     return [Advice(level, found.finding.sentence, found.mender, lasting=True)]
 
 
-def _sight_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:
+def _visibility_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:
     if facts.black:
         return [Advice("warning", f"{facts.status.name} is black: is the lens covered?")]
     unseen = [(seconds, marker) for seconds, marker in zip(facts.unseen_s, marker_ids, strict=True)

@@ -15,7 +15,15 @@ import msgspec
 import zmq
 
 from rhot_app.engine.directory import EngineDirectory, default_directory
-from rhot_app.engine.status import TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, EngineStatus, Published, decode
+from rhot_app.engine.status import (
+    TOPIC_CONTOUR,
+    TOPIC_PREVIEW,
+    TOPIC_STATE,
+    TOPIC_STATUS,
+    EngineStatus,
+    Published,
+    decode,
+)
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, parse_rig
 from rhot_app.state import HandState
@@ -52,6 +60,7 @@ class EngineClient:
         if events:
             self._stream.setsockopt(zmq.SUBSCRIBE, TOPIC_STATUS)
             self._stream.setsockopt(zmq.SUBSCRIBE, TOPIC_PREVIEW)
+            self._stream.setsockopt(zmq.SUBSCRIBE, TOPIC_CONTOUR)
             self._stream.connect(self.directory.events)
         if states:
             self._stream.setsockopt(zmq.SUBSCRIBE, TOPIC_STATE)

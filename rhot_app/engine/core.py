@@ -30,7 +30,8 @@ from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
 from rhot_app.sources.source import ObservationSource, same_network
-from rhot_app.tracking.tracker import Tracker
+from rhot_app.state import SeenContour
+from rhot_app.tracking.tracker import ShowsContours, Tracker
 
 MakeSource = Callable[[Rig], ObservationSource]
 MakeTracker = Callable[[Rig], Tracker]
@@ -60,6 +61,7 @@ class Engine:
         self._node_black = node_black
         self._notice = ""  # why the last recording ended
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
+        self._shown: dict[str, int] = {}  # times of the contours that were told last
         self._lock = threading.RLock()
         self._outputs = outputs
         if outputs is not None:
@@ -201,6 +203,14 @@ class Engine:
             status = self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
                                            self._node_message, extra, self._node_black)
             return status if outputs is None else replace(status, outputs=outputs.status())
+
+    def contours(self) -> list[SeenContour]:
+        """What the tracker has seen of a bare hand since this was asked last."""
+        tracker = self._pipeline.work.tracker
+        found = tracker.seen() if isinstance(tracker, ShowsContours) else []
+        fresh = [one for one in found if self._shown.get(one.camera) != one.t_master_ns]
+        self._shown |= {one.camera: one.t_master_ns for one in fresh}
+        return fresh
 
     def refined(self) -> dict[str, Any]:
         """What a moving hand says of the cameras (`RigWatch.refined`)."""

@@ -15,7 +15,7 @@ import msgspec
 import zmq
 
 from rhot_app.engine.commands import Answer, Arguments, refusal
-from rhot_app.engine.node_meter import health_advice, sees_black
+from rhot_app.engine.node_meter import foreground_advice, health_advice, sees_black
 from rhot_app.engine.status import Advice, EngineStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
@@ -65,6 +65,7 @@ class _Peer:
     video_dropped: int = 0
     video_advice: tuple[Advice, ...] = ()
     tag_advice: tuple[Advice, ...] = ()
+    foreground_advice: tuple[Advice, ...] = ()
 
 
 class NodeControl:
@@ -135,6 +136,8 @@ class NodeControl:
                     peer.message = printable(str(state.get("message", "")))
                     peer.health, peer.black = health_advice(peer.node.name, state), sees_black(state)
                     self._want_tags(peer, state.get("tags"))
+                    bare = self._rig is not None and self._rig.tracker.observe != "markers"
+                    peer.foreground_advice = foreground_advice(peer.node.name, state) if bare else ()
                 else:
                     done.append((asked.client, (answer, attachment)))
             for asked in [asked for asked in peer.asked.values() if now_s > asked.deadline_s]:
@@ -159,6 +162,11 @@ class NodeControl:
             elif not on and peer.previews is not None:
                 peer.previews.close()
                 peer.previews = None
+
+    @property
+    def previewing(self) -> bool:
+        """Whether somebody looks at the pictures."""
+        return self._preview
 
     def previews(self) -> list[Preview]:
         """The pictures that came since the last call."""
@@ -185,7 +193,7 @@ class NodeControl:
             if node.state != "fault":
                 peer.message = ""
             if node.state == "silent":
-                peer.health, peer.black = (), False
+                peer.health, peer.black, peer.foreground_advice = (), False, ()
             elif now_s - peer.asked_s > _STATE_PERIOD_S:
                 peer.asked_s = now_s
                 self._put(peer, None, "node", {"request": "state"})
@@ -205,7 +213,7 @@ class NodeControl:
     def advice(self) -> tuple[Advice, ...]:
         """What the nodes' machines lack, and what their videos do, for the operator."""
         return tuple(advice for peer in self._peers.values()
-                     for advice in (*peer.health, *peer.video_advice, *peer.tag_advice))
+                     for advice in (*peer.health, *peer.video_advice, *peer.tag_advice, *peer.foreground_advice))
 
     def _want_tags(self, peer: _Peer, sought: object) -> None:
         """Have a node look for the tags of the rig's objects, if its state says that it does not. It does so until it

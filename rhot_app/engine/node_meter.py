@@ -134,6 +134,22 @@ def health_advice(name: str, state: Mapping[str, Any]) -> tuple[Advice, ...]:
     return tuple(found)
 
 
+def foreground_advice(name: str, state: Mapping[str, Any]) -> tuple[Advice, ...]:
+    """What node `name` lacks to show a bare hand, by the `foreground` of its answer to a state request."""
+    known = state.get("foreground")
+    if not isinstance(known, Mapping):
+        return (Advice("error", f"Node {name} cannot search for a bare hand. Does rhot-node have the version of this "
+                                "program there?"),)
+    if known.get("problem"):
+        return (Advice("warning", f"Node {name}: {printable(str(known['problem']))[:SENTENCE_MAX]}", "foreground"),)
+    if known.get("learning_s"):
+        return (Advice("info", f"Node {name} learns the background: keep the hand out of its picture."),)
+    if not known.get("background") and known.get("skin") == "none":
+        return (Advice("warning", f"Node {name} has learnt neither background nor skin, so no bare hand can be found. "
+                                  "Use Calibrate, Background and skin.", "foreground"),)
+    return ()
+
+
 def sees_black(state: Mapping[str, Any]) -> bool:
     """Whether a node says that its camera's picture is black."""
     return any(trouble.code == BLACK_PICTURE.code for trouble in _troubles(state))

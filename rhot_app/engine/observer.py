@@ -87,9 +87,11 @@ class Observer:
     def _advice(self, nodes: tuple[NodeStatus, ...], running: bool, now_ns: int, black: NodeBlack) -> list[Advice]:
         facts = [replace(self._facts(camera, status, now_ns), black=black(status.node_id))
                  for camera, status in enumerate(nodes)]
-        nowhere = no_marker_advice(facts, running)
+        bare = self.rig.tracker.observe == "contours"  # nobody wears the markers
+        nowhere = [] if bare else no_marker_advice(facts, running)
         marker_ids = self.rig.markers.ids
-        found = [advice for one in facts for advice in node_advice(one, marker_ids, running, sight=not nowhere)]
+        visibility = not (nowhere or bare)
+        found = [advice for one in facts for advice in node_advice(one, marker_ids, running, visibility=visibility)]
         if running:
             self.rig_watch.take(self._pipeline.recent)
             stale = self.rig_watch.advice(now_ns)

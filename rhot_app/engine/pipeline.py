@@ -25,7 +25,7 @@ from rhot_app.project import OTHER_HAND, Rig, RigNode
 from rhot_app.sources.source import ObservationSource
 from rhot_app.state import LATENCY_STAGES, HandState
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.marker_model import points_on
+from rhot_app.tracking.markers.marker_model import points_on
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, ImageTracking, Tracker, feed, may_be_due
 from rhot_node.wire.codec import decode as decode_datagram
 from rhot_node.wire.codec import encode as encode_datagram

@@ -14,8 +14,15 @@ import msgspec
 
 from rhot_app.engine.status import Advice
 from rhot_app.project import Rig
-from rhot_app.tracking.refined_rig import Refinement, figure_rows, refined_rig, stale_sentence, usable, verdict_of
-from rhot_app.tracking.rig_refinement import Gathered, RigRefiner
+from rhot_app.tracking.refinement.refined_rig import (
+    Refinement,
+    figure_rows,
+    refined_rig,
+    stale_sentence,
+    usable,
+    verdict_of,
+)
+from rhot_app.tracking.refinement.rig_refinement import Gathered, RigRefiner
 from rhot_app.tracking.tracker import CameraObservations
 
 JUDGE_NS = 10_000_000_000

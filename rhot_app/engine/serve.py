@@ -20,7 +20,7 @@ from rhot_app.engine.directory import EngineDirectory, EngineLock, open_director
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.node_meter import most_urgent_first
 from rhot_app.engine.output_process import OutputProcess
-from rhot_app.engine.status import TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, encode
+from rhot_app.engine.status import TOPIC_CONTOUR, TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, encode
 from rhot_app.errors import EngineError
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.sources.receiver import share_interpreter
@@ -153,6 +153,9 @@ class Server:
             self._send(client, *node_answer)
         for preview in self._nodes.previews():
             self._publish(TOPIC_PREVIEW, encode(preview))
+        if self._nodes.previewing:
+            for contour in self._engine.contours():
+                self._publish(TOPIC_CONTOUR, encode(contour))
         now_ns = time.monotonic_ns()
         if now_ns >= self._status_due_ns:
             self._status_due_ns = now_ns + STATUS_NS

@@ -10,7 +10,7 @@ import numpy as np
 
 from rhot_app.errors import EngineError
 from rhot_app.outputs.spec import OutputStatus
-from rhot_app.state import HandState
+from rhot_app.state import HandState, SeenContour
 
 Level = Literal["info", "warning", "error"]
 NodeWord = Literal["silent", "starting", "ready", "streaming", "fault"]
@@ -95,8 +95,9 @@ class Preview:
 TOPIC_STATE = b"state"
 TOPIC_STATUS = b"status"
 TOPIC_PREVIEW = b"preview"
+TOPIC_CONTOUR = b"contour"
 
-Published = HandState | EngineStatus | Preview
+Published = HandState | EngineStatus | Preview | SeenContour
 
 
 def _encode_array(value: Any) -> Any:
@@ -118,6 +119,7 @@ _decoders: dict[bytes, msgspec.msgpack.Decoder[Any]] = {
     TOPIC_STATE: msgspec.msgpack.Decoder(HandState, dec_hook=_decode_array),
     TOPIC_STATUS: msgspec.msgpack.Decoder(EngineStatus),
     TOPIC_PREVIEW: msgspec.msgpack.Decoder(Preview),
+    TOPIC_CONTOUR: msgspec.msgpack.Decoder(SeenContour, dec_hook=_decode_array),
 }
 
 

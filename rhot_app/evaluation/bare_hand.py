@@ -60,7 +60,7 @@ START_SD: Final = (0.015, 0.2, 0.2)
 _OLD_NS = 1_000_000  # a state that is older than its newest picture by more says nothing of it
 
 
-class BareHandTracker(Protocol):
+class EvaluatedTracker(Protocol):
     """What is evaluated. One may also have ``start(pose, t_ns)``, for cases that give it a pose to begin with."""
 
     def step(self, images: Sequence[Picture | None], t_ns: Sequence[int]) -> HandState:
@@ -84,7 +84,7 @@ class Case:
     known_size: bool = True
 
 
-MakeTracker = Callable[[Rig, Case], BareHandTracker]
+MakeTracker = Callable[[Rig, Case], EvaluatedTracker]
 """Makes a tracker for a rig, and for what a user would tell it of a case; never for what was drawn from the seed."""
 
 _MISMATCH = BareHandOptions(length_sd=0.05, radius_sd=0.08, background="skin", sleeve=False, turn_deg=25.0,
@@ -104,7 +104,7 @@ CASES: Final = (
 
 
 @dataclass(frozen=True)
-class BareHandRun:
+class EvaluatedRun:
     """One seed of a case, by frame (F,): `joint_m` mean joint error, `angle_rad` mean angle error, `image_px` mean
     joint error in the first camera's picture, `within` share of joints within three sigma; NaN where there is no
     state. `step_s` (F,): time that a step took. `followed` (F,): a state that is not confused. `judged` (F,).
@@ -133,7 +133,7 @@ def filmed(case: Case, seed: int, seconds: float, kept_in: Path | None) -> BareH
 
 
 def run_case(case: Case, make: MakeTracker, seeds: Iterable[int], seconds: float, kept_in: Path | None = None,
-             progress: Progress = silent) -> list[BareHandRun]:
+             progress: Progress = silent) -> list[EvaluatedRun]:
     """A tracker through every seed of a case. Raises SimulatorError."""
     chosen = list(seeds)
     runs = []
@@ -143,7 +143,7 @@ def run_case(case: Case, make: MakeTracker, seeds: Iterable[int], seconds: float
     return runs
 
 
-def run_sequence(case: Case, sequence: BareHandSequence, make: MakeTracker) -> BareHandRun:
+def run_sequence(case: Case, sequence: BareHandSequence, make: MakeTracker) -> EvaluatedRun:
     """A tracker through one sequence."""
     given = msgspec.structs.replace(sequence.tracker_rig, nodes=sequence.tracker_rig.nodes[:case.cameras])
     tracker = make(given, case)
@@ -168,7 +168,7 @@ class _Startable(Protocol):
     def start(self, pose: HandPose, t_ns: int) -> None: ...
 
 
-def _stepped(tracker: BareHandTracker, images: Sequence[Picture | None], t_ns: Sequence[int]) -> HandState | None:
+def _stepped(tracker: EvaluatedTracker, images: Sequence[Picture | None], t_ns: Sequence[int]) -> HandState | None:
     """The state of the newest picture; None while there is no hand, or nothing new of it."""
     try:
         state = tracker.step(images, t_ns)
@@ -191,7 +191,7 @@ def _start(case: Case, seed: int, frame: BareHandFrame) -> HandPose:
 
 
 def _judged(case: Case, sequence: BareHandSequence, frames: Sequence[BareHandFrame],
-            states: Sequence[HandState | None], step_s: Array) -> BareHandRun:
+            states: Sequence[HandState | None], step_s: Array) -> EvaluatedRun:
     camera = CameraModel.from_rig(sequence.rig.nodes[0].intrinsics, sequence.rig.nodes[0].pose)
     figures = np.full((len(frames), 4), np.nan)
     for k, state in enumerate(states):
@@ -211,8 +211,8 @@ def _judged(case: Case, sequence: BareHandSequence, frames: Sequence[BareHandFra
     judged_s = LOSS_S[0] if case.lost else good_s + SETTLE_S
     judged = in_view & (times_s >= (judged_s if np.isfinite(judged_s) else begin_s + SETTLE_S))
     joint_m, angle_rad, image_px, consistent = figures.T
-    return BareHandRun(sequence.seed, sequence.motion, joint_m, angle_rad, image_px, consistent, step_s, followed,
-                       judged, good_s - begin_s)
+    return EvaluatedRun(sequence.seed, sequence.motion, joint_m, angle_rad, image_px, consistent, step_s, followed,
+                        judged, good_s - begin_s)
 
 
 def _within(error: Array, covariances: Array) -> float:
@@ -239,7 +239,7 @@ def _first(times_s: Array, true: NDArray[np.bool_]) -> float:
 Figures = dict[str, float | None]
 
 
-def figures_of(runs: Sequence[BareHandRun]) -> Figures:
+def figures_of(runs: Sequence[EvaluatedRun]) -> Figures:
     """Over all judged frames of all seeds; the worst seed is that of the largest mean. Lost frames are those without a
     state, or with a confused one. Keys end in their unit; None where there is nothing to say."""
     figures: Figures = {}
@@ -275,7 +275,7 @@ def _p95(values: Array) -> float:
 
 def evaluate_bare_hand(make: MakeTracker, seeds: Iterable[int], seconds: float, kept_in: Path | None,
                        cases: Sequence[Case] = CASES, progress: Progress = silent
-                       ) -> Iterator[tuple[Case, list[BareHandRun]]]:
+                       ) -> Iterator[tuple[Case, list[EvaluatedRun]]]:
     """Case by case, all seeds of it. A first sequence is run before anything is timed, so that all is compiled."""
     chosen = list(seeds)
     for case in (cases[0], *cases):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from rhot_app.evaluation.bare_hand import BareHandRun, Case, Figures, figures_of
+from rhot_app.evaluation.bare_hand import Case, EvaluatedRun, Figures, figures_of
 from rhot_app.evaluation.compare import cell
 
 
@@ -48,7 +48,7 @@ Over all judged frames of all seeds; worst: the seed with the largest mean.
   Hz, p99         steps of the tracker on this machine, one process"""
 
 
-def bare_hand_table(found: Sequence[tuple[Case, Sequence[BareHandRun]]]) -> str:
+def bare_hand_table(found: Sequence[tuple[Case, Sequence[EvaluatedRun]]]) -> str:
     """One line per case, what the columns mean, and the published figures."""
     margin = max(len(case.name) for case, _ in found) + 1
     lines = [" " * margin + "".join(name.center(count * _WIDTH) for name, count in _GROUPS).rstrip(),
@@ -66,9 +66,9 @@ def published_lines() -> list[str]:
             *(f"  {one.tracker:<26}{one.quantity:<20}{one.value:g} {one.unit}" for one in PUBLISHED)]
 
 
-def bare_hand_fields(found: Sequence[tuple[Case, Sequence[BareHandRun]]], seconds: float) -> dict[str, object]:
+def bare_hand_fields(found: Sequence[tuple[Case, Sequence[EvaluatedRun]]], seconds: float) -> dict[str, object]:
     """For JSON: each case's figures, those of each of its seeds, and the published ones."""
-    def of_run(run: BareHandRun) -> dict[str, object]:
+    def of_run(run: EvaluatedRun) -> dict[str, object]:
         figures: Figures = figures_of([run])
         return {"seed": run.seed, "motion": run.motion, **figures}
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import replay_states
 from rhot_app.errors import SimulatorError
 from rhot_app.evaluation import fault_injection
 from rhot_app.evaluation.accuracy import Deviations, Figures, WornMarkers, axes_within, deviations, distances, worn_by

@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import replay_states
 from rhot_app.errors import SimulatorError
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.recording.raw_log import Record, RecordKind

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -14,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.overlay import overlay
-from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import ExportError, RecordingError
 from rhot_app.export.export import check_place, format_of, make_writer, whole_file
 from rhot_app.export.pictures import check_pictures, whole_pictures
@@ -24,24 +23,13 @@ from rhot_app.export.states import BLOCK, states_of
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.sources.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
-from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
-from rhot_node.detect.foreground import Foreground, foreground_map, learn_background, learn_skin, skin_foreground
+from rhot_app.state import HandState
+from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
 Image = NDArray[np.uint8]
-Points = NDArray[np.float64]
 
 BACKGROUND_PICTURES: Final = 16
 """Pictures of each camera from which its background is learnt: a pixel's noise is then known to 1/sqrt(2 n), 18 %."""
-
-MOST: Final = 0.5
-"""Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
-
-CONFUSED_M: Final = 0.02
-"""Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
-apart in the hand files."""
-
-FASTEST_M_S: Final = 4.0
-"""m/s: twice the speed of the fastest motion in `resources/motions`. Chosen, not measured."""
 
 TABLES: Final = ("csv", "parquet", "npz")
 _TEXT_RGB: Final = (255, 255, 255)
@@ -87,107 +75,6 @@ def learn_backgrounds(videos: Sequence[CameraVideo], seconds: float | None = Non
     return learnt
 
 
-class BareHandRun:
-    """Tracks through frame sets; looks for the hand while there is none, and says so in the states."""
-
-    def __init__(self, rig: Rig, foreground: Sequence[Foreground] | None, *, known_size: bool,
-                 empty_until_ns: int) -> None:
-        """`foreground`: of each camera; None: the colours of skin are learnt while the hand is looked for.
-        `empty_until_ns`: no hand is looked for before."""
-        self.tracker = BareHandTracker(rig, known_size=known_size, foreground=foreground)
-        self.starts = 0
-        self.step_s: list[float] = []
-        self._skin, self._empty_until_ns = foreground is None, empty_until_ns
-        self._names = tuple(node.name for node in rig.nodes)
-        self._following = False
-        self._proposed: tuple[int, Points] | None = None
-        self._count = 0
-
-    def step(self, frames: FrameSet) -> HandState:
-        """The state after one frame set. LOST or SEARCHING, without numbers, where no hand is found."""
-        begun = time.perf_counter()
-        following = self._following
-        if not following and not self._found(frames):
-            self._proposed = None
-            return self._none(frames, begun)
-        state = self.tracker.step(frames.images, frames.t_ns)
-        good = state.tracked and self._supported(frames) and self._on_foreground(frames, state, whole=not following)
-        self._following = good and (following or self._confirmed(state))
-        if not self._following:
-            return self._none(frames, begun)
-        if following:
-            self.step_s.append(time.perf_counter() - begun)
-        else:
-            self.starts += 1
-            self._proposed = None
-        self._count += 1
-        return replace(state, sequence=self._count - 1)
-
-    @property
-    def following(self) -> bool:
-        """Whether the newest state has a hand."""
-        return self._following
-
-    def _found(self, frames: FrameSet) -> bool:
-        whole = all(image is not None for image in frames.images)
-        if not whole or frames.first_ns < self._empty_until_ns:
-            return False
-        if self._skin:
-            self.tracker.foreground = [learn_skin(image) for image in frames.images if image is not None]
-        return self.tracker.find(frames.images, frames.first_ns)
-
-    def _supported(self, frames: FrameSet) -> bool:
-        """Whether the cameras of this set find the contour that the hand should have."""
-        seen = np.sum([self.tracker.fit.seen[c].sum(axis=0) for c, image in enumerate(frames.images)
-                       if image is not None], axis=0)
-        return bool(seen[0] > MOST * seen[1])
-
-    def _on_foreground(self, frames: FrameSet, state: HandState, *, whole: bool) -> bool:
-        """Whether most joints lie on foreground in every camera that shows most of them, of which there must be one;
-        `whole`: every camera must show most of them."""
-        shown = []
-        for camera, image, known in zip(self.tracker.cameras, frames.images, self.tracker.foreground, strict=True):
-            if image is None:
-                continue
-            places = camera.project(state.joint_positions)
-            inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
-            columns, rows = np.round(places[inside]).astype(int).T
-            shown.append(bool(np.mean(inside) > MOST))
-            if shown[-1] and np.mean(foreground_map(image, known, 1)[rows, columns] > 0.5) <= MOST:
-                return False
-        return all(shown) if whole else any(shown)
-
-    def _confirmed(self, state: HandState) -> bool:
-        """Whether the hand that was found in the frame set before is the same one. Finding is a random search: two of
-        them agree by chance on a wrong hand less probably than one is wrong."""
-        before, self._proposed = self._proposed, (state.t_master_ns, state.joint_positions)
-        if before is None:
-            return False
-        centre, earlier = state.joint_positions.mean(axis=0), before[1].mean(axis=0)
-        pace = float(np.linalg.norm(centre - earlier)) / max(1e-9 * (state.t_master_ns - before[0]), 1e-3)
-        shape = np.linalg.norm((state.joint_positions - centre) - (before[1] - earlier), axis=1)
-        return pace < FASTEST_M_S and float(np.mean(shape)) < CONFUSED_M
-
-    def _none(self, frames: FrameSet, begun: float) -> HandState:
-        self._count += 1
-        return no_hand(self._count - 1, frames.first_ns, Condition.LOST if self.starts else Condition.SEARCHING,
-                       self._names, time.perf_counter() - begun)
-
-
-def no_hand(sequence: int, t_ns: int, condition: Condition, cameras: tuple[str, ...], filter_s: float) -> HandState:
-    """A state without markers that says nothing of a hand."""
-    unknown, nothing = int(Knowledge.UNKNOWN), np.empty((0, 3))
-    return HandState(
-        sequence=sequence, t_master_ns=t_ns, t_receive_ns=t_ns, condition=condition, marker_ids=(),
-        marker_positions=nothing, marker_raw_positions=nothing, marker_covariances=np.empty((0, 3, 3)),
-        marker_knowledge=np.empty(0, np.uint8), camera_names=cameras, camera_pixels=np.empty((len(cameras), 0, 2)),
-        camera_flags=np.empty((len(cameras), 0), np.uint16), joint_positions=np.full((21, 3), np.nan),
-        joint_knowledge=np.full(21, unknown, np.uint8), fingertip_positions=np.full((5, 3), np.nan),
-        angles=np.full(21, np.nan), angle_knowledge=np.full(21, unknown, np.uint8),
-        world_from_palm=np.full((4, 4), np.nan), palm_knowledge=Knowledge.UNKNOWN, epipolar_error_px=np.empty(0),
-        **UNESTIMATED | {"hand_scale": np.nan}, latency_s={"filter": filter_s})
-
-
 # -- The whole run ----------------------------------------------------------------------------------------------------
 
 def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[Foreground] | None, *,
@@ -205,8 +92,8 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
         if pictures is not None:
             check_pictures(video.path, pictures, again)
     first, last = overlap(videos)
-    run = BareHandRun(rig, foreground, known_size=known_size,
-                      empty_until_ns=first + round(1e9 * empty_s) if empty_s else first)
+    run = HandFollower(rig, foreground, known_size=known_size,
+                       empty_until_ns=first + round(1e9 * empty_s) if empty_s else first)
     spent: list[tuple[int, bool]] = []
     with contextlib.ExitStack() as stack:
         table = stack.enter_context(_table(rig, videos[0].path.name, out)) if out is not None else None
@@ -214,7 +101,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
         drawn = stack.enter_context(whole_pictures(pictures, fps)) if pictures is not None else None
         for frames in frame_sets(videos):
             progress("tracking", min(max((frames.first_ns - first) / max(last - first, 1), 0.0), 1.0))
-            state = run.step(frames)
+            state = run.step(frames.images, frames.t_ns)
             spent.append((state.t_master_ns, state.tracked))
             if table is not None:
                 table.add(state)
@@ -294,7 +181,7 @@ def _table(rig: Rig, name: str, out: Path) -> Iterator[_Table]:
         yield table
 
 
-def side_by_side(run: BareHandRun, frames: FrameSet, state: HandState) -> Image:
+def side_by_side(run: HandFollower, frames: FrameSet, state: HandState) -> Image:
     """All cameras' pictures (H, W, 3) RGB of a frame set beside each other, with the hand's contour, slices and
     skeleton, and the state's condition. A camera without picture is black."""
     tracker, shown = run.tracker, []

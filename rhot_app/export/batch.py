@@ -40,7 +40,7 @@ Status = Literal["done", "losses", "failed", "interrupted"]
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class BatchJob:
     """One log and the file that comes of it: an export in `format`, or with None a summary of what the tracker makes of
     the log. `rig`: another rig file than the log's own."""
 
@@ -69,7 +69,7 @@ Ends = Generator[JobOutcome, None, None]
 
 
 def jobs_of(logs: Sequence[Path], folder: Path, format_name: str | None, rig: Path | None,
-            options: ExportOptions) -> list[Job]:
+            options: ExportOptions) -> list[BatchJob]:
     """The jobs of some logs, each named after its log. Raises ExportError when two would have the same name."""
     ending = ".json" if format_name in (None, CERTIFICATE) else FORMATS[str(format_name)].endings[0]
     named: dict[str, Path] = {}
@@ -84,10 +84,11 @@ def jobs_of(logs: Sequence[Path], folder: Path, format_name: str | None, rig: Pa
         if log == folder.absolute() / f"{stem}{ending}":
             raise ExportError(f"{log} is a recording, which is never written over; choose another --out.")
     rig = None if rig is None else rig.absolute()
-    return [Job(log, folder.absolute() / f"{stem}{ending}", format_name, rig, options) for stem, log in named.items()]
+    return [BatchJob(log, folder.absolute() / f"{stem}{ending}", format_name, rig, options)
+            for stem, log in named.items()]
 
 
-def run_job(job: Job) -> JobOutcome:
+def run_job(job: BatchJob) -> JobOutcome:
     """Do one job; whatever goes wrong is in the outcome."""
     begun = time.monotonic()
     try:
@@ -108,7 +109,7 @@ def run_job(job: Job) -> JobOutcome:
         return JobOutcome(job.log, job.out, "failed", 0, time.monotonic() - begun, f"{type(exc).__name__}: {exc}")
 
 
-def _summarise(job: Job) -> tuple[int, tuple[str, ...]]:
+def _summarise(job: BatchJob) -> tuple[int, tuple[str, ...]]:
     """Write what the tracker makes of a log as one JSON object; every key ends in its unit."""
     sums = _Sums()
     with TrackedLog(job.log, job.rig, job.options.tracker, smooth=job.options.smooth) as tracked:
@@ -123,7 +124,7 @@ def _summarise(job: Job) -> tuple[int, tuple[str, ...]]:
         return tracked.count, tuple(tracked.losses)
 
 
-def _certify(job: Job) -> tuple[int, tuple[str, ...]]:
+def _certify(job: BatchJob) -> tuple[int, tuple[str, ...]]:
     """Write the certificate of a folder of recordings: JSON, and HTML and PDF beside it. Without a rig it is that of
     the first log. Returns how many lines were judged."""
     from rhot_app.certificate.certify import certify, rig_of
@@ -175,9 +176,9 @@ class _Sums:
                 "markers": markers}
 
 
-def run_batch(jobs: Sequence[Job], folder: Path, *, workers: int = 1, scheduler: str | None = None, again: bool = False,
-              report: Report = lambda outcome: None) -> list[JobOutcome]:
-    """Do all jobs and return what came of them, in their order; `told` is called with each as it ends.
+def run_batch(jobs: Sequence[BatchJob], folder: Path, *, workers: int = 1, scheduler: str | None = None,
+              again: bool = False, report: Report = lambda outcome: None) -> list[JobOutcome]:
+    """Do all jobs and return what came of them, in their order; `report` is called with each as it ends.
 
     `workers` processes here (1: this one), or those of a Dask cluster whose `scheduler` has this address and whose
     workers see the same files. Raises ExportError when the folder or the cluster cannot be used.
@@ -214,7 +215,7 @@ class Manifest:
         with contextlib.suppress(OSError, ValueError, AttributeError):  # a broken list: everything is done again
             self._done = dict(json.loads(self._path.read_text()).get("done", {}))
 
-    def order(self, job: Job) -> dict[str, Any] | None:
+    def order(self, job: BatchJob) -> dict[str, Any] | None:
         """What decides about a job's result; None when its log is not to be had."""
         try:
             files = sorted(job.log.iterdir()) if job.log.is_dir() else [job.log]
@@ -226,7 +227,7 @@ class Manifest:
                 "mtime_ns": max((log.st_mtime_ns for log in logs), default=0),
                 "order": hashlib.sha256(how).hexdigest()}
 
-    def unchanged(self, job: Job) -> JobOutcome | None:
+    def unchanged(self, job: BatchJob) -> JobOutcome | None:
         """What came of the same job before, if its file is still there."""
         before = self._done.get(job.out.name)
         order = self.order(job)
@@ -237,7 +238,7 @@ class Manifest:
         return JobOutcome(job.log, job.out, "losses" if before.get("message") else "done", int(before.get("states", 0)),
                           0.0, str(before.get("message", "")), unchanged=True)
 
-    def note(self, job: Job, order: dict[str, Any] | None, outcome: JobOutcome) -> None:
+    def note(self, job: BatchJob, order: dict[str, Any] | None, outcome: JobOutcome) -> None:
         """Remember a job that was done; `order` as it was before."""
         if outcome.status not in ("done", "losses") or order is None:
             return
@@ -249,7 +250,7 @@ class Manifest:
             raise ExportError(f"{self._path}: cannot be written ({exc.strerror}).") from exc
 
 
-def _in_order(jobs: Sequence[Job]) -> Ends:
+def _in_order(jobs: Sequence[BatchJob]) -> Ends:
     """One after the other, by this process. An interrupted job is the last one."""
     for job in jobs:
         outcome = run_job(job)
@@ -258,7 +259,7 @@ def _in_order(jobs: Sequence[Job]) -> Ends:
             raise KeyboardInterrupt
 
 
-def _here(jobs: Sequence[Job], workers: int) -> Ends:
+def _here(jobs: Sequence[BatchJob], workers: int) -> Ends:
     """By processes of this computer. After one died, those that were not done are tried alone, to tell who kills it."""
     done: set[Path] = set()
     try:
@@ -274,7 +275,7 @@ def _here(jobs: Sequence[Job], workers: int) -> Ends:
                     yield JobOutcome(job.log, job.out, "failed", message="its process died; is there enough memory?")
 
 
-def _by_pool(jobs: Sequence[Job], workers: int) -> Ends:
+def _by_pool(jobs: Sequence[BatchJob], workers: int) -> Ends:
     """Raises BrokenProcessPool when a process dies."""
     if not jobs:
         return
@@ -300,7 +301,7 @@ def _deaf_to_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _interruptible(job: Job) -> JobOutcome:
+def _interruptible(job: BatchJob) -> JobOutcome:
     """A job in a worker: an interrupt ends it, and it leaves nothing behind."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
@@ -309,7 +310,7 @@ def _interruptible(job: Job) -> JobOutcome:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _on_cluster(jobs: Sequence[Job], scheduler: str) -> Ends:
+def _on_cluster(jobs: Sequence[BatchJob], scheduler: str) -> Ends:
     """By the workers of a Dask cluster."""
     distributed = require("distributed", "a batch on a cluster", "cluster")
     try:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
 
 if TYPE_CHECKING:
-    from rhot_app.export.batch import Job, JobOutcome
+    from rhot_app.export.batch import BatchJob, JobOutcome
 
 FAILED = 2
 
@@ -92,7 +92,7 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _compile(jobs: list[Job]) -> None:
+def _compile(jobs: list[BatchJob]) -> None:
     """Compile what is not compiled yet, once, before several processes would do so side by side."""
     from rhot_app.engine.pipeline import warm_up
     from rhot_app.errors import RhotError

@@ -11,7 +11,7 @@ import numpy as np
 
 from rhot_app.barehand.observations import ImageFrame, SliceRequest
 from rhot_app.calibration.recorded_observations import why_none
-from rhot_app.engine.replay_summary import replay_states, smoothed_states
+from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
 from rhot_app.errors import ExportError, RecordingError, take_losses
 from rhot_app.export.states import HandStates, in_blocks
 from rhot_app.objects.observations import ObjectFrame

@@ -5,7 +5,7 @@ the joint's centre of the kinematic hand, in all cameras alike. Each camera's de
 while. Each frame has an error that is common to all its landmarks, and each landmark an error of its own. A detector
 errs in proportion to the hand's size in the image, so all these are lengths at the hand, per axis.
 
-`python benchmarks/landmarks.py` measures them on a recorded hand.
+`python benchmarks/landmarks.py` measures them on a recorded hand. `landmark_set` makes the markers of a detector.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ COMMON_M = 1e-3
 NOISE_M = 1.3e-3
 """m: standard deviation of a landmark's own error in a frame, beside what its detector states."""
 
+
+# -- the master's part of a model card (docs/landmarks.md) -------------------------------------------------------------
 
 def landmark_set(card: Path) -> MarkerSet:
     """The landmarks of a card's network as a marker set, in the order of its points.

@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import replay_states
 from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
 from rhot_app.evaluation.track import Timed
 from rhot_app.hand.skeleton import TIP_ROLES
@@ -87,7 +87,7 @@ class MouseRun:
 def play(script: Script, seed: int, *, settings: MouseSettings | None = None, pictures: bool = False,
          sway: Sway | None = None, covered_s: float = math.inf, told: Watch = lambda title: None) -> MouseRun:
     """Play a script to the twin and its states to the mouse. `pictures`: render and detect; else the observations are
-    made without pictures (`rhot_app.simulator.truth.ideal_observations`). From `covered_s` on the second camera is
+    made without pictures (`rhot_app.simulator.film.ideal_observations`). From `covered_s` on the second camera is
     silent. Raises RhotError."""
     settings, scene = settings or MouseSettings(), make_scene(twin_defaults(), seed)
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name:
@@ -156,23 +156,23 @@ def coupling(seed: int, **how: Any) -> list[Figures]:
     axis, mm."""
     script = Script()
     script.move((0.0, 0.0, 0.08), 0.5)
-    spans = []
+    phases = []
     for name, away in (("right", (0.12, 0.0, 0.08)), ("forward", (0.0, 0.12, 0.08)), ("height", (0.0, 0.0, 0.18))):
         script.wait(0.4)
         begin_s = script.end_s
         script.move(away, 0.6)
         script.move((0.0, 0.0, 0.08), 0.6)
-        spans.append((name, begin_s, script.end_s))
+        phases.append((name, begin_s, script.end_s))
     for button in ("thumb", "little"):
         script.wait(0.4)
         begin_s = script.end_s
         script.click(button, 0.3)
         script.wait(0.2)
-        spans.append((button, begin_s, script.end_s))
+        phases.append((button, begin_s, script.end_s))
     run = play(script, seed, **how)
     off = run.cursor - run.true_cursor
     figures = []
-    for name, begin_s, end_s in spans:
+    for name, begin_s, end_s in phases:
         inside = run.during(begin_s, end_s)
         strays = off[inside] - off[inside][0]
         figures.append({"moved": name, "rms": _axes(np.sqrt(np.square(strays).mean(axis=0))),

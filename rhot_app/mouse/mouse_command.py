@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,12 +26,15 @@ PATIENCE_S = 5.0
 LINE_S = 0.1
 """Between lines for people."""
 
+AGES = 10_000
+"""So many states, the last ones, are in the ages that are printed at the end: a minute and a half at 120 states/s."""
+
 PLACES = 20
 MOTION = "mouse"
 """Of resources/motions; the hand carries the balls of the app's page about."""
 
-TRACKED_S = 60.0
-"""The first start of all compiles the numerical code."""
+TRACKED_S = 360.0
+"""The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -116,8 +120,10 @@ class _Outputs:
 
     def __init__(self, args: argparse.Namespace, stack: contextlib.ExitStack) -> None:
         """Raises OutputError."""
-        self._json, self._next_s = args.json, 0.0
-        self._ages_ms: list[float] = []
+        from rhot_app.outputs.joints import LIVE_S
+
+        self._json, self._next_s, self._live_ms = args.json, 0.0, 1e3 * LIVE_S
+        self._ages_ms: deque[float] = deque(maxlen=AGES)
         self._pointer = self._osc = None
         if args.pointer:
             from rhot_app.mouse.system_pointer import SystemPointer
@@ -133,7 +139,8 @@ class _Outputs:
     def write(self, mouse: MouseState) -> None:
         """Give one state to all of them."""
         age_ms = 1e-6 * (time.monotonic_ns() - mouse.t_master_ns)
-        self._ages_ms.append(age_ms)
+        live = 0.0 <= age_ms < self._live_ms  # else it is of a replayed log
+        self._ages_ms.extend([age_ms] if live else [])
         if self._osc is not None:
             from rhot_app.outputs.osc import bundles, mouse_messages
 
@@ -142,9 +149,10 @@ class _Outputs:
         if self._pointer is not None:
             self._pointer.write(mouse)
         if self._json:
+            cursor = None if mouse.cursor is None else [round(float(value), 5) for value in mouse.cursor]
             print(json.dumps({"t_master_ns": mouse.t_master_ns, "condition": mouse.condition.value,
-                              "cursor_m": None if mouse.cursor is None else [round(float(v), 5) for v in mouse.cursor],
-                              "pressed": sorted(mouse.pressed), "age_ms": round(age_ms, 2), "needs": mouse.needs}),
+                              "cursor_m": cursor, "pressed": sorted(mouse.pressed),
+                              "age_ms": round(age_ms, 2) if live else None, "needs": mouse.needs}),
                   flush=True)
         elif time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + LINE_S
@@ -156,8 +164,8 @@ class _Outputs:
             import numpy as np
 
             p50, p99 = np.percentile(self._ages_ms, [50, 99])
-            print(f"rhot: {len(self._ages_ms)} states; from the hand to the cursor {p50:.0f} ms (p50), {p99:.0f} ms "
-                  "(p99).", file=sys.stderr)
+            print(f"rhot: the last {len(self._ages_ms)} states: from the hand to the cursor {p50:.0f} ms (p50), "
+                  f"{p99:.0f} ms (p99).", file=sys.stderr)
 
 
 def line_of(mouse: MouseState) -> str:

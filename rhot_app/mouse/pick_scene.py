@@ -31,7 +31,7 @@ class Ball:
         return replace(self, centre=(self.centre[0], self.centre[1], self.radius_m))
 
 
-START: Final = (Ball("red ball", (-0.12, 0.06, 0.03), 0.03, (213, 94, 0)),
+START: Final = (Ball("orange ball", (-0.12, 0.06, 0.03), 0.03, (213, 94, 0)),
                 Ball("blue ball", (0.12, 0.1, 0.025), 0.025, (0, 114, 178)),
                 Ball("green ball", (0.06, -0.09, 0.035), 0.035, (0, 158, 115)))
 """Colours that people with any colour vision tell apart (Okabe and Ito 2008)."""

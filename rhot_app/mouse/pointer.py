@@ -64,13 +64,15 @@ class MouseSettings:
 
 @dataclass(frozen=True, slots=True)
 class MouseState:
-    """One instant. `cursor` (3,) m; None before the place of rest is known. `needs`: sentences on what is missing."""
+    """One instant. `cursor` (3,) m; None before the place of rest is known. `needs`: sentences on what is missing.
+    `observed`: whether all of the cursor follows the hand at this instant."""
 
     t_master_ns: int
     condition: Condition
     cursor: Array | None
     pressed: frozenset[str]  # of BUTTONS
     needs: tuple[str, ...] = ()
+    observed: bool = False
 
     def is_pressed(self, button: str) -> bool:
         """Whether a button is held."""
@@ -126,11 +128,12 @@ class Mouse:
         clicks, home = self._click(state), self._palm.mean
         if home is None:
             return self._state(state, "Hold the hand still for half a second: that becomes the cursor's origin.")
-        return self._state(state, *self._move(state, home[:3, 3], cursor_axes(home, self._up)), *clicks)
+        needs = self._move(state, home[:3, 3], cursor_axes(home, self._up))
+        return self._state(state, *needs, *clicks, observed=not needs)
 
-    def _state(self, state: HandState, *needs: str) -> MouseState:
+    def _state(self, state: HandState, *needs: str, observed: bool = False) -> MouseState:
         cursor = None if self._palm.mean is None else np.array([*self._foot, self._height])
-        return MouseState(state.t_master_ns, state.condition, cursor, self._pressed, needs)
+        return MouseState(state.t_master_ns, state.condition, cursor, self._pressed, needs, observed)
 
     def _move(self, state: HandState, origin: Array, axes: Array) -> list[str]:
         """Move the cursor; what it needs and does not have."""
@@ -196,11 +199,11 @@ def finger_spread(state: HandState, button: str) -> tuple[float, float]:
     across = palm @ np.array([-way[1], way[0], 0.0]) / length**2
     variance = (across @ state.fingertip_covariances[finger] @ across
                 + palm[:, 2] @ state.palm_covariance[3:, 3:] @ palm[:, 2])
-    hand = 1.0 if palm_is_right(state) else -1.0
+    hand = 1.0 if _is_right(state) else -1.0
     return hand * _AWAY[button] * float(np.arctan2(way[1], way[0])), float(np.sqrt(max(np.nan_to_num(variance), 0.0)))
 
 
-def palm_is_right(state: HandState) -> bool:
+def _is_right(state: HandState) -> bool:
     """Whether the thumb's root lies on the side of +y, as on a right hand."""
     palm = state.world_from_palm
     return bool(palm[:3, 1] @ (state.joint_positions[_ROOT["thumb"]] - state.joint_positions[_ROOT["little"]]) > 0.0)

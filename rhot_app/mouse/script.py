@@ -53,7 +53,7 @@ _SPREADS: Final = {"thumb": ("thumb_cmc_flexion", -1.0), "little": ("little_mcp_
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class Waypoint:
     """Where the script wants the mouse at a time: `cursor` (3,) m, spread of each button 0..1, `turn_rad` about up."""
 
     t_s: float
@@ -68,12 +68,12 @@ class Script:
     def __init__(self, *, turn_deg: float = 0.0) -> None:
         """`turn_deg`: how the resting palm is turned on the table."""
         turn = float(np.radians(turn_deg))
-        self.moments = [Moment(0.0, turn_rad=turn), Moment(LEAD_S, turn_rad=turn)]
+        self.waypoints = [Waypoint(0.0, turn_rad=turn), Waypoint(LEAD_S, turn_rad=turn)]
 
     @property
     def end_s(self) -> float:
-        """Time of the last moment."""
-        return self.moments[-1].t_s
+        """Time of the last waypoint."""
+        return self.waypoints[-1].t_s
 
     def wait(self, seconds: float) -> None:
         """Do nothing for a while."""
@@ -85,7 +85,7 @@ class Script:
 
     def spread(self, button: str, *, out: bool) -> None:
         """Spread a finger, or let it return."""
-        spread = list(self.moments[-1].spread)
+        spread = list(self.waypoints[-1].spread)
         spread[BUTTONS.index(button)] = float(out)
         self._add(CLICK_S, spread=(spread[0], spread[1]))
 
@@ -97,13 +97,13 @@ class Script:
 
     def _add(self, seconds: float, *, cursor: tuple[float, float, float] | None = None,
              spread: tuple[float, float] | None = None) -> None:
-        last = self.moments[-1]
-        self.moments.append(Moment(last.t_s + seconds, cursor or last.cursor, spread or last.spread, last.turn_rad))
+        last = self.waypoints[-1]
+        self.waypoints.append(Waypoint(last.t_s + seconds, cursor or last.cursor, spread or last.spread, last.turn_rad))
 
     def sample(self, times_s: Array) -> Array:
         """(N, 6): cursor, spreads and turn at times (N,), by ways of minimum jerk."""
-        rows = np.array([[*moment.cursor, *moment.spread, moment.turn_rad] for moment in self.moments])
-        ends = np.array([moment.t_s for moment in self.moments])
+        rows = np.array([[*point.cursor, *point.spread, point.turn_rad] for point in self.waypoints])
+        ends = np.array([point.t_s for point in self.waypoints])
         after = np.clip(np.searchsorted(ends, times_s, side="right"), 1, len(ends) - 1)
         part = np.clip((times_s - ends[after - 1]) / (ends[after] - ends[after - 1]), 0.0, 1.0)
         part = part**3 * (10.0 - 15.0 * part + 6.0 * part**2)

@@ -35,7 +35,7 @@ class FiducialFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectPose:
+class MeasuredPose:
     """A pose of the object `name` in the rig frame, `world_from_object` (4, 4) m, that another tracker measured at
     master time `t_ns`. `covariance` (6, 6) m^2 and rad^2: translation, then rotation about its origin, world axes."""
 
@@ -45,7 +45,7 @@ class ObjectPose:
     covariance: Array
 
 
-ObjectFrame = FiducialFrame | ObjectPose
+ObjectFrame = FiducialFrame | MeasuredPose
 """What is observed of objects beside the markers: tags of one frame, or one pose."""
 
 

@@ -7,19 +7,19 @@ import struct
 import numpy as np
 
 from rhot_app.errors import RecordingError
-from rhot_app.objects.observations import ObjectPose
+from rhot_app.objects.observations import MeasuredPose
 
 _HEAD = struct.Struct("<q12d21d")
 _UPPER = np.triu_indices(6)
 _ORTHONORMAL = 1e-6
 
 
-def encode_pose(pose: ObjectPose) -> bytes:
+def encode_pose(pose: MeasuredPose) -> bytes:
     """The record's data."""
     return _HEAD.pack(pose.t_ns, *pose.world_from_object[:3].ravel(), *pose.covariance[_UPPER]) + pose.name.encode()
 
 
-def decode_pose(data: bytes) -> ObjectPose:
+def decode_pose(data: bytes) -> MeasuredPose:
     """Raises RecordingError for what is no pose."""
     try:
         t_ns, *numbers = _HEAD.unpack_from(data)
@@ -34,4 +34,4 @@ def decode_pose(data: bytes) -> ObjectPose:
     if (not np.isfinite(numbers).all() or np.abs(rotation @ rotation.T - np.eye(3)).max() > _ORTHONORMAL
             or (np.linalg.eigvalsh(covariance) <= 0.0).any()):
         raise RecordingError("a record of an object's pose holds no pose.")
-    return ObjectPose(name, t_ns, world, covariance)
+    return MeasuredPose(name, t_ns, world, covariance)

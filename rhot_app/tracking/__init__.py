@@ -1,1 +1,1 @@
-"""From observations to a hand state: pairing in time, the trackers, and the state they produce."""
+"""From observations to hand states: pairing in time, association, and the trackers."""

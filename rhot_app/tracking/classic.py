@@ -23,7 +23,7 @@ from rhot_app.project import IkMethod, Rig
 from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking import locate, trust
 from rhot_app.tracking.association import MarkerAssociation
-from rhot_app.tracking.locate import Sheet
+from rhot_app.tracking.locate import LocateArrays
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
 from rhot_app.tracking.tracker import CameraObservations
@@ -103,10 +103,10 @@ class ClassicTracker:
         self._last_s = t_s
         return t_s
 
-    def _locate(self, t_s: float, paired: Paired, clock: _Stopwatch) -> Sheet:
+    def _locate(self, t_s: float, paired: Paired, clock: _Stopwatch) -> LocateArrays:
         """Raw positions decide which markers are accepted; their pixels are filtered and located again."""
         rig, shapes = self._rig, self._shapes()
-        markers = Sheet(len(rig.cameras), len(rig.marker_ids))
+        markers = LocateArrays(len(rig.cameras), len(rig.marker_ids))
         locate.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
                           rig.cameras, rig.focal, shapes, rig.law, rig.reach, self._memory, self._confirmed,
                           markers.used, markers.doubtful, markers.accepted, markers.restarted, markers.raw,
@@ -136,7 +136,7 @@ class ClassicTracker:
         locate.turn_band(pose.world_from_palm, band, self._turned_shapes[self._rig.wrist])
         return self._turned_shapes
 
-    def _solve_hand(self, t_s: float, markers: Sheet) -> SolvedHand:
+    def _solve_hand(self, t_s: float, markers: LocateArrays) -> SolvedHand:
         """Say how each marker is known, those out of sight too, and solve the hand that wears them."""
         rig = self._rig
         wrist, tips, tip_knowledge = np.empty(3), np.empty((5, 3)), np.empty(5, np.uint8)
@@ -155,7 +155,8 @@ class ClassicTracker:
             return Condition.LOST
         return Condition.TRACKING if self._all_measured else Condition.PARTIAL
 
-    def _state(self, t_s: float, paired: Paired, markers: Sheet, hand: SolvedHand, clock: _Stopwatch) -> HandState:
+    def _state(self, t_s: float, paired: Paired, markers: LocateArrays, hand: SolvedHand,
+               clock: _Stopwatch) -> HandState:
         pixels, flags = self._pairing.last_seen()
         self._sequence += 1
         completed = paired.completed_by

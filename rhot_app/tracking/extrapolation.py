@@ -19,7 +19,7 @@ from rhot_app.objects.motion import SIZE, TWIST, ObjectProcess, pose_of
 from rhot_app.objects.state import ObjectState
 from rhot_app.project import Rig
 from rhot_app.state import HandState
-from rhot_app.tracking.marker_model import compile_markers, scaled_table
+from rhot_app.tracking.markers.marker_model import compile_markers, scaled_table
 from rhot_app.tracking.rig_arrays import rigs_of_hands
 
 Array = NDArray[np.float64]

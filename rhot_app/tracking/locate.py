@@ -30,7 +30,7 @@ calibration has drifted: such a place is inferred, not measured."""
 GATE_SIGMAS = 6.0
 
 EXACT_PX2 = 1e-6
-"""Variance, per axis, of a sight that is said to be exact: to a thousandth of a pixel."""
+"""Variance, per axis, of an observation that is said to be exact: to a thousandth of a pixel."""
 
 
 @njit(cache=True)
@@ -38,7 +38,7 @@ def choose_views(flags: NDArray[np.int64], live: Mask, used: Mask, doubtful: Mas
     """Which cameras count for each marker: those that see it beyond doubt if these are two, else all that see it.
 
     `flags` (C, M) of the bracketing samples, -1 for none; `live` (C,). Fills `used` (C, M), and `doubtful` (M,):
-    whether a doubtful sight counts.
+    whether a doubtful observation counts.
     """
     for m in range(flags.shape[1]):
         clear = 0
@@ -131,8 +131,8 @@ Codes = NDArray[np.uint8]
 _MEASURED, _INFERRED, _UNKNOWN = int(Knowledge.MEASURED), int(Knowledge.INFERRED), int(Knowledge.UNKNOWN)
 
 
-class Sheet:
-    """Work sheet of one state: C cameras, M markers."""
+class LocateArrays:
+    """Arrays of one state: C cameras, M markers."""
 
     def __init__(self, cameras: int, markers: int) -> None:
         self.used = np.empty((cameras, markers), np.bool_)

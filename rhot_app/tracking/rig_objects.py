@@ -19,21 +19,21 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
 from rhot_app.objects.motion import TWIST, VELOCITY, pose_of
-from rhot_app.objects.observations import MarkerPoints, ObjectFrame, ObjectPose
+from rhot_app.objects.observations import MarkerPoints, MeasuredPose, ObjectFrame
 from rhot_app.objects.shape import shape_of
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
 from rhot_app.project import Rig
-from rhot_app.state import HandState, Knowledge
-from rhot_app.tracking.marker_model import scaled_table
-from rhot_app.tracking.tracker import CameraObservations, ImageTracking, Tracker
+from rhot_app.state import HandState, Knowledge, SeenContour
+from rhot_app.tracking.markers.marker_model import scaled_table
+from rhot_app.tracking.tracker import CameraObservations, ImageTracking, ShowsContours, Tracker
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_PER_SIGHT = ("pixels", "covariances", "diameters", "qualities", "flags")
+_PER_OBSERVATION = ("pixels", "covariances", "diameters", "qualities", "flags")
 _UNKNOWN: dict[str, Any] = {
     "marker_positions": np.nan, "marker_raw_positions": np.nan, "marker_covariances": np.nan,
     "marker_knowledge": int(Knowledge.UNKNOWN), "epipolar_error_px": np.nan}
@@ -64,7 +64,7 @@ class RigObjects:
 
     def ingest_objects(self, frame: ObjectFrame) -> None:
         """Take the tags of one frame, or a pose of another tracker, in."""
-        if isinstance(frame, ObjectPose):
+        if isinstance(frame, MeasuredPose):
             self._tracker.take_pose(frame.name, PoseMeasurement(frame.t_ns, frame.world_from_object, frame.covariance))
         else:
             self._tracker.take(frame)
@@ -145,6 +145,10 @@ class WithObjects:
         if isinstance(self._hand, ImageTracking):
             self._hand.ingest_image(frame)
 
+    def seen(self) -> list[SeenContour]:
+        """What the hand's tracker has seen of a bare hand."""
+        return self._hand.seen() if isinstance(self._hand, ShowsContours) else []
+
     def requests(self) -> list[SliceRequest]:
         """What the nodes shall search for the hand."""
         return self._hand.requests() if isinstance(self._hand, ImageTracking) else []
@@ -195,7 +199,7 @@ class MarkersBeside:
         if last is None or not 0 <= last.t_row0_master_ns - frame.t_row0_master_ns < _JUMP_NS:
             self.newest[frame.camera] = frame
         further = None if frame.further is None else frame.further.of(self._own)
-        return replace(frame, further=further, **{name: getattr(frame, name)[self._own] for name in _PER_SIGHT})
+        return replace(frame, further=further, **{name: getattr(frame, name)[self._own] for name in _PER_OBSERVATION})
 
     def completed(self, state: HandState, objects: list[ObjectState]) -> HandState:
         """The state with all markers of the rig: those of objects lie where the object's pose puts them."""

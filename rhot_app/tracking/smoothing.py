@@ -21,10 +21,10 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.observations import ObjectFrame
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
-from rhot_app.tracking.acquisition import Located
-from rhot_app.tracking.estimator import Estimator
-from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
-from rhot_app.tracking.marker_residual import MarkerFrame
+from rhot_app.tracking.markers.acquisition import Located
+from rhot_app.tracking.markers.estimator import Estimator
+from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
+from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.rig_arrays import without_objects
 from rhot_app.tracking.rig_objects import MarkersBeside, SmoothedObjects
 from rhot_app.tracking.tracker import CameraObservations
@@ -44,14 +44,14 @@ _Key = tuple[int, int]  # camera, time of row 0
 
 @dataclass(slots=True, eq=False)
 class Instant:
-    """What is kept of one frame. `none`: the state without a hand. `filtered`: the knot. `sightings`, `scale` and
+    """What is kept of one frame. `none`: the state without a hand. `filtered`: the knot. `recent`, `scale` and
     `process` are as they were after it. `estimate`: smoothed."""
 
     number: int
     observations: CameraObservations
     t_ns: int
     none: HandState | None = None
-    sightings: Sightings | None = None
+    recent: RecentObservations | None = None
     scale: tuple[float, float] = (1.0, math.nan)
     process: HandProcess | None = None
     filtered: Knot | None = None
@@ -86,7 +86,7 @@ class RecordingEstimator(Estimator):
         """The filtered state after the frame, None when it came before."""
         state = super().solve()
         newest = next(reversed(self._instants.values()), None)
-        if newest is not None and newest.number == self._count - 1 and newest.sightings is None:
+        if newest is not None and newest.number == self._count - 1 and newest.recent is None:
             if state is not None and state.condition in (Condition.SEARCHING, Condition.LOST):
                 newest.none = state
             else:  # it came before, or is older than the first knot
@@ -114,9 +114,9 @@ class RecordingEstimator(Estimator):
         """The smoothed state of an instant, predicted to `t_ns` if that is later."""
         if instant.none is not None:
             return replace(instant.none, sequence=0)
-        estimate, knot, sightings = instant.estimate, instant.filtered, instant.sightings
-        assert estimate is not None and knot is not None and sightings is not None
-        states, begun = EstimatorStates(self._rig, self._file_size, sightings), time.perf_counter()
+        estimate, knot, recent = instant.estimate, instant.filtered, instant.recent
+        assert estimate is not None and knot is not None and recent is not None
+        states, begun = EstimatorStates(self._rig, self._file_size, recent), time.perf_counter()
         states.resize(*instant.scale)
         state, covariance, later_ns = estimate.state, estimate.covariance, max(t_ns - instant.t_ns, 0)
         if later_ns:
@@ -146,7 +146,7 @@ class RecordingEstimator(Estimator):
         instant = self._instants.get(_key(frame.observations))
         if instant is not None:
             instant.none, instant.scale = None, self._scale
-            instant.sightings, instant.process = _copied(self._sightings), _copied(self._process)
+            instant.recent, instant.process = _copied(self._observations), _copied(self._process)
         before, knots = self._buffered, list(self._filter.knots)
         if before and not knots[0].residuals and knots[0] is not before[0]:  # begun anew from the newest one
             before[-1] = replace(before[-1], state=knots[0].state, covariance=knots[0].covariance)
@@ -187,7 +187,7 @@ class RecordingEstimator(Estimator):
         self._smooth_buffered()
         self._conclude(self._smoother.finish())
         self._smoother = None
-        for key in [key for key, one in self._instants.items() if one.sightings is not None]:
+        for key in [key for key, one in self._instants.items() if one.recent is not None]:
             del self._instants[key]  # so late that they have no knot of their own
 
     def _release(self, number: int) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ImageFrame, SliceRequest
 from rhot_app.objects.observations import ObjectFrame
-from rhot_app.state import HandState
+from rhot_app.state import HandState, SeenContour
 
 Array = NDArray[np.float64]
 
@@ -79,6 +79,15 @@ class Tracker(Protocol):
 
     def reset(self) -> None:
         """Forget everything: a new session, or a node's clock was set."""
+        ...
+
+
+@runtime_checkable
+class ShowsContours(Protocol):
+    """A tracker that can say what it has seen of a bare hand."""
+
+    def seen(self) -> list[SeenContour]:
+        """The newest image of each camera; none while there is no hand. Any thread may ask."""
         ...
 
 

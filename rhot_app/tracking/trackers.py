@@ -14,8 +14,8 @@ from rhot_app.project import Rig, estimator_obstacle
 from rhot_app.state import HandState
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.contours.tracker import ContourEstimator
-from rhot_app.tracking.estimator import Estimator
 from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.rig_arrays import rigs_of_hands, without_objects
 from rhot_app.tracking.rig_objects import WithObjects
 from rhot_app.tracking.tracker import CameraObservations, Tracker
@@ -23,7 +23,7 @@ from rhot_app.tracking.tracker import CameraObservations, Tracker
 Indices = NDArray[np.intp]
 Column = NDArray[Any]
 
-_PER_SIGHT = ("pixels", "covariances", "diameters", "qualities", "flags")
+_PER_OBSERVATION = ("pixels", "covariances", "diameters", "qualities", "flags")
 _PER_MARKER = ("marker_positions", "marker_raw_positions", "marker_covariances", "marker_knowledge",
                "epipolar_error_px")
 _PER_CAMERA = ("camera_pixels", "camera_flags")
@@ -56,13 +56,13 @@ class TwoHands:
         self._other.reset()
 
     def ingest(self, observations: CameraObservations) -> None:
-        """Take one frame in; each hand gets the sights of its own markers."""
+        """Take one frame in; each hand gets the observations of its own markers."""
         last = self._newest[observations.camera]
         if last is None or not 0 <= last.t_row0_master_ns - observations.t_row0_master_ns < _JUMP_NS:
             self._newest[observations.camera] = observations
         for tracker, own in zip((self._hand, self._other), self._own, strict=True):
             further = None if observations.further is None else observations.further.of(own)
-            columns = {name: getattr(observations, name)[own] for name in _PER_SIGHT}
+            columns = {name: getattr(observations, name)[own] for name in _PER_OBSERVATION}
             tracker.ingest(replace(observations, further=further, **columns))
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:

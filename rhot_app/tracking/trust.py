@@ -54,13 +54,13 @@ def empty_memory(markers: int) -> Array:
 @njit(cache=True)
 def _reachable(position: Array, covariance: Array, since: Array, step: Array, step_s: float, dt: float) -> bool:
     """Whether a hand that came to `since` by `step` in `step_s` (NaN: unknown) can be at `position` after `dt` s."""
-    surprise = 0.0
+    squared = 0.0
     for k in range(3):
-        surprise += (position[k] - since[k] - step[k] * dt / step_s) ** 2
+        squared += (position[k] - since[k] - step[k] * dt / step_s) ** 2
     margin = 5.0 * math.sqrt(max(covariance[0, 0] + covariance[1, 1] + covariance[2, 2], 0.0)) + JUMP_FLOOR_M
     if _distance(position, since) > SPEED_LIMIT * dt + margin:
         return False
-    return not math.sqrt(surprise) > 0.5 * ACCELERATION_LIMIT * dt * (dt + step_s) + margin
+    return not math.sqrt(squared) > 0.5 * ACCELERATION_LIMIT * dt * (dt + step_s) + margin
 
 
 @njit(cache=True)

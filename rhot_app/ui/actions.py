@@ -48,6 +48,8 @@ class Actions(QObject):
                                      "delete.")
         self.outputs = self._make("Outputs …", "", "Live streams to other programs: OSC, VMC, WebSocket, web view and "
                                   "others; which run, and how they go.")
+        self.mouse = self._make("3-D mouse …", "", "Work a cursor in three dimensions with the hand: pick balls, "
+                                "move them, and take a target test.")
         self.add_object = self._make("Add a tracked object …", "", "Track an object with tags or colour markers beside "
                                      "the hand: choose its object file.")
         self.objects = QMenu("Remove a tracked object", parent)
@@ -155,8 +157,8 @@ class MainToolBar(QToolBar):
         self.rig_button, self.rig_menu = self._add_menu("Rig", [
             a.twin, a.open, a.nodes, None, a.open_recording, a.recordings, a.video, a.bookmark, a.export, None,
             a.add_object, a.objects.menuAction(), None,
-            a.outputs, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig, a.close_rig,
-            None, a.quit])
+            a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
+            a.close_rig, None, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
             *a.wizards, None, a.earlier, None, a.tracker, None, a.files])
         self.view_button, self.view_menu = self._add_menu("View", [

@@ -31,7 +31,7 @@ from rhot_app.ui.replay.windows import ReplayWindows
 from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import Docks, Screen
 from rhot_app.ui.simulated_rig_menus import LensCaps, TwinShows
-from rhot_app.ui.status_words import RigWatch, label_of, look_of, notices_of
+from rhot_app.ui.status_words import RigFileWatch, label_of, look_of, notices_of
 from rhot_app.ui.tracked_objects import TrackedObjects
 from rhot_app.ui.welcome import WelcomePage
 from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, WIZARDS, wizard_named
@@ -56,7 +56,7 @@ class MainWindow(QMainWindow):
         self.passing = TransientNotices()
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, self.tell)
-        self.rig_watch = RigWatch(controller)
+        self.rig_watch = RigFileWatch(controller)
         self.wizards = Launcher(controller.backend.asker, controller.backend.client,
                                 lambda: self.appearance.scheme, settings, self)
         self.replays = ReplayWindows(settings, lambda: self.appearance.scheme, self, lambda: controller.rig)
@@ -119,6 +119,7 @@ class MainWindow(QMainWindow):
         a.recordings.triggered.connect(self.replays.list)
         a.outputs.triggered.connect(lambda: self.dialogs.show_outputs(
             c, lambda: self.appearance.scheme, [a.save_rig, a.guide], self.rig_watch.look_soon))
+        a.mouse.triggered.connect(lambda: self.dialogs.show_mouse(c, self.appearance.scheme))
         a.save_rig.triggered.connect(lambda: self.rig_watch.save(self.tell))
         a.close_rig.triggered.connect(c.close_rig)
         a.quit.triggered.connect(self.close)
@@ -146,6 +147,7 @@ class MainWindow(QMainWindow):
         c.busy_changed.connect(self._show_busy)
         c.failed.connect(self._show_failure)
         self.appearance.scheme_changed.connect(self._recolour_buttons)
+        self.appearance.scheme_changed.connect(lambda: self.dialogs.set_scheme(self.appearance.scheme))
         self.appearance.scheme_changed.connect(lambda: self.replays.set_scheme(self.appearance.scheme))
         self.docks.docks[2].visibilityChanged.connect(c.set_preview)
 

@@ -139,7 +139,7 @@ def _file_says(path: Path, rig: Rig) -> bool:
         return False
 
 
-class RigWatch:
+class RigFileWatch:
     """Looks now and then, in a worker; the controller's rig follows what another client gave the engine."""
 
     def __init__(self, controller: Controller) -> None:

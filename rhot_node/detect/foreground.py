@@ -93,11 +93,12 @@ class BackgroundSums:
 
     def add(self, image: Image) -> None:
         """Take one image (H, W, 3) RGB. Raises ValueError when it has another size than those before."""
-        values = image.astype(np.float64)
         if not self.count:
-            self._sum, self._squares = np.zeros_like(values), np.zeros_like(values)
-        self._sum += values
-        self._squares += values * values
+            self._sum, self._squares = np.zeros(image.shape), np.zeros(image.shape)
+        if image.shape != self._sum.shape:
+            raise ValueError(f"an image of {image.shape[1]} x {image.shape[0]} px came among others")
+        cv2.accumulate(image, self._sum)
+        cv2.accumulateSquare(image, self._squares)
         self.count += 1
 
     def learnt(self, model: Foreground) -> Foreground:

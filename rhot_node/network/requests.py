@@ -114,13 +114,27 @@ class VideoDeleteRequest(_Request, frozen=True, tag="video_delete"):
 
 
 class LearnBackgroundRequest(_Request, frozen=True, tag="learn_background"):
-    """Learn the scene as it is during the next `seconds`, without a hand. Answered at once; the state tells when."""
+    """Learn the scene as it is during the next `seconds`, without a hand. Answered at once; the state tells when.
+    `save` False tries it out, as in `SetSettingsRequest`."""
 
     seconds: Annotated[float, Meta(ge=0.1, le=60)] = 3.0
+    save: bool = True
 
 
 class LearnSkinRequest(_Request, frozen=True, tag="learn_skin"):
     """Learn the colours of the skin that the next picture shows."""
+
+    save: bool = True
+
+
+class SaveForegroundRequest(_Request, frozen=True, tag="save_foreground"):
+    """Keep background and skin as they are in force."""
+
+
+class RevertForegroundRequest(_Request, frozen=True, tag="revert_foreground"):
+    """Use what is kept again, or with `earlier` what was kept before the last save."""
+
+    earlier: bool = False
 
 
 class ForgetForegroundRequest(_Request, frozen=True, tag="forget_foreground"):
@@ -131,7 +145,8 @@ class ForegroundMaskRequest(_Request, frozen=True, tag="foreground_mask"):
     """The foreground of the next picture, a grey PNG in a second message part: 255 is the hand."""
 
 
-ForegroundRequest = LearnBackgroundRequest | LearnSkinRequest | ForgetForegroundRequest | ForegroundMaskRequest
+ForegroundRequest = (LearnBackgroundRequest | LearnSkinRequest | SaveForegroundRequest | RevertForegroundRequest
+                     | ForgetForegroundRequest | ForegroundMaskRequest)
 VideoRequest = VideoStartRequest | VideoStopRequest | VideoListRequest | VideoReadRequest | VideoDeleteRequest
 Request = (StateRequest | CountersRequest | SettingsRequest | SetSettingsRequest | StillRequest | StartRequest
            | LinkRequest | StopRequest | ForegroundRequest | VideoRequest)
@@ -218,8 +233,8 @@ class Responder:
                 return self._link(request, master), b""
             case StopRequest():
                 return {"ok": True, "stopped": self._sessions.stop(request.session)}, b""
-            case (LearnBackgroundRequest() | LearnSkinRequest() | ForgetForegroundRequest()
-                  | ForegroundMaskRequest()):
+            case (LearnBackgroundRequest() | LearnSkinRequest() | SaveForegroundRequest() | RevertForegroundRequest()
+                  | ForgetForegroundRequest() | ForegroundMaskRequest()):
                 return self._learn(request)
             case _:
                 return self._video(request)
@@ -238,10 +253,16 @@ class Responder:
             raise NodeError("this node learns neither background nor skin.")
         match request:
             case LearnBackgroundRequest():
-                store.learn_background(self._pictures, request.seconds)
+                store.learn_background(self._pictures, request.seconds, save=request.save)
                 return {"ok": True}, b""
             case LearnSkinRequest():
-                return {"ok": True, "found": store.learn_skin(self._pictures)}, b""
+                return {"ok": True, "found": store.learn_skin(self._pictures, save=request.save)}, b""
+            case SaveForegroundRequest():
+                store.save()
+                return {"ok": True}, b""
+            case RevertForegroundRequest():
+                store.revert(earlier=request.earlier)
+                return {"ok": True}, b""
             case ForgetForegroundRequest():
                 store.forget()
                 return {"ok": True}, b""

@@ -16,6 +16,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState
+from rhot_app.tracking.tracker import ShowsContours
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 from rhot_node.files import resource_path
@@ -69,10 +70,17 @@ def test_a_hand_is_found_followed_and_lost(film, forget: bool) -> None:
     last, pose = nodes.states[-1], poses("grasp", TIMES)[-1]
     assert last.tracked and error_mm(last, pose) < 5.0
     assert last.t_receive_ns - last.t_master_ns == pytest.approx(9_000_000, abs=1000)
+    assert isinstance(nodes.tracker, ShowsContours)
+    for seen, camera in zip(nodes.tracker.seen(), film[0][0], strict=True):
+        assert len(seen.contour) == len(seen.outline) == len(seen.slices) > 50
+        assert len(seen.edges) == len(seen.of_hand) and 0.3 < np.mean(seen.of_hand) <= 1.0
+        apart = np.linalg.norm(seen.edges[seen.of_hand][:, None] - seen.contour[None], axis=2).min(axis=1)
+        assert np.median(apart) < 2.0 and (seen.edges < [camera.width, camera.height]).all()
     assert last.marker_ids == rig.markers.ids and np.isnan(last.marker_positions).all()
     for _ in range(20):
         nodes.step(number, film[0][2])
         number += 1
+    assert nodes.tracker.seen() == []
     assert nodes.states[-1].condition is Condition.LOST and np.isnan(nodes.states[-1].joint_positions).all()
 
 

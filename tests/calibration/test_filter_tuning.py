@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 from log_writing import write_log
-from synthetic_rig import WIDE, Sight, compare, make_rig, observe, run, still_trajectory
+from synthetic_rig import WIDE, Viewing, compare, make_rig, observe, run, still_trajectory
 from waving import waving
 
 from rhot_app.__main__ import main
@@ -33,7 +33,7 @@ WAVING = waving(RIG, SECONDS)
 def logs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("logs")
     resting = still_trajectory(WAVING(np.zeros(1))[0])
-    return tuple(write_log(folder / f"{name}.log", RIG, observe(RIG, WIDE, trajectory, SECONDS, Sight(noise_px=0.05)))
+    return tuple(write_log(folder / f"{name}.log", RIG, observe(RIG, WIDE, trajectory, SECONDS, Viewing(noise_px=0.05)))
                  for name, trajectory in (("still", resting), ("fast", WAVING)))
 
 
@@ -77,7 +77,7 @@ def test_the_simulation_filters_as_the_tracker_does(tables: tuple[InstantTable, 
     _, filtered = simulate(footage, *rows)
     _, raw = simulate(footage, np.tile(OFF, (6, 1)), np.tile(OFF, (6, 1)))
     np.testing.assert_allclose(raw[tables[1].measured], tables[1].positions[tables[1].measured], atol=1e-4)
-    states = run(make_tracker(slow), observe(RIG, WIDE, WAVING, SECONDS, Sight(noise_px=0.05)))
+    states = run(make_tracker(slow), observe(RIG, WIDE, WAVING, SECONDS, Viewing(noise_px=0.05)))
     at = {state.t_master_ns: state.marker_positions for state in states}
     same = [k for k, t in enumerate(tables[1].t_ns) if int(t) in at][30:]
     expected = np.array([at[int(tables[1].t_ns[k])] for k in same])
@@ -97,7 +97,7 @@ def test_the_proposal_keeps_the_rule_and_the_tracker_confirms_it(tables: tuple[I
     assert 0.03 < report.markers[0].raw_jitter_px < 0.1
     tuned = report.apply(RIG)
     still = still_trajectory(WAVING(np.zeros(1))[0])
-    noise = Sight(noise_px=0.05, seed=99)
+    noise = Viewing(noise_px=0.05, seed=99)
     calm = [compare(rig, run(make_tracker(rig), observe(rig, WIDE, still, SECONDS, noise)), still).marker_mm
             for rig in (tuned, RIG)]
     assert calm[0] < 0.85 * calm[1]

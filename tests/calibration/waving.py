@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import msgspec
 import numpy as np
-from synthetic_rig import WIDE, Preset, Sight, Trajectory, hand_trajectory, observe
+from synthetic_rig import WIDE, Preset, Trajectory, Viewing, hand_trajectory, observe
 
 from rhot_app.calibration.observations import ObservationCollector, ObservationTable
 from rhot_app.project import Rig
@@ -37,10 +37,10 @@ def see(rig: Rig, trajectory: Trajectory, seconds: float, *, late_s: tuple[float
     for camera, node in enumerate(rig.nodes):
         preset = Preset(WIDE.fps, row_times_ns[camera], WIDE.focal)
         alone = msgspec.structs.replace(rig, nodes=(node,))
-        sight = Sight(phases=(0.37 * camera % 1.0,), noise_px=noise_px, marker_loss=marker_loss, seed=11 + camera)
+        viewing = Viewing(phases=(0.37 * camera % 1.0,), noise_px=noise_px, marker_loss=marker_loss, seed=11 + camera)
         frames += [replace(frame, camera=camera, row_time_ns=said_ns[camera],
                            t_row0_master_ns=frame.t_row0_master_ns - round(1e9 * late_s[camera]))
-                   for frame in observe(alone, preset, trajectory, seconds, sight)]
+                   for frame in observe(alone, preset, trajectory, seconds, viewing)]
     return sorted(frames, key=lambda frame: frame.t_receive_ns)
 
 

@@ -97,7 +97,7 @@ def test_one_sentence_when_nobody_sees_anything() -> None:
     blind = replace(WELL, unseen_s=(9.0, 8.0, 10.0))
     (advice,) = no_marker_advice([blind, blind], running=True)
     assert "No camera has seen a marker for 8 s" in advice.text
-    assert node_advice(blind, IDS, True, sight=False) == []
+    assert node_advice(blind, IDS, True, visibility=False) == []
     assert no_marker_advice([blind, WELL], running=True) == []
 
 

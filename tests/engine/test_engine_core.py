@@ -13,7 +13,7 @@ from patience import eventually, settled
 
 from rhot_app.engine import status
 from rhot_app.engine.core import Engine
-from rhot_app.engine.replay_summary import replay_states, summarise
+from rhot_app.engine.offline.replay_summary import replay_states, summarise
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import EngineError, RecordingError, RhotError, RigError
 from rhot_app.project import OneEuroSettings, OutputSettings, Rig, load_rig

@@ -8,7 +8,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from synthetic_rig import WIDE, Sight, Trajectory, hand_trajectory, make_rig, observe
+from synthetic_rig import WIDE, Trajectory, Viewing, hand_trajectory, make_rig, observe
 
 from rhot_app.engine.advice import calibration_advice
 from rhot_app.engine.observer import HealthWatch
@@ -56,12 +56,12 @@ def grasp() -> Trajectory:
 
 @pytest.mark.parametrize("motion", ["grasp", "wave"])
 def test_a_sound_rig_is_left_in_peace_for_a_minute(motion: str) -> None:
-    frames = observe(RIG, WIDE, hand_trajectory(RIG, motion, 60.0), 60.0, Sight(noise_px=0.15, marker_loss=0.05))
+    frames = observe(RIG, WIDE, hand_trajectory(RIG, motion, 60.0), 60.0, Viewing(noise_px=0.15, marker_loss=0.05))
     assert said(RIG, frames) == []
 
 
 def test_a_camera_that_was_turned_is_noticed_and_forgiven_once_mended(grasp: Trajectory) -> None:
-    frames = observe(RIG, WIDE, grasp, 12.0, Sight(noise_px=0.1))
+    frames = observe(RIG, WIDE, grasp, 12.0, Viewing(noise_px=0.1))
     found = said(turned(0, 0.3), frames)
     assert texts(found) and all("stereo calibration is stale" in text for text in texts(found))
     assert min(when for when, _ in found) < 8.0
@@ -75,7 +75,7 @@ def test_a_camera_that_is_late_is_told_from_one_that_was_turned() -> None:
         swing = 0.07 * np.sin(2.0 * np.pi * 1.2 * times) * (np.mod(times, 4.0) < 2.0)
         return hand(times) + swing[:, None, None] * np.array([0.0, 1.0, 0.0])
     frames = [replace(frame, t_row0_master_ns=frame.t_row0_master_ns - 8_000_000) if frame.camera else frame
-              for frame in observe(RIG, WIDE, stop_and_go, 20.0, Sight(noise_px=0.1))]
+              for frame in observe(RIG, WIDE, stop_and_go, 20.0, Viewing(noise_px=0.1))]
     found = texts(said(RIG, frames))
     assert found and all("times are off" in text and "waving hand" in text for text in found)
 
@@ -84,13 +84,13 @@ def test_a_hand_larger_than_its_file_is_noticed() -> None:
     larger = msgspec.structs.replace(RIG.hand, fingers={name: msgspec.structs.replace(
         finger, bones_mm=tuple(0.85 * bone for bone in finger.bones_mm), marker_mm=0.85 * finger.marker_mm,
         base_mm=tuple(0.85 * value for value in finger.base_mm)) for name, finger in RIG.hand.fingers.items()})
-    frames = observe(RIG, WIDE, hand_trajectory(RIG, "spread", 12.0), 12.0, Sight(noise_px=0.1))
+    frames = observe(RIG, WIDE, hand_trajectory(RIG, "spread", 12.0), 12.0, Viewing(noise_px=0.1))
     found = texts(said(msgspec.structs.replace(RIG, hand=larger), frames))
     assert found and all("larger than the hand file" in text for text in found)
 
 
 def test_faded_and_doubled_colours_are_named_with_marker_and_camera(grasp: Trajectory) -> None:
-    frames = observe(RIG, WIDE, grasp, 12.0, Sight(noise_px=0.1))
+    frames = observe(RIG, WIDE, grasp, 12.0, Viewing(noise_px=0.1))
     faded = [replace(frame, qualities=np.where(np.arange(6) == 2, 0.3, 0.9)) for frame in frames]
     (text,) = texts(said(RIG, faded))
     assert "colour of middle" in text and "learn the colours" in text
@@ -102,7 +102,7 @@ def test_faded_and_doubled_colours_are_named_with_marker_and_camera(grasp: Traje
 
 def test_an_uncalibrated_rig_is_spared_what_supposes_a_calibration(grasp: Trajectory) -> None:
     rig = msgspec.structs.replace(RIG, depth=DepthSettings(mode="disparity"))
-    assert not said(rig, observe(RIG, WIDE, grasp, 6.0, Sight(noise_px=0.1)))
+    assert not said(rig, observe(RIG, WIDE, grasp, 6.0, Viewing(noise_px=0.1)))
     (advice,) = calibration_advice(rig)
     assert "Distances are estimates" in advice.text and (advice.level, advice.mender) == ("info", "stereo")
 
@@ -111,7 +111,7 @@ def test_a_new_run_begins_without_the_old_ones_sentences(grasp: Trajectory) -> N
     rig = turned(0, 0.3)
     tracker, watch = make_tracker(rig), HealthWatch(rig)
     state, now_ns = None, 0
-    for frame in observe(RIG, WIDE, grasp, 8.0, Sight(noise_px=0.1)):
+    for frame in observe(RIG, WIDE, grasp, 8.0, Viewing(noise_px=0.1)):
         tracker.ingest(frame)
         state, now_ns = tracker.solve() or state, frame.t_receive_ns
         found = watch.advice(state, tracker, now_ns)

@@ -15,7 +15,7 @@ from zmq.utils import z85
 
 from rhot_app.__main__ import main
 from rhot_app.engine.client import EngineClient
-from rhot_app.engine.report import last_part, without_keys
+from rhot_app.engine.offline.report import last_part, without_keys
 from rhot_app.errors import EngineError
 from rhot_app.keys import keys_path, load_master_keys
 from rhot_app.recording.bookmarks import Bookmark, bookmark_record
@@ -75,7 +75,7 @@ def test_no_key_and_no_code_is_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyP
     rig = msgspec.structs.replace(FakeClient.own_rig, nodes=(left, FakeClient.own_rig.nodes[1]))
     monkeypatch.setattr(FakeClient, "own_rig", rig)
     monkeypatch.setattr(FakeClient, "key", link.hex())
-    monkeypatch.setattr("rhot_app.engine.report.EngineClient", FakeClient)
+    monkeypatch.setattr("rhot_app.engine.offline.report.EngineClient", FakeClient)
     place = tmp_path / "engine"
     place.mkdir(mode=0o700)
     said = f"key {own.public_key}\n{own.secret_key.upper()}\ncode {show_code(code)} {code}\n"
@@ -102,7 +102,7 @@ def test_no_key_and_no_code_is_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_a_report_without_an_engine_says_what_is_not_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                                                            monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FakeClient, "command", lambda *_, **__: (_ for _ in ()).throw(EngineError("no answer")))
-    monkeypatch.setattr("rhot_app.engine.report.EngineClient", FakeClient)
+    monkeypatch.setattr("rhot_app.engine.offline.report.EngineClient", FakeClient)
     arguments = ["report", "--directory", str(tmp_path / "none"), "--out", str(tmp_path / "bug.zip")]
     assert main(arguments) == 0
     assert "not in it: rig, status and nodes of the engine (no answer)" in capsys.readouterr().out

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from knocked_rig import moved
 from log_writing import write_log
-from synthetic_rig import WIDE, Sight, hand_trajectory, make_rig, observe
+from synthetic_rig import WIDE, Viewing, hand_trajectory, make_rig, observe
 
 from rhot_app.__main__ import main
 from rhot_app.engine.rig_watch import JUDGE_NS, RigWatch
@@ -32,7 +32,7 @@ def turned(rig: Rig, degrees: float) -> Rig:
 
 @pytest.fixture(scope="module")
 def frames() -> list[CameraObservations]:
-    return observe(RIG, WIDE, hand_trajectory(RIG, "sweep", SECONDS), SECONDS, Sight(noise_px=0.03))
+    return observe(RIG, WIDE, hand_trajectory(RIG, "sweep", SECONDS), SECONDS, Viewing(noise_px=0.03))
 
 
 def told(watch: RigWatch, frames: list[CameraObservations]) -> list[Advice]:

@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from rhot_app.engine.offline.replay_summary import SmoothedReplay, replay_states, smoothed_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import SmoothedReplay, replay_states, smoothed_states
 from rhot_app.errors import EngineError, RecordingError
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
 from rhot_app.project import with_tracker

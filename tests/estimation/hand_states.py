@@ -10,7 +10,7 @@ from synthetic_rig import WIDE, make_rig
 
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY, HandProcess
-from rhot_app.tracking.marker_model import compile_markers
+from rhot_app.tracking.markers.marker_model import compile_markers
 
 SPREAD = np.array([0.2, 0.6])
 SLOWEST, FASTEST = np.array([2.0, 4.0, 3.0]), 25.0

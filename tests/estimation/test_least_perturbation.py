@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from synthetic_rig import WIDE, Sight, altered, hand_trajectory, make_rig, observe, run
+from synthetic_rig import WIDE, Viewing, altered, hand_trajectory, make_rig, observe, run
 
-from rhot_app.tracking.estimator import Estimator
+from rhot_app.tracking.markers.estimator import Estimator
 
 SECONDS, PIXELS = 10.0, 1e-12
 
@@ -18,8 +18,8 @@ SECONDS, PIXELS = 10.0, 1e-12
 def frames(marker_loss):
     """Ten seconds of a hand that opens and closes."""
     rig = make_rig(bodies=True)
-    sight = replace(Sight(), marker_loss=marker_loss)
-    return rig, observe(rig, WIDE, hand_trajectory(rig, "grasp", SECONDS), SECONDS, sight)
+    viewing = replace(Viewing(), marker_loss=marker_loss)
+    return rig, observe(rig, WIDE, hand_trajectory(rig, "grasp", SECONDS), SECONDS, viewing)
 
 
 def perturbed(observations, sign):

@@ -15,7 +15,7 @@ from hand_states import (
 )
 
 from rhot_app.hand.motion.hand_process import BIAS, MOTION, POSE, VELOCITY
-from rhot_app.tracking.marker_residual import MarkerFrame
+from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from rhot_app.estimation.filter import IteratedFilter, update
 from rhot_app.hand.motion.hand_process import POSE
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.tracking.marker_residual import MarkerFrame
+from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
 
 PHALANGES = [(first, first + 1) for finger in range(5) for first in range(1 + 4 * finger, 4 + 4 * finger)]

@@ -41,7 +41,7 @@ def sequence(case: Case, seed: int = 1) -> BareHandSequence:
     return Unrendered(**{name: getattr(made, name) for name in made.__dataclass_fields__})
 
 
-def run(case: Case, **options: float) -> tuple[bare_hand.BareHandRun, FakeBareHand]:
+def run(case: Case, **options: float) -> tuple[bare_hand.EvaluatedRun, FakeBareHand]:
     filmed = sequence(case)
     tracker = FakeBareHand(filmed.truth_at, **options)  # type: ignore[arg-type]
     return run_sequence(case, filmed, lambda rig, case: tracker), tracker

@@ -171,7 +171,7 @@ def test_an_interrupt_leaves_nothing(recorded: Recorded, tmp_path: Path, monkeyp
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(bare_hand.BareHandRun, "step", stopped)
+    monkeypatch.setattr(bare_hand.HandFollower, "step", stopped)
     code = main(recorded.arguments("--out", str(tmp_path / "hand.csv"), "--overlay", str(tmp_path / "pictures")))
     assert code == 130 and not list(tmp_path.iterdir())
 

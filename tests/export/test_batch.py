@@ -13,7 +13,7 @@ import distributed
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_app.export.batch import Job, run_batch
+from rhot_app.export.batch import BatchJob, run_batch
 from rhot_app.export.export import export_log
 from rhot_app.export.plan import ExportOptions
 
@@ -117,8 +117,8 @@ class Deadly(ExportOptions):
 
 def test_a_worker_that_dies_takes_its_own_log_only(folder: Path) -> None:
     out, options = folder / "out", ExportOptions(tracker="classic")
-    jobs = [Job(folder / "a.rhotlog", out / "a.csv", "csv", None, options),
-            Job(folder / "torn.rhotlog", out / "torn.csv", "csv", None, Deadly())]
+    jobs = [BatchJob(folder / "a.rhotlog", out / "a.csv", "csv", None, options),
+            BatchJob(folder / "torn.rhotlog", out / "torn.csv", "csv", None, Deadly())]
     whole, dead = run_batch(jobs, out, workers=2)
     assert whole.status == "done" and (out / "a.csv").exists()
     assert dead.status == "failed" and "its process died" in dead.message
@@ -126,7 +126,7 @@ def test_a_worker_that_dies_takes_its_own_log_only(folder: Path) -> None:
 
 def test_a_cluster_does_the_same(folder: Path) -> None:
     out, options = folder / "out", ExportOptions(tracker="classic")
-    jobs = [Job(folder / f"{name}.rhotlog", out / f"{name}.csv", "csv", None, options) for name in ("a", "other")]
+    jobs = [BatchJob(folder / f"{name}.rhotlog", out / f"{name}.csv", "csv", None, options) for name in ("a", "other")]
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as one:
         whole, failed = run_batch(jobs, out, scheduler=one.scheduler_address)
     assert (whole.status, failed.status) == ("done", "failed")

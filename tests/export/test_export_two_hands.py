@@ -12,7 +12,7 @@ import pandas
 import pygltflib
 import pytest
 from log_writing import write_log
-from modelled_hand import model_rig, moving, sights
+from modelled_hand import model_rig, moving, observations_of
 from tracked_log import states_of_log
 
 from rhot_app.export.export import export_log
@@ -33,7 +33,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Path:
         right, markers=msgspec.structs.replace(right.markers, markers=right.markers.markers + others),
         other_hand=left.hand, tracker=TrackerSettings(kind="estimator"))
     own, other = moving("grasp", 1.0, "rhot8"), moving("pinch", 1.0, "rhot8", "left")
-    frames = sights(rig, lambda times: np.concatenate([own(times), other(times) + ASIDE], axis=1), 1.0)
+    frames = observations_of(rig, lambda times: np.concatenate([own(times), other(times) + ASIDE], axis=1), 1.0)
     return write_log(tmp_path_factory.mktemp("both") / "both.rhotlog", rig, frames)
 
 

@@ -9,7 +9,7 @@ from rhot_app.hand.kinematics import TWIST, forward, move
 from rhot_app.hand.limits import PERSON_LIMIT_SD_RAD
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.tracking.size_evidence import Fitting, Posture, implausibility, linearise
+from rhot_app.tracking.markers.size_evidence import Fitting, Posture, implausibility, linearise
 
 SIZE = TWIST + len(ANGLES)
 ROWS = [0, *range(len(JOINTS), len(JOINTS) + 5)]  # wrist and fingertips of the model's own points

@@ -10,8 +10,9 @@ import pytest
 APP = Path(__file__).parents[2] / "rhot_app"
 FILES = [APP / "estimation" / f"{name}.py" for name in ("filter", "residual")] + [
     APP / "hand" / "motion" / "hand_process.py"] + [
-    APP / "tracking" / f"{name}.py" for name in ("acquisition", "estimator", "estimator_state", "extrapolation",
-                                                 "marker_model", "marker_residual")]
+    APP / "tracking" / "extrapolation.py"] + [
+    APP / "tracking" / "markers" / f"{name}.py" for name in ("acquisition", "estimator", "estimator_state",
+                                                             "marker_model", "marker_residual")]
 """The estimator, its residuals, its process, its start, and what it publishes."""
 
 LAYOUT = frozenset(("POSE", "MOTION", "WORLD", "ANGLES", "VELOCITY", "ACCELERATION", "BIAS", "_FIRST_TIP",

@@ -16,10 +16,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("rhot_node", "rhot_app")
 COMFORTABLE_LINES = 300
 MOST_FILES = 15
-CROWDED: dict[str, str] = {
-    "rhot_app/tracking": "to be divided",
-    "rhot_app/engine": "to be divided",
-}
+CROWDED: dict[str, str] = {}
 """Folders that may hold more, and why."""
 UNOWNED = re.compile(r"\b(?:TO" r"DO|FIX" r"ME|XX" r"X)\b(?!\((\w+)\):)")
 

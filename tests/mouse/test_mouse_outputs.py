@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import argparse
+import contextlib
 import json
 import os
 import socket
 import struct
 import subprocess
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +19,7 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 
 from rhot_app.errors import OutputError
+from rhot_app.mouse import mouse_command
 from rhot_app.mouse.pointer import MouseState
 from rhot_app.mouse.system_pointer import SystemPointer
 from rhot_app.outputs.osc import bundles, mouse_messages
@@ -87,6 +92,18 @@ def test_a_file_that_is_no_uinput_device_is_refused(tmp_path: Path) -> None:
         SystemPointer(tmp_path / "uinput")
 
 
+def test_a_replayed_state_has_no_age(capsys) -> None:
+    """Its time is that of the recording."""
+    arguments = argparse.Namespace(json=True, pointer=False, osc=None)
+    with contextlib.ExitStack() as stack:
+        outputs = mouse_command._Outputs(arguments, stack)
+        outputs.write(mouse(0.1, 0.0, 0.0))
+        outputs.write(replace(mouse(pressed=("thumb",)), t_master_ns=time.monotonic_ns()))
+    old, new = (json.loads(line) for line in capsys.readouterr().out.splitlines())
+    assert old["age_ms"] is None and old["cursor_m"] == [0.1, 0.0, 0.0]
+    assert new["age_ms"] >= 0.0 and new["cursor_m"] is None and new["pressed"] == ["thumb"]
+
+
 def rhot_mouse(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", "rhot_app", "mouse", *arguments], capture_output=True, text=True,
                           check=False, cwd=ROOT)
@@ -106,7 +123,7 @@ def test_the_simulated_hand_works_the_mouse_by_itself() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(1.0)
-        done = rhot_mouse("--simulated", "--seconds", "6", "--json", "--osc", f"127.0.0.1:{receiver.getsockname()[1]}")
+        done = rhot_mouse("--simulated", "--seconds", "10", "--json", "--osc", f"127.0.0.1:{receiver.getsockname()[1]}")
         heard = {message.address for message in OscBundle(receiver.recv(65536))}
     assert done.returncode == 0, done.stderr
     lines = [json.loads(line) for line in done.stdout.splitlines()]

@@ -197,6 +197,27 @@ def test_background_and_skin_are_learnt_kept_and_forgotten(tmp_path: Path) -> No
     assert not path.exists() and again.report(160, 120)["skin"] == "none"
 
 
+def test_what_is_tried_out_can_be_kept_and_taken_back(tmp_path: Path) -> None:
+    path = foreground_path(tmp_path / "left.json")
+    store = ForegroundStore(path)
+    with Camera(with_hand(BACKGROUND)) as camera:
+        assert store.learn_skin(camera.box)
+        kept = path.read_bytes()
+        camera.picture = BACKGROUND
+        store.learn_background(camera.box, 0.1, save=False)
+        eventually(lambda: not store.learning)
+        assert store.report(160, 120)["background"] and path.read_bytes() == kept
+        store.revert()
+        assert not store.report(160, 120)["background"] and store.report(160, 120)["skin"] == "learnt"
+        store.learn_background(camera.box, 0.1, save=False)
+        eventually(lambda: not store.learning)
+    store.save()
+    assert ForegroundStore(path).report(160, 120)["background"]
+    store.revert(earlier=True)
+    assert not ForegroundStore(path).report(160, 120)["background"]
+    assert ForegroundStore(path).report(160, 120)["skin"] == "learnt"
+
+
 def test_a_file_that_is_none_is_named_and_the_node_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "left.foreground.npz"
     path.write_bytes(b"no archive")

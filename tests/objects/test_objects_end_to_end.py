@@ -107,7 +107,7 @@ def test_a_cube_before_two_nodes_reaches_a_client_and_a_replay_says_the_same(ben
 
 def replayed(log: Path) -> list:
     """The states of a log tracked at once, with the rig that it holds."""
-    from rhot_app.engine.replay_summary import replay_states
+    from rhot_app.engine.offline.replay_summary import replay_states
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogValidator
     from rhot_app.tracking.trackers import make_tracker

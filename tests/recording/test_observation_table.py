@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from log_writing import write_log
-from synthetic_rig import EPOCH_NS, LOST, WIDE, Sight, hand_trajectory, make_rig, observe
+from synthetic_rig import EPOCH_NS, LOST, WIDE, Viewing, hand_trajectory, make_rig, observe
 
 from rhot_app.calibration.recorded_observations import read_instants, read_observations
 from rhot_app.errors import RecordingError
@@ -23,7 +23,7 @@ def grasp():
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory, grasp) -> Path:
-    frames = observe(RIG, WIDE, grasp, SECONDS, Sight(marker_loss=0.05))
+    frames = observe(RIG, WIDE, grasp, SECONDS, Viewing(marker_loss=0.05))
     return write_log(tmp_path_factory.mktemp("log") / "grasp.log", RIG, frames)
 
 

@@ -13,8 +13,9 @@ from rhot_app.calibration.board.corners import detect
 from rhot_app.simulator.film.pictures import PicturesFile, picture_times, take_pictures
 from rhot_app.simulator.film.shot import make_shot, read_shot
 from rhot_app.simulator.film.truth import load_thing_truth, load_truth
+from rhot_app.simulator.scene.background import background_image
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.simulator.scene.scene_description import BoardShow, RulerShow
+from rhot_app.simulator.scene.scene_description import BoardShow, EmptyShow, RulerShow
 
 
 def test_board_pictures_show_the_board_at_its_true_place(tmp_path: Path) -> None:
@@ -46,6 +47,15 @@ def test_samples_lie_on_the_markers_paint(tmp_path: Path) -> None:
         paint = np.array(marker.display_rgb)
         assert np.dot(colour, paint) / (np.linalg.norm(colour) * np.linalg.norm(paint)) > 0.985, marker.id
     assert load_truth(tmp_path / "take" / "truth.npz").cameras[0].visible.shape == (1, 6)
+
+
+def test_an_empty_scene_shows_the_background_alone(tmp_path: Path) -> None:
+    scene = make_scene(twin_defaults(), 3)
+    take_pictures(make_shot(scene, EmptyShow(), 1.0), tmp_path / "take", 1)
+    for index, name in enumerate(("left", "right")):
+        image = cv2.imread(str(tmp_path / "take" / name / "000.png")).astype(float)
+        wall = background_image(scene.settings.background, scene.camera(index), scene.settings.distance_m, scene.seed)
+        assert np.abs(image[:, :, ::-1] - wall.transpose(1, 2, 0)).mean() < 6.0, "the sensor's noise is the difference"
 
 
 def test_the_rulers_crosses_are_told_where_they_are_drawn(tmp_path: Path) -> None:

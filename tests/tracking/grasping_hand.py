@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from synthetic_rig import EPOCH_NS, WIDE, Preset, Sight, Trajectory, hand_trajectory, make_rig, observe, run
+from synthetic_rig import EPOCH_NS, WIDE, Preset, Trajectory, Viewing, hand_trajectory, make_rig, observe, run
 
 from rhot_app.project import Rig
 from rhot_app.state import HandState, Knowledge
@@ -13,13 +13,13 @@ RIG = make_rig()
 GRASP = hand_trajectory(RIG, "grasp", 5.0)
 REST = GRASP(np.array([0.0]))[0]
 MEASURED, INFERRED, UNKNOWN = Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.UNKNOWN
-SIGHT = Sight()
+VIEWING = Viewing()
 
 
-def states_of(sight: Sight = SIGHT, rig: Rig = RIG, preset: Preset = WIDE, trajectory: Trajectory = GRASP,
+def states_of(viewing: Viewing = VIEWING, rig: Rig = RIG, preset: Preset = WIDE, trajectory: Trajectory = GRASP,
               seconds: float = 4.0) -> list[HandState]:
     """What a new tracker says of this trajectory."""
-    return run(make_tracker(rig), observe(rig, preset, trajectory, seconds, sight))
+    return run(make_tracker(rig), observe(rig, preset, trajectory, seconds, viewing))
 
 
 def seconds(state: HandState) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from synthetic_rig import EPOCH_NS, WIDE, Sight, Trajectory, hand_trajectory, make_rig, observe, run
+from synthetic_rig import EPOCH_NS, WIDE, Trajectory, Viewing, hand_trajectory, make_rig, observe, run
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import Rig, TrackerSettings
@@ -37,10 +37,11 @@ def moving(motion: str = "grasp", seconds: float = 4.0, markers: str = "rhot6", 
     return hand_trajectory(model_rig(markers, side), motion, seconds)
 
 
-def sights(rig: Rig, truth: Trajectory, seconds: float, sight: Sight | None = None) -> list[CameraObservations]:
+def observations_of(rig: Rig, truth: Trajectory, seconds: float,
+                    viewing: Viewing | None = None) -> list[CameraObservations]:
     """What the rig's cameras, which take turns, see of the motion."""
     phases = tuple(0.37 * camera % 1.0 for camera in range(len(rig.nodes)))
-    return observe(rig, WIDE, truth, seconds, Sight(phases=phases) if sight is None else sight)
+    return observe(rig, WIDE, truth, seconds, Viewing(phases=phases) if viewing is None else viewing)
 
 
 def states_of(rig: Rig, frames: list[CameraObservations]) -> list[HandState]:

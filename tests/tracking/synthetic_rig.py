@@ -63,7 +63,7 @@ def still_trajectory(points: np.ndarray) -> Trajectory:
 
 
 @dataclass(frozen=True)
-class Sight:
+class Viewing:
     """How the cameras see: phases in frame periods, pixel noise, parts of frames and markers lost, network delays."""
 
     phases: tuple[float, ...] = (0.0, 0.37)
@@ -74,21 +74,22 @@ class Sight:
     seed: int = 7
 
 
-def observe(rig: Rig, preset: Preset, trajectory: Trajectory, seconds: float, sight: Sight) -> list[CameraObservations]:
+def observe(rig: Rig, preset: Preset, trajectory: Trajectory, seconds: float,
+            viewing: Viewing) -> list[CameraObservations]:
     """All frames of all cameras in the order of their arrival."""
-    rng = np.random.default_rng(sight.seed)
+    rng = np.random.default_rng(viewing.seed)
     frames: list[CameraObservations] = []
     for index, node in enumerate(rig.nodes):
         model = CameraModel.from_rig(node.intrinsics, node.pose)
-        starts = (np.arange(int(seconds * preset.fps)) + sight.phases[index]) / preset.fps
+        starts = (np.arange(int(seconds * preset.fps)) + viewing.phases[index]) / preset.fps
         for start in starts:
             pixels = _see(model, trajectory, start, preset.row_time_ns * 1e-9)
-            pixels = pixels + rng.normal(0.0, sight.noise_px, pixels.shape)
-            lost = rng.random(len(pixels)) < sight.marker_loss
-            arrival = start + 480 * preset.row_time_ns * 1e-9 + 0.004 + rng.uniform(*sight.delay_s)
-            if rng.random() >= sight.frame_loss:
+            pixels = pixels + rng.normal(0.0, viewing.noise_px, pixels.shape)
+            lost = rng.random(len(pixels)) < viewing.marker_loss
+            arrival = start + 480 * preset.row_time_ns * 1e-9 + 0.004 + rng.uniform(*viewing.delay_s)
+            if rng.random() >= viewing.frame_loss:
                 frames.append(frame(index, start, pixels, np.where(lost, LOST, 0), arrival, preset.row_time_ns,
-                                    max(sight.noise_px, 1e-3)))
+                                    max(viewing.noise_px, 1e-3)))
     return sorted(frames, key=lambda f: f.t_receive_ns)
 
 

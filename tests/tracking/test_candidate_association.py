@@ -10,7 +10,7 @@ from grasping_hand import INFERRED, MEASURED, REST, RIG, seconds
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
-from synthetic_rig import LOST, WIDE, Sight, observe, run, still_trajectory
+from synthetic_rig import LOST, WIDE, Viewing, observe, run, still_trajectory
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import with_tracker
@@ -82,7 +82,7 @@ THING = REST[1] + np.array([0.2, -0.15, 0.5])  # of the index marker's colour, h
 @pytest.mark.parametrize("first", [False, True])
 def test_a_thing_behind_the_hand_is_not_the_marker(kind: str, first: bool) -> None:
     frames = [with_further(frame, [1], THING[None], first=first)
-              for frame in observe(RIG, WIDE, still_trajectory(REST), 1.0, Sight())]
+              for frame in observe(RIG, WIDE, still_trajectory(REST), 1.0, Viewing())]
     states = [state for state in run(make_tracker(with_tracker(RIG, kind)), frames) if seconds(state) > 0.3]
     assert all(state.marker_knowledge[1] == KNOWN[kind] for state in states)
     assert max(np.linalg.norm(state.marker_positions[1] - REST[1]) for state in states) < 2e-3
@@ -92,7 +92,7 @@ def test_a_thing_behind_the_hand_is_not_the_marker(kind: str, first: bool) -> No
 def test_a_thing_does_not_take_the_place_of_a_hidden_marker(kind: str) -> None:
     things = np.stack([THING, THING + np.array([-0.4, 0.0, 0.1])])
     frames = []
-    for frame in observe(RIG, WIDE, still_trajectory(REST), 2.5, Sight()):
+    for frame in observe(RIG, WIDE, still_trajectory(REST), 2.5, Viewing()):
         t_s = 1e-9 * frame.t_row0_master_ns - 5e5
         both = with_further(frame, [1, 1], things)
         if 1.0 <= t_s < 2.0:  # hidden: the node reports the things, one of them as the best candidate
@@ -110,7 +110,7 @@ def test_a_thing_does_not_take_the_place_of_a_hidden_marker(kind: str) -> None:
 
 def association_of_a_still_hand() -> tuple[MarkerAssociation, CameraObservations]:
     association = MarkerAssociation(compile_rig(RIG))
-    frame = observe(RIG, WIDE, still_trajectory(REST), 0.1, Sight())[0]
+    frame = observe(RIG, WIDE, still_trajectory(REST), 0.1, Viewing())[0]
     association.update(frame.t_row0_master_ns - 25_000_000, REST)
     association.update(frame.t_row0_master_ns, REST)
     return association, frame

@@ -11,7 +11,7 @@ from synthetic_rig import (
     EPOCH_NS,
     LOST,
     WIDE,
-    Sight,
+    Viewing,
     altered,
     compare,
     make_rig,
@@ -43,7 +43,7 @@ def test_a_hidden_marker_is_carried_on_then_unknown_and_its_finger_a_guess():
         if camera == 0 and t > 1.0:
             flags[1] = LOST
 
-    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 2.0, Sight()), hide))
+    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 2.0, Viewing()), hide))
     knowledge = {round(seconds(s) - 1.0, 3): s.marker_knowledge[1] for s in states}
     assert all(known == MEASURED for t, known in knowledge.items() if -0.9 < t < -0.03)
     assert all(known == INFERRED for t, known in knowledge.items() if 0.03 < t < 0.2)
@@ -68,8 +68,8 @@ def test_a_doubtful_sight_is_inferred_unless_two_others_are_clear(flag):
 
     for cameras, expected in ((2, INFERRED), (3, MEASURED)):
         rig = make_rig(cameras=cameras)
-        sight = Sight(phases=(0.0, 0.37, 0.71))
-        last = run(make_tracker(rig), altered(observe(rig, WIDE, GRASP, 1.0, sight), doubt))[-1]
+        viewing = Viewing(phases=(0.0, 0.37, 0.71))
+        last = run(make_tracker(rig), altered(observe(rig, WIDE, GRASP, 1.0, viewing), doubt))[-1]
         assert last.marker_knowledge[2] == expected
         assert (np.delete(last.marker_knowledge, 2) == MEASURED).all()
         assert np.linalg.norm(last.marker_positions[2] - GRASP(np.array([seconds(last)]))[0, 2]) < 3e-3
@@ -80,7 +80,7 @@ def test_rays_that_miss_each_other_are_not_measured():
         if camera == 1 and t > 0.5:
             pixels[3, 1] += 9.0
 
-    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.2, Sight()), shift))
+    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.2, Viewing()), shift))
     assert states[-1].marker_knowledge[3] == UNKNOWN
     assert states[-1].epipolar_error_px[3] == pytest.approx(4.5, abs=0.3)
     assert all(s.marker_knowledge[3] != MEASURED for s in states if seconds(s) > 0.53)
@@ -92,7 +92,7 @@ def test_rays_that_nearly_meet_are_inferred():
         if camera == 1 and t > 0.5:
             pixels[3, 1] += 3.0
 
-    last = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.0, Sight()), shift))[-1]
+    last = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.0, Viewing()), shift))[-1]
     assert last.marker_knowledge[3] == INFERRED
     assert (np.delete(last.marker_knowledge, 3) == MEASURED).all()
 
@@ -103,8 +103,8 @@ def test_one_wrong_camera_of_three_is_given_up():
             pixels[3] += [-4.0, 9.0]
 
     rig = make_rig(cameras=3)
-    sight = Sight(phases=(0.0, 0.37, 0.71))
-    last = run(make_tracker(rig), altered(observe(rig, WIDE, GRASP, 1.0, sight), shift))[-1]
+    viewing = Viewing(phases=(0.0, 0.37, 0.71))
+    last = run(make_tracker(rig), altered(observe(rig, WIDE, GRASP, 1.0, viewing), shift))[-1]
     assert last.marker_knowledge[3] == MEASURED
     assert np.linalg.norm(last.marker_positions[3] - GRASP(np.array([seconds(last)]))[0, 3]) < 2e-3
 
@@ -118,7 +118,7 @@ def test_a_marker_beyond_the_hands_reach_is_not_measured() -> None:
             pixels[4] = models[camera].project(elsewhere)[0]
             flags[4] = int(MarkerFlag.ACQUIRED) if t < 0.524 else 0
 
-    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, still_trajectory(REST), 2.0, Sight()), jump))
+    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, still_trajectory(REST), 2.0, Viewing()), jump))
     assert [s.marker_knowledge[4] for s in states if seconds(s) < 0.45][-1] == MEASURED
     assert all(s.marker_knowledge[4] != MEASURED for s in states if seconds(s) > 0.55)
     assert all((s.marker_knowledge[:4] == MEASURED).all() for s in states if seconds(s) > 0.05)
@@ -138,7 +138,7 @@ def test_an_impossible_jump_waits_for_three_states():
         if any(start <= t < start + 0.024 for start in (0.5, 0.54, 1.0)):
             flags[4] = int(MarkerFlag.ACQUIRED)
 
-    frames = altered(observe(RIG, WIDE, still_trajectory(REST), 1.5, Sight(phases=(0.0, 0.02))), jump)
+    frames = altered(observe(RIG, WIDE, still_trajectory(REST), 1.5, Viewing(phases=(0.0, 0.02))), jump)
     states = run(make_tracker(rig), frames)
     for state in states:
         if state.marker_knowledge[4] == MEASURED:
@@ -157,7 +157,7 @@ def test_conditions_from_nothing_to_tracking_to_lost():
 
     tracker = make_tracker(RIG)
     assert tracker.solve() is None
-    states = run(tracker, altered(observe(RIG, WIDE, GRASP, 3.0, Sight()), empty))
+    states = run(tracker, altered(observe(RIG, WIDE, GRASP, 3.0, Viewing()), empty))
     words = [s.condition for s in states]
     assert words[0] is Condition.SEARCHING and words[-1] is Condition.LOST
     changes = [words[0], *(b for a, b in pairwise(words) if a is not b)]
@@ -170,7 +170,7 @@ def test_conditions_from_nothing_to_tracking_to_lost():
 
 
 def test_one_camera_alone_measures_nothing_and_says_lost():
-    frames = [f for f in observe(RIG, WIDE, GRASP, 2.0, Sight())
+    frames = [f for f in observe(RIG, WIDE, GRASP, 2.0, Viewing())
               if f.camera == 0 or f.t_row0_master_ns < EPOCH_NS + 10**9]
     states = run(make_tracker(RIG), frames)
     alone = [s for s in states if seconds(s) > 1.25]
@@ -182,7 +182,7 @@ def test_one_camera_alone_measures_nothing_and_says_lost():
 
 def test_a_rig_with_one_camera_searches_forever():
     rig = make_rig(cameras=1)
-    states = states_of(Sight(phases=(0.0,)), rig, seconds=1.0)
+    states = states_of(Viewing(phases=(0.0,)), rig, seconds=1.0)
     assert states and all(s.condition is Condition.SEARCHING for s in states)
 
 
@@ -190,7 +190,7 @@ def test_a_rig_with_one_camera_searches_forever():
 def test_garbage_never_raises_and_is_never_measured(seed):
     rng = np.random.default_rng(seed)
     tracker = make_tracker(RIG)
-    clean = observe(RIG, WIDE, GRASP, 3.0, Sight())
+    clean = observe(RIG, WIDE, GRASP, 3.0, Viewing())
     poison = np.array([np.nan, np.inf, -np.inf, 1e300, -1e9, 0.0])
     for f in clean:
         pixels, covariances, flags = f.pixels.copy(), f.covariances.copy(), f.flags.copy()

@@ -10,7 +10,7 @@ from patience import quickest
 from synthetic_rig import (
     FAST,
     WIDE,
-    Sight,
+    Viewing,
     compare,
     frame,
     hand_trajectory,
@@ -38,10 +38,10 @@ def test_a_hand_at_two_metres_per_second_is_met_although_the_cameras_are_not_syn
     rig = make_rig(FAST, filters=FilterSettings(enabled=False))
     trajectory = hand_trajectory(rig, "fast", 4.0, distance_m=1.0)
     assert np.linalg.norm(trajectory(np.linspace(0, 4, 4000), 1), axis=2).max() > 1.5
-    assert compare(rig, states_of(Sight(noise_px=0.0), rig, FAST, trajectory), trajectory).marker_mm < 0.1
+    assert compare(rig, states_of(Viewing(noise_px=0.0), rig, FAST, trajectory), trajectory).marker_mm < 0.1
     wide = make_rig(filters=FilterSettings(enabled=False))
     trajectory = hand_trajectory(wide, "fast", 4.0)
-    assert compare(wide, states_of(Sight(noise_px=0.0), wide, WIDE, trajectory), trajectory).marker_mm < 0.6
+    assert compare(wide, states_of(Viewing(noise_px=0.0), wide, WIDE, trajectory), trajectory).marker_mm < 0.6
 
 
 @pytest.mark.parametrize("ik", ["transpose", "pseudo_inverse", "svd", "dls", "newton", "lm", "closed_form"])
@@ -52,15 +52,15 @@ def test_every_inverse_kinematics_solver_bends_the_fingers(ik):
 
 
 def test_lost_and_late_frames_cost_little():
-    errors = compare(RIG, states_of(Sight(frame_loss=0.2, delay_s=(0.0, 0.06))), GRASP)
+    errors = compare(RIG, states_of(Viewing(frame_loss=0.2, delay_s=(0.0, 0.06))), GRASP)
     assert errors.marker_mm < 1.0 and errors.fingertip_mm < 1.2
     assert errors.measured > 0.9
 
 
 def test_three_cameras_measure_better_than_two():
     rig = make_rig(cameras=3)
-    sight = Sight(phases=(0.0, 0.37, 0.71))
-    assert compare(rig, states_of(sight, rig), GRASP).marker_mm < 0.8 * compare(RIG, states_of(), GRASP).marker_mm
+    viewing = Viewing(phases=(0.0, 0.37, 0.71))
+    assert compare(rig, states_of(viewing, rig), GRASP).marker_mm < 0.8 * compare(RIG, states_of(), GRASP).marker_mm
 
 
 def test_the_outline_of_a_body_is_set_back_to_its_centre():
@@ -69,14 +69,14 @@ def test_the_outline_of_a_body_is_set_back_to_its_centre():
     radii = np.array([1e-3 * marker.radius_mm for marker in rig.markers.markers])
     seen = points.copy()
     seen[:5, 2] -= radii[:5] ** 2 / points[:5, 2]
-    states = states_of(Sight(noise_px=0.0), rig, WIDE, still_trajectory(seen), 0.5)
+    states = states_of(Viewing(noise_px=0.0), rig, WIDE, still_trajectory(seen), 0.5)
     assert np.abs(states[-1].marker_positions[:5] - points[:5]).max() < 1e-5
     # The band lies as the palm does: its flat side is turned to the cameras.
     assert 1e3 * (states[-1].marker_positions[5, 2] - seen[5, 2]) == pytest.approx(1e3 * 0.0212**2 / 0.6, abs=0.1)
 
 
 def test_states_carry_their_numbers_times_and_last_sights():
-    states = states_of(Sight(noise_px=0.0), seconds=1.0, trajectory=still_trajectory(REST))
+    states = states_of(Viewing(noise_px=0.0), seconds=1.0, trajectory=still_trajectory(REST))
     assert [s.sequence for s in states] == list(range(len(states)))
     assert (np.diff([s.t_master_ns for s in states]) > 0).all()
     for state in states:
@@ -99,7 +99,7 @@ def test_a_marker_without_a_place_on_the_hand_is_a_free_point():
 
 def test_a_flood_of_frames_is_taken_in_quickly():
     tracker = make_tracker(RIG)
-    frames = observe(RIG, WIDE, GRASP, 5.0, Sight())
+    frames = observe(RIG, WIDE, GRASP, 5.0, Viewing())
     run(tracker, frames[:20])
     flood = iter(frames[20:])
     tenth = len(frames[20:]) // 10
@@ -114,7 +114,7 @@ def test_a_flood_of_frames_is_taken_in_quickly():
 def test_frames_of_an_older_session_time_do_not_confuse():
     """A tracker that is reset starts from nothing, whatever the new times are."""
     tracker = make_tracker(RIG)
-    assert run(tracker, observe(RIG, WIDE, GRASP, 0.5, Sight()))
+    assert run(tracker, observe(RIG, WIDE, GRASP, 0.5, Viewing()))
     tracker.reset()
     assert tracker.solve() is None
     early = [frame(c, 0.025 * k - 100.0, np.full((6, 2), 200.0), np.zeros(6, np.uint16), 0.025 * k - 99.9)

@@ -5,7 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from synthetic_rig import EPOCH_NS, WIDE, Sight, hand_trajectory, make_rig, observe, run
+from synthetic_rig import EPOCH_NS, WIDE, Viewing, hand_trajectory, make_rig, observe, run
 
 from rhot_app.calibration.depth.fit import depth_from_disparity, depth_from_power_law
 from rhot_app.project import CameraPose, DepthSettings
@@ -71,7 +71,7 @@ def test_a_hand_is_tracked_with_cameras_nobody_calibrated(depth: DepthSettings) 
     """Lens and poses of the rig are wrong; the second camera hangs 8 px too low, which no triangulation would take."""
     rig = rig_with(depth)
     grasp = hand_trajectory(rig, "grasp", 2.0)
-    frames = observe(rig, WIDE, grasp, 2.0, Sight(noise_px=0.05))
+    frames = observe(rig, WIDE, grasp, 2.0, Viewing(noise_px=0.05))
     for frame in frames:
         if frame.camera == 1:
             frame.pixels[:, 1] += 8.0

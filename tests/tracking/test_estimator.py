@@ -5,8 +5,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from modelled_hand import after_s, deviations, model_rig, moving, seconds, sights, states_of
-from synthetic_rig import LOST, Sight, altered, hand_trajectory, make_rig, run
+from modelled_hand import after_s, deviations, model_rig, moving, observations_of, seconds, states_of
+from synthetic_rig import LOST, Viewing, altered, hand_trajectory, make_rig, run
 
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
@@ -15,8 +15,8 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES
 from rhot_app.simulator.scene.motion import FACING
 from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.classic import ClassicTracker
-from rhot_app.tracking.estimator import Estimator
-from rhot_app.tracking.marker_model import compile_markers
+from rhot_app.tracking.markers.estimator import Estimator
+from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.trackers import make_tracker
 
@@ -34,7 +34,7 @@ def in_limits(states, rig=RIG):
 
 @pytest.mark.parametrize("motion", ["rest", "grasp", "fast"])
 def test_hand_is_where_it_is_and_the_covariances_say_how_well(motion):
-    states = states_of(RIG, sights(RIG, moving(motion), SECONDS))
+    states = states_of(RIG, observations_of(RIG, moving(motion), SECONDS))
     found = deviations(after_s(states, 1.0), moving(motion))
     assert found.rms_mm < 1.5
     assert 0.01 < found.normalised.mean() < 2.0
@@ -47,7 +47,7 @@ def test_hand_is_where_it_is_and_the_covariances_say_how_well(motion):
     (model_rig(side="left"), moving(side="left")), (model_rig("rhot8"), moving(markers="rhot8")),
     (model_rig(cameras=3), moving()), (model_rig(limits="thesis"), moving())], ids=["left", "rhot8", "three", "thesis"])
 def test_other_hands_markers_cameras_and_limits(rig, truth):
-    states = states_of(rig, sights(rig, truth, 2.0))
+    states = states_of(rig, observations_of(rig, truth, 2.0))
     assert deviations(after_s(states, 1.0), truth).rms_mm < 1.5
     assert in_limits(states, rig)
 
@@ -55,7 +55,7 @@ def test_other_hands_markers_cameras_and_limits(rig, truth):
 def test_two_knuckles_show_how_the_palm_is_turned_and_a_wrist_alone_does_not():
     def palm(markers):
         rig = model_rig(markers)
-        last = states_of(rig, sights(rig, moving(markers=markers), 1.0))[-1]
+        last = states_of(rig, observations_of(rig, moving(markers=markers), 1.0))[-1]
         return last, np.sqrt(np.trace(last.palm_covariance[3:, 3:]))
 
     (bare, unsure), (full, sure) = palm("rhot6"), palm("rhot8")
@@ -65,7 +65,7 @@ def test_two_knuckles_show_how_the_palm_is_turned_and_a_wrist_alone_does_not():
 
 def test_coupled_hands_keep_their_couplings():
     rig = model_rig(variant="coupled")
-    states = after_s(states_of(rig, sights(rig, moving(), 2.0)), 0.5)
+    states = after_s(states_of(rig, observations_of(rig, moving(), 2.0)), 0.5)
     angles = np.array([state.angles for state in states])
     for finger in ("index", "middle", "ring", "little"):
         pip, dip = (angles[:, ANGLES.index(f"{finger}_{joint}_flexion")] for joint in ("pip", "dip"))
@@ -74,7 +74,7 @@ def test_coupled_hands_keep_their_couplings():
 
 
 def test_a_hand_is_found_within_a_fifth_of_a_second():
-    states = states_of(RIG, sights(RIG, moving(), 0.5))
+    states = states_of(RIG, observations_of(RIG, moving(), 0.5))
     assert states[0].condition is Condition.SEARCHING and states[0].palm_knowledge is Knowledge.UNKNOWN
     first = next(state for state in states if state.condition in HERE)
     assert seconds(first) < 0.2
@@ -87,7 +87,7 @@ def before_one_camera(rig, truth):
         if camera == 0 and 1.0 < t < 2.0:
             flags[:] = LOST
 
-    return states_of(rig, altered(sights(rig, truth, SECONDS), blind))
+    return states_of(rig, altered(observations_of(rig, truth, SECONDS), blind))
 
 
 def test_a_hand_before_one_camera_is_as_far_away_as_its_fingertips_look():
@@ -125,7 +125,7 @@ def hidden(markers, begin, end, camera=None):
 @pytest.mark.parametrize(("motion", "camera"), [
     ("rest", 0), ("rest", 1), ("grasp", 0), ("grasp", 1)])
 def test_half_a_second_before_one_camera_is_bridged_and_not_called_measured(motion, camera):
-    states = states_of(RIG, altered(sights(RIG, moving(motion), 2.0), hidden(slice(None), 1.0, 1.5, camera)))
+    states = states_of(RIG, altered(observations_of(RIG, moving(motion), 2.0), hidden(slice(None), 1.0, 1.5, camera)))
     dark = after_s(states, 1.0, 1.5)
     found = deviations(dark, moving(motion))
     assert found.rms_mm < 25.0
@@ -140,7 +140,7 @@ def test_half_a_second_before_one_camera_is_bridged_and_not_called_measured(moti
 @pytest.mark.parametrize("motion", ["rest", "grasp"])
 def test_a_wrist_out_of_sight_stays_near_is_not_called_measured_and_comes_back_at_once(motion):
     wrist = RIG.markers.ids.index(next(marker.id for marker in RIG.markers.markers if marker.role == "wrist"))
-    states = states_of(RIG, altered(sights(RIG, moving(motion), 2.0), hidden(wrist, 1.0, 1.5)))
+    states = states_of(RIG, altered(observations_of(RIG, moving(motion), 2.0), hidden(wrist, 1.0, 1.5)))
 
     def off_mm(some):
         truth = moving(motion)(np.array([seconds(state) for state in some]))[:, wrist]
@@ -163,7 +163,7 @@ def test_markers_hidden_in_turns():
             if (t + 0.31 * marker) % 1.0 < 0.3:
                 flags[marker] = LOST
 
-    states = after_s(states_of(RIG, altered(sights(RIG, moving("rest"), SECONDS), hide)), 1.0)
+    states = after_s(states_of(RIG, altered(observations_of(RIG, moving("rest"), SECONDS), hide)), 1.0)
     found = deviations(states, moving("rest"))
     assert found.rms_mm < 6.0 and found.within >= 0.97
     hidden = np.array([state.camera_flags[:, :5] & LOST for state in states]).all(axis=1)
@@ -176,14 +176,15 @@ def test_names_that_are_exchanged_are_put_right_by_the_hand():
         if t > 1.0:
             pixels[[1, 2]] = pixels[[2, 1]]
 
-    states = states_of(RIG, altered(sights(RIG, moving(), SECONDS), swap))
+    states = states_of(RIG, altered(observations_of(RIG, moving(), SECONDS), swap))
     late = after_s(states, 1.0)
     assert deviations(late, moving()).rms_mm < 1.5
     assert np.mean([state.marker_knowledge[1:3] == Knowledge.MEASURED for state in late]) > 0.9
 
 
 def test_a_lossy_network_and_doubled_and_late_frames():
-    frames = sights(RIG, moving(), SECONDS, Sight(frame_loss=0.1, marker_loss=0.02, delay_s=(0.001, 0.04), seed=3))
+    viewing = Viewing(frame_loss=0.1, marker_loss=0.02, delay_s=(0.001, 0.04), seed=3)
+    frames = observations_of(RIG, moving(), SECONDS, viewing)
     twice = [frame for k, frame in enumerate(frames) for frame in ([frame] * (2 if k % 7 == 0 else 1))]
     arrivals = np.array([frame.t_row0_master_ns for frame in frames])
     assert (np.diff(arrivals) < 0).sum() > 10
@@ -193,7 +194,7 @@ def test_a_lossy_network_and_doubled_and_late_frames():
 
 
 def test_a_frame_that_comes_late_counts_as_if_it_had_come_in_time():
-    frames, found = sights(RIG, moving(), 0.6), []
+    frames, found = observations_of(RIG, moving(), 0.6), []
     late = max(k for k, frame in enumerate(frames[:-1]) if frame.camera != frames[-1].camera)
     for order in (frames, [*frames[:late], *frames[late + 1:], frames[late]]):
         found.append(states_of(RIG, order)[-1])
@@ -203,7 +204,7 @@ def test_a_frame_that_comes_late_counts_as_if_it_had_come_in_time():
 
 
 def test_a_frame_that_is_far_too_late_changes_nothing():
-    frames = sights(RIG, moving(), 0.9)
+    frames = observations_of(RIG, moving(), 0.9)
     tracker = make_tracker(RIG)
     for frame in frames[1:]:
         tracker.ingest(frame)
@@ -219,7 +220,7 @@ def test_a_hand_that_leaves_is_lost_and_found_again():
         if 1.0 < t < 2.0:
             flags[:] = LOST
 
-    states = states_of(RIG, altered(sights(RIG, moving(), SECONDS), leave))
+    states = states_of(RIG, altered(observations_of(RIG, moving(), SECONDS), leave))
     assert all(state.condition in HERE for state in after_s(states, 0.2, 1.0))
     assert all(state.condition is Condition.PARTIAL for state in after_s(states, 1.1, 1.4))
     gone = after_s(states, 1.6, 2.0)
@@ -243,7 +244,7 @@ def sizes_of(states):
 @pytest.mark.parametrize(("factor", "markers"), [(1.1, "rhot6"), (0.9, "rhot6"), (1.05, "rhot8")])
 def test_the_hands_size_is_found_while_it_moves_and_never_overstated(factor, markers):
     truth = moving("grasp", 8.0, markers)
-    sizes = sizes_of(states_of(of_wrong_size(factor, markers), sights(model_rig(markers), truth, 7.0)))
+    sizes = sizes_of(states_of(of_wrong_size(factor, markers), observations_of(model_rig(markers), truth, 7.0)))
     off = sizes[:, 0] + np.log(factor)
     assert np.abs(off[-1]) < 0.02 and 0.01 < sizes[-1, 1] < 0.025
     assert (np.abs(off) < 2.0 * sizes[:, 1]).all()
@@ -251,7 +252,7 @@ def test_the_hands_size_is_found_while_it_moves_and_never_overstated(factor, mar
 
 @pytest.mark.parametrize("factor", [1.1, 1.0, 0.9])
 def test_a_still_hand_leaves_its_size_open(factor):
-    sizes = sizes_of(states_of(of_wrong_size(factor), sights(RIG, moving("still"), SECONDS)))
+    sizes = sizes_of(states_of(of_wrong_size(factor), observations_of(RIG, moving("still"), SECONDS)))
     assert (sizes[:, 1] > 0.03).all()
     assert (np.abs(sizes[:, 0] + np.log(factor)) < 2.0 * sizes[:, 1]).all()
 
@@ -262,17 +263,17 @@ def test_a_hand_found_again_has_the_size_that_it_had_and_a_reset_forgets_it():
             flags[:] = LOST
 
     tracker = make_tracker(of_wrong_size(1.1))
-    states = run(tracker, altered(sights(RIG, moving("grasp", 8.0), 7.0), leave))
+    states = run(tracker, altered(observations_of(RIG, moving("grasp", 8.0), 7.0), leave))
     assert any(state.condition is Condition.LOST for state in states)
     before, after = (sizes_of(after_s(states, *span)) for span in ((4.0, 5.0), (6.2, 7.0)))
     assert np.abs(after[0, 0] - before[-1, 0]) < 0.02 and after[0, 1] < before[0, 1] + 0.01
     tracker.reset()
-    again = sizes_of(run(tracker, sights(RIG, moving(), 0.4)))
+    again = sizes_of(run(tracker, observations_of(RIG, moving(), 0.4)))
     assert np.abs(again[0, 0]) < 1e-6 and again[0, 1] > 0.05
 
 
 def test_a_size_that_does_not_float_is_that_of_the_file():
-    assert (sizes_of(states_of(RIG, sights(RIG, moving(), 1.0))) == 0.0).all()
+    assert (sizes_of(states_of(RIG, observations_of(RIG, moving(), 1.0))) == 0.0).all()
 
 
 def test_classic_and_estimator_are_exchangeable():
@@ -282,7 +283,7 @@ def test_classic_and_estimator_are_exchangeable():
         assert type(tracker) is kind
         assert tracker.solve() is None and tracker.newest_frames() == (None, None)
         state = None
-        for frame in sights(rig, moving(), 0.6):
+        for frame in observations_of(rig, moving(), 0.6):
             tracker.ingest(frame)
             state = tracker.solve() or state
         found.append(state)
@@ -324,5 +325,6 @@ def test_a_thumb_that_bends_the_other_way_stays_where_both_cameras_see_it(lasts_
     off_mm = []
     for begin_s in np.arange(1.0, 1.05, 0.01):  # cameras take their turns otherwise
         truth = bending(begin_s, lasts_s)
-        off_mm.append(deviations(after_s(states_of(RIG, sights(RIG, truth, begin_s + 1.2)), 1.0), truth).mm[:, 0])
+        states = states_of(RIG, observations_of(RIG, truth, begin_s + 1.2))
+        off_mm.append(deviations(after_s(states, 1.0), truth).mm[:, 0])
     assert np.sqrt(np.mean(np.concatenate(off_mm) ** 2)) < most_mm

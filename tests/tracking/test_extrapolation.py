@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from modelled_hand import model_rig, moving, seconds, sights, states_of
+from modelled_hand import model_rig, moving, observations_of, seconds, states_of
 from synthetic_rig import EPOCH_NS
 
 from rhot_app.project import with_tracker
@@ -17,7 +17,7 @@ AHEAD_NS = 20_000_000
 
 @pytest.fixture(scope="module")
 def fast():
-    return states_of(RIG, sights(RIG, moving("fast"), 2.0))
+    return states_of(RIG, observations_of(RIG, moving("fast"), 2.0))
 
 
 def test_prediction_is_nearer_to_what_comes_than_the_newest_state(fast):
@@ -72,13 +72,13 @@ def test_there_is_no_prediction_far_ahead_and_of_a_hand_that_is_gone(fast):
 
 def test_a_state_without_a_velocity_stays_where_it_is():
     rig = with_tracker(RIG, "classic")
-    state = states_of(rig, sights(rig, moving("grasp"), 1.0))[-1]
+    state = states_of(rig, observations_of(rig, moving("grasp"), 1.0))[-1]
     later = Extrapolator(rig).at(state, state.t_master_ns + AHEAD_NS)
     np.testing.assert_array_equal(later.joint_positions, state.joint_positions)
 
 
 def test_a_hand_at_rest_may_have_moved_a_little_until_it_is_seen():
-    state = states_of(RIG, sights(RIG, moving("still"), 2.0))[-1]
+    state = states_of(RIG, observations_of(RIG, moving("still"), 2.0))[-1]
     extrapolator = Extrapolator(RIG)
     grown = [np.trace(extrapolator.at(state, state.t_master_ns + ahead_ns).fingertip_covariances, axis1=1, axis2=2)
              for ahead_ns in (0, 30_000_000, 60_000_000)]

@@ -2,7 +2,17 @@
 
 import numpy as np
 import pytest
-from synthetic_rig import FAST, WIDE, Sight, compare, hand_trajectory, make_rig, observe, run, still_trajectory
+from synthetic_rig import (
+    FAST,
+    WIDE,
+    Viewing,
+    compare,
+    hand_trajectory,
+    make_rig,
+    observe,
+    run,
+    still_trajectory,
+)
 
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.project import FilterSettings
@@ -18,7 +28,7 @@ def with_and_without(preset, distance, motion, noise_px=0.03):
         trajectory = hand_trajectory(rig, motion or "rest", 4.0, distance)
         if motion is None:
             trajectory = still_trajectory(trajectory(np.array([0.0]))[0])
-        frames = observe(rig, preset, trajectory, 4.0, Sight(noise_px=noise_px))
+        frames = observe(rig, preset, trajectory, 4.0, Viewing(noise_px=noise_px))
         figures.append(compare(rig, run(make_tracker(rig), frames), trajectory).marker_mm)
     return figures
 

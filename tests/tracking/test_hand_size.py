@@ -6,9 +6,9 @@ from modelled_hand import model_rig
 
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.simulator.scene.motion import FACING
-from rhot_app.tracking.acquisition import Located
-from rhot_app.tracking.hand_size import FOLLOW_S, GRID, LEAST_SD, USUAL_SD, HandSize
-from rhot_app.tracking.marker_model import compile_markers
+from rhot_app.tracking.markers.acquisition import Located
+from rhot_app.tracking.markers.hand_size import FOLLOW_S, GRID, LEAST_SD, USUAL_SD, HandSize
+from rhot_app.tracking.markers.marker_model import compile_markers
 
 WORN = compile_markers(model_rig())
 MARKERS = len(WORN.roles)

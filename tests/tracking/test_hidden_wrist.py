@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from grasping_hand import GRASP, MEASURED, RIG, SIGHT, UNKNOWN, seconds
+from grasping_hand import GRASP, MEASURED, RIG, UNKNOWN, VIEWING, seconds
 from synthetic_rig import LOST, WIDE, altered, observe, run
 
 from rhot_app.state import HandState, Knowledge
@@ -19,7 +19,7 @@ def states_without_wrist(since_s: float, until_s: float, tips: int, length_s: fl
         if since_s <= t < until_s:
             flags[tips:] = LOST
 
-    return run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, length_s, SIGHT), hide))
+    return run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, length_s, VIEWING), hide))
 
 
 def tip_errors_m(state: HandState, tips: int, knowledge: Knowledge = Knowledge.MEASURED) -> np.ndarray:

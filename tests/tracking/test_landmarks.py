@@ -19,8 +19,8 @@ from rhot_app.simulator.nodes.landmark_detector import (
     landmark_rig,
     moving_hand,
 )
-from rhot_app.tracking.marker_model import compile_markers
-from rhot_app.tracking.marker_residual import MarkerFrame
+from rhot_app.tracking.markers.marker_model import compile_markers
+from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
-from synthetic_rig import EPOCH_NS, WIDE, Sight, compare, hand_trajectory, make_rig, observe, run
+from synthetic_rig import EPOCH_NS, WIDE, Viewing, compare, hand_trajectory, make_rig, observe, run
 
 from rhot_app.hand.model import build_model
 from rhot_app.project import FilterSettings, Rig, TrackerSettings
@@ -40,7 +40,7 @@ def bends_off(rig: Rig, states: list) -> float:
 def nails() -> tuple[Rig, CubicSpline, list]:
     rig = nails_rig()
     way = hand_trajectory(rig, "grasp", SECONDS)
-    return rig, way, observe(rig, WIDE, way, SECONDS, Sight(noise_px=0.02))
+    return rig, way, observe(rig, WIDE, way, SECONDS, Viewing(noise_px=0.02))
 
 
 @pytest.mark.parametrize("kind", ["classic", "estimator"])

@@ -9,13 +9,13 @@ import msgspec
 import numpy as np
 import pytest
 from knocked_rig import filmed, moved, rig_of, scene_of, volume_motion
-from synthetic_rig import WIDE, Sight, hand_trajectory, make_rig, observe
+from synthetic_rig import WIDE, Viewing, hand_trajectory, make_rig, observe
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import CameraCalibration, DepthSettings, Rig
-from rhot_app.tracking.pair_observations import CAPACITY, PairStore, linearise
-from rhot_app.tracking.refined_rig import Refinement, Scale, refined_rig, stale_sentence, usable, verdict_of
-from rhot_app.tracking.rig_refinement import RigRefiner
+from rhot_app.tracking.refinement.pair_observations import CAPACITY, PairStore, linearise
+from rhot_app.tracking.refinement.refined_rig import Refinement, Scale, refined_rig, stale_sentence, usable, verdict_of
+from rhot_app.tracking.refinement.rig_refinement import RigRefiner
 from rhot_app.tracking.tracker import CameraObservations
 
 SCENE = scene_of(1)
@@ -143,7 +143,7 @@ def test_outliers_do_not_pull(still: list[CameraObservations]) -> None:
 
 def test_a_late_camera_is_no_turned_one() -> None:
     rig = make_rig()
-    frames = observe(rig, WIDE, hand_trajectory(rig, "wave", SECONDS), SECONDS, Sight(noise_px=0.05))
+    frames = observe(rig, WIDE, hand_trajectory(rig, "wave", SECONDS), SECONDS, Viewing(noise_px=0.05))
     late = [delayed(frame, 2_000_000) for frame in frames]
     assert refined(frames, rig).holds
     found = refined(late, rig)

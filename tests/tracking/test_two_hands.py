@@ -5,7 +5,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from modelled_hand import after_s, deviations, model_rig, moving, seconds, sights, states_of
+from modelled_hand import after_s, deviations, model_rig, moving, observations_of, seconds, states_of
 from synthetic_rig import LOST, altered, make_rig
 
 from rhot_app.engine import status
@@ -45,7 +45,7 @@ def truth(times):
     return np.stack([RIGHT_TRUTH(times), left_truth(times)], axis=2).reshape(len(times), 2 * OWN, 3)
 
 
-FRAMES = sights(RIG, truth, 2.0)
+FRAMES = observations_of(RIG, truth, 2.0)
 
 
 @pytest.fixture(scope="module")

@@ -210,3 +210,16 @@ def test_earlier_versions_tell_of_the_tracker():
     rows = rig_rows(synthetic_rig(), with_tracker(FLOATING))
     assert [(row.what, row.before, row.after) for row in rows] == [
         ("tracker", "classic", "estimator, full, anatomical limits, size estimated")]
+
+
+def test_the_bare_hand_is_chosen_in_plain_words(opened):
+    desk = opened(with_tracker(MODEL))
+    dialog = desk.dialog
+    assert dialog.observe_box.currentText() == "markers or landmarks"
+    QTest.keyClick(dialog.observe_box, Qt.Key.Key_Down)
+    desk.until(lambda: load_rig(desk.path).tracker.observe == "contours" and dialog.close_button.isEnabled())
+    assert "Background and skin" in dialog.observe_words.text() and dialog.observe_box.currentText() == "bare hand"
+    click_on_word(dialog.kinds["classic"])
+    desk.until(lambda: load_rig(desk.path).tracker == TrackerSettings() and dialog.close_button.isEnabled())
+    QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
+    desk.until(lambda: load_rig(desk.path).tracker.observe == "contours")

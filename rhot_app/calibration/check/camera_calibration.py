@@ -83,7 +83,7 @@ def with_lens(rig: Rig, camera: str, lens: Intrinsics) -> Rig:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CalibrationError:
+class CalibrationAccuracy:
     """What a rig's calibration adds to the uncertainty of positions.
 
     `sd_m` is the standard deviation at `distance_m` from `middle` (3,) m, the middle of the cameras, in the rig frame.
@@ -109,10 +109,10 @@ class CalibrationError:
         return np.asarray(self.sd_m * np.square(away / self.distance_m))
 
 
-KNOWN_EXACTLY = CalibrationError(0.0, 1.0, np.zeros(3))
+KNOWN_EXACTLY = CalibrationAccuracy(0.0, 1.0, np.zeros(3))
 
 
-def calibration_error(rig: Rig | None) -> CalibrationError:
+def calibration_error(rig: Rig | None) -> CalibrationAccuracy:
     """What the calibration of `rig` adds. Nothing in disparity mode, whose covariances include it (docs/rig.md)."""
     if rig is None or rig.depth.mode == "disparity":
         return KNOWN_EXACTLY
@@ -125,11 +125,11 @@ def calibration_error(rig: Rig | None) -> CalibrationError:
         return _unknown("Nobody knows how far places are off: the rig file does not say how well its cameras were "
                         "calibrated. Put the cameras together again (Calibrate menu) to know it.")
     middle = np.mean([node.pose.translation_m for node in rig.nodes], axis=0)
-    return CalibrationError(record.error_m, record.distance_m, middle)
+    return CalibrationAccuracy(record.error_m, record.distance_m, middle)
 
 
-def _unknown(reason: str) -> CalibrationError:
-    return CalibrationError(float("nan"), 1.0, np.zeros(3), reason)
+def _unknown(reason: str) -> CalibrationAccuracy:
+    return CalibrationAccuracy(float("nan"), 1.0, np.zeros(3), reason)
 
 
 def _poses_nominal(rig: Rig) -> bool:

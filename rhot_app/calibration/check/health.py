@@ -70,8 +70,8 @@ class Reach:
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
-    """A marker in one camera: median quality of plain sights, and the part of all sights in which another blob of its
+class MarkerQuality:
+    """A marker in one camera: median quality of plain observations, and the part of all in which another blob of its
     colour was as likely; NaN where seen too seldom."""
 
     camera: str
@@ -87,7 +87,7 @@ class HealthFigures:
     errors_px: tuple[float, float, float]
     rigid: tuple[RigidDrift, ...]
     reaches: tuple[Reach, ...]
-    sightings: tuple[Sighting, ...]
+    qualities: tuple[MarkerQuality, ...]
 
 
 def findings_of(figures: HealthFigures) -> tuple[HealthFinding, ...]:
@@ -138,7 +138,7 @@ def _reach(figures: HealthFigures) -> list[HealthFinding]:
 
 
 def _weak(figures: HealthFigures) -> list[HealthFinding]:
-    weak = [one for one in figures.sightings if one.quality < WEAK_QUALITY]
+    weak = [one for one in figures.qualities if one.quality < WEAK_QUALITY]
     if not weak:
         return []
     worst = min(weak, key=lambda one: one.quality)
@@ -150,7 +150,7 @@ def _weak(figures: HealthFigures) -> list[HealthFinding]:
 
 
 def _doubled(figures: HealthFigures) -> list[HealthFinding]:
-    worst = max((one for one in figures.sightings if one.ambiguous > DOUBLED_PART), key=lambda one: one.ambiguous,
+    worst = max((one for one in figures.qualities if one.ambiguous > DOUBLED_PART), key=lambda one: one.ambiguous,
                 default=None)
     if worst is None:
         return []
@@ -249,7 +249,7 @@ class HealthMonitor:
         rows = self._times > 1e-9 * self._last.t_ns - WINDOW_S
         return findings_of(HealthFigures(
             errors_px=self._error(rows), rigid=tuple(self._rigid_drifts(rows)), reaches=tuple(self._reach(rows)),
-            sightings=tuple(self._sightings(rows))))
+            qualities=tuple(self._marker_qualities(rows))))
 
     def _speed(self, sample: HealthSample) -> Array:
         """(M,) m/s since the sample before; NaN where not known or too long ago."""
@@ -283,13 +283,13 @@ class HealthMonitor:
                 found.append(Reach(self._rig.markers.ids[self._tips[k]], float(far), self._longest_m[k]))
         return found
 
-    def _sightings(self, rows: Mask) -> list[Sighting]:
+    def _marker_qualities(self, rows: Mask) -> list[MarkerQuality]:
         cameras, ids = [node.name for node in self._rig.nodes], self._rig.markers.ids
         qualities = _quantiles(self._qualities[rows].reshape(-1, len(cameras) * len(ids)), 0.5)
         doubled = self._ambiguous[rows].reshape(-1, len(cameras) * len(ids))
         known = np.isfinite(doubled).sum(axis=0)
         parts = np.where(known >= _LEAST_SAMPLES, np.nansum(doubled, axis=0) / np.maximum(known, 1), np.nan)
-        return [Sighting(camera, marker, quality, part) for (camera, marker), quality, part in zip(
+        return [MarkerQuality(camera, marker, quality, part) for (camera, marker), quality, part in zip(
             itertools.product(cameras, ids), qualities.tolist(), parts.tolist(), strict=True)]
 
 

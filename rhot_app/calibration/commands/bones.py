@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Seats:
-    """Where each marker of a recording was taken to sit: `told` by a role, `guessed` by its name, or not on a hand."""
+    """Where each marker of a recording was taken to sit: `given` by a role, `guessed` by its name, or not on a hand."""
 
     given: dict[str, str]
     guessed: dict[str, str]

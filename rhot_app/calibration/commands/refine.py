@@ -13,7 +13,7 @@ from rhot_app.calibration.commands.output import add_json_argument, require_fold
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
-    from rhot_app.tracking.refined_rig import Refinement, Scale
+    from rhot_app.tracking.refinement.refined_rig import Refinement, Scale
     from rhot_app.tracking.tracker import CameraObservations
 
 SCALE_S = 120.0
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.project import load_rig
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.rig_history import accept
-    from rhot_app.tracking.refined_rig import REASON, Scale, figure_rows, refined_rig, verdict_of
+    from rhot_app.tracking.refinement.refined_rig import REASON, Scale, figure_rows, refined_rig, verdict_of
 
     if args.use and (args.rig is None or args.out is not None):
         raise CalibrationError("--use writes to the file that --rig names; give it, and leave --out away.")
@@ -82,7 +82,7 @@ def _frames(log: Path, rig: Rig) -> list[CameraObservations]:
 
 def _refine(log: Path, rig: Rig, frames: Iterable[CameraObservations]) -> Refinement:
     from rhot_app.errors import CalibrationError
-    from rhot_app.tracking.rig_refinement import RigRefiner
+    from rhot_app.tracking.refinement.rig_refinement import RigRefiner
 
     refiner = RigRefiner(rig)
     if not refiner.active:
@@ -103,7 +103,7 @@ def _scale(rig: Rig, frames: list[CameraObservations]) -> Scale:
 
     from rhot_app.errors import RhotError
     from rhot_app.project import TrackerSettings
-    from rhot_app.tracking.refined_rig import Scale
+    from rhot_app.tracking.refinement.refined_rig import Scale
     from rhot_app.tracking.trackers import make_tracker
 
     floating = msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", float_scale=True))

@@ -42,8 +42,8 @@ OVERLAP_S = 2.0
 """s: streams that overlap less are not aligned; a movement of a hand takes as long."""
 
 LASTING_M = 0.5e-3
-"""m: error of a fingertip's position that lasts and goes with its pose (`tracking.marker_model.PAINT_SD_M`, of a
-disc)."""
+"""m: error of a fingertip's position that lasts and goes with its pose
+(`tracking.markers.marker_model.PAINT_SD_M`, of a disc)."""
 
 LASTING_S = 1.0
 """s: correlation time of that error (`hand.motion.hand_process.BIAS_S`)."""

@@ -2,7 +2,7 @@
 
 Each marker's silhouette is where it was at its own row's time; what other fingers and the palm hide is left out of it.
 White noise and a bias that varies slowly, mostly alike in all cameras as limb shading makes it, are added; the stated
-covariance is larger than either, as the detector's (`benchmarks/sight_errors.py`). Colours are never mixed up. Paint
+covariance is larger than either, as the detector's (`benchmarks/marker_errors.py`). Colours are never mixed up. Paint
 on one side of a finger is a disc that is lost when it is turned away; gaps, wear and gloves are not sketched.
 """
 

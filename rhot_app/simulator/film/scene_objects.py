@@ -30,6 +30,7 @@ from rhot_app.simulator.scene.scene import Scene
 from rhot_app.simulator.scene.scene_description import (
     BareHandShow,
     BoardShow,
+    EmptyShow,
     HandShow,
     MarkerShow,
     RulerShow,
@@ -75,6 +76,9 @@ def make_object(show: Show, scene: Scene, hidden: frozenset[str] = frozenset()) 
             return SceneObject(f"{motion.name}, bare hand", hand, motion)
         case BoardShow():
             return _board_act(show, scene)
+        case EmptyShow():
+            return SceneObject("nothing", ball_on_stick(scene.markers, 0), MarkerPath(_OUT_OF_VIEW_M, (0.0, 0.0),
+                                                                                      scene.seed))
         case RulerShow():
             sheet = ruler_sheet(1e-3 * show.length_mm)
             held = BoardPoses(held_place(sheet, scene.centre)[None], scene.seed)
@@ -128,6 +132,8 @@ def _marker_act(show: MarkerShow, scene: Scene) -> SceneObject:
 # -- motion of a single marker -----------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
+
+_OUT_OF_VIEW_M = np.array([0.0, 50.0, 1.0])  # far below: nothing is painted
 
 _SWING_HZ = (1.3, 0.83)  # right and left, up and down: the path repeats after a hundred seconds only
 _TREMOR_HZ, _TREMOR_M = np.array([1.1, 2.7, 8.9]), 0.08e-3

@@ -102,7 +102,7 @@ def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cube", action="store_true",
                         help="the hand holds a cube with fiducial tags, which the rig then tracks")
     room = parser.add_argument_group("instead of a hand")
-    room.add_argument("--show", default="hand", choices=("hand", "board", "ruler", "marker"),
+    room.add_argument("--show", default="hand", choices=("hand", "board", "ruler", "marker", "empty"),
                       help="what stands before the cameras (default hand)")
     room.add_argument("--bare", action="store_true", help="the hand wears no markers: skin, nails and a forearm")
     room.add_argument("--tone", type=float, default=None, metavar="T",
@@ -151,6 +151,8 @@ def show_of(args: argparse.Namespace) -> Show:
                    "legacy": args.legacy, "on_table": args.on_table}
         if args.dictionary is not None:
             fields["dictionary"] = args.dictionary
+    elif args.show == "empty":
+        pass
     elif args.show == "ruler":
         fields["length_mm"] = args.ruler_mm
     else:

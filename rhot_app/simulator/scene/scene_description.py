@@ -38,6 +38,10 @@ class BareHandShow(_Show, frozen=True, tag="bare_hand"):
     sleeve: bool = False
 
 
+class EmptyShow(_Show, frozen=True, tag="empty"):
+    """Nothing: the background alone."""
+
+
 class BoardShow(_Show, frozen=True, tag="board"):
     """A calibration board, moved about with pauses, or lying on the table.
 
@@ -80,4 +84,4 @@ class MarkerShow(_Show, frozen=True, tag="marker"):
     moving: bool = False
 
 
-Show = HandShow | BareHandShow | BoardShow | RulerShow | MarkerShow
+Show = HandShow | BareHandShow | EmptyShow | BoardShow | RulerShow | MarkerShow

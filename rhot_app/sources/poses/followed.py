@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import RhotError
 from rhot_app.geometry.transforms import rigid, rotation_from_quaternion, skew
 from rhot_app.objects.alignment.alignment_file import Alignment, load_alignment
-from rhot_app.objects.observations import ObjectPose
+from rhot_app.objects.observations import MeasuredPose
 from rhot_app.objects.pose import Validity
 from rhot_app.project import ObjectPoses, Rig
 from rhot_app.recording.object_poses import encode_pose
@@ -33,7 +33,7 @@ AGAIN_S = 3.0
 """s after which a source that failed or ended is opened again."""
 
 
-def in_rig(pose: ForeignPose, name: str, poses: ObjectPoses, alignment: Alignment) -> ObjectPose:
+def in_rig(pose: ForeignPose, name: str, poses: ObjectPoses, alignment: Alignment) -> MeasuredPose:
     """A pose of the tracker as one of the object `name` in the rig; its covariance includes the alignment's noise."""
     turn = alignment.rig_from_foreign.matrix
     tracker_from_object = rigid(rotation_from_quaternion(poses.rotation_wxyz), poses.translation_m)
@@ -44,7 +44,7 @@ def in_rig(pose: ForeignPose, name: str, poses: ObjectPoses, alignment: Alignmen
     covariance = jacobian @ pose.covariance @ jacobian.T
     covariance[range(3), range(3)] += alignment.noise_m**2
     t_ns = pose.t_master_ns + round(1e9 * alignment.time_offset_s)
-    return ObjectPose(name, t_ns, turn @ pose.world_from_body @ tracker_from_object, covariance)
+    return MeasuredPose(name, t_ns, turn @ pose.world_from_body @ tracker_from_object, covariance)
 
 
 class FollowedObjects:
@@ -98,7 +98,7 @@ class _Followed:
         self._alignment: Alignment | None = None
         self._waits = 0
 
-    def poll(self) -> list[ObjectPose]:
+    def poll(self) -> list[MeasuredPose]:
         """The poses since the last call that were measured, in the rig."""
         if self._waits > 0:
             self._waits -= 1

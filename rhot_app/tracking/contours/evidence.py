@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
-from rhot_app.barehand.contours import STEP_M, ContourPoints
+from rhot_app.barehand.contours import SILHOUETTE, STEP_M, ContourPoints
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.motion.hand_process import MOTION
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.state import SeenContour
 from rhot_node.wire.slices import pack_slices, unpack_slices
 
 Array = NDArray[np.float64]
@@ -23,6 +24,9 @@ apart in the hand files."""
 
 APART_M = 0.1
 """m: farther apart are two hands: a hand's breadth."""
+
+NEAR_SD = 3.0
+"""Standard deviations from the contour within which an edge is shown as the hand's."""
 
 ALIKE = 0.9
 """Cosine of the largest angle between a recorded slice and the normal of the contour on it, 26 degrees."""
@@ -96,3 +100,19 @@ def joints_of(hand: BareHandTracker, state: Array) -> Array:
     place_joints(state, np.zeros((len(hand.process.stationary),) * 2), hand.model.dh, hand.surface.bone, points,
                  covariances, motion)
     return points[:21]
+
+
+def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array) -> SeenContour:
+    """What one image shows of a hand in `state`."""
+    offset, _, good = frame.predict(state)
+    centre, normal, half = frame.slices[:, :2], frame.slices[:, 2:4], frame.slices[:, 4:]
+    ends = np.hstack([centre - half * normal, centre + half * normal])
+    places, near = np.empty((0, 2)), np.empty(0, np.bool_)
+    if frame.edges is not None:
+        edges = frame.edges
+        row, column = np.nonzero((np.arange(edges.offset.shape[1]) < edges.number[:, None]) & good[:, None])
+        along = edges.offset[row, column]
+        places = centre[row] + along[:, None] * normal[row]
+        near = np.abs(along - offset[row]) < NEAR_SD * np.hypot(frame.expected_sd[row], edges.sd[row, column])
+    return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good], frame.points.behind[good] == SILHOUETTE,
+                       ends[good], places, near)

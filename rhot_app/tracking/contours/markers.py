@@ -18,10 +18,10 @@ from rhot_app.hand.landmarks import LASTING_M, LASTING_S
 from rhot_app.hand.motion.hand_process import BIAS, BIAS_S, FASTEST, MOTION, PALM_SPREAD, HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
-from rhot_app.tracking.acquisition import Starter
 from rhot_app.tracking.association import MarkerAssociation
-from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
-from rhot_app.tracking.marker_residual import MarkerFrame, triangulation_covariance
+from rhot_app.tracking.markers.acquisition import Starter
+from rhot_app.tracking.markers.marker_model import LASTING_PX, compile_markers
+from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
 

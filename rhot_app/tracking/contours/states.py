@@ -8,22 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from rhot_app.barehand.observations import EdgeFrame
-from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
+from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
-
-
-def no_hand(t_ns: int, condition: Condition) -> HandState:
-    """No hand at master time `t_ns`, and nothing of markers and cameras yet (`published`)."""
-    unknown, nothing = int(Knowledge.UNKNOWN), np.empty((0, 3))
-    return HandState(
-        sequence=0, t_master_ns=t_ns, t_receive_ns=t_ns, condition=condition, marker_ids=(), marker_positions=nothing,
-        marker_raw_positions=nothing, marker_covariances=np.empty((0, 3, 3)), marker_knowledge=np.empty(0, np.uint8),
-        camera_names=(), camera_pixels=np.empty((0, 0, 2)), camera_flags=np.empty((0, 0), np.uint16),
-        joint_positions=np.full((21, 3), np.nan), joint_knowledge=np.full(21, unknown, np.uint8),
-        fingertip_positions=np.full((5, 3), np.nan), angles=np.full(21, np.nan),
-        angle_knowledge=np.full(21, unknown, np.uint8), world_from_palm=np.full((4, 4), np.nan),
-        palm_knowledge=Knowledge.UNKNOWN, epipolar_error_px=np.empty(0), latency_s={}, **UNESTIMATED)
 
 
 def published(hand: HandState, sequence: int, frame: CameraObservations | EdgeFrame,

@@ -25,18 +25,20 @@ from rhot_app.barehand.tracker import (
     COVER_SHARE,
     PASSES,
     RELOCATION_LOG_ODDS,
+    START_SD,
     BareHandTracker,
 )
 from rhot_app.estimation.filter import update
 from rhot_app.estimation.residual import Residual
+from rhot_app.hand.motion.hand_process import BIAS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
-from rhot_app.state import Condition, HandState
-from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand
+from rhot_app.state import Condition, HandState, SeenContour, no_hand
+from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand, seen_contour
 from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.markers import MarkersOfHand
-from rhot_app.tracking.contours.states import no_hand, published
-from rhot_app.tracking.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
+from rhot_app.tracking.contours.states import published
+from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.slices import SLICES_MAX
 
@@ -121,6 +123,16 @@ class ContourEstimator:
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""
         return tuple(camera.newest for camera in self._cameras)
+
+    def seen(self) -> list[SeenContour]:
+        """See `ShowsContours`."""
+        if not (self._tracking and self._confirmed):
+            return []
+        state, found = self._hand.filter.newest.state, []
+        for name, camera, frame in zip(self._names, self._cameras, list(self._hand.frames), strict=True):
+            if frame is not None:
+                found.append(seen_contour(name, camera.answered_ns, frame, state))
+        return found
 
     def requests(self) -> list[SliceRequest]:
         """What the nodes shall search now."""
@@ -257,24 +269,29 @@ class ContourEstimator:
             return
         pose, t_ns = found
         state, _ = self._hand.filter.predict(self._seconds(t_ns))
+        other, _ = self._hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
+        other[BIAS:], seen = state[BIAS:], maps.silhouettes(self._hand)
         if same_hand(self._hand, state, pose):
             self._confirmed = self._ever = True
-        else:
+        elif self._hand.score_of(seen, other) > self._hand.score_of(seen, state):
             self._start(pose, t_ns)
+        else:
+            self._finder.look(maps)
 
     def _cover(self, maps: Maps) -> None:
         """Move the hand to where it covers the foreground better, if it has come to cover it worse than of late. What
         was found beside the frames is compared in the newest of them."""
         hand, knot = self._hand, self._hand.filter.newest
         seen, moved = maps.silhouettes(hand), self._finder.moved()
-        if moved is not None and hand.score_of(seen, moved) > hand.score_of(seen, knot.state) + LEAST_GAIN:
+        covered = hand.covered(seen, knot.state)
+        worse = hand.cover != 0.0 and covered < hand.cover - COVER_DROP
+        if worse and moved is not None and hand.score_of(seen, moved) > hand.score_of(seen, knot.state) + LEAST_GAIN:
             hand.restart(knot.t_s, moved)
             for number, camera in enumerate(self._cameras):
                 if camera.newest is not None:
                     self._ask(number, camera.newest.t_row0_master_ns)
             return
-        covered = hand.covered(seen, knot.state)
-        if hand.cover and covered < hand.cover - COVER_DROP:
+        if worse:
             self._finder.relocate(maps, knot.state, knot.covariance, 1e-9 * self._cameras[0].period_ns)
         hand.cover += (COVER_SHARE if hand.cover else 1.0) * (covered - hand.cover)
 

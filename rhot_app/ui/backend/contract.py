@@ -124,8 +124,8 @@ class Backend(Protocol):
 
     def show_in_twin(self, what: str) -> str:
         """Show something else, from its beginning; returns what is shown. `what`: ``hand:MOTION``, ``bare:MOTION``
-        (without markers), ``board``, ``table`` (the board lies on it), ``ruler``, or ``marker:METRES``. Raises
-        SimulatorError."""
+        (without markers), ``board``, ``table`` (the board lies on it), ``ruler``, ``marker:METRES``, or ``empty``.
+        Raises SimulatorError."""
         ...
 
     def give_up(self) -> None:

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.engine.status import EngineStatus, Preview
-from rhot_app.state import HandState
+from rhot_app.engine.status import EngineStatus, Preview, Published
+from rhot_app.state import HandState, SeenContour
 from rhot_app.ui.models.meters import STACKED, JitterWindow, LatencyWindow, LossMeter, RateRows, rate_names
 from rhot_app.ui.models.series import Series
 
@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 
 SILENCE_S = 1.5
 """The engine reports ten times a second; silence longer than this means that it is gone or stuck."""
+
+NEAR_NS = 50_000_000
+"""Images nearer in time show a hand in much the same place: 1 m/s is then 5 cm off at most."""
 
 _PAUSE_NS = 400_000_000
 """No state for so long is a gap in the plots; at 10 states per second three may be late."""
@@ -30,7 +33,7 @@ LOST = "lost"
 class Client(Protocol):
     """What the app needs of `rhot_app.engine.client.EngineClient`."""
 
-    def poll(self) -> list[HandState | EngineStatus | Preview]:
+    def poll(self) -> list[Published]:
         """Everything that arrived since the last call; never waits."""
         ...
 
@@ -63,6 +66,7 @@ class Live:
         self.preview_count = 0
         self.heard_at_s = time.monotonic()
         self.observations: deque[tuple[int, Array, NDArray[np.uint16]]] = deque(maxlen=256)
+        self.contours: deque[SeenContour] = deque(maxlen=128)
         self.jitter = Series(())
         self.latency = Series(LATENCY_COLUMNS)
         self.rates = Series(("states", LOST))
@@ -82,6 +86,8 @@ class Live:
             elif isinstance(message, Preview):
                 self.previews[message.camera] = message
                 self.preview_count += 1
+            elif isinstance(message, SeenContour):
+                self.contours.append(message)
 
     def silent_for_s(self) -> float:
         """Seconds since the engine last said anything about itself."""
@@ -115,6 +121,11 @@ class Live:
         else:
             self.jitter.append(now_ns, np.full(len(self.jitter.names), np.nan))
             self.latency.append(now_ns, np.full(len(LATENCY_COLUMNS), np.nan))
+
+    def contour_at(self, camera: str, t_master_ns: int) -> SeenContour | None:
+        """What was seen of a bare hand in the image nearest to a preview's time; None without one within 50 ms."""
+        near = [one for one in self.contours if one.camera == camera and abs(one.t_master_ns - t_master_ns) < NEAR_NS]
+        return min(near, key=lambda one: abs(one.t_master_ns - t_master_ns), default=None)
 
     def observation_at(self, t_master_ns: int) -> tuple[Array, NDArray[np.uint16]] | None:
         """Pixels (C, M, 2) and flags (C, M) of the state nearest to a preview's time; None when none is within 0.25 s.

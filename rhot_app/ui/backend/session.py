@@ -206,6 +206,7 @@ def _show_named(what: str) -> Show:
     from rhot_app.simulator.scene.scene_description import (
         BareHandShow,
         BoardShow,
+        EmptyShow,
         HandShow,
         MarkerShow,
         RulerShow,
@@ -222,6 +223,8 @@ def _show_named(what: str) -> Show:
                 return BoardShow()
             case "table":
                 return BoardShow(on_table=True)
+            case "empty":
+                return EmptyShow()
             case "ruler":
                 return RulerShow()
             case "marker":
@@ -234,6 +237,7 @@ def _key_of(show: Show) -> str:
     from rhot_app.simulator.scene.scene_description import (
         BareHandShow,
         BoardShow,
+        EmptyShow,
         HandShow,
         MarkerShow,
         RulerShow,
@@ -245,7 +249,8 @@ def _key_of(show: Show) -> str:
         return f"bare:{show.motion}" if show == BareHandShow(show.motion) else ""
     if isinstance(show, MarkerShow):
         return f"marker:{show.distance_m:g}" if show == MarkerShow(distance_m=show.distance_m) else ""
-    return {BoardShow(): "board", BoardShow(on_table=True): "table", RulerShow(): "ruler"}.get(show, "")
+    return {BoardShow(): "board", BoardShow(on_table=True): "table", RulerShow(): "ruler",
+            EmptyShow(): "empty"}.get(show, "")
 
 
 def _pace_in(output: Path) -> TwinPace | None:

@@ -31,6 +31,7 @@ from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.dialogs.recordings import recordings_folder
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
 from rhot_app.ui.models.palette import Scheme, hex_of
+from rhot_app.ui.mouse.window import MouseWindow
 
 
 class Dialogs:
@@ -41,6 +42,7 @@ class Dialogs:
         self.guide: GuideViewer | None = None
         self.tracker: TrackerDialog | None = None
         self.outputs: OutputsDialog | None = None
+        self.mouse: MouseWindow | None = None
 
     def choose_rig(self, last_rig: str) -> Path | None:
         """A rig file, looked for beside the one opened last; None when the person thought better of it."""
@@ -122,6 +124,26 @@ class Dialogs:
             self.outputs.deleteLater()
             self.outputs = None
 
+    def show_mouse(self, controller: Controller, scheme: Scheme) -> None:
+        """The 3-D mouse beside the window; with or without a rig."""
+        if self.mouse is None:
+            self.mouse = MouseWindow(controller.backend.client(), lambda: controller.rig, scheme,
+                                     lambda: self.open_guide("mouse"), self._parent)
+            self.mouse.finished.connect(self._forget_mouse)
+        self.mouse.show()
+        self.mouse.raise_()
+        self.mouse.activateWindow()
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change the colours of what paints by itself."""
+        if self.mouse is not None:
+            self.mouse.set_scheme(scheme)
+
+    def _forget_mouse(self) -> None:
+        if self.mouse is not None:
+            self.mouse.deleteLater()
+            self.mouse = None
+
     def open_guide(self, page: str) -> None:
         """A page of the guide beside the window."""
         if self.guide is None:
@@ -135,7 +157,7 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        for window in (self.guide, self.tracker, self.outputs):
+        for window in (self.guide, self.tracker, self.outputs, self.mouse):
             if window is not None:
                 window.close()
 

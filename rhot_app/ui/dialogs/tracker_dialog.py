@@ -31,6 +31,7 @@ from rhot_app.ui.models.words import (
     IK_METHODS,
     KINDS,
     LIMITS,
+    OBSERVED,
     SIZE_MEANING,
     VARIANTS,
     settings_text,
@@ -62,6 +63,7 @@ class TrackerDialog(QDialog):
         self._job: Job | None = None
         self.kinds = {kind: QRadioButton(title) for kind, (title, _) in KINDS.items()}
         self.ik_box, self.ik_words = _choices(IK_METHODS), _sentence()
+        self.observe_box, self.observe_words = _choices(OBSERVED), _sentence()
         self.variant_box, self.variant_words = _choices(VARIANTS), _sentence()
         self.limits_box, self.limits_words = _choices(LIMITS), _sentence()
         self.size_check = QCheckBox("Estimate the hand's size")
@@ -98,6 +100,7 @@ class TrackerDialog(QDialog):
         layout.addWidget(self.obstacle_label)
         self.solver = _form((("Fingers bent by", self.ik_box), ("", self.ik_words)))
         self.details = _form((
+            ("Tracked by", self.observe_box), ("", self.observe_words),
             ("Fingers", self.variant_box), ("", self.variant_words), ("Limits", self.limits_box),
             ("", self.limits_words), ("Size", self.size_check), ("", self.size_label), ("", self.size_button)))
         layout.addWidget(self.solver)
@@ -113,7 +116,7 @@ class TrackerDialog(QDialog):
     def _connect_parts(self) -> None:
         for kind in self.kinds.values():
             kind.clicked.connect(self._choose)
-        for box in (self.ik_box, self.variant_box, self.limits_box):
+        for box in (self.ik_box, self.observe_box, self.variant_box, self.limits_box):
             box.activated.connect(self._choose)
         self.size_check.clicked.connect(self._choose)
         self.size_button.clicked.connect(self.use_size)
@@ -131,9 +134,11 @@ class TrackerDialog(QDialog):
     @property
     def chosen(self) -> TrackerSettings:
         """What the form says."""
+        kind = self._kind()
         return TrackerSettings(
-            kind=self._kind(), ik=self.ik_box.currentData(), variant=self.variant_box.currentData(),
-            limits=self.limits_box.currentData(), float_scale=self.size_check.isChecked())
+            kind=kind, ik=self.ik_box.currentData(), variant=self.variant_box.currentData(),
+            limits=self.limits_box.currentData(), float_scale=self.size_check.isChecked(),
+            observe="markers" if kind == "classic" else self.observe_box.currentData())
 
     def _choose(self) -> None:
         settings = self.chosen
@@ -211,6 +216,8 @@ class TrackerDialog(QDialog):
         self.variant_box.setCurrentIndex(self.variant_box.findData(settings.variant))
         self.limits_box.setCurrentIndex(self.limits_box.findData(settings.limits))
         self.size_check.setChecked(settings.float_scale)
+        self.observe_box.setCurrentIndex(self.observe_box.findData(settings.observe))
+        self.observe_words.setText(OBSERVED[settings.observe][1])
         self.variant_words.setText(VARIANTS[settings.variant][1])
         self.limits_words.setText(LIMITS[settings.limits][1])
         obstacle = estimator_obstacle(self._rig)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, CalibrationError, calibration_text
+from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, CalibrationAccuracy, calibration_text
 from rhot_app.engine.status import NodeStatus
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode
@@ -36,7 +36,7 @@ def worst_sd(covariances: Array) -> Array:
     return np.asarray(np.where(known, np.sqrt(np.maximum(values, 0.0)), np.nan))
 
 
-def total_sd(covariances: Array, positions: Array, by_calibration: CalibrationError) -> Array:
+def total_sd(covariances: Array, positions: Array, by_calibration: CalibrationAccuracy) -> Array:
     """Standard deviation (...,) m of places (..., 3) m along the worst axis, the calibration's own included; NaN where
     either is not known."""
     return np.asarray(np.hypot(worst_sd(covariances), by_calibration.at(positions)))
@@ -134,7 +134,7 @@ class MarkerRow:
     detail: str
 
 
-def marker_rows(state: HandState, by_calibration: CalibrationError = KNOWN_EXACTLY) -> list[MarkerRow]:
+def marker_rows(state: HandState, by_calibration: CalibrationAccuracy = KNOWN_EXACTLY) -> list[MarkerRow]:
     """Rows of all markers, in the rig's order."""
     rows = []
     estimated = np.isfinite(state.marker_positions).all(axis=1) & np.isfinite(worst_sd(state.marker_covariances))
@@ -154,7 +154,7 @@ def position_text(position: np.ndarray) -> str:
     return ", ".join(f"{value * 1e3:.0f}" for value in position) + " mm"
 
 
-def marker_detail(state: HandState, marker: int, by_calibration: CalibrationError = KNOWN_EXACTLY) -> str:
+def marker_detail(state: HandState, marker: int, by_calibration: CalibrationAccuracy = KNOWN_EXACTLY) -> str:
     """Tooltip of one marker: position, its standard deviation per axis, epipolar error."""
     lines = [f"x, y, z: {position_text(state.marker_positions[marker])}"]
     variances = np.diagonal(state.marker_covariances[marker])
@@ -177,7 +177,7 @@ def angle_text(angle_rad: float, sd_rad: float = math.nan) -> str:
     return f"{round(math.degrees(angle_rad))}{spread}°"
 
 
-def palm_text(state: HandState, by_calibration: CalibrationError = KNOWN_EXACTLY) -> str:
+def palm_text(state: HandState, by_calibration: CalibrationAccuracy = KNOWN_EXACTLY) -> str:
     """How well the palm is known, e.g. "± 0.40 mm, ± 1.2°", worst axes; "" when that is not known."""
     place = sd_text(float(total_sd(state.palm_covariance[:3, :3], state.world_from_palm[:3, 3], by_calibration)))
     turn = math.degrees(float(worst_sd(state.palm_covariance[3:, 3:])))

@@ -221,6 +221,14 @@ LIMITS: Final = {
     "thesis": ("thesis: equation 2.1", "The thesis's ranges, for comparing with it; some are too narrow for "
                "living hands."),
 }
+OBSERVED: Final = {
+    "markers": ("markers or landmarks", "What the rig's marker set has: painted markers, or the landmarks that a "
+                "detector finds on a bare hand."),
+    "contours": ("bare hand", "No markers: the nodes search their pictures for the hand's edges. Calibrate, Background "
+                 "and skin comes first; then hold the hand still, fingers spread, until it is found."),
+    "both": ("bare hand and markers", "The bare hand's edges beside markers or landmarks: these find it, and both "
+             "follow it."),
+}
 SIZE_MEANING: Final = ("The hand's size is estimated as it moves, so that a hand file that is some percent too large "
                        "or too small does no harm. Open and close the hand for half a minute.")
 
@@ -233,6 +241,8 @@ def settings_text(settings: TrackerSettings) -> str:
     if settings.kind == "classic":
         return "classic" if settings.ik == "fabrik" else f"classic, {IK_METHODS[settings.ik][0]}"
     size = ", size estimated" if settings.float_scale else ""
+    if settings.observe != "markers":
+        return f"estimator, {OBSERVED[settings.observe][0]}{size}"
     return f"estimator, {settings.variant}, {settings.limits} limits{size}"
 
 

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, QSizeF, Qt
+from PySide6.QtCore import QEvent, QLineF, QPointF, QRectF, QSize, QSizeF, Qt
 from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QImage, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
+from rhot_app.state import SeenContour
 from rhot_app.ui.backend.live import Live
 from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import place_at_sides
@@ -21,6 +22,11 @@ from rhot_app.ui.panels.empty_state import EmptyState
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
+
+OUTLINE_COLOUR, INNER_COLOUR, SLICE_COLOUR = "#28e650", "#3c8cff", "#60808080"
+HAND_COLOUR, OTHER_COLOUR = "#ff2828", "#ffdc00"
+"""As in `barehand.overlay`: the contour before the background and within the hand, slices; edges, the hand's and
+others."""
 
 _RING_PX = (4.0, 7.0)  # radius in small and in large pictures
 _ROOM_FOR_NAMES_PX = 320.0
@@ -46,13 +52,16 @@ class CameraView(QWidget):
         self._image = QImage()
         self._frame = (4, 3)
         self._marks: list[Mark] = []
+        self.contour: SeenContour | None = None
         self._pointed_at = False
         self.setMinimumSize(120, 90)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName(f"Picture of camera {name}")
         self.setToolTip(f"Camera {name}: what it saw a moment ago, and the markers found in that picture.\n"
                         "A full ring is a marker seen whole, a broken ring one that is half hidden or doubtful.\n"
-                        "Names stand in large pictures, and in small ones while the mouse is over them.")
+                        "Names stand in large pictures, and in small ones while the mouse is over them.\n"
+                        "Of a bare hand: green its outline, blue contours within it, red the edges that are its, "
+                        "yellow others.")
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Four by three."""
@@ -78,6 +87,12 @@ class CameraView(QWidget):
         """No marks: no state belongs to this picture."""
         if self._marks:
             self._marks = []
+            self.update()
+
+    def show_contour(self, seen: SeenContour | None) -> None:
+        """What was seen of a bare hand in this picture."""
+        if seen is not self.contour:
+            self.contour = seen
             self.update()
 
     @property
@@ -120,6 +135,8 @@ class CameraView(QWidget):
         painter.translate(target.topLeft())
         scale = target.width() / self._frame[0]
         places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self._marks]
+        if self.contour is not None:
+            paint_contour(painter, self.contour, scale)
         self._paint_rings(painter, places, target.width())
         if self.named:
             self._paint_names(painter, places, target.size())
@@ -152,6 +169,21 @@ class CameraView(QWidget):
                 painter.drawLine(QPointF(*anchor), QPointF(*box.nearest(anchor)))
         for mark, box in zip(self._marks, boxes, strict=True):
             paint_tag(painter, QPointF(box.x, box.y), mark.name)
+
+
+def paint_contour(painter: QPainter, seen: SeenContour, scale: float) -> None:
+    """A bare hand's contour, the slices across it and the edges on them, `scale` px of the screen for one of the
+    frame."""
+    def dots(places: Array, colour: str, width: float) -> None:
+        painter.setPen(QPen(QColor(colour), width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.drawPoints([QPointF(float(x), float(y)) for x, y in (places + 0.5) * scale])
+
+    painter.setPen(QPen(QColor(SLICE_COLOUR), 1.0))
+    painter.drawLines([QLineF(*(float(value) for value in row)) for row in (seen.slices + 0.5) * scale])
+    dots(seen.contour[seen.outline], OUTLINE_COLOUR, 5.0)
+    dots(seen.contour[~seen.outline], INNER_COLOUR, 5.0)
+    dots(seen.edges[~seen.of_hand], OTHER_COLOUR, 2.0)
+    dots(seen.edges[seen.of_hand], HAND_COLOUR, 2.0)
 
 
 class CameraPanel(QWidget):
@@ -213,6 +245,7 @@ class CameraPanel(QWidget):
                 self._unmarked.add(name)
                 view.show_preview(preview)
                 view.clear_marks()
+            view.show_contour(live.contour_at(name, preview.t_master_ns))
             if name in self._unmarked:
                 self._mark(view, camera, preview, live)
 

@@ -12,8 +12,8 @@ import msgspec
 import numpy as np
 
 from rhot_app.engine.observer import condition_of
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import replay_states
 from rhot_app.errors import RecordingError, RhotError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import with_tracker

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.observer import condition_of
+from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
 from rhot_app.engine.pipeline import warm_up
-from rhot_app.engine.replay_summary import replay_states, smoothed_states
 from rhot_app.engine.status import TOPIC_STATE, decode, encode
 from rhot_app.errors import RecordingError
 from rhot_app.progress import Progress, silent

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.check.camera_calibration import CalibrationError
+from rhot_app.calibration.check.camera_calibration import CalibrationAccuracy
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND, Rig
@@ -89,7 +89,7 @@ class Spot:
     place: Array
     covariance: Array
 
-    def text(self, by_calibration: CalibrationError) -> str:
+    def text(self, by_calibration: CalibrationAccuracy) -> str:
         """Its tooltip."""
         spread = sd_text(float(total_sd(self.covariance, self.place, by_calibration)))
         unknown = by_calibration.reason or "its uncertainty is not estimated"

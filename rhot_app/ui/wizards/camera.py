@@ -153,7 +153,7 @@ Settings = dict[str, Any]
 
 
 class Tryout(QObject):
-    """`want` as often as you like; at most one request is under way. `told` with "" or with what went wrong."""
+    """`want` as often as you like; at most one request is under way. `answered` with "" or with what went wrong."""
 
     answered = Signal(str)
 

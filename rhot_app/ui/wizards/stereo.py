@@ -13,7 +13,7 @@ from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.known_step import KnownStep
 from rhot_app.ui.wizards.steps.stereo_steps import (
     ShowStep,
-    SolveStep,
+    StereoSolveStep,
     TableStep,
     chosen_nodes,
     known_lenses,
@@ -28,7 +28,7 @@ def make_plan(kit: Kit) -> Plan:
     board = BoardStep(fields_from(kit.memory.remembered(MEMORY)), cameras)
     show = ShowStep(board, cameras)
     known = KnownStep(cameras)
-    solve = SolveStep(show, known_lenses(nodes), lambda: known.known)
+    solve = StereoSolveStep(show, known_lenses(nodes), lambda: known.known)
     table = TableStep(board, solve, cameras)
 
     def propose() -> Proposal | None:

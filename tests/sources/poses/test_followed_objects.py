@@ -16,7 +16,7 @@ from rhot_app.errors import RecordingError, RigError, SourceError
 from rhot_app.geometry.transforms import exp_so3, log_so3, quaternion_from_rotation, rigid
 from rhot_app.objects.alignment.alignment_file import Alignment, RigidTransform, save_alignment
 from rhot_app.objects.object_file import ObjectModel, SphereShape, cube, save_object
-from rhot_app.objects.observations import ObjectPose
+from rhot_app.objects.observations import MeasuredPose
 from rhot_app.objects.pose import Validity
 from rhot_app.objects.state import Validity as ObjectValidity
 from rhot_app.project import ObjectPoses, Rig, RigObject, load_rig, save_rig
@@ -112,7 +112,7 @@ def test_a_record_comes_back_and_damage_is_no_pose() -> None:
 
 
 def test_poses_are_delivered_recorded_and_replayed_alike(rig: Rig) -> None:
-    source, delivered, records = FakeSource(), list[ObjectPose](), list[Record]()
+    source, delivered, records = FakeSource(), list[MeasuredPose](), list[Record]()
 
     class Tap:
         def put(self, kind: RecordKind, node_id: int, t_master_ns: int, data: bytes) -> None:
@@ -127,7 +127,7 @@ def test_poses_are_delivered_recorded_and_replayed_alike(rig: Rig) -> None:
     followed.close()
     assert source.closed and [one.name for one in delivered] == ["cup"] * 5
     replayed = [LogValidator(rig).feed(record) for record in records]
-    assert all(isinstance(one, ObjectPose) for one in replayed)
+    assert all(isinstance(one, MeasuredPose) for one in replayed)
     objects = [RigObjects(rig), RigObjects(rig)]
     for tracked, given in zip(objects, (delivered, replayed), strict=True):
         for one in given:
@@ -164,7 +164,7 @@ def test_lines_by_udp_reach_the_tracker(rig: Rig) -> None:
     entry = rig.objects[0]
     assert entry.poses is not None
     entry = msgspec.structs.replace(entry, poses=msgspec.structs.replace(entry.poses, source=f"udp:{port}"))
-    followed, delivered = FollowedObjects(msgspec.structs.replace(rig, objects=(entry,))), list[ObjectPose]()
+    followed, delivered = FollowedObjects(msgspec.structs.replace(rig, objects=(entry,))), list[MeasuredPose]()
     followed.deliver = delivered.extend  # type: ignore[assignment]
     followed.start()
     words = " ".join(f"{value:.9f}" for value in (*FOREIGN[:3, 3], *quaternion(FOREIGN)))

@@ -12,7 +12,7 @@ from fake_engine import FakeEngine
 from log_writing import write_log
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from synthetic_rig import WIDE, Sight, make_rig, observe
+from synthetic_rig import WIDE, Viewing, make_rig, observe
 from wizard_hand import HeldMarker, RecordingAsker
 from wizard_hands import Hands
 from wizard_rig import FakeMemory
@@ -40,7 +40,7 @@ def write_movement(rig, path):
         columns = tracks.positions.reshape(len(tracks.times_s), -1).T
         return np.stack([np.interp(times, tracks.times_s, column) for column in columns], axis=1).reshape(-1, 6, 3)
 
-    write_log(Path(path), rig, observe(rig, WIDE, trajectory, SECONDS - 0.5, Sight(noise_px=0.05)))
+    write_log(Path(path), rig, observe(rig, WIDE, trajectory, SECONDS - 0.5, Viewing(noise_px=0.05)))
 
 
 def twin_report(rig):

@@ -12,7 +12,7 @@ from fake_engine import FakeEngine
 from log_writing import write_log
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from synthetic_rig import WIDE, Sight, make_rig, observe, still_trajectory
+from synthetic_rig import WIDE, Viewing, make_rig, observe, still_trajectory
 from waving import waving
 from wizard_hand import RecordingAsker
 from wizard_hands import Hands
@@ -52,7 +52,7 @@ def write_movement(rig, path):
     """What the engine would have recorded: a resting hand or a waving one, by the page's title."""
     moving = waving(rig, SECONDS)
     trajectory = moving if "fast" in Path(path).name else still_trajectory(moving(np.zeros(1))[0])
-    write_log(Path(path), rig, observe(rig, WIDE, trajectory, SECONDS, Sight(noise_px=0.05)))
+    write_log(Path(path), rig, observe(rig, WIDE, trajectory, SECONDS, Viewing(noise_px=0.05)))
 
 
 @pytest.fixture

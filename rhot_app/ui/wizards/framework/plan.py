@@ -95,6 +95,8 @@ WIZARDS: tuple[Wizard, ...] = (
            "tracked.", "refined calibration"),
     Wizard("colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
            "colour calibration"),
+    Wizard("foreground", "Background and skin", "What the empty scene and your skin look like, so that a bare hand can "
+           "be tracked.", "background and skin"),
     Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),
     Wizard("depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
            "depth calibration"),

@@ -13,7 +13,7 @@ import msgspec
 from rhot_app.calibration.verdict import Finding, Grade, Verdict
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, parse_rig
-from rhot_app.tracking.refined_rig import REASON
+from rhot_app.tracking.refinement.refined_rig import REASON
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows

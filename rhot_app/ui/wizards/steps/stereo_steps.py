@@ -171,7 +171,7 @@ class ShowStep(BoardFinder):
         return overlays
 
 
-class SolveStep(Step):
+class StereoSolveStep(Step):
     """Puts the cameras together and says what that is worth."""
 
     title = "Put them together"
@@ -230,7 +230,7 @@ class TableStep(BoardFinder):
     title = "The table"
     captures = True
 
-    def __init__(self, board_step: BoardStep, solve: SolveStep, cameras: tuple[str, ...]) -> None:
+    def __init__(self, board_step: BoardStep, solve: StereoSolveStep, cameras: tuple[str, ...]) -> None:
         super().__init__(board_step, cameras)
         self._solve = solve
         self._of: StereoReport | None = None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-POSE = 6
+TWIST = 6
 """Numbers of a camera's correction: turn rad, shift m."""
 
 HISTORY_S = 300.0
@@ -110,7 +110,7 @@ def linearise(rows: PairObservations, world_from_camera: Array, focal: Array) ->
     per_px = np.sqrt(np.square(n_j[:, :2] / focal[j]).sum(axis=1) + np.square(m_i[:, :2] / focal[i]).sum(axis=1))
     variance = (np.einsum("ni,nij,nj->n", m_i[:, :2], rows.noise[:, 0], m_i[:, :2])
                 + np.einsum("ni,nij,nj->n", n_j[:, :2], rows.noise[:, 1], n_j[:, :2]))
-    jacobian = np.zeros((len(i), len(turns), POSE))
+    jacobian = np.zeros((len(i), len(turns), TWIST))
     every = np.arange(len(i))
     jacobian[every, j, :3] = np.cross(x_j, n_j)
     jacobian[every, j, 3:] = np.einsum("nji,nj->ni", turns[j], across)

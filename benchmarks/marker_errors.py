@@ -1,11 +1,11 @@
 """How wrong the image positions of nodes are, beside what they state: px per axis, against the twin's truth.
 
-    python benchmarks/sight_errors.py [--seeds 3] [--motions rest,wave,grasp,pinch,fast] [--sketched]
+    python benchmarks/marker_errors.py [--seeds 3] [--motions rest,wave,grasp,pinch,fast] [--sketched]
 
-The takes of `rhot evaluate --compare`, sights without flags only. `common` is what both cameras see alike: half the sum
-of two sights that are nearest in time; `own` is each camera's alone: half their difference, as an rms of one camera.
-`share` is own squared in parts of the stated variance; constants of `tracking/marker_model.py` and
-`tracking/marker_residual.py` rest on it. `lasts`: correlation of own errors 0.1 s apart, 0 for noise.
+The takes of `rhot evaluate --compare`, observations without flags only. `common` is what both cameras see alike: half
+the sum of two observations nearest in time; `own` is each camera's alone: half their difference, rms of one camera.
+`share` is own squared in parts of the stated variance; constants of `tracking/markers/marker_model.py` and
+`tracking/markers/marker_residual.py` rest on it. `lasts`: correlation of own errors 0.1 s apart, 0 for noise.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rhot_app.progress import ProgressLine
 from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.marker_model import MarkerModel, compile_markers, project_marker
+from rhot_app.tracking.markers.marker_model import MarkerModel, compile_markers, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def errors_of(one: DataSet, markers: MarkerModel) -> list[Errors]:
 
 
 def _off(one: DataSet, markers: MarkerModel, seen: CameraObservations, times_s: Array) -> Array:
-    """(M, 2) px: one frame's sights less where the true hand's silhouettes were at their rows' times."""
+    """(M, 2) px: one frame's observations less where the true hand's silhouettes were at their rows' times."""
     places, palms = one.truth.markers_at(times_s), one.truth.palm_at(times_s)
     out, pixel, slope = np.full(seen.pixels.shape, np.nan), np.empty(2), np.empty((2, 3))
     for m in np.flatnonzero((seen.flags == 0) & np.isfinite(seen.pixels).all(axis=1)):

@@ -28,11 +28,11 @@ Indices = NDArray[np.int64]
 PAINT_SD_M = {"capsule": 0.12e-3, "sphere": 0.3e-3, "disc": 0.5e-3, "band": 0.4e-3, "blob": 3e-3,
               "landmark": ANATOMY_SD_M}
 """m: standard deviation of a marker's centre about the place that the hand file gives it, by its shape: paint, its
-shading and the skin under it (`python benchmarks/sight_errors.py`). A blob is paint that nobody measured. For a
+shading and the skin under it (`python benchmarks/marker_errors.py`). A blob is paint that nobody measured. For a
 landmark see `hand.landmarks`."""
 
 LASTING_PX = 0.01
-"""px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/sight_errors.py`)."""
+"""px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/marker_errors.py`)."""
 
 NEAREST_M = 0.02
 """m: nearer to a camera's plane than its housing, nothing is seen."""

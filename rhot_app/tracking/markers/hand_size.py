@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import PosePrior
-from rhot_app.tracking.acquisition import Located
-from rhot_app.tracking.size_evidence import Posture, implausibility
+from rhot_app.tracking.markers.acquisition import Located
+from rhot_app.tracking.markers.size_evidence import Posture, implausibility
 
 Array = NDArray[np.float64]
 

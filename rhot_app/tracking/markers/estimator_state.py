@@ -25,8 +25,8 @@ from rhot_app.state import (
 from rhot_app.tracking import locate
 from rhot_app.tracking.association import GATE
 from rhot_app.tracking.locate import locate_all
-from rhot_app.tracking.marker_model import MarkerModel, project_marker, scaled_table
-from rhot_app.tracking.marker_residual import SIZE_S, SIZE_SD, MarkerFrame
+from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker, scaled_table
+from rhot_app.tracking.markers.marker_residual import SIZE_S, SIZE_SD, MarkerFrame
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.tracks import DOUBTFUL
@@ -40,7 +40,7 @@ SIZE_FRAMES = 10
 
 SIZE_FLOOR = 0.005
 """Standard deviation of the logarithm of a fingertip's width by what the pose and the light change about it, at least
-(`python benchmarks/sight_errors.py`)."""
+(`python benchmarks/marker_errors.py`)."""
 
 _SIZE_MEMORY = 200  # frames over which a fingertip's size is averaged
 _SAME_FRAME_NS = 1_000_000
@@ -62,7 +62,7 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
                              for _ in range(columns.stop - columns.start)])
 
 
-class Sightings:
+class RecentObservations:
     """The last accepted observation of each of M markers by each of C cameras, and the cameras' frames.
 
     `newest`: each camera's newest frame. `times` (C, M) ns; `residuals` (C, M, 2) px, observed less predicted;
@@ -139,8 +139,8 @@ class Sightings:
 class EstimatorStates:
     """Makes states of estimates."""
 
-    def __init__(self, rig: RigArrays, markers: MarkerModel, sightings: Sightings) -> None:
-        self._rig, self._markers, self._sightings = rig, markers, sightings
+    def __init__(self, rig: RigArrays, markers: MarkerModel, observations: RecentObservations) -> None:
+        self._rig, self._markers, self._observations = rig, markers, observations
         one, other = markers.model.dh, markers.dh
         self._file_size = self._dh = one._replace(point_row=np.concatenate([one.point_row, other.point_row]),
                                 point_offset=np.concatenate([one.point_offset, other.point_offset]))
@@ -156,29 +156,29 @@ class EstimatorStates:
     def describe(self, t_ns: int, state: Array, covariance: Array, sequence: int, newest: CameraObservations,
                  begun: float) -> HandState:
         """The state of master time `t_ns`; work on it began at `begun`, s of `time.perf_counter`."""
-        solved, rig, sightings, m = time.perf_counter(), self._rig, self._sightings, self._markers
+        solved, rig, observations, m = time.perf_counter(), self._rig, self._observations, self._markers
         state = state.copy()
         state[ANGLES:VELOCITY] = np.minimum(np.maximum(state[ANGLES:VELOCITY], m.limits[:, 0]), m.limits[:, 1])
         count = len(rig.marker_ids)
         points, covariances = np.empty((_FIRST_MARKER + count, 3)), np.empty((_FIRST_MARKER + count, 3, 3))
-        age = np.abs(t_ns - sightings.times)
-        fresh = age <= sightings.fresh_ns[:, None]
-        clear = fresh & ~sightings.doubtful & (sightings.fresh_ns[:, None] <= _SLOWEST_CLEAR_NS)
+        age = np.abs(t_ns - observations.times)
+        fresh = age <= observations.fresh_ns[:, None]
+        clear = fresh & ~observations.doubtful & (observations.fresh_ns[:, None] <= _SLOWEST_CLEAR_NS)
         shown = np.count_nonzero(clear, axis=0) >= 2
         raw, raw_covariances, errors = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count)
         markers, joints, angles = np.empty(count, np.uint8), np.empty(21, np.uint8), np.empty(21, np.uint8)
         angle_sd = np.empty(21)
         aligned, motion_sd = np.empty((*fresh.shape, 2)), np.empty((2, 21))
-        _place(state, covariance, self._dh, m.half_axes, m.poses, m.intrinsics, sightings.residuals, points,
+        _place(state, covariance, self._dh, m.half_axes, m.poses, m.intrinsics, observations.residuals, points,
                covariances, motion_sd, aligned)
         if rig.band_half_axes is not None:
             world = np.eye(4)
             world[:3] = state[:ANGLES].reshape(3, 4)
             locate.turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
-        locate_all(aligned, sightings.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
+        locate_all(aligned, observations.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
                    rig.cameras, rig.focal, self._shapes, raw, raw_covariances, errors)
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
-        in_sight = (np.count_nonzero(age <= 2 * sightings.fresh_ns[:, None], axis=0) > 1).all()
+        in_sight = (np.count_nonzero(age <= 2 * observations.fresh_ns[:, None], axis=0) > 1).all()
         world, deviation = np.eye(4), np.sqrt(np.maximum(np.diag(covariance), 0.0))
         world[:3] = state[:ANGLES].reshape(3, 4)
         return HandState(
@@ -186,7 +186,8 @@ class EstimatorStates:
             condition=Condition.TRACKING if in_sight else Condition.PARTIAL,
             marker_ids=rig.marker_ids, marker_positions=points[_FIRST_MARKER:], marker_raw_positions=raw,
             marker_covariances=covariances[_FIRST_MARKER:], marker_knowledge=markers,
-            camera_names=rig.camera_names, camera_pixels=sightings.pixels.copy(), camera_flags=sightings.flags.copy(),
+            camera_names=rig.camera_names, camera_pixels=observations.pixels.copy(),
+            camera_flags=observations.flags.copy(),
             joint_positions=points[:_FIRST_TIP], joint_knowledge=joints,
             fingertip_positions=points[_FIRST_TIP:_FIRST_MARKER], angles=state[ANGLES:VELOCITY].copy(),
             angle_knowledge=angles, world_from_palm=world, palm_knowledge=Knowledge(palm), epipolar_error_px=errors,
@@ -209,7 +210,7 @@ class EstimatorStates:
             condition=condition, marker_ids=rig.marker_ids, marker_positions=np.full((markers, 3), np.nan),
             marker_raw_positions=np.full((markers, 3), np.nan), marker_covariances=np.full((markers, 3, 3), np.nan),
             marker_knowledge=np.full(markers, unknown, np.uint8), camera_names=rig.camera_names,
-            camera_pixels=self._sightings.pixels.copy(), camera_flags=self._sightings.flags.copy(),
+            camera_pixels=self._observations.pixels.copy(), camera_flags=self._observations.flags.copy(),
             joint_positions=np.full((21, 3), np.nan), joint_knowledge=np.full(21, unknown, np.uint8),
             fingertip_positions=np.full((5, 3), np.nan), angles=np.full(21, np.nan),
             angle_knowledge=np.full(21, unknown, np.uint8), world_from_palm=np.full((4, 4), np.nan),
@@ -248,7 +249,7 @@ def _note_sizes(camera, t_ns, times, fresh_ns, widths, diameters, correlated, si
 @njit(cache=True)
 def _accept(t_ns, expected, pixels, pixel_covariances, flags, seen, weights, times, residuals, covariances, doubtful,
             inlier):
-    """Take one camera's inliers over into its row of the sightings; `weights` are those of the seen markers."""
+    """Take one camera's inliers over into its row of the observations; `weights` are those of the seen markers."""
     count = 0
     for m in range(seen.shape[0]):
         if not seen[m] or math.isnan(expected[m, 0]):

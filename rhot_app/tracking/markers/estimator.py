@@ -19,12 +19,12 @@ from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
-from rhot_app.tracking.acquisition import Located, Starter
 from rhot_app.tracking.association import GATE, MarkerAssociation, assign
-from rhot_app.tracking.estimator_state import EstimatorStates, Sightings
-from rhot_app.tracking.hand_size import HandSize
-from rhot_app.tracking.marker_model import LASTING_PX, compile_markers
-from rhot_app.tracking.marker_residual import MarkerFrame, triangulation_covariance
+from rhot_app.tracking.markers.acquisition import Located, Starter
+from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
+from rhot_app.tracking.markers.hand_size import HandSize
+from rhot_app.tracking.markers.marker_model import LASTING_PX, compile_markers
+from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
@@ -65,8 +65,8 @@ class Estimator:
         self._filter = IteratedFilter(self._process)
         self._starter = Starter(self._rig, self._markers)
         self._association = MarkerAssociation(self._rig)  # without a prediction, by rays
-        self._sightings = Sightings(self._rig, self._markers)
-        self._states = EstimatorStates(self._rig, self._markers, self._sightings)
+        self._observations = RecentObservations(self._rig, self._markers)
+        self._states = EstimatorStates(self._rig, self._markers, self._observations)
         self._sequence = 0
         self.reset()
 
@@ -75,7 +75,7 @@ class Estimator:
         self._pending: list[CameraObservations] = []
         self._starter.reset()
         self._association.reset()
-        self._sightings.reset()
+        self._observations.reset()
         if self._size is not None:
             self._size.reset()
             self._resize(*self._size.known)
@@ -89,7 +89,7 @@ class Estimator:
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""
-        return tuple(self._sightings.newest)
+        return tuple(self._observations.newest)
 
     def solve(self) -> HandState | None:
         """The state after the frames since the last one, None without any."""
@@ -120,9 +120,9 @@ class Estimator:
         frame = MarkerFrame(self._markers, observations)
         if self._tracking and abs(frame.t_ns - self._time_ns(self._filter.newest.t_s)) > _JUMP_NS:
             self._give_up()
-            self._sightings.reset()
+            self._observations.reset()
         too_late = self._tracking and self._seconds(frame.t_ns) < self._filter.knots[0].t_s
-        if too_late or not self._sightings.enter(frame):
+        if too_late or not self._observations.enter(frame):
             return False
         self._starter.ingest(self._association.select(observations))
         if not self._tracking:
@@ -137,7 +137,7 @@ class Estimator:
             state = self._filter.newest.state
             self._size.look(located, np.vstack([state[:ANGLES].reshape(3, 4), np.eye(4)[3]]), state[ANGLES:VELOCITY])
         newest_ns = self._time_ns(self._filter.newest.t_s)
-        period_ns = 1e9 * self._sightings.shortest_period_s
+        period_ns = 1e9 * self._observations.shortest_period_s
         if (newest_ns - self._accepted_ns > max(LOST_AFTER_NS, LOST_AFTER_PERIODS * period_ns)
                 or newest_ns - self._plausible_ns > max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns)):
             self._give_up()
@@ -154,7 +154,7 @@ class Estimator:
         self._filter.start(0.0, *self._process.start(pose.world_from_palm, pose.angles, START_SD))
         self._tracking = self._ever = True
         self._accepted_ns = self._plausible_ns = located.t_ns
-        for frame in self._sightings.recent(located.t_ns):
+        for frame in self._observations.recent(located.t_ns):
             self._update(frame)
 
     def _resize(self, log_scale: float, variance: float) -> None:
@@ -172,7 +172,7 @@ class Estimator:
         t_s = self._seconds(frame.t_ns)
         candidates = np.count_nonzero(frame.seen)
         prediction = self._filter.predict(t_s)
-        self._sightings.note_sizes(frame, prediction[0])
+        self._observations.note_sizes(frame, prediction[0])
         frame.add_landmark_noise(prediction[0])
         pixels, covariances = frame.predict_pixels(*prediction)
         distances = _distances(frame, pixels, covariances)
@@ -183,7 +183,7 @@ class Estimator:
         except np.linalg.LinAlgError:  # the estimate contradicts itself
             self._give_up()
             return
-        inliers = self._sightings.accept(frame, knot.state, knot.weights)
+        inliers = self._observations.accept(frame, knot.state, knot.weights)
         self._weighed(frame)
         self._reacquire(frame, inliers, distances)
         accepted = np.count_nonzero(inliers)
@@ -202,7 +202,7 @@ class Estimator:
         rejected = self._rejected[frame.camera]
         rejected[accepted] = 0
         rejected[self._reported(frame) & ~accepted] += 1
-        lasting = max(LASTING_S / self._sightings.periods_s[frame.camera], 1.0)
+        lasting = max(LASTING_S / self._observations.periods_s[frame.camera], 1.0)
         enough = REJECTIONS * np.where(self._markers.landmark, lasting, 1.0)
         for m in np.flatnonzero((rejected >= enough) & (distances > GATE)):
             finger, knot = self._markers.finger[m], self._filter.newest

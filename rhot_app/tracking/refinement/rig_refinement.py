@@ -28,9 +28,9 @@ from rhot_app.geometry.transforms import exp_so3, inverse, log_so3, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
 from rhot_app.project import Rig
 from rhot_app.tracking.locate import EXACT_PX2
-from rhot_app.tracking.pair_observations import POSE, PairObservations, PairStore, linearise, midpoints
 from rhot_app.tracking.pairing import Paired, Pairing
-from rhot_app.tracking.refined_rig import CameraCorrection, Refinement
+from rhot_app.tracking.refinement.pair_observations import TWIST, PairObservations, PairStore, linearise, midpoints
+from rhot_app.tracking.refinement.refined_rig import CameraCorrection, Refinement
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.tracks import DOUBTFUL
@@ -134,7 +134,7 @@ class RigRefiner:
         self._pair_of = np.zeros((len(models), len(models)), np.intp)
         for number, (i, j) in enumerate(self._pairs):
             self._pair_of[i, j] = number
-        self._poses = POSE * (len(models) - 1)
+        self._poses = TWIST * (len(models) - 1)
         self._size = self._poses + len(self._pairs) * len(rig.markers.ids)
         self._calibrated, copies = self._calibrated_variances(), len(models) - 1
         biases = np.zeros(self._size - self._poses)
@@ -307,7 +307,7 @@ class RigRefiner:
         """(C, 4, 4) world_from_camera with the correction `state`, baselines as long as they were."""
         poses = self._stored.copy()
         for camera in range(1, len(poses)):
-            step = state[POSE * (camera - 1):POSE * camera]
+            step = state[TWIST * (camera - 1):TWIST * camera]
             poses[camera] = poses[camera] @ rigid(exp_so3(step[:3]), step[3:])
         centres = poses[:, :3, 3]
         length = float(np.linalg.norm(centres - centres[0], axis=1).sum())
@@ -319,7 +319,7 @@ class RigRefiner:
         covariance = found.covariance[:self._poses, :self._poses]
         cameras = []
         for camera in range(1, len(poses)):
-            part = slice(POSE * (camera - 1), POSE * camera)
+            part = slice(TWIST * (camera - 1), TWIST * camera)
             change = inverse(self._stored[camera]) @ poses[camera]
             along = self._stored[camera, :3, :3].T @ (self._stored[camera, :3, 3] - self._stored[0, :3, 3])
             cameras.append(CameraCorrection(self.rig.nodes[camera].name, log_so3(change[:3, :3]), change[:3, 3],
@@ -350,7 +350,7 @@ class RigRefiner:
 
         The calibration's variance is in the prior and is added once more, so false alarms are rarer than the level.
         """
-        scale = np.tile(KNOCK_SD, self._poses // POSE)
+        scale = np.tile(KNOCK_SD, self._poses // TWIST)
         covariance = (found.covariance[:self._poses, :self._poses] + np.diag(self._calibrated)) / np.outer(scale, scale)
         values, vectors = np.linalg.eigh(covariance)
         determined = values < 0.25  # at most half as uncertain as a knock makes them

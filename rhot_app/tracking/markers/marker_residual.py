@@ -14,7 +14,7 @@ from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.hand.kinematics import direction_jacobian, forward_arrays, jacobian_arrays
 from rhot_app.hand.landmarks import COMMON_M, NOISE_M
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
-from rhot_app.tracking.marker_model import MarkerModel, project_marker
+from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
@@ -28,7 +28,7 @@ CENTROID_KERNEL = student(4.0)
 """Centroids have heavy tails: blobs are partly hidden. 4 degrees of freedom (Lange, Little and Taylor 1989)."""
 
 SIZE_SD = 0.02
-"""Standard deviation of the logarithm of a fingertip's apparent width (`python benchmarks/sight_errors.py`)."""
+"""Standard deviation of the logarithm of a fingertip's apparent width (`python benchmarks/marker_errors.py`)."""
 
 SIZE_S = 0.2
 """s: correlation time of that error. Within it, all frames together count as one observation."""

@@ -19,10 +19,10 @@ from rhot_app.hand.solvers.finger_ik import solve_fingers
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.tracking import pairing
 from rhot_app.tracking.locate import choose_views, locate_all
-from rhot_app.tracking.marker_model import MarkerModel
+from rhot_app.tracking.markers.marker_model import MarkerModel
+from rhot_app.tracking.markers.size_evidence import Posture, implausibility
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import RigArrays
-from rhot_app.tracking.size_evidence import Posture, implausibility
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rhot_app.engine.directory import default_directory
 
 if TYPE_CHECKING:
-    from rhot_app.engine.report import Report
+    from rhot_app.engine.offline.report import Report
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Collect and write; raises EngineError, RecordingError, RigError."""
-    from rhot_app.engine.report import Report
+    from rhot_app.engine.offline.report import Report
     from rhot_app.errors import EngineError
     from rhot_app.project import load_rig
     from rhot_node.files import require_replaceable, write_atomically

@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay; with clients to serve, until the log's end, SIGTERM, SIGINT or the command ``quit``."""
-    from rhot_app.engine.replay_summary import SmoothedReplay, summarise
+    from rhot_app.engine.offline.replay_summary import SmoothedReplay, summarise
     from rhot_app.engine.serve import serving
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig, with_tracker

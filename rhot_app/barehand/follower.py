@@ -1,0 +1,136 @@
+"""A bare hand from images alone: looks for the hand while there is none, follows it, and says when it is lost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.project import Rig
+from rhot_app.state import Condition, HandState, no_hand
+from rhot_node.detect.foreground import Foreground, foreground_map, learn_skin
+
+Image = NDArray[np.uint8]
+Points = NDArray[np.float64]
+
+MOST: Final = 0.5
+"""Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
+
+CONFUSED_M: Final = 0.02
+"""Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
+apart in the hand files."""
+
+FASTEST_M_S: Final = 4.0
+"""m/s: twice the speed of the fastest motion in `resources/motions`. Chosen, not measured."""
+
+BLIND_NS: Final = 250_000_000
+"""Without any image for longer, a hand at `FASTEST_M_S` may be out of the picture: it is looked for anew."""
+
+
+class HandFollower:
+    """One bare hand before the cameras of a rig, with its search and its loss."""
+
+    def __init__(self, rig: Rig, foreground: Sequence[Foreground] | None, *, known_size: bool,
+                 empty_until_ns: int = 0) -> None:
+        """`foreground`: of each camera; None: the colours of skin are learnt while the hand is looked for.
+        `empty_until_ns`: no hand is looked for before."""
+        self.tracker = BareHandTracker(rig, known_size=known_size, foreground=foreground)
+        self.starts = 0
+        self.step_s: list[float] = []
+        self._skin, self._empty_until_ns = foreground is None, empty_until_ns
+        self._names = tuple(node.name for node in rig.nodes)
+        self._following = False
+        self._proposed: tuple[int, Points] | None = None
+        self._count, self._seen_ns = 0, 0
+
+    @property
+    def following(self) -> bool:
+        """Whether the newest state has a hand."""
+        return self._following
+
+    def know(self, foreground: Sequence[Foreground]) -> None:
+        """Use what each camera has learnt of hand and background."""
+        self.tracker.foreground, self._skin = list(foreground), False
+
+    def start(self, pose: HandPose, t_ns: int) -> None:
+        """Follow a hand from a pose on (`BareHandTracker.start`)."""
+        self.tracker.start(pose, t_ns)
+        self._following, self._seen_ns = True, t_ns
+        self.starts += 1
+
+    def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
+        """The state after one image (H, W, 3) RGB of each camera, None where it has none, of master times `t_ns`.
+        LOST or SEARCHING, without numbers, where no hand is found."""
+        begun, following = time.perf_counter(), self._following
+        if not following and not self._found(images, min(t_ns)):
+            self._proposed = None
+            return self._none(min(t_ns), begun)
+        state = self.tracker.step(images, t_ns)
+        if any(image is not None for image in images):
+            good = state.tracked and self._supported(images) and self._on_foreground(images, state, not following)
+            self._seen_ns = max(t_ns)
+        else:
+            good = max(t_ns) - self._seen_ns < BLIND_NS
+        self._following = good and (following or self._confirmed(state))
+        if not self._following:
+            return self._none(min(t_ns), begun)
+        if following:
+            self.step_s.append(time.perf_counter() - begun)
+        else:
+            self.starts += 1
+            self._proposed = None
+        self._count += 1
+        return replace(state, sequence=self._count - 1)
+
+    def _found(self, images: Sequence[Image | None], t_ns: int) -> bool:
+        if any(image is None for image in images) or t_ns < self._empty_until_ns:
+            return False
+        if self._skin:
+            self.tracker.foreground = [learn_skin(image) for image in images if image is not None]
+        return self.tracker.find(images, t_ns)
+
+    def _supported(self, images: Sequence[Image | None]) -> bool:
+        """Whether the cameras find the contour that the hand should have."""
+        seen = np.sum([self.tracker.fit.seen[c].sum(axis=0) for c, image in enumerate(images) if image is not None],
+                      axis=0)
+        return bool(seen[0] > MOST * seen[1])
+
+    def _on_foreground(self, images: Sequence[Image | None], state: HandState, whole: bool) -> bool:
+        """Whether most joints lie on foreground in every camera that shows most of them, of which there must be one;
+        `whole`: every camera must show most of them. A camera without known foreground tells nothing of it."""
+        shown = []
+        for camera, image, known in zip(self.tracker.cameras, images, self.tracker.foreground, strict=True):
+            if image is None:
+                continue
+            places = camera.project(state.joint_positions)
+            with np.errstate(invalid="ignore"):
+                inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
+            columns, rows = np.round(places[inside]).astype(int).T
+            shown.append(bool(np.mean(inside) > MOST))
+            if (shown[-1] and known.informative
+                    and np.mean(foreground_map(image, known, 1)[rows, columns] > 0.5) <= MOST):
+                return False
+        return all(shown) if whole else any(shown)
+
+    def _confirmed(self, state: HandState) -> bool:
+        """Whether the hand that was found in the images before is the same one. Finding is a random search: two of them
+        agree by chance on a wrong hand less probably than one is wrong."""
+        before, self._proposed = self._proposed, (state.t_master_ns, state.joint_positions)
+        if before is None:
+            return False
+        centre, earlier = state.joint_positions.mean(axis=0), before[1].mean(axis=0)
+        pace = float(np.linalg.norm(centre - earlier)) / max(1e-9 * (state.t_master_ns - before[0]), 1e-3)
+        shape = np.linalg.norm((state.joint_positions - centre) - (before[1] - earlier), axis=1)
+        return pace < FASTEST_M_S and float(np.mean(shape)) < CONFUSED_M
+
+    def _none(self, t_ns: int, begun: float) -> HandState:
+        self._count += 1
+        state = no_hand(t_ns, Condition.LOST if self.starts else Condition.SEARCHING, self._names,
+                        time.perf_counter() - begun)
+        return replace(state, sequence=self._count - 1)

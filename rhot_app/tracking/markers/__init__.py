@@ -1,0 +1,1 @@
+"""The estimator of a hand with markers: what it measures, how it starts, how large the hand is, what it reports."""

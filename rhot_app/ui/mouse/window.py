@@ -1,0 +1,236 @@
+"""The window of the 3-D mouse: pick balls up and move them with the hand, undo that, and run the target test."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import QComboBox, QDialog, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+
+from rhot_app.engine.status import EngineStatus
+from rhot_app.errors import RhotError
+from rhot_app.mouse.pick_scene import PickScene
+from rhot_app.mouse.pointer import BUTTONS, Mouse, MouseSettings, MouseState
+from rhot_app.mouse.target_test import TargetTest
+from rhot_app.project import Rig
+from rhot_app.state import HandState
+from rhot_app.ui.backend.contract import Listener
+from rhot_app.ui.backend.live import SILENCE_S
+from rhot_app.ui.common.shapes import shape_pixmap
+from rhot_app.ui.common.theme import app_font
+from rhot_app.ui.models.pacing import FramePacer
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.words import NO_RIG, condition_look
+from rhot_app.ui.mouse.scene import MouseView
+from rhot_app.ui.panels.state_badge import StateBadge
+
+TICK_MS: Final = 16
+TOLD_S: Final = 6.0
+"""What was done stands so long, as in the main window."""
+
+_SIZE: Final = (960, 720)
+_SHAPE_PX: Final = 18
+_READOUT_PT: Final = 14.0
+_NAMES: Final = {"thumb": "Thumb", "little": "Little finger"}
+
+NO_ENGINE: Final = ("No engine is heard, so no hand moves the mouse. Open a rig, or the simulated rig, in the main "
+                    "window and press Start.")
+
+
+class MouseWindow(QDialog):
+    """`listener` is this window's own; `rig` gives the rig that is open. `step` is one turn of the timer."""
+
+    def __init__(self, listener: Listener, rig: Callable[[], Rig | None], scheme: Scheme,
+                 open_guide: Callable[[], None], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("3-D mouse")
+        self.setProperty("guide", "mouse")
+        self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
+        self.resize(*_SIZE)
+        self._listener, self._rig, self._scheme = listener, rig, scheme
+        self._followed: Rig | None = None
+        self._heard_s = time.monotonic()
+        self._told, self._told_s = "", -TOLD_S
+        self.mouse = Mouse()
+        self.state: MouseState | None = None
+        self.pick = PickScene()
+        self.test: TargetTest | None = None
+        self.pacer = FramePacer()
+        self.view = MouseView(scheme)
+        self.view.frameSwapped.connect(lambda: self.pacer.end(time.monotonic()))
+        self._make_parts(scheme)
+        self._lay_out()
+        for key, action in (("H", self.take_rest), ("T", self.begin_or_end_test), ("Ctrl+Z", self.undo),
+                            ("F1", open_guide)):
+            QShortcut(QKeySequence(key), self).activated.connect(action)
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self.step)
+        self._timer.start(TICK_MS)
+        self.step()
+
+    def _make_parts(self, scheme: Scheme) -> None:
+        self.rest_button = _button("Rest here", "The hand as it lies for the next half second becomes the cursor's "
+                                   "origin (H).", self.take_rest)
+        self.undo_button = _button("Undo", "Take the last move of a ball back (Ctrl+Z).", self.undo)
+        self.test_button = _button("Target test", "Click ten targets with the thumb: how many bits per second the hand "
+                                   "conveys (T).", self.begin_or_end_test)
+        self.height_box = QComboBox()
+        self.height_box.setToolTip("What sets the pole's length: the index fingertip above the palm, or the palm.")
+        self.height_box.setAccessibleName("Height from")
+        for title, source in (("Height from the index finger", "index"), ("Height from the palm", "palm")):
+            self.height_box.addItem(title, source)
+        self.height_box.currentIndexChanged.connect(self._choose_height)
+        self.badge = StateBadge(scheme)
+        self.place = QLabel()
+        self.place.setFont(app_font(_READOUT_PT))
+        self.place.setToolTip("Cursor: right and forward of the ground's middle, and above it.")
+        self.shapes = {button: QLabel() for button in BUTTONS}
+        self.words = {button: QLabel() for button in BUTTONS}
+        for button, label in self.words.items():
+            label.setFont(app_font(_READOUT_PT))
+            label.setToolTip(f"Pressed while the {button} is spread away from the hand.")
+        self.sentence = QLabel()
+        self.sentence.setWordWrap(True)
+        self.sentence.setMinimumHeight(2 * self.sentence.fontMetrics().height())
+        self.sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
+
+    def _lay_out(self) -> None:
+        top, below = QHBoxLayout(), QHBoxLayout()
+        for part in (self.rest_button, self.undo_button, self.test_button, self.height_box):
+            top.addWidget(part)
+        top.addStretch(1)
+        top.addWidget(self.badge)
+        below.addWidget(self.place)
+        below.addStretch(1)
+        for button in BUTTONS:
+            below.addWidget(self.shapes[button])
+            below.addWidget(self.words[button])
+            below.addSpacing(16)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(8)
+        layout.addLayout(top)
+        layout.addWidget(self.view, 1)
+        layout.addLayout(below)
+        layout.addWidget(self.sentence)
+
+    # -- what the person does --------------------------------------------------------------------------------------
+
+    def take_rest(self) -> None:
+        """The next half second is the hand's rest."""
+        self.mouse.rest()
+        self._tell("Hold the hand still.")
+
+    def undo(self) -> None:
+        """Take the last move of a ball back, or say that there is none."""
+        self._tell(self.pick.undo() if self.test is None else "The target test moves no ball. End it to undo moves.")
+
+    def begin_or_end_test(self) -> None:
+        """Nine targets in place of the balls, or the balls again, which lie where they were."""
+        self.test = TargetTest() if self.test is None else None
+        self.test_button.setText("Target test" if self.test is None else "End the test")
+        self._told = ""
+
+    def _choose_height(self) -> None:
+        self.mouse = self._new_mouse()
+        self._tell("Hold the hand still for half a second: that becomes the cursor's origin.")
+
+    def _new_mouse(self) -> Mouse:
+        up = np.array([0.0, 0.0, 1.0]) if self._followed is not None and self._followed.up == "z" else None
+        return Mouse(MouseSettings(height_from=self.height_box.currentData()), up)
+
+    # -- every tick ------------------------------------------------------------------------------------------------
+
+    def step(self) -> None:
+        """Take in what arrived, and show it."""
+        if self._rig() is not self._followed:
+            self._followed = self._rig()
+            self.mouse = self._new_mouse()
+        now = time.monotonic()
+        try:
+            messages = self._listener.poll()
+        except RhotError as exc:
+            messages = []
+            self._tell(str(exc))
+        for message in messages:
+            if isinstance(message, HandState):
+                self._feed(message)
+            if isinstance(message, HandState | EngineStatus):
+                self._heard_s = now
+        if self._rig() is None or now - self._heard_s > SILENCE_S:
+            self.state = None
+        self._show_words(now)
+        self.pacer.give_up(now)
+        if self.pacer.due(now) and self.view.isVisible():
+            self.pacer.begin(now)
+            self.view.show_mouse(self.state, self.pick, self.test)
+
+    def _feed(self, hand: HandState) -> None:
+        self.state = self.mouse.feed(hand)
+        if self.test is None:
+            self.pick.feed(self.state)
+            return
+        if self.test.wanted is not None:
+            self.test.feed(self.state)
+
+    def _tell(self, sentence: str) -> None:
+        self._told, self._told_s = sentence, time.monotonic()
+
+    def _show_words(self, now: float) -> None:
+        state = self.state
+        self.badge.show_look(NO_RIG if state is None else condition_look(state.condition.value), None)
+        cursor = None if state is None else state.cursor
+        self.place.setText("right – mm   forward – mm   height – mm" if cursor is None else
+                           "right {:+4.0f} mm   forward {:+4.0f} mm   height {:3.0f} mm".format(*(1e3 * cursor)))
+        for button in BUTTONS:
+            down = state is not None and state.is_pressed(button)
+            self.words[button].setText(f"{_NAMES[button]} {'DOWN' if down else 'up'}")
+            self.shapes[button].setPixmap(shape_pixmap(
+                "disc" if down else "ring", self._scheme.accent if down else self._scheme.neutral, _SHAPE_PX,
+                self.devicePixelRatioF()))
+        self.sentence.setText(self._sentence(now))
+
+    def _sentence(self, now: float) -> str:
+        """The most urgent thing: what was done just now, what is missing, what to do."""
+        if now - self._told_s < TOLD_S and self._told:
+            return self._told
+        if self.state is None:
+            return NO_ENGINE
+        if self.state.needs:
+            return self.state.needs[0]
+        if self.test is not None:
+            found = self.test.result()
+            done = "Move the cursor's foot into the blue target and spread the thumb."
+            return done if found is None else f"Done: {found.sentence}"
+        if self.pick.held is not None:
+            return f"The {self.pick.balls[self.pick.held].name} moves with the cursor until the thumb returns."
+        if self.pick.selected is not None:
+            return (f"Spread the thumb to pick the {self.pick.balls[self.pick.selected].name}, the little finger to "
+                    "put it on the ground.")
+        return "Bring the cursor to a ball."
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        self.badge.set_scheme(scheme)
+        self.view.set_scheme(scheme)
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """Stop listening."""
+        self._timer.stop()
+        with contextlib.suppress(RhotError):
+            self._listener.close()
+        super().closeEvent(event)
+
+
+def _button(title: str, meaning: str, action: Callable[[], None]) -> QPushButton:
+    button = QPushButton(title)
+    button.setToolTip(meaning)
+    button.setAutoDefault(False)
+    button.clicked.connect(lambda checked=False: action())
+    return button

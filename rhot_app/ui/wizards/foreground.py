@@ -1,0 +1,82 @@
+"""The wizard for a bare hand: the nodes learn the empty scene and the skin."""
+
+from __future__ import annotations
+
+import contextlib
+
+from PySide6.QtWidgets import QPushButton
+
+from rhot_app.errors import RhotError
+from rhot_app.ui.common.job import Job
+from rhot_app.ui.wizards.framework.page import AcceptPage, Page
+from rhot_app.ui.wizards.framework.plan import Kit, Plan
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, LearningStep, SkinStep, ask_node, propose
+
+_KEPT = "Each node keeps what it had, and Restore the old one brings it back."
+
+
+def make_plan(kit: Kit) -> Plan:
+    """The wizard's pages for the rig at hand."""
+    cameras = {node.name: node.node_id for node in kit.rig.nodes if node.node_id in kit.node_settings}
+    empty, skin = EmptyStep(cameras), SkinStep(cameras, lambda: kit.connect().command)
+    accept = AcceptStep(lambda: propose(empty, skin), missing="Learn the empty scene and your hand first.")
+    pages = (LearnPage(empty, kit, "Learn the empty scene"), LearnPage(skin, kit, "Learn my skin"),
+             AcceptPage(accept, kit.scheme, _KEPT))
+
+    def put_back() -> None:
+        """What was only tried out goes."""
+        if accept.state != "used" and (empty.learnt or skin.learnt):
+            asker = kit.connect()
+            try:
+                for node_id in cameras.values():
+                    with contextlib.suppress(RhotError):  # a node that is gone has forgotten it anyway
+                        ask_node(asker.command, node_id, "revert_foreground")
+            finally:
+                asker.close()
+
+    return Plan("Background and skin", pages, put_back=put_back)
+
+
+class LearnPage(Page):
+    """A button that has the nodes learn; the pictures stay live."""
+
+    def __init__(self, step: LearningStep, kit: Kit, label: str) -> None:
+        super().__init__(step)
+        self._learning, self._kit = step, kit
+        self._job: Job | None = None
+        self.learn_button = QPushButton(label)
+        self.learn_button.setAutoDefault(False)
+        self.learn_button.setToolTip("Tried out at once by every node, and kept by none before the last step.")
+        self.learn_button.clicked.connect(self.learn)
+        self.column.addWidget(self.learn_button)
+        self.column.addStretch(1)
+        self.first_field = self.learn_button
+
+    def learn(self) -> None:
+        """Have the nodes learn, in a worker."""
+        if self._job is None:
+            self._learning.begin()
+            self._job = Job(lambda progress: self._ask(), self._learnt, self._failed, None, self).start()
+            self.changed.emit()
+
+    def show_view(self, view: StepView) -> None:
+        """The button waits for what is under way."""
+        self.learn_button.setEnabled(self._job is None and bool(self._learning.nodes))
+
+    def _ask(self) -> str:
+        asker = self._kit.connect()
+        try:
+            return self._learning.learn(asker.command)
+        finally:
+            asker.close()
+
+    def _learnt(self, problem: str) -> None:
+        self._job = None
+        self._learning.finish(problem)
+        self.changed.emit()
+
+    def _failed(self, sentence: str) -> None:
+        self._job = None
+        self._learning.finish(sentence, learnt=False)
+        self.changed.emit()

@@ -1,0 +1,259 @@
+"""The background and skin wizard without its widgets: nodes learn the empty scene, then the hand, tried out live."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
+from rhot_app.errors import EngineError, RhotError
+from rhot_app.ui.models.proposal import Command, Proposal, Row
+from rhot_app.ui.wizards.models.drawing import Layer, Overlay
+from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
+
+REASON = "background and skin"
+
+SECONDS = 3.0
+"""s of the empty scene: a hundred pictures at 30 Hz, after which a pixel's noise is known to 7 %."""
+
+LEAST, MOST = 0.005, 0.5
+"""Parts of a picture that a hand with its forearm covers, from 2 m away and from 0.25 m, seen with 62 degrees."""
+
+WHOLE = 0.8
+"""Part of the foreground that is in one piece when it shows a hand and little else."""
+
+_WAIT_S = 10.0  # beyond SECONDS, for a slow node
+_LOOK_S = 0.2
+_TINT = (60, 200, 255)
+
+
+def ask_node(command: Command, node_id: int, request: str, **fields: Any) -> dict[str, Any]:
+    """A node's whole answer, a picture included. Raises EngineError."""
+    return command("node", node_id=node_id, request={"request": request, **fields})
+
+
+def foreground_of(command: Command, node_id: int) -> dict[str, Any]:
+    """What a node knows of background and skin. Raises EngineError, also for a node that knows no such thing."""
+    known = ask_node(command, node_id, "state").get("answer", {}).get("foreground")
+    if not isinstance(known, dict):
+        raise EngineError("a node learns neither background nor skin. Does rhot-node have the version of this program "
+                          "there?")
+    return known
+
+
+class LearningStep(Step):
+    """Base of both: `learn` is called in a worker, between `begin` and `finish`."""
+
+    def __init__(self, cameras: Mapping[str, int]) -> None:
+        """`cameras`: node ids by name."""
+        self.nodes = dict(cameras)
+        self.cameras = tuple(cameras)
+        self.learning = self.learnt = False
+        self.problem = ""
+
+    def learn(self, command: Command) -> str:
+        """Have every node learn; returns what is worth a sentence. Raises RhotError."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """It is being learnt."""
+        self.learning, self.problem = True, ""
+
+    def finish(self, problem: str = "", *, learnt: bool = True) -> None:
+        """It has ended so."""
+        self.learning, self.problem, self.learnt = False, problem, learnt or self.learnt
+
+    @property
+    def keeps(self) -> bool:
+        """What was learnt is only tried out."""
+        return self.learnt
+
+
+class EmptyStep(LearningStep):
+    """The scene without a hand."""
+
+    title = "Empty scene"
+
+    def __init__(self, cameras: Mapping[str, int]) -> None:
+        super().__init__(cameras)
+        self.before: dict[str, dict[str, Any]] = {}
+        self._until_s = 0.0
+
+    def learn(self, command: Command) -> str:
+        """For SECONDS."""
+        for name, node_id in self.nodes.items():
+            known = foreground_of(command, node_id)
+            self.before.setdefault(name, known)
+            ask_node(command, node_id, "learn_background", seconds=SECONDS, save=False)
+        self._until_s = time.monotonic() + SECONDS
+        while waiting := [name for name, node_id in self.nodes.items() if not self._has_learnt(command, node_id)]:
+            if time.monotonic() > self._until_s + _WAIT_S:
+                raise EngineError(f"{' and '.join(waiting)}: the background was not learnt in time. Look at the Nodes "
+                                  "panel, then learn it again.")
+            time.sleep(_LOOK_S)
+        return ""
+
+    def _has_learnt(self, command: Command, node_id: int) -> bool:
+        known = foreground_of(command, node_id)
+        if known.get("problem"):
+            raise EngineError(str(known["problem"]))
+        return bool(known.get("background")) and not known.get("learning_s")
+
+    def view(self) -> StepView:
+        """What to do."""
+        if not self.nodes:
+            return StepView("No camera answers.", hint="Look at the Nodes panel: its sentence says what is wrong.")
+        done = 1.0 if self.learnt else 0.0
+        if self.learning:
+            done = min(max(1.0 - (self._until_s - time.monotonic()) / SECONDS, 0.0), 1.0)
+        sentence = ("Keep out of the pictures." if self.learning else
+                    "Learnt. Go on, or learn it again after anything in the pictures has changed." if self.learnt else
+                    "Take the hand out of both pictures and leave everything as it will be. Then press Learn.")
+        return StepView(sentence, done=self.learnt and not self.learning, hint=self.problem,
+                        bars=(Bar("empty scene", done, f"{SECONDS:g} s of every camera"),))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mask:
+    """One camera's foreground: `covered`, its part of the picture, and `whole`, the largest piece's part of it."""
+
+    covered: float
+    whole: float
+    overlay: Overlay
+
+
+class SkinStep(LearningStep):
+    """The hand before the learnt background, its foreground live."""
+
+    title = "Your hand"
+    watches = True
+
+    def __init__(self, cameras: Mapping[str, int], command: Callable[[], Command]) -> None:
+        """`command`: gives the engine's, for the thread that looks at pictures."""
+        super().__init__(cameras)
+        self.masks: dict[str, Mask] = {}
+        self._command = command
+        self._asker: Command | None = None
+
+    def learn(self, command: Command) -> str:
+        """The next picture's skin of each camera."""
+        without = [name for name, node_id in self.nodes.items() if not ask_node(
+            command, node_id, "learn_skin", save=False).get("answer", {}).get("found")]
+        return "" if not without else (
+            f"No skin was found in the picture of {' and '.join(without)}, so the colours of any skin are used there. "
+            "Hold the hand into both pictures and learn it again.")
+
+    def see(self, pictures: Pictures) -> dict[str, Mask]:
+        """What each node takes for the hand now."""
+        self._asker = self._asker or self._command()
+        found = {}
+        for name in pictures:
+            if name in self.nodes:
+                try:
+                    found[name] = mask_of(ask_node(self._asker, self.nodes[name], "foreground_mask").get("data", b""))
+                except RhotError:
+                    continue  # its picture says what is wrong
+        return found
+
+    def take(self, seen: dict[str, Mask]) -> None:
+        """The newest masks."""
+        self.masks = {**self.masks, **seen}
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """On all cameras together; None until every one has a mask."""
+        if not self.masks or set(self.masks) != set(self.nodes):
+            return None
+        findings = [finding for name, mask in self.masks.items() for finding in findings_of(name, mask)]
+        return judge("; ".join(f"{name}: {mask.covered:.1%} of the picture is the hand"
+                               for name, mask in self.masks.items()) + ".", findings)
+
+    def view(self) -> StepView:
+        """The masks and what they say."""
+        verdict = self.verdict
+        good = verdict is not None and verdict.acceptable
+        sentence = ("One moment." if self.learning else
+                    "Hold your bare hand into both pictures, fingers spread, and press Learn." if not self.learnt else
+                    "The hand and little else should be tinted: then press Next." if good else
+                    "Read what is wrong, then learn it again.")
+        return StepView(sentence, done=self.learnt and good and not self.learning, hint=self.problem, verdict=verdict,
+                        overlays={name: mask.overlay for name, mask in self.masks.items()})
+
+
+def mask_of(png: bytes) -> Mask:
+    """What a node's answer shows. Raises EngineError when it is no picture."""
+    grey = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_GRAYSCALE) if png else None
+    if grey is None:
+        raise EngineError("a node gave a foreground that cannot be read; restart it.")
+    hand: NDArray[np.uint8] = np.asarray(grey > 127, np.uint8)
+    count, _, stats, _ = cv2.connectedComponentsWithStats(hand, connectivity=8)
+    total = int(hand.sum())
+    largest = int(stats[1:, cv2.CC_STAT_AREA].max()) if count > 1 else 0
+    rgba = np.zeros((*hand.shape, 4), np.uint8)
+    rgba[hand > 0] = (*_TINT, 130)
+    return Mask(total / hand.size, largest / max(total, 1), (Layer(rgba),))
+
+
+def findings_of(camera: str, mask: Mask) -> list[Finding]:
+    """What is wrong with one camera's foreground."""
+    if mask.covered < LEAST:
+        return [Finding("nothing", Grade.POOR, f"{camera}: the hand covers {mask.covered:.1%} of the picture, less "
+                        f"than {LEAST:.1%}.",
+                        "It was in the picture while the empty scene was learnt, or is not there now.",
+                        "Hold it into the picture; if it is there, go back and learn the empty scene without it.")]
+    if mask.covered > MOST:
+        return [Finding("everything", Grade.POOR, f"{camera}: {mask.covered:.0%} of the picture differs from the empty "
+                        f"scene, more than {MOST:.0%}.", "Light, exposure or the camera have changed since.",
+                        "Go back and learn the empty scene again.")]
+    if mask.whole < WHOLE:
+        return [Finding("pieces", Grade.FAIR, f"{camera}: {1.0 - mask.whole:.0%} of what is tinted is not the hand.",
+                        "Shadows, a second hand, a face or moving things.", "Take them away, or have more even light.")]
+    return []
+
+
+# -- what is kept ------------------------------------------------------------------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class ForegroundChange:
+    """What the nodes `node_ids` try out is kept in their files; a restore brings back what these had."""
+
+    node_ids: tuple[int, ...]
+
+    def use(self, command: Command) -> None:
+        """Keep it, on all nodes or on none."""
+        kept: list[int] = []
+        try:
+            for node_id in self.node_ids:
+                ask_node(command, node_id, "save_foreground")
+                kept.append(node_id)
+        except RhotError:
+            for node_id in kept:
+                ask_node(command, node_id, "revert_foreground", earlier=True)
+            raise
+
+    def restore(self, command: Command) -> None:
+        """What was kept before."""
+        for node_id in self.node_ids:
+            ask_node(command, node_id, "revert_foreground", earlier=True)
+
+
+def propose(empty: EmptyStep, skin: SkinStep) -> Proposal | None:
+    """What both steps have learnt; None before."""
+    verdict = skin.verdict
+    if not (empty.learnt and skin.learnt) or verdict is None:
+        return None
+    rows = [row for name in empty.nodes for row in (
+        Row(f"{name}: background", _background(empty.before.get(name, {})), "learnt now"),
+        Row(f"{name}: skin", str(empty.before.get(name, {}).get("skin", "none")), "learnt now"))]
+    return Proposal(REASON, verdict, tuple(rows), (ForegroundChange(tuple(empty.nodes.values())),),
+                    "Calibrate, Tracker chooses the bare hand.")
+
+
+def _background(known: dict[str, Any]) -> str:
+    return "learnt earlier" if known.get("background") else "none"

@@ -1,0 +1,186 @@
+"""The window of the 3-D mouse, worked as a person works it: by buttons, keys, and a hand that moves."""
+
+from __future__ import annotations
+
+import pytest
+from mouse_states import REST, SPREAD, hand_state, lost
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from screen_pictures import check, colours_in, picture_of
+
+from rhot_app.ui.mouse.scene import shadow_of
+from rhot_app.ui.mouse.window import MouseWindow
+
+
+class Hand:
+    """In place of an engine's client: states come when a test lets them come."""
+
+    def __init__(self) -> None:
+        self.number = 0
+        self.waiting: list = []
+        self.closed = False
+
+    def poll(self) -> list:
+        sent, self.waiting = self.waiting, []
+        return sent
+
+    def close(self) -> None:
+        self.closed = True
+
+    def be(self, *place: float, states: int = 1, **angles: float) -> None:
+        for _ in range(states):
+            self.waiting.append(hand_state(self.number, place or (0.0, 0.0, 0.0), **angles))
+            self.number += 1
+
+
+@pytest.fixture
+def hand() -> Hand:
+    return Hand()
+
+
+@pytest.fixture
+def window(themed, qtbot, hand, bench):
+    rig = bench.backend.engine.rig
+    opened: list[str] = []
+    window = MouseWindow(hand, lambda: rig, bench.window.appearance.scheme, lambda: opened.append("guide"))
+    window.opened = opened
+    qtbot.addWidget(window)
+    window.show()
+    window.activateWindow()
+    assert QTest.qWaitForWindowActive(window)
+    hand.be(states=REST)
+    window.step()
+    yield window
+    window.close()
+
+
+def to(window: MouseWindow, ball: int) -> tuple[float, float, float]:
+    """Palm place m that brings the cursor's foot under a ball, which lies low enough to be picked from there."""
+    x, y, _ = window.pick.balls[ball].centre
+    gain = window.mouse.settings.gain
+    return (x / gain, y / gain, 0.0)
+
+
+def carry(window: MouseWindow, hand: Hand, ball: int, *place: float) -> None:
+    """Pick a ball, bring the palm to `place`, and let go."""
+    start = to(window, ball)
+    for where, angles in ((start, {}), (start, SPREAD["thumb"]), (place, SPREAD["thumb"]), (place, {})):
+        hand.be(*where, **angles)
+        window.step()
+
+
+def test_a_ball_is_picked_moved_and_brought_back_by_undo(window, hand):
+    before = window.pick.balls[1].centre
+    hand.be(*to(window, 1))
+    window.step()
+    assert "Spread the thumb to pick the blue ball" in window.sentence.text()
+    hand.be(*to(window, 1), **SPREAD["thumb"])
+    window.step()
+    assert window.words["thumb"].text() == "Thumb DOWN"
+    assert "moves with the cursor" in window.sentence.text()
+    carry(window, hand, 1, 0.0, 0.0, 0.0)
+    assert window.words["thumb"].text() == "Thumb up"
+    assert window.pick.balls[1].centre[:2] == pytest.approx((0.0, 0.0), abs=1e-6)
+    QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert window.pick.balls[1].centre == before
+    window.step()
+    assert "back where it was" in window.sentence.text()
+
+
+def test_undo_without_a_move_is_a_sentence(window):
+    QTest.mouseClick(window.undo_button, Qt.MouseButton.LeftButton)
+    window.step()
+    assert "nothing to undo" in window.sentence.text()
+
+
+def test_a_lost_hand_and_a_silent_engine_are_said_and_nothing_is_lost(window, hand, monkeypatch):
+    carry(window, hand, 1, 0.0, 0.0, 0.0)
+    hand.waiting.append(lost(hand.number))
+    window.step()
+    assert "No hand is tracked" in window.sentence.text() and window.badge.word == "LOST"
+    moved = list(window.pick.balls)
+    window._heard_s -= 100.0
+    window.step()
+    assert "No engine is heard" in window.sentence.text() and window.badge.word == "NO RIG"
+    assert window.pick.balls == moved
+    hand.be(states=2)
+    window.step()
+    assert window.badge.word == "TRACKING"
+
+
+def test_h_takes_another_rest(window, hand):
+    hand.be(0.05, 0.0, 0.0)
+    window.step()
+    assert "+150 mm" in window.place.text()
+    QTest.keyClick(window, Qt.Key.Key_H)
+    hand.be(0.05, 0.0, 0.0, states=REST)
+    window.step()
+    assert "right   +0 mm" in window.place.text()
+
+
+def test_the_target_test_is_begun_clicked_through_and_ended(window, hand):
+    balls = list(window.pick.balls)
+    QTest.mouseClick(window.test_button, Qt.MouseButton.LeftButton)
+    assert window.test_button.text() == "End the test"
+    test = window.test
+    while (wanted := test.wanted) is not None:
+        x, y = test.targets[wanted] / window.mouse.settings.gain
+        for angles in ({}, SPREAD["thumb"], {}):
+            hand.be(x, y, 0.0, states=3, **angles)
+            window.step()
+    assert "bit/s" in window.sentence.text() and "0 missed" in window.sentence.text()
+    QTest.mouseClick(window.undo_button, Qt.MouseButton.LeftButton)
+    window.step()
+    assert "moves no ball" in window.sentence.text()
+    QTest.keyClick(window, Qt.Key.Key_T)
+    assert window.test is None and window.pick.balls == balls
+
+
+def test_the_palm_can_set_the_height(window, hand):
+    window.height_box.setFocus()
+    QTest.keyClick(window.height_box, Qt.Key.Key_Down)
+    hand.be(states=REST)
+    hand.be(0.0, 0.0, 0.02)
+    window.step()
+    assert "height 120 mm" in window.place.text()
+
+
+def test_f1_opens_the_guide_and_closing_ends_the_client(window, hand):
+    QTest.keyClick(window, Qt.Key.Key_F1)
+    assert window.opened == ["guide"]
+    window.close()
+    assert hand.closed
+
+
+def test_a_shadow_lies_on_the_ground_beside_what_is_high():
+    import numpy as np
+
+    low, high = shadow_of(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]))
+    assert low == pytest.approx([0.0, 0.0, 0.0]) and high[2] == 0.0
+    assert np.linalg.norm(high) > 0.03
+
+
+def test_the_menu_opens_it_without_a_rig_and_with_one(bench):
+    bench.window.actions_.mouse.trigger()
+    opened = bench.window.dialogs.mouse
+    bench.until(lambda: "No engine is heard" in opened.sentence.text())
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: opened.badge.word in ("TRACKING", "PARTIAL"))
+    opened.close()
+    bench.until(lambda: bench.window.dialogs.mouse is None)
+
+
+def test_picture(window, hand, bench):
+    window.move(0, 0)
+    carry(window, hand, 1, -0.01, 0.02, 0.0)
+    start = to(window, 0)
+    hand.be(*start)
+    hand.be(*start, **SPREAD["thumb"])
+    hand.be(0.015, -0.01, 0.0, index_mcp_flexion=2.0, **SPREAD["thumb"])
+    for _ in range(30):
+        hand.be(0.015, -0.01, 0.0, index_mcp_flexion=2.0, **SPREAD["thumb"])
+        bench.run(0.03)
+    picture = picture_of(window)
+    view = window.view.geometry()
+    assert colours_in(picture.copy(view)) > 20, "the scene is blank"
+    check("mouse", picture.copy(0, 0, window.width(), window.height()), 30)

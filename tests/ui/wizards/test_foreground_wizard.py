@@ -1,0 +1,149 @@
+"""The background and skin wizard, clicked through on nodes that learn: empty scene, hand, verdict, what is kept."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from fake_engine import synthetic_rig
+from wizard_hands import Hands
+from wizard_rig import FakeMemory, FakeRigAsker
+
+from rhot_app.errors import EngineError
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.foreground import make_plan
+from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
+from rhot_app.ui.wizards.steps import foreground_steps
+from rhot_app.ui.wizards.steps.foreground_steps import findings_of, mask_of
+from rhot_node.foreground_store import ForegroundStore
+from rhot_node.network.pictures import PictureBox
+
+SKIN = (115, 140, 200)  # BGR
+
+
+class LearningNodes(FakeRigAsker):
+    """Nodes with real stores that see a desk, and a hand once `hand` says so."""
+
+    def __init__(self, folder):
+        super().__init__(synthetic_rig(), self.picture)
+        self.hand, self.broken = False, False
+        self.stores = {node.node_id: ForegroundStore(folder / f"{node.name}.npz") for node in self.rig.nodes}
+
+    def picture(self, node_id, t_s):
+        rows = np.linspace(60, 130, 480)[:, None, None]
+        bgr = np.broadcast_to(rows * (1.1, 1.0, 0.8), (480, 640, 3)).astype(np.uint8).copy()
+        if self.hand:
+            cv2.circle(bgr, (320 - 20 * node_id, 260), 60, SKIN, -1)
+            for x in (-55, -25, 8, 40):
+                cv2.line(bgr, (320 - 20 * node_id, 260), (320 - 20 * node_id + x, 120), SKIN, 22)
+        return bgr
+
+    def box(self, node_id):
+        """What the node's camera sees next."""
+        class Box(PictureBox):
+            def next_still(box, timeout_s):  # noqa: N805
+                from rhot_node.detect.image import from_bgr
+                from rhot_node.network.pictures import Picture
+                return Picture(from_bgr(self.picture(node_id, 0.0)), 1, 1)
+        return Box(4.0)
+
+    def command(self, name, *, timeout_s=3.0, **arguments):
+        request = arguments.get("request", {})
+        kind, node_id = request.get("request", ""), arguments.get("node_id")
+        if name != "node" or not ("foreground" in kind or kind.startswith(("learn_", "state"))):
+            return super().command(name, timeout_s=timeout_s, **arguments)
+        if self.broken:
+            raise EngineError("node left does not answer on its control channel.")
+        store = self.stores[node_id]
+        if kind == "state":
+            return {"answer": {"foreground": store.report(640, 480)}}
+        if kind == "learn_background":
+            store.learn_background(self.box(node_id), 0.1, save=request["save"])
+        elif kind == "learn_skin":
+            return {"answer": {"found": store.learn_skin(self.box(node_id), save=request["save"])}}
+        elif kind == "foreground_mask":
+            return {"answer": {}, "data": store.mask(self.box(node_id))[0]}
+        elif kind == "save_foreground":
+            store.save()
+            self.saved.append(node_id)
+        else:
+            store.revert(earlier=request.get("earlier", False))
+        return {"answer": {}}
+
+
+@pytest.fixture
+def nodes(tmp_path, monkeypatch):
+    monkeypatch.setattr(foreground_steps, "SECONDS", 0.1)
+    return LearningNodes(tmp_path)
+
+
+@pytest.fixture
+def hands(themed, nodes):
+    settings = {node.node_id: {"node_id": node.node_id} for node in nodes.rig.nodes}
+    kit = Kit(nodes.rig, None, nodes.connect, DARK, FakeMemory(), settings)
+    hands = Hands(WizardWindow(make_plan(kit), kit))
+    yield hands
+    hands.window.end().wait(5.0)
+    hands.window.deleteLater()
+
+
+def test_from_an_empty_scene_to_what_the_nodes_keep(hands, nodes):
+    assert "Take the hand out" in hands.sentence and not hands.window.frame.next_button.isEnabled()
+    hands.click(hands.window.page.learn_button)
+    hands.until(lambda: hands.sentence.startswith("Learnt."))
+    hands.next()
+    nodes.hand = True
+    assert "Hold your bare hand" in hands.sentence
+    hands.click(hands.window.page.learn_button)
+    hands.until(lambda: hands.sentence.startswith("The hand and little else"))
+    for store in nodes.stores.values():
+        assert store.report(640, 480)["skin"] == "learnt"
+        assert not store.path.exists(), "nothing is kept before the last step"
+    hands.keep("foreground-hand")
+    hands.next()
+    assert hands.window.page.table.rowCount() == 4
+    hands.next()
+    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    assert nodes.saved == [1, 2]
+    assert all(ForegroundStore(store.path).report(640, 480)["background"] for store in nodes.stores.values())
+    hands.click(hands.window.page.restore_button)
+    hands.until(lambda: hands.sentence == "The old one is back.")
+    assert not any(store.report(640, 480)["background"] for store in nodes.stores.values())
+
+
+def test_a_hand_that_was_there_all_the_time_is_not_found(hands, nodes):
+    nodes.hand = True
+    hands.click(hands.window.page.learn_button)
+    hands.until(lambda: hands.sentence.startswith("Learnt."))
+    hands.next()
+    hands.click(hands.window.page.learn_button)
+    hands.until(lambda: hands.sentence.startswith("Read what is wrong"))
+    assert "No skin was found" in hands.window.frame.hint.text()
+    assert "less than 0.5%" in hands.window.frame.verdict.verdict.findings[0].sentence
+    assert not hands.window.frame.next_button.isEnabled()
+
+
+def test_closing_without_use_forgets_what_was_tried_out(hands, nodes):
+    hands.click(hands.window.page.learn_button)
+    hands.until(lambda: hands.sentence.startswith("Learnt."))
+    hands.window.end().wait(5.0)
+    assert not any(store.report(640, 480)["background"] for store in nodes.stores.values())
+
+
+def test_a_node_that_does_not_answer_is_named(hands, nodes):
+    nodes.broken = True
+    hands.click(hands.window.page.learn_button)
+    hands.until(lambda: "does not answer" in hands.window.frame.hint.text())
+    assert hands.window.page.learn_button.isEnabled() and not hands.window.frame.next_button.isEnabled()
+
+
+@pytest.mark.parametrize(("boxes", "code"), [
+    ([], "nothing"), ([(0, 0, 320, 200)], "everything"), ([(40, 40, 100, 120)], ""),
+    ([(40, 40, 90, 100), (200, 40, 260, 90)], "pieces")])
+def test_the_verdict_names_what_is_wrong_with_a_mask(boxes, code):
+    grey = np.zeros((240, 320), np.uint8)
+    for x0, y0, x1, y1 in boxes:
+        grey[y0:y1, x0:x1] = 255
+    found = findings_of("left", mask_of(cv2.imencode(".png", grey)[1].tobytes()))
+    assert [finding.code for finding in found] == ([code] if code else [])
