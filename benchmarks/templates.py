@@ -78,14 +78,13 @@ def crossing(seeds: int, texture: float = 0.15, frames: int = 61) -> None:
             spent = 1e3 * (time.process_time() - begun) / (frames - 1)
             rms = np.sqrt(np.mean(np.square(errors), axis=0))
             print(f"{seed:4d}  {'yes' if layered else 'no':6s}  {rms[0]:9.2f} {rms[1]:6.2f}  {rms[2]:10.2f} "
-                  f"{rms[3]:5.2f}"
-                  f"  {np.abs(errors).max():8.1f}  {spent:11.1f}", flush=True)
+                  f"{rms[3]:5.2f}  {np.abs(errors).max():8.1f}  {spent:11.1f}", flush=True)
 
 
 def order(poses: int) -> None:
     model, surface = model_and_surface()
     bodies, _ = hand_bodies(surface)
-    camera = look_at(np.zeros(3), np.array([0.0, 0.0, 0.5]), focal=225.0, width=240, height=180)
+    camera = look_at(np.zeros(3), np.array([0.0, 0.0, 0.5]), focal=150.0, width=160, height=120)
     rays, pose = camera_rays(camera), np.ascontiguousarray(camera.camera_from_world[:3])
     rng, covariance = np.random.default_rng(1), np.linalg.inv(pose_prior().information)
     wrong = deep = digits = cyclic = above = 0
@@ -100,7 +99,7 @@ def order(poses: int) -> None:
         seen = visibility(bodies, placed, pose)
         spent += time.process_time() - begun
         labels = segment(bodies, placed, seen.order, pose, camera.intrinsics, rays)
-        nearest, depth = depth_labels(bodies, placed, camera, rays)
+        nearest, depth = depth_labels(bodies, placed, camera, rays, labels >= 0)
         digit = (labels >= 0) & ((labels < 15) | (nearest < 15))
         own = np.take_along_axis(depth, np.maximum(labels, 0)[..., None], 2)[..., 0]
         behind = own[digit] - depth.min(axis=2)[digit]

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 SIZE_PX = 640, 480
-FILM_FRAMES, FILM_HZ = 90, 15.0
-"""A film is one turn about the vertical: four degrees from frame to frame, six seconds."""
+FILM_FRAMES, FILM_HZ = 60, 15.0
+"""A film is one turn about the vertical: six degrees from frame to frame, four seconds."""
 
 FILL = 0.42
 """Part of the picture's height from its middle to the farthest part of the object."""
