@@ -54,7 +54,8 @@ def rgb_of(image: YuvImage) -> NDArray[np.uint8]:
 
 
 class ForegroundStore:
-    """The foreground model in force. `current` may be read by any thread; the control thread changes it."""
+    """The foreground model in force. `current` may be read by any thread; the control thread and the one that
+    learns change it."""
 
     def __init__(self, path: Path | None) -> None:
         """Reads `path` if there is one; what cannot be read is told by `report` and counts as nothing."""
@@ -87,7 +88,7 @@ class ForegroundStore:
             problem = (f"The background was learnt from pictures of {columns} x {rows} px, and the camera gives "
                        f"{width} x {height} px: learn it again.")
         return {"sentence": known.sentence, "background": bool(known.mean.size), "skin": _skin_of(known),
-                "learning_s": max(0.0, self._until_s - time.monotonic()) if self.learning else 0.0,
+                "learning_s": max(0.1, self._until_s - time.monotonic()) if self.learning else 0.0,
                 "problem": problem}
 
     @property
@@ -108,6 +109,8 @@ class ForegroundStore:
     def learn_skin(self, pictures: PictureBox, *, save: bool = True) -> bool:
         """Learn the skin's colours from the next picture. False when it shows no skin; generic colours are then used.
         `save` as in `learn_background`. Raises NodeError without a picture, or when the file cannot be written."""
+        if self.learning:
+            raise NodeError("the background is being learnt; wait for its end.")
         image = self._picture(pictures)
         model = self.of_size(image.shape[1], image.shape[0])
         self._use(learn_skin(image, model), save=save)
@@ -117,9 +120,12 @@ class ForegroundStore:
         """Keep what is in force; what was kept before can be brought back by `revert`. Raises NodeError."""
         if self.learning:
             raise NodeError("the background is being learnt; wait for its end.")
-        if self.path is not None and self.path.exists():
+        if self.path is not None:
             try:
-                write_atomically(self._before(), self.path.read_bytes())
+                if self.path.exists():
+                    write_atomically(self._before(), self.path.read_bytes())
+                else:
+                    self._before().unlink(missing_ok=True)
             except OSError as exc:
                 raise NodeError(f"{self._before()}: cannot be written ({exc.strerror}); nothing was changed.") from exc
         self._use(self.current, save=True)

@@ -126,7 +126,7 @@ class LayeredTracker:
     def _held(self, layer: int) -> bool:
         """Whether the last images agree with the templates of a layer."""
         used, held = np.sum([[view.frame.used[layer], view.frame.held[layer]] for view in self.views
-                             if view.frame is not None], axis=0)
+                             if view.frame is not None] or [[0, 0]], axis=0)
         return bool(held >= LEAST_POINTS and held > HELD * used)
 
     def _sd_m(self, knot: Knot, placed: Placed, layer: int) -> float:

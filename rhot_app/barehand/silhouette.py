@@ -112,7 +112,7 @@ def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, sl
             wide = intrinsics[0] * (thick + s * FOREARM_SPREAD) / depth / step
             for j in range(-2, 3):
                 across = 0.4 * j * wide / max(length, 1e-9)
-                row, column = int(v + across * du + 0.5), int(u - across * dv + 0.5)
+                row, column = int(np.floor(v + across * du + 0.5)), int(np.floor(u - across * dv + 0.5))
                 if 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column] != 1:
                     total += 0.4 * wide * length * odds[row, column]
         b[0], b[1], known = u, v, True

@@ -180,6 +180,7 @@ class BareHandTracker:
         self.filter.start(0.0, state, covariance)
         self.tracking = self._fresh = True
         self._taken_s = [-np.inf] * len(self.cameras)
+        self.frames = [None] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
         """Look for a hand of which nothing is known, and begin with the most probable one. False without any.

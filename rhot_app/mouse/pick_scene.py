@@ -53,6 +53,8 @@ class PickScene:
         """Follow the mouse: select, pick, carry and let go."""
         changed, self._pressed = mouse.pressed ^ self._pressed, mouse.pressed
         if mouse.cursor is None:
+            if self.held is not None and "thumb" not in mouse.pressed:
+                self._let_go()
             return
         if self.held is None:
             self.selected = self._nearest(mouse.cursor)

@@ -79,11 +79,16 @@ class MouseState:
         return button in self.pressed
 
 
+GAP_NS: Final = 100_000_000
+"""ns: states farther apart are of different stays of the hand: three frames of a camera at 30 Hz."""
+
+
 class _Rest:
-    """The mean of a value over the first half second in which it was known; each part of a hand has its own."""
+    """The mean of a value over the first half second in which it was known without a gap; each part of a hand has its
+    own."""
 
     def __init__(self) -> None:
-        self._first_ns: int | None = None
+        self._first_ns = self._last_ns = -GAP_NS
         self._values: list[Array] = []
         self.mean: Array | None = None  # None until it is taken
 
@@ -91,7 +96,9 @@ class _Rest:
         """One more known value."""
         if self.mean is not None:
             return
-        self._first_ns = t_ns if self._first_ns is None else self._first_ns
+        if not self._values or not 0 <= t_ns - self._last_ns < GAP_NS:
+            self._first_ns, self._values = t_ns, []
+        self._last_ns = t_ns
         self._values.append(value)
         if t_ns - self._first_ns >= round(1e9 * HOME_S):
             self.mean = np.mean(self._values, axis=0)

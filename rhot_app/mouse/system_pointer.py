@@ -37,9 +37,9 @@ class SystemPointer:
     def __init__(self, path: Path = DEVICE, ioctl: Ioctl | None = None) -> None:
         """Make the device. `ioctl`: a stand-in for that of ``fcntl``. Raises OutputError with the permission that is
         missing."""
+        self._ioctl = ioctl or _system_ioctl()  # first: it says which systems have none
         self._file = _open(path)
         self._sent: dict[tuple[int, int], int] = {}
-        self._ioctl = ioctl or _system_ioctl()
         try:
             self._create()
         except OSError as exc:

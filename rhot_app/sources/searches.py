@@ -23,7 +23,7 @@ FRAMES = 4
 U32 = 0xFFFFFFFF
 
 Answer = SliceEdges | ForegroundPart
-_Key = tuple[type, int]
+_Key = tuple[type, int, int]
 
 
 class NodeSearches:
@@ -66,7 +66,7 @@ class NodeSearches:
         """All parts of a frame's answer once this one completes it. Raises WireError 'request' when nobody asked."""
         if message.request not in self._requests:
             raise WireError("request", f"an answer to the request {message.request}, which was not made of late")
-        key = type(message), message.frame_number
+        key = type(message), message.frame_number, message.request
         parts = self._parts.setdefault(key, {})
         parts[message.part] = message
         while len(self._parts) > 2 * FRAMES:
@@ -85,7 +85,8 @@ class NodeSearches:
             data = b"".join(part.data for part in parts if isinstance(part, ForegroundPart))
             return ForegroundFrame(camera, t_row0_ns, last.row_time_ns, t_receive_ns, last.step,
                                    unpack_map(data, last.width, last.height, last.step))
-        if request is None or last.slice_count != len(request.slices):
+        if request is None or any(not isinstance(part, SliceEdges) or part.slice_count != len(request.slices)
+                                  for part in parts):
             raise WireError("count", f"edges of {last.slice_count} slices, which were not asked for so")
         columns = [part.edges.columns() for part in parts if isinstance(part, SliceEdges)
                    and isinstance(part.edges, EdgeTable)]

@@ -15,8 +15,8 @@ from rhot_node.wire.slices import MAP_STEPS
 
 Map = NDArray[np.float32]
 
-LEVELS = 16
-"""Probabilities are told in so many steps: finer ones are noise, and compress badly."""
+LEVELS = 17
+"""Probabilities have so many steps: finer ones are noise, and compress badly. One of them is one half: unknown."""
 
 _HEAD = Struct("<qqIIIHHIIHBBB1s")
 

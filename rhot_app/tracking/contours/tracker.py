@@ -7,6 +7,7 @@ it starts the track and tells when it is wrong.
 
 from __future__ import annotations
 
+import copy
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -406,7 +407,7 @@ class ContourEstimator:
         """The contour on the slices that were searched: as it was expected, or in a log as it is now."""
         expected = frame.request.expected
         if isinstance(expected, ContourFrame) and expected.surface is self._hand.surface:
-            return expected if len(expected.slices) == len(frame.request.slices) else None
+            return copy.copy(expected) if len(expected.slices) == len(frame.request.slices) else None  # for this frame
         middle_ns = round(0.5e9 * self._hand.row_s[frame.camera] * self._hand.cameras[frame.camera].height)
         state, covariance = self._hand.filter.predict(self._seconds(frame.t_row0_master_ns + middle_ns))
         return matched(self._hand, frame, state, covariance)

@@ -226,8 +226,8 @@ OBSERVED: Final = {
                 "detector finds on a bare hand."),
     "contours": ("bare hand", "No markers: the nodes search their pictures for the hand's edges. Calibrate, Background "
                  "and skin comes first; then hold the hand still, fingers spread, until it is found."),
-    "both": ("bare hand and markers", "The bare hand's edges beside markers or landmarks: these find it, and both "
-             "follow it."),
+    "both": ("bare hand and markers", "The bare hand's edges beside markers or landmarks. Calibrate, Background and "
+             "skin comes first here, too; the hand is shown once its foreground agrees."),
 }
 SIZE_MEANING: Final = ("The hand's size is estimated as it moves, so that a hand file that is some percent too large "
                        "or too small does no harm. Open and close the hand for half a minute.")

@@ -98,7 +98,7 @@ class MouseView(GLViewWidget):
     def _solids(self, mouse: MouseState | None, scene: PickScene,
                 with_balls: bool) -> tuple[Array, Array, Bytes, NDArray[np.bool_]]:
         """Vertices, normals, colours and hatching of pole, cursor, selection line and balls. What is not there
-        collapses to a point below the ground's middle."""
+        collapses to a point the ground's middle."""
         cursor = None if mouse is None else mouse.cursor
         tip = np.zeros(3) if cursor is None else cursor
         chosen = scene.held if scene.held is not None else scene.selected

@@ -77,8 +77,8 @@ class MouseWindow(QDialog):
         self.rest_button = _button("Rest here", "The hand as it lies for the next half second becomes the cursor's "
                                    "origin (H).", self.take_rest)
         self.undo_button = _button("Undo", "Take the last move of a ball back (Ctrl+Z).", self.undo)
-        self.test_button = _button("Target test", "Click ten targets with the thumb: how many bits per second the hand "
-                                   "conveys (T).", self.begin_or_end_test)
+        self.test_button = _button("Target test", "Click nine targets with the thumb: how many bits per second the "
+                                   "hand conveys (T).", self.begin_or_end_test)
         self.height_box = QComboBox()
         self.height_box.setToolTip("What sets the pole's length: the index fingertip above the palm, or the palm.")
         self.height_box.setAccessibleName("Height from")

@@ -101,9 +101,11 @@ class EmptyStep(LearningStep):
 
     def _has_learnt(self, command: Command, node_id: int) -> bool:
         known = foreground_of(command, node_id)
+        if known.get("learning_s"):
+            return False
         if known.get("problem"):
             raise EngineError(str(known["problem"]))
-        return bool(known.get("background")) and not known.get("learning_s")
+        return bool(known.get("background"))
 
     def view(self) -> StepView:
         """What to do."""
