@@ -50,7 +50,7 @@ def hands(themed, scene, tmp_path):
     kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), settings)
     hands = Hands(WizardWindow(make_plan(kit), kit))
     hands.path, hands.asker = path, asker
-    hands.until(lambda: set(hands.window.step._sights) == {"left", "right"}
+    hands.until(lambda: set(hands.window.step._masked) == {"left", "right"}
                 and all(view.shown is not None for view in hands.window.frame.wall.views.values()))
     yield hands
     hands.window.end().wait(5.0)
@@ -134,7 +134,7 @@ def move_a_bound(hands):
     hands.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert step.model("thumb").hue_tolerance_deg == learnt and box.value() == pytest.approx(learnt, abs=0.05)
     enter(7.0)
-    hands.until(lambda: step._sights)
+    hands.until(lambda: step._masked)
 
 
 def test_one_picture_is_large_and_a_click_enlarges_the_other(hands):
@@ -152,7 +152,7 @@ def test_one_picture_is_large_and_a_click_enlarges_the_other(hands):
 def test_names_stand_at_the_side_and_leave_the_paint_in_sight(hands, scene):
     pick_all(hands)
     step, view = hands.window.step, hands.window.frame.wall.views["left"]
-    hands.until(lambda: all(mark.found for mark in step._sights["left"].seen))
+    hands.until(lambda: all(mark.found for mark in step._masked["left"].seen))
     place = view._place()
     callouts = [mark for mark in step.view().overlays["left"] if isinstance(mark, Callout)]
     boxes = callout_boxes(callouts, place, QFontMetricsF(view.font()))
@@ -187,10 +187,10 @@ def test_the_chosen_line_of_a_drop_down_can_be_read(qapp, qtbot, scheme):
 def test_the_mask_is_what_the_detector_takes(hands, scene):
     pick_all(hands)
     step = hands.window.step
-    hands.until(lambda: all(mark.found for mark in step._sights["left"].seen))
+    hands.until(lambda: all(mark.found for mark in step._masked["left"].seen))
     layer, *marks = step.view().overlays["left"]
     assert isinstance(layer, Layer) and {mark.text for mark in marks if isinstance(mark, Callout)} >= set(PAINTS)
-    labels = step._sights["left"].labels
+    labels = step._masked["left"].labels
     assert layer.rgba.shape == (120, 160, 4)
     assert np.array_equal(layer.rgba[..., 3] == 255, labels > 0)
     row, column = (round(at / 2) for at in reversed(PaintScene.where("ring")))
@@ -299,7 +299,7 @@ def said(hands):
 def test_the_page_says_which_test_a_camera_that_does_not_find_a_marker_refuses_it_by(hands, scene):
     other = PaintScene({name: rgb for name, rgb in PAINTS.items() if name != "ring"}, background=(60, 62, 66))
     hands.asker.draw = lambda node_id, t_s: (scene if node_id == 1 else other).draw(node_id, t_s)
-    hands.until(lambda: hands.window.step._sights["right"].image.y[10, 10] < 90)  # grey, no longer wood
+    hands.until(lambda: hands.window.step._masked["right"].image.y[10, 10] < 90)  # grey, no longer wood
     choose(hands, "ring")
     click_at(hands, "left", *PaintScene.where("ring"))
     choose(hands, SKIN)

@@ -99,7 +99,7 @@ def test_colours_are_learnt(simulated_rig, open_on_rig):
     simulated_rig.stage.show(HandShow("still"))
     hands = open_on_rig("colours")
     step = hands.window.step
-    hands.until(lambda: step._sights and hands.window.feed.newest("left") is not None)
+    hands.until(lambda: step._masked and hands.window.feed.newest("left") is not None)
     hands.run(1.0)
     image = from_bgr(hands.window.feed.newest("left").bgr)
     seen = {truth.markers.ids[mark.index]: (mark.x, mark.y) for mark in FastDetector(truth.markers).detect(image)}
