@@ -58,7 +58,7 @@ class ForegroundStore:
     learns change it."""
 
     def __init__(self, path: Path | None) -> None:
-        """Reads `path` if there is one; what cannot be read is told by `report` and counts as nothing."""
+        """Reads `path` if there is one; what cannot be read is reported and counts as nothing."""
         self.path = path
         self.current = _FLAT
         self._failure = ""

@@ -61,7 +61,7 @@ class Engine:
         self._node_black = node_black
         self._notice = ""  # why the last recording ended
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
-        self._shown: dict[str, int] = {}  # times of the contours that were told last
+        self._shown: dict[str, int] = {}  # times of the contours that were published last
         self._lock = threading.RLock()
         self._outputs = outputs
         if outputs is not None:

@@ -85,7 +85,7 @@ class MouseRun:
 
 
 def play(script: Script, seed: int, *, settings: MouseSettings | None = None, pictures: bool = False,
-         sway: Sway | None = None, covered_s: float = math.inf, told: Watch = lambda title: None) -> MouseRun:
+         sway: Sway | None = None, covered_s: float = math.inf, watch: Watch = lambda title: None) -> MouseRun:
     """Play a script to the twin and its states to the mouse. `pictures`: render and detect; else the observations are
     made without pictures (`rhot_app.simulator.film.ideal_observations`). From `covered_s` on the second camera is
     silent. Raises RhotError."""
@@ -94,7 +94,7 @@ def play(script: Script, seed: int, *, settings: MouseSettings | None = None, pi
         path = Path(name) / "mouse.json"
         write_document(path, motion_file(script, scene.hand, settings, sway or Sway(), key_s=_KEY_S))
         order = Order(scene, str(path), script.end_s, sketched=not pictures)
-        data = data_set(order, data_sets_folder() if pictures else Path(name) / "sets", told)
+        data = data_set(order, data_sets_folder() if pictures else Path(name) / "sets", watch)
         truth, second = data.truth, data.rig.nodes[1].node_id
         records = [one for one in data.records() if one.node_id != second or one.kind is not RecordKind.DATAGRAM
                    or 1e-9 * (one.t_master_ns - T0_MASTER_NS) < covered_s]
@@ -152,7 +152,7 @@ def resolution(turn_deg: float, seed: int, **how: Any) -> Figures:
 
 
 def coupling(seed: int, **how: Any) -> list[Figures]:
-    """How far the cursor strays from the true hand's while one degree of freedom alone is moved: `rms` and `peak` per
+    """How far the cursor errs from the true hand's while one degree of freedom alone is moved: `rms` and `peak` per
     axis, mm."""
     script = Script()
     script.move((0.0, 0.0, 0.08), 0.5)
@@ -174,9 +174,9 @@ def coupling(seed: int, **how: Any) -> list[Figures]:
     figures = []
     for name, begin_s, end_s in phases:
         inside = run.during(begin_s, end_s)
-        strays = off[inside] - off[inside][0]
-        figures.append({"moved": name, "rms": _axes(np.sqrt(np.square(strays).mean(axis=0))),
-                        "peak": _axes(np.abs(strays).max(axis=0))})
+        errors = off[inside] - off[inside][0]
+        figures.append({"moved": name, "rms": _axes(np.sqrt(np.square(errors).mean(axis=0))),
+                        "peak": _axes(np.abs(errors).max(axis=0))})
     return figures
 
 
@@ -283,11 +283,11 @@ def _random_place(rng: np.random.Generator, half: Array) -> tuple[float, float, 
     return float(x), float(y), float(rng.uniform(_CARRY_M, 0.12))
 
 
-def measures(seed: int, places: int, *, pictures: bool, told: Watch) -> Figures:
+def measures(seed: int, places: int, *, pictures: bool, watch: Watch) -> Figures:
     """All of it. The speeds are always from pictures, because it is the detector that loses a fast hand."""
-    how = {"pictures": pictures, "told": told}
+    how = {"pictures": pictures, "watch": watch}
     figures: Figures = {"seed": seed, "pictures": pictures}
-    figures["speed"] = [speed(one, seed, pictures=True, told=told) for one in SPEEDS_M_PER_S]
+    figures["speed"] = [speed(one, seed, pictures=True, watch=watch) for one in SPEEDS_M_PER_S]
     figures["coupling"] = coupling(seed, **how)
     figures["resolution"] = [resolution(turn, seed, **how) for turn in TURNS_DEG]
     figures["throughput"], run = throughput(seed, **how)

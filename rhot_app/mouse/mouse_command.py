@@ -220,7 +220,7 @@ def _measure(args: argparse.Namespace) -> int:
     from rhot_app.progress import ProgressLine
 
     figures = measures(args.seed, args.places, pictures=args.pictures,
-                       told=lambda title: ProgressLine(f"rendering {title}"))
+                       watch=lambda title: ProgressLine(f"rendering {title}"))
     print(json.dumps(figures) if args.json else report(figures))
     return 0
 

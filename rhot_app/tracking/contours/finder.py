@@ -117,7 +117,7 @@ class Finder:
 
 
 def _logged(search_for: Callable[..., None], *arguments: Any) -> None:
-    """A search that fails is told in the log; the next maps are searched anew."""
+    """A search that fails is logged; the next maps are searched anew."""
     try:
         search_for(*arguments)
     except Exception:

@@ -368,7 +368,7 @@ class ContourEstimator:
         hand.filter.add(t_s, residuals, prediction, initial)
 
     def _weigh_markers(self, frame: CameraObservations) -> bool:
-        """Weigh one frame's markers, or begin with them. Whether they told anything."""
+        """Weigh one frame's markers, or begin with them. Whether they showed anything."""
         assert self._markers is not None
         if self._tracking:
             try:
