@@ -8,8 +8,6 @@ published with the truth:
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -17,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from tables import arguments, publish, table
 
 from rhot_app.errors import RhotError
-from rhot_app.evaluation.run import evaluate_frames, table
+from rhot_app.evaluation.run import COLUMNS, evaluate_frames
 from rhot_app.simulator.film.film import film
 from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.scene.scene import Scene, TwinSettings, make_scene, twin_defaults
@@ -71,28 +70,25 @@ def measure(row: Row, seconds: float, seed: int) -> list[tuple[str, dict[str, An
 
 
 def main() -> int:
-    """Measure all rows, print the table as it grows complete, write JSON."""
-    parser = argparse.ArgumentParser(description="Accuracy of the whole system on the twin.")
+    """Measure all rows, print the table, write JSON."""
+    parser = arguments(__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--recording", metavar="FILE", help="a Qualisys .tsv or Leap .csv recording of real motion")
     parser.add_argument("--only", nargs="*", metavar="NAME", help="rows to measure")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     results: list[tuple[str, dict[str, Any]]] = []
-    for row in rows(args.recording):
-        if args.only and row.name not in args.only:
-            continue
-        try:
-            results += measure(row, args.seconds, args.seed)
-        except RhotError as exc:
-            print(f"{row.name}: {exc}", file=sys.stderr)
-    if not results:
-        print("nothing was measured", file=sys.stderr)
+    try:
+        for row in rows(args.recording):
+            if not args.only or row.name in args.only:
+                results += measure(row, args.seconds, args.seed)
+    except RhotError as exc:
+        print(f"{row.name}: {exc}", file=sys.stderr)
         return 2
-    print(table(results))
-    if args.json is not None:
-        args.json.write_text(json.dumps(dict(results), indent=1) + "\n")
+    publish(args, dict(results), table(
+        [f"{args.seconds:g} s", *(head for _, head, _ in COLUMNS), "age p50, ms"],
+        [[name, *(figures[key] for key, _, _ in COLUMNS), figures["state_age_ms"]["p50"]]
+         for name, figures in results]))
     return 0
 
 

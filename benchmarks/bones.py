@@ -6,8 +6,6 @@ average: every bone scaled as the mean distance between the markers at its two e
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from itertools import pairwise
@@ -20,6 +18,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "calibration"))
 
 from bones_twin import RICH, SIX, Sloppiness, base_hand, bones_mm, person, record
+from tables import arguments, publish, table
 
 from rhot_app.calibration.hand.bones import solve_bones
 from rhot_app.calibration.hand.bones_report import BonesReport, Known
@@ -120,38 +119,32 @@ def say(what: str) -> None:
     print(what, file=sys.stderr, flush=True)
 
 
-def show(rich: list[dict[str, Any]], halves: dict[str, Any] | None, six: list[dict[str, Any]]) -> None:
-    """Print the tables."""
-    print(f"Rich marker set, error of bones, mm (target: all within {TARGET_MM:g})")
-    print(f"{'noise':>8}{'person':>8}{'side':>8}{'worst':>8}{'inner':>8}{'rms':>8}{'per std':>9}{'in 95 %':>9}"
-          f"{'plain':>8}{'seconds':>9}")
-    for row in rich:
-        print(f"{row['noise_mm']:8.2f}{row['person']:8}{row['side']:>8}{row['worst_mm']:8.2f}{row['inner_bones_mm']:8.2f}"
-              f"{row['rms_mm']:8.2f}{row['errors_per_std']:9.2f}{row['within_95']:6}/15{row['plain_worst_mm']:8.2f}"
-              f"{row['seconds']:9.1f}")
-    if halves is None:
-        print(f"Real recording: {QUALISYS} is not there.")
-    else:
-        print(f"Real recording, two halves apart, mm (target: {TARGET_HALVES_MM:g}): worst {halves['worst_mm']:.2f}, "
-              f"rms {halves['rms_mm']:.2f}, plain average {halves['plain_worst_mm']:.2f}; bones that it shows at all: "
-              f"{halves['observed']} of 15")
-    print(f"Six markers, error of the hand's size, % (target: {100 * TARGET_SIZE:g})")
-    print(f"{'person':>8}{'size':>8}{'error':>8}{'stated':>8}{'not observed':>14}")
-    for row in six:
-        print(f"{row['person']:8}{row['size']:8.3f}{100 * row['size_error']:8.2f}{100 * row['stated_std']:8.2f}"
-              f"{row['not_observed']:11} /15")
-
-
 def main() -> int:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    """Measure all three and print their tables."""
+    parser = arguments(__doc__)
     parser.add_argument("--persons", type=int, default=6)
-    parser.add_argument("--json", type=Path, metavar="FILE")
     args = parser.parse_args()
     halves, six = real_halves(), six_markers(args.persons)
     rich = [row for noise_mm in NOISES_MM for row in rich_twin(args.persons, noise_mm)]
-    show(rich, halves, six)
-    if args.json is not None:
-        args.json.write_text(json.dumps({"rich": rich, "halves": halves, "six": six}, indent=1))
+    others = [[f"six markers, 40 Hz, 0.5 mm of noise, {len(six)} persons: the hand's size is off by, %",
+               " to ".join(f"{end(100.0 * abs(row['size_error']) for row in six):.1f}" for end in (min, max))],
+              ["the same, reported standard deviation, %",
+               " to ".join(f"{end(100.0 * row['stated_std'] for row in six):.1f}" for end in (min, max))]]
+    if halves is not None:
+        others[:0] = [["real hand, 100 Hz, 11 markers: its two halves of 15 s disagree, worst bone, rms; mm",
+                       f"{halves['worst_mm']:.2f}, {halves['rms_mm']:.2f}"],
+                      ["the same, scaled plainly, worst bone, mm", halves["plain_worst_mm"]],
+                      ["bones of 15 that the halves observe", ", ".join(map(str, halves["observed"]))]]
+    publish(args, {"rich": rich, "halves": halves, "six": six},
+            table(["noise, mm", "worst bone of each person, mm", "worst inner bone", "rms", "in 95 %", "plain, worst",
+                   "a solve, s"],
+                  [[f"{noise_mm:g}", ", ".join(f"{row['worst_mm']:.2f}" for row in rows),
+                    max(row["inner_bones_mm"] for row in rows),
+                    float(np.sqrt(np.mean([row["rms_mm"] ** 2 for row in rows]))),
+                    f"{sum(row['within_95'] for row in rows)} of {15 * len(rows)}",
+                    max(row["plain_worst_mm"] for row in rows), float(np.median([row["seconds"] for row in rows]))]
+                   for noise_mm in NOISES_MM if (rows := [row for row in rich if row["noise_mm"] == noise_mm])]),
+            table(["other recordings", "result"], others))
     return 0
 
 

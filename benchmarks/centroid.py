@@ -12,8 +12,6 @@ Then the twin's painted fingertips and wrist band, at 0.6 m with its own noise: 
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,6 +25,7 @@ sys.path.insert(0, str(ROOT / "tests" / "detect"))
 
 from chroma_bound import place_bound  # noqa: E402
 from marker_rendering import SKIN, Canvas, disc, to_yuv  # noqa: E402
+from tables import arguments, publish, table  # noqa: E402
 from twin_frames import Pose, held_poses, twin_scene  # noqa: E402
 
 from rhot_node.detect.fast import FastDetector  # noqa: E402
@@ -107,24 +106,18 @@ def detectors(marker: Marker) -> dict[str, Detector]:
 
 
 def discs() -> dict[str, Any]:
-    """Every paint: bound, still, on an edge, moving. Prints a table."""
-    print("disc of 20 px, px     bound    jitter  / bound   bias rms  box jitter  box bias | skin/desk edge bias  box |"
-          " moving rms   box")
+    """Every paint: bound, still, on an edge, moving."""
     results: dict[str, Any] = {}
     for painted in MARKERS.markers:
         marker = msgspec.structs.replace(painted, shape="disc", role=None)
-        bound = float(np.sqrt(np.mean(place_bound(drawn, on_grey(marker, 50.2, 44.3), NOISE) ** 2)))
-        still, edge, moving = still_disc(marker, False), still_disc(marker, True), moving_disc(marker)
-        results[marker.id] = {"bound": bound, "grey": still, "edge": edge, "moving": moving}
-        fast, box = still["fast"], still["box"]
-        print(f"{marker.id:<18}{bound:9.4f} {fast['jitter']:9.4f} {fast['jitter'] / bound:8.2f} {fast['bias']:10.4f} "
-              f"{box['jitter']:11.3f} {box['bias']:9.3f} | {edge['fast']['bias']:19.3f} {edge['box']['bias']:5.2f} | "
-              f"{moving['fast']:10.4f} {moving['box']:5.2f}", flush=True)
+        results[marker.id] = {
+            "bound": float(np.sqrt(np.mean(place_bound(drawn, on_grey(marker, 50.2, 44.3), NOISE) ** 2))),
+            "grey": still_disc(marker, False), "edge": still_disc(marker, True), "moving": moving_disc(marker)}
     return results
 
 
 def twin(poses: int) -> dict[str, Any]:
-    """The painted hand before cloth and before a cluttered desk. Prints a table."""
+    """The painted hand before cloth and before a cluttered desk."""
     results: dict[str, Any] = {}
     for background, motion, seed in (("cloth", "grasp", 1), ("clutter", "rest", 3)):
         scene = twin_scene(background, seed=seed)
@@ -133,18 +126,13 @@ def twin(poses: int) -> dict[str, Any]:
         for pose in held_poses(scene, motion, poses, FRAMES // 2):
             for name, store in (("fast", rows), ("box", boxes)):
                 _score(pose, name, store)
-        print(f"\n{motion} before {background}, px   jitter x      y   bias rms    left-right  |  box: bias  "
-              "left-right")
-        results[background] = {}
+        results[f"{motion} before {background}"] = {}
         for marker, ours, theirs in zip(MARKERS.markers, rows, boxes, strict=True):
             if not ours:
                 continue
             a, b = np.array(ours), np.array(theirs)  # (N, 2 cameras, columns of `_score`)
             figures = _figures(a) | {f"box_{key}": value for key, value in _figures(b).items()}
-            results[background][marker.id] = figures
-            print(f"{marker.id:<26}{figures['jitter_x']:9.4f} {figures['jitter_y']:7.4f} {figures['bias']:9.3f} "
-                  f"{figures['left_minus_right']:13.3f}  | {figures['box_bias']:10.2f} "
-                  f"{figures['box_left_minus_right']:10.3f}", flush=True)
+            results[f"{motion} before {background}"][marker.id] = figures
     return results
 
 
@@ -171,18 +159,29 @@ def _figures(scored: Array) -> dict[str, float]:
 
 def main() -> int:
     """Run, print the tables, write the JSON."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--only", choices=("disc", "twin"))
     parser.add_argument("--poses", type=int, default=12)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    options = parser.parse_args()
+    args = parser.parse_args()
     result: dict[str, Any] = {}
-    if options.only != "twin":
+    printed = []
+    if args.only != "twin":
         result["disc"] = discs()
-    if options.only != "disc":
-        result["twin"] = twin(options.poses)
-    if options.json:
-        options.json.write_text(json.dumps(result, indent=2) + "\n")
+        printed.append(table(
+            ["disc of 20 px; px", "bound", "jitter", "ratio", "bias rms", "thesis's box: jitter", "bias",
+             "bias across a skin/desk edge", "moving, rms", "box, moving"],
+            [[name, f"{one['bound']:.4f}", f"{one['grey']['fast']['jitter']:.4f}",
+              one["grey"]["fast"]["jitter"] / one["bound"], one["grey"]["fast"]["bias"], one["grey"]["box"]["jitter"],
+              one["grey"]["box"]["bias"], one["edge"]["fast"]["bias"], one["moving"]["fast"], one["moving"]["box"]]
+             for name, one in result["disc"].items()]))
+    if args.only != "disc":
+        result["twin"] = twin(args.poses)
+        printed.append(table(
+            ["the twin's hand; px", "jitter x", "y", "bias", "left - right", "thesis's box: bias", "left - right"],
+            [[f"{scene}, {name}", *(figures[key] for key in ("jitter_x", "jitter_y", "bias", "left_minus_right",
+                                                             "box_bias", "box_left_minus_right"))]
+             for scene, markers in result["twin"].items() for name, figures in markers.items()]))
+    publish(args, result, *printed)
     return 0
 
 

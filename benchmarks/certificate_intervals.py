@@ -9,14 +9,13 @@ the nodes' own detector sees rendered pictures, which takes some minutes a seed.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import tempfile
 from pathlib import Path
 
 import msgspec
 import numpy as np
+from tables import arguments, publish, table
 
 from rhot_app.certificate.certify import certify
 from rhot_app.certificate.document import Certificate
@@ -56,12 +55,12 @@ def delay_ms(folder: Path, protocol: ProtocolFile, rig: Rig) -> float:
 
 
 def main() -> int:
-    """Run all seeds and print two tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    """Run all seeds and print the tables."""
+    parser = arguments(__doc__)
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--pictures", action="store_true")
-    parser.add_argument("--json", type=Path)
     args = parser.parse_args()
+    first: dict[str, list[str]] = {}
     held: dict[str, list[bool]] = {}
     widths: dict[str, list[float]] = {}
     named: dict[str, list[bool]] = {}
@@ -74,6 +73,8 @@ def main() -> int:
             for code, what, truth in (*TRUTHS, ("latency", "screen to master", delay_ms(folder, protocol, rig))):
                 found = made.line(code).figure(what)
                 if found is not None and found.value is not None:
+                    first.setdefault(f"{code}: {what}", [
+                        f"{found.value:.3f} ({found.interval.low:.3f} to {found.interval.high:.3f})", f"{truth:.3g}"])
                     held.setdefault(f"{code}: {what}", []).append(bool(found.interval.holds(truth)))
                     widths.setdefault(f"{code}: {what}", []).append(found.interval.half_width)
             for line in made.lines:
@@ -82,9 +83,17 @@ def main() -> int:
                 _judge_wrong(certify(folder, ProtocolFile(ruler=protocol.ruler, rod=protocol.rod),
                                      with_baseline(rig, factor)), factor, named)
         print(f"seed {seed} of {args.seeds}", file=sys.stderr)
-    _print(held, widths, named, verdicts)
-    if args.json:
-        args.json.write_text(json.dumps({"held": held, "half_widths": widths, "named": named, "verdicts": verdicts}))
+    total = [one for each in held.values() for one in each]
+    perfect = [one for each in verdicts.values() for one in each]
+    publish(args, {"held": held, "half_widths": widths, "named": named, "verdicts": verdicts},
+            table(["figure", "seed 1 (95 % interval)", "true", "intervals that hold it", "mean half width"],
+                  [[what, *first[what], f"{sum(each)} of {len(each)}", float(np.mean(widths[what]))]
+                   for what, each in held.items()]),
+            table(["of all", "count"],
+                  [["intervals that hold the truth", f"{sum(total)} of {len(total)}"],
+                   *([f"{what}: differs and names the baseline", f"{sum(each)} of {len(each)}"]
+                     for what, each in named.items()),
+                   ["lines of a perfect rig that differ", f"{perfect.count('differs')} of {len(perfect)}"]]))
     return 0
 
 
@@ -93,21 +102,6 @@ def _judge_wrong(made: Certificate, factor: float, named: dict[str, list[bool]])
         line = made.line(code)
         named.setdefault(f"{code}, baseline x {factor:g}", []).append(
             line.verdict == "differs" and "baseline" in line.cause)
-
-
-def _print(held: dict[str, list[bool]], widths: dict[str, list[float]], named: dict[str, list[bool]],
-           verdicts: dict[str, list[str]]) -> None:
-    print("| figure | intervals that hold the truth | mean half width |\n|---|---|---|")
-    for what, each in held.items():
-        print(f"| {what} | {sum(each)} of {len(each)} | {np.mean(widths[what]):.3f} |")
-    total = [one for each in held.values() for one in each]
-    print(f"| all | {sum(total)} of {len(total)} ({100.0 * np.mean(total):.1f} %) | |")
-    print("\n| wrong rig | differs and names the baseline |\n|---|---|")
-    for what, each in named.items():
-        print(f"| {what} | {sum(each)} of {len(each)} |")
-    print("\n| line of a perfect rig | agrees | differs | not measured |\n|---|---|---|---|")
-    for code, words in verdicts.items():
-        print(f"| {code} | {words.count('agrees')} | {words.count('differs')} | {words.count('not measured')} |")
 
 
 if __name__ == "__main__":

@@ -13,8 +13,6 @@ Fails: in more than 5 % of the pictures the marker is lost or found elsewhere. T
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
 import sys
 from pathlib import Path
@@ -26,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "calibration"))
 
 from colour_twin import SKIN, WOOD_RGB, HandScene, calibrate, repainted, tally  # noqa: E402
+from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.calibration.colour.colours import ColourReport  # noqa: E402
 from rhot_app.calibration.verdict import Grade  # noqa: E402
@@ -88,46 +87,43 @@ def said_of(report: ColourReport, name: str) -> list[str]:
             if finding.grade is not Grade.GOOD and re.search(rf"\b{name}\b", finding.figure)]
 
 
-def print_paints(rows: list[dict[str, Any]]) -> None:
-    """One line per mixture and per marker of which there is something to say; how well warnings and failures agree."""
-    print(f"\n{'mixed':<8} {'with':<8} {'share':>6} {'marker':<8} {'failed %':>9}  said")
+def agreement(name: str, rows: list[dict[str, Any]]) -> list[Any]:
+    """How well warnings and failures agree: a row of the table."""
     warned = np.array([bool(WARNINGS.intersection(row["said"])) for row in rows])
     fails = np.array([row["failed"] > FAILS for row in rows])
-    for row, warning, failing in zip(rows, warned, fails, strict=True):
-        if row["marker"] == row["mixed"] or warning or failing:
-            verdict = "" if warning == failing else "  <- false" if warning else "  <- missed"
-            print(f"{row['mixed']:<8} {row['towards']:<8} {row['share']:6.2f} {row['marker']:<8} "
-                  f"{100 * row['failed']:9.1f}  {', '.join(row['said']) or '-'}{verdict}")
     both = int((warned & fails).sum())
-    print(f"\nwarned {warned.sum()}, fails {fails.sum()}, both {both} of {len(rows)}: "
-          f"precision {both / max(warned.sum(), 1):.2f}, recall {both / max(fails.sum(), 1):.2f}")
+    return [name, len(rows), int(fails.sum()), both, int((warned & ~fails).sum()), both / max(warned.sum(), 1),
+            both / max(fails.sum(), 1)]
 
 
 def main() -> int:
     """Run, print the tables, write the JSON."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--frames", type=int, default=8)
     parser.add_argument("--only", choices=("lamps", "paints", "others"))
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    options = parser.parse_args()
-    result: dict[str, Any] = {"seeds": options.seeds, "frames": options.frames}
-    if options.only in (None, "lamps"):
-        print(f"{'background':<10} {'colours':<18} {'in view':>8} {'lost':>6} {'elsewhere':>10}")
+    args = parser.parse_args()
+    result: dict[str, Any] = {"seeds": args.seeds, "frames": args.frames}
+    printed = []
+    if args.only in (None, "lamps"):
+        rows = []
         for background in ("cloth", "clutter"):
-            result[background] = lamps(background, options.seeds, options.frames)
-            for name, counts in result[background].items():
-                if isinstance(counts, list):
-                    print(f"{background:<10} {name:<18} {counts[0]:8d} {counts[1]:6d} {counts[2]:10d}", flush=True)
-            print(f"{background:<10} warnings: {result[background]['warnings']}")
-    tables = (("paints", MIXTURES, SHARES, 1), ("others", OTHERS, OTHER_SHARES, OTHER_SEEDS))
-    for part, mixtures, shares, first in tables:
-        if options.only in (None, part):
+            result[background] = lamps(background, args.seeds, args.frames)
+            rows += [[background, *name.split(", "), *counts] for name, counts in result[background].items()
+                     if isinstance(counts, list)]
+        printed.append(table(["background", "colours", "images", "markers in view", "lost", "elsewhere"], rows))
+    rows = []
+    for part, mixtures, shares, first in (("paints", MIXTURES, SHARES, 1),
+                                          ("others", OTHERS, OTHER_SHARES, OTHER_SEEDS)):
+        if args.only in (None, part):
             mixed = [(name, target, share) for name, target in mixtures for share in shares]
-            result[part] = [row for k, one in enumerate(mixed, first) for row in paint(*one, options.frames, k)]
-            print_paints(result[part])
-    if options.json:
-        options.json.write_text(json.dumps(result, indent=2) + "\n")
+            result[part] = [row for k, one in enumerate(mixed, first) for row in paint(*one, args.frames, k)]
+            rows.append(agreement({"paints": "one paint mixed", "others": "other mixtures and scenes"}[part],
+                                  result[part]))
+    if rows:
+        printed.append(table(["set", "markers", "fail", "warned of and failing", "false warnings", "precision",
+                              "recall"], rows))
+    publish(args, result, *printed)
     return 0
 
 

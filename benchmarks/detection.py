@@ -19,18 +19,16 @@ ones hardly ever. Ends with code 1 when an aim is missed.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 from independent_drawing import MARKERS, SHAPES, SIZES, Array, Scene, build_scene
 from independent_scenes import right
+from tables import arguments, publish, table
 from thesis_pipeline import ThesisPipeline
 
 from rhot_node.detect.fast import SEARCH_STEP, FastDetector
@@ -103,8 +101,8 @@ def measure(scene: Scene, rounds: int, clock: Clock) -> tuple[dict[str, Array], 
         ("thesis, whole frame", whole.full, bgr[::8]),
         ("thesis, regions of interest", regions.regions, bgr),
         ("acquire: search for all six", lambda image: gate.blobs(image, everything, step=SEARCH_STEP), yuv),
-        ("track, soft only", soft.detect, yuv),
-        ("track, with fit", fit.detect, yuv)]
+        ("track, soft centroids only", soft.detect, yuv),
+        ("track, outlines fitted", fit.detect, yuv)]
     hidden_frames = {f"{len(hidden)} hidden": frames_of(scene, hidden) for hidden in HIDDEN}
     for detector in (fit, soft, lost):
         for image in yuv[-SETTLE:]:
@@ -132,58 +130,45 @@ def ratios(taken: dict[str, Array]) -> dict[str, tuple[float, float]]:
     """How many times faster than the thesis's pipeline, by medians, and the aim."""
     p50 = {name: float(np.median(us)) for name, us in taken.items()}
     whole, regions, hidden = p50["thesis, whole frame"], p50["thesis, regions of interest"], AIMS["hidden"]
-    out = {"tracked: regions of interest / track": (regions / p50["track, with fit"], AIMS["tracked"])}
+    out = {"tracked: than its regions of interest": (regions / p50["track, outlines fitted"], AIMS["tracked"])}
     for name in (f"{len(hidden)} hidden" for hidden in HIDDEN):
-        out[f"{name}: its regions in these frames / track"] = (p50[f"thesis, regions, {name}"] / p50[f"track, {name}"],
+        out[f"{name}: than its regions in the same frames"] = (p50[f"thesis, regions, {name}"] / p50[f"track, {name}"],
                                                                hidden)
-        out[f"{name}: its regions with all six / track"] = (regions / p50[f"track, {name}"], hidden)
+        out[f"{name}: than its regions with all six there"] = (regions / p50[f"track, {name}"], hidden)
     for name in ("all lost", "cold start"):
-        out[f"{name}: one whole frame / sum until found"] = (whole / p50[name], AIMS[name])
+        out[f"{name} until all found: than one whole frame"] = (whole / p50[name], AIMS[name])
     return out
-
-
-def report(name: str, scene: Scene, taken: dict[str, Array], worst: dict[str, int]) -> tuple[dict[str, Any], bool]:
-    """Print the tables of one scene; says whether all aims are met."""
-    print(f"\n{f'{name} ({scene.name})':48}{'us p50':>9} {'p99':>9} {'max':>9} {'of reading':>11}")
-    read = float(np.median(taken["read one BGR frame (copy)"]))
-    for stage, us in taken.items():
-        print(f"{stage:48}{np.median(us):9.1f} {np.percentile(us, 99):9.1f} {us.max():9.1f} "
-              f"{np.median(us) / read:11.2f}")
-    good, rows = True, ratios(taken)
-    for what, (ratio, aim) in rows.items():
-        good &= ratio >= aim
-        print(f"{what:48}{ratio:9.2f} times, aim {aim:4.1f}{'' if ratio >= aim else '  missed'}")
-    for kind, frames in worst.items():
-        good &= frames <= FOUND_WITHIN
-        print(f"{f'{kind}: frames until all are found, most':48}{frames:9d} , aim at most {FOUND_WITHIN}"
-              f"{'' if frames <= FOUND_WITHIN else '  missed'}")
-    return {"us": {stage: {"p50": float(np.median(us)), "p99": float(np.percentile(us, 99)), "max": float(us.max())}
-                   for stage, us in taken.items()},
-            "ratios": {what: {"ratio": ratio, "aim": aim} for what, (ratio, aim) in rows.items()},
-            "frames_until_found": worst}, good
 
 
 def main() -> int:
     """Run, print the tables, write the JSON; 1 when an aim is missed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--rounds", type=int, default=4)
     parser.add_argument("--processor", action="store_true", help="the processor's time, not the clock's")
     parser.add_argument("--size", choices=SIZES, default="16", help="px")
     parser.add_argument("--shapes", choices=SHAPES, default="disc")
     parser.add_argument("--seed", type=int, default=3)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    options = parser.parse_args()
+    args = parser.parse_args()
     cv2.setNumThreads(1)
-    clock = time.thread_time_ns if options.processor else time.perf_counter_ns
-    result: dict[str, Any] = {}
-    good = True
+    clock = time.thread_time_ns if args.processor else time.perf_counter_ns
+    taken, worst = {}, {}
     for name, (layout, room) in SCENES.items():
-        scene = build_scene(layout, options.size, room, options.seed, options.shapes)
-        result[name], met = report(name, scene, *measure(scene, max(options.rounds, 1), clock))
-        good = good and met
-    if options.json:
-        options.json.write_text(json.dumps({"ring": RING, "size": [640, 480], "scenes": result}, indent=2) + "\n")
-    return 0 if good else 1
+        scene = build_scene(layout, args.size, room, args.seed, args.shapes)
+        taken[name], worst[name] = measure(scene, max(args.rounds, 1), clock)
+    faster = {name: ratios(us) for name, us in taken.items()}
+    publish(args, {"us": {name: {stage: [float(np.percentile(one, share)) for share in (50, 99, 100)]
+                                 for stage, one in us.items()} for name, us in taken.items()},
+                   "ratios": faster, "frames_until_found": worst},
+            table(["µs, median (99th percentile)", *SCENES],
+                  [[stage, *(f"{np.median(us[stage]):.0f} ({np.percentile(us[stage], 99):.0f})"
+                             for us in taken.values())] for stage in taken["compact"]]),
+            table(["times faster than the thesis's pipeline", *SCENES, "aim"],
+                  [[what, *(one[what][0] for one in faster.values()), aim]
+                   for what, (_, aim) in faster["compact"].items()]
+                  + [[f"{kind}: frames until all found", *(one[kind] for one in worst.values()), FOUND_WITHIN]
+                     for kind in worst["compact"]]))
+    return int(any(ratio < aim for one in faster.values() for ratio, aim in one.values())
+               or max(frames for one in worst.values() for frames in one.values()) > FOUND_WITHIN)
 
 
 if __name__ == "__main__":

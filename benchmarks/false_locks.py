@@ -11,8 +11,6 @@ cameras and all cases together. Exit code 1 with any false lock.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import tempfile
 from collections import Counter
@@ -20,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tables import arguments, publish, table
 from twin_frames import twin_scene
 
 from rhot_app.engine.offline.replay_summary import replay_states
@@ -74,10 +73,9 @@ def case(background: str, bare: bool, frames: int, kinds: list[str], folder: Pat
 
 def main() -> int:
     """Run, print what was measured, write the JSON."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--frames", type=int, default=10_000)
     parser.add_argument("--trackers", default="classic,estimator")
-    parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
     kinds = options.trackers.split(",")
     report: dict[str, Any] = {}
@@ -86,12 +84,10 @@ def main() -> int:
             for bare in (True, False):
                 name = f"{background}, {'no paint' if bare else 'one marker missing'}"
                 report[name] = case(background, bare, options.frames // 4, kinds, Path(folder))
-                said = [f"{kind}: {counts.get('false', 0)} false, measured "
-                        f"{counts.get('measured', 0) / max(counts.get('worn', 0), 1):.3f} of {counts.get('states', 0)}"
-                        " states" for kind, counts in report[name].items() if kind != "frames"]
-                print(f"{name:<28} {report[name]['frames']:6} frames  {'; '.join(said)}", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=2) + "\n")
+    publish(options, report, table(["room, hand", "frames", "tracker", "states", "false locks", "measured"], [
+        [name, found["frames"], kind, found[kind].get("states", 0), found[kind].get("false", 0),
+         found[kind].get("measured", 0) / worn if (worn := found[kind].get("worn", 0)) else None]
+        for name, found in report.items() for kind in kinds]))
     return int(any(report[name][kind].get("false", 0) for name in report for kind in kinds))
 
 

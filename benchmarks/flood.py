@@ -8,15 +8,14 @@ settings. Prints a table; exits with 1 when a datagram was lost, refused or not 
 
 from __future__ import annotations
 
-import argparse
-import json
 import multiprocessing
 import resource
 import socket
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
+
+from tables import arguments, publish, table
 
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.serve import prepare_process
@@ -101,16 +100,16 @@ class Consumer:
 
 def main() -> int:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--rate", type=int, default=10_000, help="datagrams per second")
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures here")
     args = parser.parse_args()
     figures = run(args.rate, args.seconds)
-    for name, value in figures.items():
-        print(f"{name:>22}  {value:.1f}" if isinstance(value, float) else f"{name:>22}  {value}")
-    if args.json:
-        args.json.write_text(json.dumps(figures, indent=2) + "\n")
+    shown = ("sent", "received", "verified", "sequence_lost", "kernel_overflow", "handed_to_tracker",
+             "cpu_us_per_datagram")
+    publish(args, figures, table([f"{args.rate} datagrams/s for {args.seconds:g} s", "count"],
+                                 [[name.replace("_", " ").replace("cpu us", "processor time, µs,"), figures[name]]
+                                  for name in shown]))
     return 0 if figures["verified"] == figures["sent"] and not figures["sequence_lost"] else 1
 
 

@@ -11,9 +11,7 @@ anything was wrong or they were not flat.
 
 from __future__ import annotations
 
-import argparse
 import gc
-import json
 import logging
 import sys
 import time
@@ -23,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from fuzz_targets import Door, NodeSide, Replies, Target, WronglyTakenError
 from numpy.typing import NDArray
+from tables import arguments, publish, table
 
 from rhot_node.wire.codec import TAG_LENGTH
 
@@ -156,27 +155,23 @@ def flat(figures: dict[str, object]) -> bool:
 
 def main() -> int:
     """Run both phases and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--count", type=int, default=10_000_000, help="datagrams of each phase")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--short", action="store_true", help="too short a run to judge rate and memory by")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures here")
     args = parser.parse_args()
     logging.disable(logging.CRITICAL)  # every start and stop is logged
-    results = []
-    for phase in ("wild", "keyed"):
-        try:
-            figures = run(phase, args.count, args.seed)
-        except WronglyTakenError as exc:
-            print(f"{phase}: {exc}")
-            return 1
-        results.append(figures)
-        print(f"{phase}: {figures['datagrams']} datagrams, {figures['taken']} taken, no exception")
-        for name in ("to", "rate_per_s", "memory_mb", "refused"):
-            print(f"  {name:>10}  {figures[name]}")
-    if args.json:
-        args.json.write_text(json.dumps(results, indent=2) + "\n")
-    return 0 if args.short or all(flat(figures) for figures in results) else 1
+    try:
+        results = {phase: run(phase, args.count, args.seed) for phase in ("wild", "keyed")}
+    except WronglyTakenError as exc:
+        print(exc, file=sys.stderr)
+        return 2
+    publish(args, results, table(
+        ["run", "datagrams", "accepted", "per second of one core", "memory, MB"],
+        [[said, results[phase]["datagrams"], results[phase]["taken"],
+          *(" to ".join(str(end(results[phase][key])) for end in (min, max)) for key in ("rate_per_s", "memory_mb"))]
+         for phase, said in (("wild", "without the key"), ("keyed", "with the key"))]))
+    return 0 if args.short or all(flat(figures) for figures in results.values()) else 1
 
 
 if __name__ == "__main__":

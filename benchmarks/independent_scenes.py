@@ -1,7 +1,8 @@
 """Detection rate, bias and jitter of the detector in pictures that share no code with the twin or the tests.
 
     python benchmarks/independent_scenes.py [--seed N] [--frames N] [--scenes N] [--layout L] [--size S] [--room R]
-                                            [--shapes S] [--told shipped|disc] [--part scenes|returns] [--json FILE]
+                                            [--shapes S] [--told shipped|disc] [--part scenes|returns]
+                                            [--each] [--json FILE]
 
 The pictures are those of `independent_drawing`: six discs and capsules of 12 to 40 px, from close together to spread
 to the frame's edge, before five kinds of rooms. For each layout, size and room:
@@ -20,18 +21,18 @@ frames in which a hidden marker is reported. Ends with code 1 when an aim is mis
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from itertools import product
 from typing import Any
 
 import msgspec
 import numpy as np
 from independent_drawing import LAYOUTS, MARKERS, ROOMS, SHAPES, SIZES, Scene, Shape, build_scene
 from numpy.typing import NDArray
+from tables import arguments, publish, table
 
 from rhot_node.detect.fast import FastDetector
 from rhot_node.markers import MarkerSet
@@ -42,7 +43,6 @@ SETTLE = 12  # frames that are not counted while the tracks of resting markers s
 STILLS = 8  # frames of each scene with a reset before them, at least
 AWAY, APART = (8, 40), (12, 30)  # range of the frames for which a marker is hidden, and of those between two absences
 BOTH = 0.3  # probability that a second marker is hidden with the first
-WORST = 12  # rows of the list of the worst scenes
 
 
 @dataclass
@@ -125,66 +125,43 @@ def meets(row: dict[str, float]) -> bool:
     return min(row["stills"], row["sequence"]) >= FOUND_AIM and row["bias"] <= BIAS_AIM and row["ratio"] <= JITTER_AIM
 
 
-def written(row: dict[str, float]) -> str:
-    """Figures as the columns of the table."""
-    return (f"{100 * row['stills']:7.1f} {100 * row['sequence']:9.1f} {row['bias']:8.3f} {row['worst']:7.3f} "
-            f"{row['jitter']:8.4f} {row['bound']:7.4f} {row['ratio']:6.2f}  {'' if meets(row) else 'missed'}")
+def row_of(name: str, row: dict[str, float]) -> list[Any]:
+    """Figures as a row of the table."""
+    return [name, *(f"{100.0 * row[key]:.1f} %" for key in ("stills", "sequence")),
+            *(row[key] for key in ("bias", "worst", "jitter", "ratio"))]
 
 
-def scenes(options: argparse.Namespace) -> tuple[list[Scored], dict[str, Any], bool]:
-    """Measure scenes of all kinds and print their table."""
-    told = MARKERS if options.told == "shipped" else msgspec.structs.replace(
+def scenes(args: argparse.Namespace) -> list[Scored]:
+    """Measure scenes of all kinds."""
+    told = MARKERS if args.told == "shipped" else msgspec.structs.replace(
         MARKERS, markers=tuple(msgspec.structs.replace(marker, shape="disc") for marker in MARKERS.markers))
-    rng = np.random.default_rng(options.seed)
-    print(f"{'':31}stills  sequence  bias rms   worst   jitter   bound  ratio\n"
-          f"{'layout   size   room':26}{'all found, %':>17}{'px':>10}{'px':>8}{'px':>9}{'px':>8}\n"
-          f"{'aims':26}{100 * FOUND_AIM:12.1f} {100 * FOUND_AIM:9.1f} {BIAS_AIM:8.3f} {JITTER_AIM:32.2f}", flush=True)
-    everything: list[Scored] = []
-    rows = []
-    for layout in options.layout or LAYOUTS:
-        for size in options.size or SIZES:
-            for room in options.room or ROOMS:
-                own = []
-                for _ in range(options.scenes):
-                    shapes = options.shapes or SHAPES[len(everything) % len(SHAPES)]
-                    seed = 1000 * options.seed + len(everything)
-                    scene = build_scene(layout, size, room, seed, shapes)
-                    own.append(judge(scene, (layout, size, room), options.frames, rng, told))
-                    everything.append(own[-1])
-                rows.append({"layout": layout, "size": size, "room": room} | figures(own))
-                print(f"{layout:8} {size:6} {room:9} {written(figures(own))}", flush=True)
-    print()
-    for column in ("layout", "size", "room"):
-        for value in dict.fromkeys(getattr(one, column) for one in everything):
-            print(f"{'all of ' + value:25} "
-                  f"{written(figures([one for one in everything if getattr(one, column) == value]))}")
-    total = figures(everything)
-    print(f"{'all':25} {written(total)}")
-    _print_worst(everything)
-    return everything, {"rows": rows, "all": total}, meets(total)
+    rng, everything = np.random.default_rng(args.seed), []
+    for layout, size, room in product(args.layout or LAYOUTS, args.size or SIZES, args.room or ROOMS):
+        for _ in range(args.scenes):
+            scene = build_scene(layout, size, room, 1000 * args.seed + len(everything),
+                                args.shapes or SHAPES[len(everything) % len(SHAPES)])
+            everything.append(judge(scene, (layout, size, room), args.frames, rng, told))
+    return everything
 
 
-def _print_worst(everything: Sequence[Scored]) -> None:
-    print("\nworst: found")
-    for one in sorted(everything, key=lambda one: min(one.stills, one.sequence))[:WORST]:
-        if one.missed:
-            print(f"  {one.name:36} stills {100 * one.stills:5.1f} sequence {100 * one.sequence:5.1f}  missed "
-                  + ", ".join(f"{name} {times}" for name, times in one.missed.items()))
-    ids, by_marker = MARKERS.ids, np.array([one.bias for one in everything])
-    print("worst: bias")
-    for flat in np.argsort(-np.nan_to_num(by_marker), axis=None)[:WORST]:
-        scene, index = np.unravel_index(flat, by_marker.shape)
-        print(f"  {everything[scene].name:36} {ids[index]:8} {by_marker[scene, index]:6.3f} px")
-    ratio = np.sqrt(np.array([one.variance for one in everything]) / np.array([one.bound for one in everything]))
-    print("worst: jitter")
-    for flat in np.argsort(-np.nan_to_num(ratio), axis=None)[:WORST]:
-        scene, index = np.unravel_index(flat, ratio.shape)
-        jitter = math.sqrt(everything[scene].variance[index])
-        print(f"  {everything[scene].name:36} {ids[index]:8} {jitter:6.4f} px, {ratio[scene, index]:5.2f} of its bound")
-    print("by marker: bias rms px " + ", ".join(f"{name} {value:.3f}" for name, value in zip(
-        ids, np.sqrt(np.nanmean(by_marker**2, axis=0)), strict=True)))
-    print("by marker: jitter / bound " + ", ".join(f"{name} {value:.2f}" for name, value in zip(
-        ids, np.sqrt(np.nanmean(ratio**2, axis=0)), strict=True)))
+def scene_tables(everything: list[Scored], each: bool) -> list[str]:
+    """By size, and all; with `each`, of every scene, layout and room, too, and what was missed."""
+    rows = [row_of(f"{size} px" if size.isdigit() else size, figures([one for one in everything if one.size == size]))
+            for size in dict.fromkeys(one.size for one in everything)]
+    rows += [row_of("all", figures(everything)),
+             ["aim", *(f"{100 * FOUND_AIM:g} %",) * 2, BIAS_AIM, None, None, JITTER_AIM]]
+    if each:
+        rows[:0] = [*(row_of(one.name, figures([one])) for one in everything),
+                    *(row_of(value, figures([one for one in everything if getattr(one, column) == value]))
+                      for column in ("layout", "room")
+                      for value in dict.fromkeys(getattr(one, column) for one in everything))]
+    printed = [table(["scenes", "all found: stills", "sequence", "bias rms, px", "worst marker", "jitter, px",
+                      "jitter / bound"], rows)]
+    if each and any(one.missed for one in everything):
+        printed.append(table(["scene", "missed"], [
+            [one.name, ", ".join(f"{name} {times}" for name, times in one.missed.items())]
+            for one in everything if one.missed]))
+    return printed
 
 
 def absences(length: int, count: int, rng: np.random.Generator) -> NDArray[np.bool_]:
@@ -239,35 +216,20 @@ def returning(scene: Scene, length: int, rng: np.random.Generator) -> Returned:
                                         if times})
 
 
-def returns(options: argparse.Namespace) -> tuple[list[Returned], bool]:
-    """Long sequences of every layout and room, of 12 px, 16 px and mixed; prints their table."""
-    rng = np.random.default_rng(options.seed + 1)
-    print(f"\n{'markers vanish and return':40}all found  until found again, frames  stated while hidden,\n"
-          f"{'':40}    %      p50  max  never  of      frames\n{'aims':40}{100 * FOUND_AIM:7.1f} {'':6}{RETURN_AIM:6}"
-          f" {0:6}", flush=True)
+def returns(args: argparse.Namespace) -> list[Returned]:
+    """Long sequences of every layout and room, of 12 px, 16 px and mixed."""
+    rng = np.random.default_rng(args.seed + 1)
     everything: list[Returned] = []
-    for layout in options.layout or LAYOUTS:
-        for room in options.room or ROOMS:
-            for size in options.size or ("12", "16", "mixed"):
-                scene = build_scene(layout, size, room, 1000 * options.seed + 500 + len(everything),
-                                    options.shapes or SHAPES[len(everything) % len(SHAPES)])
-                one = returning(scene, options.long, rng)
-                everything.append(one)
-                seen = [wait for wait in one.waits if wait] or [0]
-                bad = one.found < FOUND_AIM or max(seen) > RETURN_AIM or 0 in one.waits
-                print(f"{one.name:40}{100 * one.found:7.1f} {np.median(seen):7.0f} {max(seen):4} "
-                      f"{one.waits.count(0):6} {len(one.waits):4} {one.phantoms:6} / {one.hidden}"
-                      f"{f'  missed {one.missed}' if bad else ''}", flush=True)
-    waits = [wait for one in everything for wait in one.waits]
-    found = float(np.mean([one.found for one in everything]))
-    print(f"{'all':40}{100 * found:7.1f} {np.median(waits):7.0f} {max(waits):4} {waits.count(0):6} {len(waits):4} "
-          f"{sum(one.phantoms for one in everything):6} / {sum(one.hidden for one in everything)}")
-    return everything, found >= FOUND_AIM and max(waits) <= RETURN_AIM and 0 not in waits
+    for layout, room, size in product(args.layout or LAYOUTS, args.room or ROOMS, args.size or ("12", "16", "mixed")):
+        scene = build_scene(layout, size, room, 1000 * args.seed + 500 + len(everything),
+                            args.shapes or SHAPES[len(everything) % len(SHAPES)])
+        everything.append(returning(scene, args.long, rng))
+    return everything
 
 
 def main() -> int:
     """Run, print the tables, write the JSON; 1 when an aim is missed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--frames", type=int, default=24, help="of a sequence, and of markers that keep their places")
     parser.add_argument("--scenes", type=int, default=1, help="of each layout, size and room")
@@ -279,19 +241,28 @@ def main() -> int:
     parser.add_argument("--told", choices=("shipped", "disc"), default="shipped",
                         help="what the detector takes the markers for: the set's shapes (capsules, a band), or discs")
     parser.add_argument("--part", choices=("scenes", "returns"), help="else both")
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    options = parser.parse_args()
-    result: dict[str, Any] = {"seed": options.seed, "frames": options.frames}
-    good = True
-    if options.part != "returns":
-        scored, summary, good = scenes(options)
-        result |= summary | {"scenes": [asdict(one) for one in scored]}
-    if options.part != "scenes":
-        again, returned = returns(options)
-        result["returns"] = [asdict(one) for one in again]
-        good = good and returned
-    if options.json:
-        options.json.write_text(json.dumps(result, indent=2) + "\n")
+    parser.add_argument("--each", action="store_true", help="print every scene, too")
+    args = parser.parse_args()
+    result: dict[str, Any] = {"seed": args.seed, "frames": args.frames}
+    printed, good = [], True
+    if args.part != "returns":
+        scored = scenes(args)
+        result |= {"all": figures(scored), "scenes": [asdict(one) for one in scored]}
+        good = meets(result["all"])
+        printed += scene_tables(scored, args.each)
+    if args.part != "scenes":
+        returned = returns(args)
+        result["returns"] = [asdict(one) for one in returned]
+        waits = [wait for one in returned for wait in one.waits]
+        found = float(np.mean([one.found for one in returned]))
+        good = good and found >= FOUND_AIM and max(waits) <= RETURN_AIM and 0 not in waits
+        printed.append(table([f"{len(returned)} sequences in which markers vanish and return", "result", "aim"], [
+            ["frames with all visible markers found", f"{100.0 * found:.1f} %", f"{100 * FOUND_AIM:g} %"],
+            [f"frames until a returned marker is found, worst of {len(waits)} returns", max(waits), RETURN_AIM],
+            ["returned markers never found", waits.count(0), 0],
+            [f"hidden markers reported, of {sum(one.hidden for one in returned)} frames",
+             sum(one.phantoms for one in returned), 0]]))
+    publish(args, result, *printed)
     return 0 if good else 1
 
 

@@ -9,9 +9,7 @@ perfect board, with one whose corners are off by a tenth of a millimetre, and wi
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +19,7 @@ from stereo_intervals import Tally
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "calibration"))
 
 from intrinsics_twin import BOARD, twin_views
+from tables import arguments, publish, table
 
 from rhot_app.calibration.lens.fit import PARAMETERS
 from rhot_app.calibration.lens.intrinsics import solve
@@ -58,22 +57,19 @@ def run(args: argparse.Namespace, off: float, square: bool) -> Tally:
 
 def main() -> int:
     """Print the share inside by parameter and pooled; exit code 1 when a pooled share is not 92 to 98 %."""
-    parser = argparse.ArgumentParser(description="Share of true parameters inside the stated 95 % intervals.")
+    parser = arguments(__doc__)
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--views", type=int, default=15)
     parser.add_argument("--noise", type=float, default=0.1, help="px per axis")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     kept: dict[str, dict[str, float]] = {}
     for way, (off, square) in WAYS.items():
-        began = time.monotonic()
         tally = run(args, off, square)
         kept[way] = {"pooled": tally.pooled, **{name: tally.inside(name) for name in tally.ratios}}
-        print(f"{way}: {100 * tally.pooled:.1f} % pooled over {args.seeds} seeds ({time.monotonic() - began:.0f} s)")
-        print("  " + "  ".join(f"{name} {100 * tally.inside(name):.0f}" for name in tally.ratios), flush=True)
-    if args.json is not None:
-        args.json.write_text(json.dumps({"seeds": args.seeds, "views": args.views, "noise_px": args.noise,
-                                         "inside": kept}, indent=2))
+    columns = ["pooled", *dict.fromkeys(name for figures in kept.values() for name in figures if name != "pooled")]
+    publish(args, kept, table(["board; % inside", *columns], [
+        [way, *(f"{100.0 * figures[name]:.1f}" if name in figures else None for name in columns)]
+        for way, figures in kept.items()]))
     return 0 if all(0.92 <= figures["pooled"] <= 0.98 for figures in kept.values()) else 1
 
 

@@ -9,8 +9,6 @@ twin of the tests; and the largest difference between the two, and from central 
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -24,6 +22,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "hand"))
 
 from dh_oracle import frames_of, jacobian_of, lever_jacobian, points_of
+from tables import arguments, publish, table
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.articulated import articulated_hand, load_articulated
@@ -158,24 +157,17 @@ def error_inflation(model: ArticulatedModel) -> tuple[float, float, float]:
 
 def main() -> int:
     """Measure, print the table, write JSON when asked; exit code 1 when the hand misses its target."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--seconds", type=float, default=1.0, help="for each figure")
-    parser.add_argument("--json", type=Path, help="also write the figures here")
     args = parser.parse_args()
     digiteyes = build_articulated(load_articulated(resource_path("hands", "digiteyes.json")))
     costs = [hand_cost(args.seconds), state_cost("digiteyes", digiteyes, args.seconds), openxr_cost(args.seconds)]
-    print(f"{'':58s} {'Python us':>10s} {'compiled us':>12s} {'numpy us':>10s} {'ratio':>7s}")
-    for cost in costs:
-        print(f"{cost.name:58s} {cost.python_us:10.2f} {cost.compiled_us:12.2f} {cost.numpy_us:10.0f} "
-              f"{cost.numpy_us / cost.python_us:7.0f}")
     worst = error_inflation(digiteyes)
-    print(f"digiteyes, largest difference: from numpy {worst[0]:.1e} m, its Jacobian {worst[1]:.1e}; "
-          f"from central differences {worst[2]:.1e}")
-    print(f"target: hand, forward and Jacobian, {TARGET_US:g} us: "
-          f"{'met' if costs[0].python_us <= TARGET_US else 'missed'}")
-    if args.json:
-        args.json.write_text(json.dumps({"costs": [asdict(cost) for cost in costs], "target_us": TARGET_US,
-                                         "worst": worst}, indent=2) + "\n")
+    publish(args, {"costs": [asdict(cost) for cost in costs], "target_us": TARGET_US, "worst": worst},
+            table(["µs per call", "called from Python", "inside compiled code", "plain numpy"],
+                  [list(asdict(cost).values()) for cost in costs]),
+            f"The largest difference of `digiteyes` from the numpy twin is {worst[0]:.1e} m. Its Jacobian differs by\n"
+            f"{worst[1]:.1e} from the twin's, and by {worst[2]:.1e} from central differences.")
     return 0 if costs[0].python_us <= TARGET_US else 1
 
 

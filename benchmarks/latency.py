@@ -9,8 +9,6 @@ figures with it. Prints p50, p99 and maximum of every stage.
 
 from __future__ import annotations
 
-import argparse
-import json
 import multiprocessing
 import multiprocessing.synchronize
 import shlex
@@ -22,6 +20,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from tables import arguments, publish, table
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import StartedProcess, end_processes, ensure_engine, start_ticks, stop_engine
@@ -105,22 +104,18 @@ def _summary(values_s: list[float]) -> dict[str, float]:
 
 def main() -> int:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--rate", type=float, default=120.0, help="datagrams per second and node")
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--beside", metavar="COMMAND", help="run this too; {directory} is the engine's directory")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures here")
     args = parser.parse_args()
     figures = measure(args.rate, args.seconds, args.beside)
-    print(f"{figures['states']} states at {figures['state_rate_hz']:.1f} Hz, {figures['lost']} datagrams lost")
-    print(f"{'stage':>17} {'p50 ms':>9} {'p99 ms':>9} {'max ms':>9}")
     latency = figures["latency_ms"]
     assert isinstance(latency, dict)
-    for stage, summary in latency.items():
-        if summary:
-            print(f"{stage:>17} {summary['p50']:9.3f} {summary['p99']:9.3f} {summary['max']:9.3f}")
-    if args.json:
-        args.json.write_text(json.dumps(figures, indent=2) + "\n")
+    publish(args, figures,
+            table(["stage", "p50, ms", "p99, ms", "max, ms"],
+                  [[stage.replace("_", " "), *summary.values()] for stage, summary in latency.items() if summary]),
+            f"{figures['state_rate_hz']:.1f} states/s; {figures['lost']} datagrams lost.")
     return 0
 
 

@@ -1,7 +1,6 @@
 """What damage costs a raw log: flipped bytes, and the death of the program that records.
 
-    .venv/bin/python benchmarks/log_damage.py              # 1,000 flips and 100 kills, about two minutes
-    .venv/bin/python benchmarks/log_damage.py --kills 10
+    python benchmarks/log_damage.py [--flips 1000] [--kills 100] [--json FILE]
 
 A log of 10,000 records is read once for every flipped byte behind its header. A recorder that takes 1,000 records a
 second is killed (SIGKILL) at a random moment; the log must open, and what is missing is the time from its last record
@@ -10,14 +9,14 @@ to the kill.
 
 from __future__ import annotations
 
-import argparse
-import json
 import multiprocessing
+import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
+from tables import arguments, publish, table
 
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
@@ -79,9 +78,9 @@ def record_for_ever(path: Path) -> None:
         time.sleep(0.001)
 
 
-def main() -> None:
-    """Print both tables and one JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def main() -> int:
+    """Print the table."""
+    parser = arguments(__doc__)
     parser.add_argument("--flips", type=int, default=1000)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
@@ -89,12 +88,15 @@ def main() -> None:
     rng = np.random.default_rng(args.seed)
     with tempfile.TemporaryDirectory() as work:
         flipped, killed = flips(args.flips, rng, Path(work)), kills(args.kills, rng, Path(work))
-    print(f"{flipped['flips']} flipped bytes: at most {flipped['lost_max']} of {RECORDS} records lost, "
-          f"{flipped['lost_mean']:.3f} on average; {flipped['not_said']} not said, {flipped['wrong_records']} wrong")
-    print(f"{killed['kills']} kills: {killed['opened']} logs open, {killed['damaged']} damaged; at most "
-          f"{1e3 * killed['missing_max_s']:.0f} ms missing, {1e3 * killed['missing_mean_s']:.0f} ms on average")
-    print(json.dumps({"flips": flipped, "kills": killed}))
+    publish(args, {"flips": flipped, "kills": killed}, table(["damage", "result"], [
+        [f"each of {args.flips} flipped bytes in {RECORDS} records",
+         f"at most {flipped['lost_max']} lost, {flipped['lost_mean']:.2f} on average; {flipped['not_said']} not "
+         f"reported, {flipped['wrong_records']} wrong"],
+        [f"{args.kills} killed recordings",
+         f"{killed['opened']} opened, {killed['damaged']} damaged; at most {1e3 * killed['missing_max_s']:.0f} ms "
+         f"missing, {1e3 * killed['missing_mean_s']:.0f} ms on average"]]))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

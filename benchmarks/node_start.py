@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import signal
@@ -18,6 +17,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+import tables
 
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.config import CameraSettings, NodeSettings, save_settings
@@ -91,10 +91,9 @@ def _megabytes(status: str, name: str) -> float:
 
 def main() -> int:
     """Start a node several times, print a table; 1 when a warm start misses what is promised."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = tables.arguments(__doc__)
     parser.add_argument("--starts", type=int, default=5, help="warm starts")
     parser.add_argument("--cold", action="store_true", help="first compile anew, in a cache of its own (minutes)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="rhot-") as work:
         arguments = make_node(Path(work))
@@ -104,19 +103,18 @@ def main() -> int:
             environment["NUMBA_CACHE_DIR"] = str(Path(work) / "numba")
         first = start_node(arguments, environment)
         warm = [start_node(arguments, environment) for _ in range(args.starts)]
-    for name, starts in (("first", [first]), ("warm", warm)):
-        ready = [start.ready_s for start in starts]
-        processor_s = statistics.median(start.processor_s for start in starts)
-        memory_mb, peak_mb = (max(values) for values in zip(*((s.memory_mb, s.peak_mb) for s in starts), strict=True))
-        print(f"{name:<6} ready after {statistics.median(ready):6.2f} s (worst {max(ready):.2f}), {processor_s:.2f} s "
-              f"of the processor   memory {memory_mb:4.0f} MB, peak {peak_mb:4.0f} MB")
+    rows = []
+    for name, starts in (("first, compiling" if args.cold else "first", [first]), (f"warm, of {args.starts}", warm)):
+        ready, processor_s = ([getattr(start, key) for start in starts] for key in ("ready_s", "processor_s"))
+        rows.append([name, statistics.median(ready), max(ready), statistics.median(processor_s),
+                     *(f"{max(getattr(start, key) for start in starts):.0f}" for key in ("memory_mb", "peak_mb"))])
+    ready_s, peak_mb = statistics.median(start.ready_s for start in warm), max(start.peak_mb for start in warm)
     unwanted = sorted({name for start in warm for name in start.unwanted})
-    ready_s = statistics.median(start.ready_s for start in warm)
-    print(f"imported although the node needs it not: {', '.join(unwanted) or 'nothing'}")
-    print(f"promised: warm, ready within {READY_MAX_S:.0f} s ({ready_s:.2f}), at most {MEMORY_MAX_MB:.0f} MB "
-          f"({peak_mb:.0f}), neither SciPy nor Qt")
-    if args.json is not None:
-        args.json.write_text(json.dumps({"first": asdict(first), "warm": [asdict(start) for start in warm]}, indent=1))
+    tables.publish(
+        args, {"first": asdict(first), "warm": [asdict(start) for start in warm]},
+        tables.table(["start", "ready after, s", "worst", "of the processor, s", "memory, MB", "peak, MB"],
+                     [*rows, ["aim, warm", READY_MAX_S, None, None, None, f"{MEMORY_MAX_MB:.0f}"]]),
+        f"Imported although the node does not need it: {', '.join(unwanted) or 'nothing'}.")
     return int(ready_s > READY_MAX_S or peak_mb > MEMORY_MAX_MB or bool(unwanted))
 
 

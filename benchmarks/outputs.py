@@ -10,22 +10,21 @@ time from the datagram's receipt in the kernel to the published state, and the r
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import signal
 import socket
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 from latency import measure
+from tables import arguments, publish, table
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from rhot_app.project import OutputSettings
 
-ARMS = ("none", "reading", "stopped")
+ARMS = {"none": "none, no streams", "reading": "read", "stopped": "suspended after a second"}
 STAGE = "receive_to_state"
 BEFORE_STOP_S = 1.0
 
@@ -83,31 +82,25 @@ def run(arm: str, rate_hz: float, seconds: float) -> dict[str, object]:
 
 def main() -> int:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=6.0)
     parser.add_argument("--rate", type=float, default=120.0, help="datagrams per second and node")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures here")
     parser.add_argument("--client", type=int, nargs=3, help=argparse.SUPPRESS)
     parser.add_argument("--stops", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.client:
         read(args.client[0], args.client[1:], args.stops)
     found: dict[str, list[dict[str, float]]] = {arm: [] for arm in ARMS}
-    rates: dict[str, list[float]] = {arm: [] for arm in ARMS}
+    arms = list(ARMS)
     for number in range(args.runs):
-        for arm in (*ARMS[number % 3:], *ARMS[:number % 3]):
-            figures = run(arm, args.rate, args.seconds)
-            found[arm].append(figures["latency_ms"][STAGE])  # type: ignore[index]
-            rates[arm].append(float(figures["state_rate_hz"]))  # type: ignore[arg-type]
-    print(f"{'clients':>9} {'states/s':>9} {'p50 ms':>8} {'p99 ms':>8} {'p99 of each run':>30} {'ratio':>6}")
+        for arm in (arms[number % 3:] + arms[:number % 3]):
+            found[arm].append(run(arm, args.rate, args.seconds)["latency_ms"][STAGE])  # type: ignore[index]
     medians = {arm: {key: float(np.median([one[key] for one in found[arm]])) for key in ("p50", "p99")} for arm in ARMS}
-    for arm in ARMS:
-        each = " ".join(f"{one['p99']:.2f}" for one in found[arm])
-        print(f"{arm:>9} {np.median(rates[arm]):9.1f} {medians[arm]['p50']:8.3f} {medians[arm]['p99']:8.3f} {each:>30} "
-              f"{medians[arm]['p99'] / medians['none']['p99']:6.2f}")
-    if args.json:
-        args.json.write_text(json.dumps({"stage": STAGE, "medians_ms": medians, "runs_ms": found}, indent=2) + "\n")
+    publish(args, {"stage": STAGE, "medians_ms": medians, "runs_ms": found},
+            table(["clients of the streams", "p50, ms", "p99, ms", "p99 against none"],
+                  [[ARMS[arm], medians[arm]["p50"], medians[arm]["p99"], medians[arm]["p99"] / medians["none"]["p99"]]
+                   for arm in ARMS]))
     return 0
 
 

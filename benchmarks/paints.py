@@ -3,8 +3,8 @@
     python benchmarks/paints.py [--motion tap] [--seconds 4] [--seed 1] [--only NAME ...] [--logs DIR] [--json FILE]
 
 The twin's hand at 0.6 m is rendered and goes through the nodes' detector, the classic and the estimator. Each
-paint is rendered from the sides of the hand that `PAINTS` names: `palm` or `back` towards the cameras. Each
-side has a table:
+paint is rendered from the sides of the hand that `PAINTS` names: `palm` or `back` towards the cameras.
+Columns:
 
     in view     share of marker frames in which both cameras see nine tenths of the paint that faces them
     tips seen   share of the fingertips' frames in which both cameras see any of their paint
@@ -17,7 +17,6 @@ The markers are those of rhot6 with the fields of `PAINTS`. `segment` is rhot6 i
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from dataclasses import dataclass, field
@@ -25,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
+from tables import arguments, publish, table
 
 from rhot_app.errors import RhotError
 from rhot_app.evaluation.compare import TRACKERS, judge
@@ -41,6 +40,7 @@ WHITE, BLACK, BLUE_GLOVE, BLACK_GLOVE = (235, 232, 225), (32, 32, 36), (60, 84, 
 FLAT: dict[str, Any] = {"shape": "disc", "radius_mm": None}
 RING: dict[str, Any] = {"patch": "ring", "length_mm": 10.0, "shape": "band"}
 BOTH = ("palm", "back")
+COLUMNS = {"measured_share": "measured", "tip_measured_mm": "fingertips, mm", "angles_deg": "angles, deg"}
 
 
 @dataclass(frozen=True)
@@ -96,32 +96,9 @@ def rows(name: str, args: argparse.Namespace, folder: Path) -> list[dict[str, An
     return out
 
 
-def table(figures: list[dict[str, Any]]) -> str:
-    """The rows of each side, whole segments first."""
-    lines = []
-    heads = "".join(f"{name:>{10 * len(TRACKERS)}}" for name in ("measured", "tips mm", "angles deg"))
-    kinds = "".join(f"{tracker:>10}" for tracker in TRACKERS) * 3
-    for side in BOTH:
-        rows = [row for row in figures if row["side"] == side]
-        if rows:
-            lines += [f"{side + ' to the cameras':24}{'in view':>9}{'tips seen':>11}{heads}", f"{'':44}{kinds}"]
-        for row in rows:
-            cells = "".join(f"{_cell(row[tracker][key]):>10}"
-                            for key in ("measured_share", "tip_measured_mm", "angles_deg")
-                            for tracker in TRACKERS)
-            note = "  the paint is on the other side" if row["tips_seen"] < 0.5 else ""
-            lines.append(f"{row['paint']:24}{row['in_view']:9.3f}{row['tips_seen']:11.3f}{cells}{note}")
-        lines += [""] if rows else []
-    return "\n".join(lines)
-
-
-def _cell(value: float | None) -> str:
-    return "-" if value is None or not np.isfinite(value) else f"{value:.2f}" if value < 10.0 else f"{value:.1f}"
-
-
 def main() -> int:
     """Film, track, print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--motion", default="tap", metavar="M", help="motion of the hand (default tap)")
     parser.add_argument("--seconds", type=float, default=4.0, metavar="S",
                         help="length; the first second is not judged (default 4)")
@@ -129,7 +106,6 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=tuple(PAINTS), default=tuple(PAINTS), metavar="NAME",
                         help=f"which of: {', '.join(PAINTS)}")
     parser.add_argument("--logs", type=Path, default=None, metavar="DIR", help="keep what was filmed here")
-    parser.add_argument("--json", type=Path, default=None, metavar="FILE", help="write the figures as JSON as well")
     args = parser.parse_args()
     try:
         with tempfile.TemporaryDirectory(prefix="rhot-paints-") as work:
@@ -137,9 +113,12 @@ def main() -> int:
     except RhotError as exc:
         print(f"paints: {exc}", file=sys.stderr)
         return 2
-    print(table(figures))
-    if args.json is not None:
-        args.json.write_text(json.dumps(figures, indent=2))
+    publish(args, figures, table(
+        ["paint, side towards the cameras", "in view", "tips seen",
+         *(f"{head}: {tracker}" for head in COLUMNS.values() for tracker in TRACKERS)],
+        [[f"{row['paint']}, {row['side']}", row["in_view"], row["tips_seen"],
+          *(row[tracker][key] for key in COLUMNS for tracker in TRACKERS)]
+         for row in sorted(figures, key=lambda row: BOTH.index(row["side"]))]))
     return 0
 
 

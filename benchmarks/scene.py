@@ -1,6 +1,6 @@
 """What one redrawing of the scene costs: posing the meshes, and drawing them to the end.
 
-    python benchmarks/scene.py [--redraws N]
+    python benchmarks/scene.py [--redraws N] [--json FILE]
 
 Opens one window (on a virtual screen: ``xvfb-run -a``). The hand's joints are a third each measured, inferred and
 guessed, with names and uncertainty shown: what costs most. Medians, ms; the processor's time (of all threads) says the
@@ -9,12 +9,13 @@ same whatever else the machine does.
 
 from __future__ import annotations
 
-import argparse
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from tables import arguments, publish, table
 
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
@@ -95,9 +96,9 @@ def costs(redraws: int) -> Iterator[Cost]:
     scene.close()
 
 
-def main() -> None:
+def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--redraws", type=int, default=400)
     args = parser.parse_args()
     choose_gl_platform()
@@ -109,14 +110,18 @@ def main() -> None:
 
     QApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     app = QApplication([])
-    print(f"drawn by {choose_format()}, {SIZE[0]} x {SIZE[1]} px")
+    renderer = choose_format()
     found = list(costs(args.redraws + BATCH))[BATCH:]
     batches = [found[k:k + BATCH] for k in range(0, len(found), BATCH)]
-    for name in ("redraw", "pose", "processor"):
-        medians = [1e3 * float(np.median([getattr(cost, name) for cost in batch])) for batch in batches]
-        print(f"{name:9} {np.median(medians):6.2f} ms (best batch {min(medians):.2f})")
+    figures = {said: [1e3 * float(np.median([getattr(cost, name) for cost in batch])) for batch in batches]
+               for name, said in (("redraw", "all of a redraw"), ("pose", "posing of the meshes in it"),
+                                  ("processor", "processor time of all threads"))}
+    publish(args, figures,
+            table([f"{SIZE[0]} x {SIZE[1]} px, {renderer}", "median, ms", "best batch, ms"],
+                  [[said, np.median(medians), min(medians)] for said, medians in figures.items()]))
     app.quit()
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -11,19 +11,19 @@ that nobody touched. With `--bias` the markers' centroids are off by that much i
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "tracking"))
 
 from knocked_rig import filmed, rig_of, scene_of, volume_motion
+from tables import arguments, publish, table
 
 from rhot_app.tracking.refinement.refined_rig import Refinement
 from rhot_app.tracking.refinement.rig_refinement import RigRefiner
@@ -85,9 +85,9 @@ def run(frames: list[CameraObservations], refiner: RigRefiner, knock_s: float) -
     return Run(noticed_s, alarms, found, 1e3 * taken_s / now_s, 1e3 * float(np.mean(refining)))
 
 
-def study(name: str, knock: Callable[[np.random.Generator], np.ndarray], seeds: int, seconds: float, knock_s: float,
-          bias_px: float) -> dict[str, object]:
-    """All seeds of one kind of knock: printed, and returned for the file."""
+def study(knock: Callable[[np.random.Generator], np.ndarray], seeds: int, seconds: float, knock_s: float,
+          bias_px: float) -> dict[str, Any]:
+    """All seeds of one kind of knock: errors of the worst seed, medians of the processor's time."""
     runs, errors_deg, errors_mm, ratios = [], [], [], []
     for seed in range(1, seeds + 1):
         rng = np.random.default_rng([seed, 0xBEC])
@@ -101,45 +101,39 @@ def study(name: str, knock: Callable[[np.random.Generator], np.ndarray], seeds: 
         errors_deg.append(np.degrees(np.abs(away[:3])))
         errors_mm.append(1e3 * np.abs(away[3:]))
         ratios.append(away / np.sqrt(np.diag(camera.covariance)[[0, 1, 2, 4, 5]]))
-    noticed = np.array([one.noticed_s for one in runs])
-    worst = np.max(errors_deg, axis=0)
-    inside = float(np.mean(np.abs(ratios) < NORMAL_95))
-    print(f"{name}: {seeds} seeds, {seconds:g} s")
-    if np.any(np.isfinite(noticed)):
-        print(f"  noticed after {np.nanmedian(noticed):.0f} s (median), {np.nanmax(noticed):.0f} s (worst); "
-              f"never: {int(np.isnan(noticed).sum())}")
-    print(f"  alarms while nothing had happened: {sum(one.alarms for one in runs)}")
-    print(f"  error at the end, worst seed: x {worst[0]:.4f}, y {worst[1]:.4f}, z {worst[2]:.4f} degrees; across the "
-          f"baseline {np.max(errors_mm):.3f} mm; rms of the worst axis "
-          f"{np.sqrt(np.mean(np.square(errors_deg), axis=0)).max():.4f} degrees")
-    print(f"  inside the stated 95 %: {100 * inside:.0f} % of {5 * seeds}; dispersion up to "
-          f"{max(one.found.dispersion for one in runs):.2f}")
-    print(f"  processor: {np.median([one.take_ms_s for one in runs]):.1f} ms/s for frames, "
-          f"{np.median([one.refine_ms for one in runs]):.0f} ms for each refinement", flush=True)
-    return {"noticed_s": noticed.tolist(), "alarms": [one.alarms for one in runs], "inside": inside,
-            "errors_deg": np.array(errors_deg).tolist(), "errors_mm": np.array(errors_mm).tolist()}
+    return {"noticed_s": [one.noticed_s for one in runs], "alarms": sum(one.alarms for one in runs),
+            "errors_deg": np.max(errors_deg, axis=0).tolist(), "errors_mm": float(np.max(errors_mm)),
+            "inside": float(np.mean(np.abs(ratios) < NORMAL_95)),
+            "dispersion": max(one.found.dispersion for one in runs),
+            "frames_ms_per_s": float(np.median([one.take_ms_s for one in runs])),
+            "refinement_ms": float(np.median([one.refine_ms for one in runs]))}
 
 
 def main() -> int:
     """Print the table; exit code 1 when a knock of 0.3 degrees is missed for a minute, the refined pose is off by more
     than 0.03 degrees, or a rig that nobody touched raised an alarm."""
-    parser = argparse.ArgumentParser(description="Self-calibration of two cameras by a moving hand.")
+    parser = arguments(__doc__)
     parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--still-seconds", type=float, default=600.0)
     parser.add_argument("--bias", type=float, default=0.0, help="px, rms of each marker in each camera")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
-    whole = KNOCK_S + AFTER_S
-    kept = {"turned by 0.3 degrees": study("turned by 0.3 degrees", random_turn, args.seeds, whole, KNOCK_S, args.bias),
-            "moved by 2 mm": study("moved by 2 mm", random_shift, args.seeds, whole, KNOCK_S, args.bias),
-            "untouched": study("untouched", nothing, args.seeds, args.still_seconds, args.still_seconds + 1.0,
-                               args.bias)}
-    if args.json is not None:
-        args.json.write_text(json.dumps(kept, indent=1) + "\n")
-    turned = kept["turned by 0.3 degrees"]
-    good = (np.nan_to_num(turned["noticed_s"], nan=1e9).max() <= 60.0 and np.max(turned["errors_deg"]) <= 0.03
-            and not any(sum(one["alarms"]) for one in kept.values()))
-    return 0 if good else 1
+    whole, still = KNOCK_S + AFTER_S, args.still_seconds
+    kept = {name: study(knock, args.seeds, seconds, knock_s, args.bias) for name, knock, seconds, knock_s in (
+        ("turned by 0.3 degrees about a random axis", random_turn, whole, KNOCK_S),
+        ("moved by 2 mm across the baseline", random_shift, whole, KNOCK_S),
+        (f"untouched for {still:g} s", nothing, still, still + 1.0))}
+    turned, *others = kept.values()
+    noticed = {name: np.nan_to_num(one["noticed_s"], nan=np.inf) for name, one in kept.items()}
+    publish(args, kept, table(
+        ["camera", "noticed after, s: median", "worst", "false alarms", "worst error about x, y, z, degrees",
+         "across the baseline, mm", "inside 95 %"],
+        [[name, float(np.median(noticed[name])), float(noticed[name].max()), one["alarms"],
+          ", ".join(f"{error:.4f}" for error in one["errors_deg"]), f"{one['errors_mm']:.3f}",
+          f"{100.0 * one['inside']:.0f} %"] for name, one in kept.items()]),
+        f"{args.seeds} seeds. Frames take {turned['frames_ms_per_s']:.1f} ms of the processor per second, a refinement "
+        f"{turned['refinement_ms']:.0f} ms.")
+    return int(max(noticed[next(iter(kept))]) > 60.0 or max(turned["errors_deg"]) > 0.03
+               or any(one["alarms"] for one in (turned, *others)))
 
 
 if __name__ == "__main__":

@@ -10,9 +10,7 @@ by a tenth of a millimetre.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,6 +21,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "calibration"))
 
 from stereo_twin import SIZE, Twin, stereo_twin
+from tables import arguments, publish, table
 
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import calibrate
@@ -94,11 +93,10 @@ def run(starts: Callable[[Twin, np.random.Generator], list[LensStart]], args: ar
 
 def main() -> int:
     """Print the share inside by parameter and pooled; exit code 1 when a pooled share is not 92 to 98 %."""
-    parser = argparse.ArgumentParser(description="Share of true parameters inside the stated 95 % intervals.")
+    parser = arguments(__doc__)
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--shots", type=int, default=14)
     parser.add_argument("--noise", type=float, default=0.2, help="px per axis")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     kept: dict[str, dict[str, float]] = {}
     ways = {"lenses from the same views": (from_views, True, False, 0.0),
@@ -106,13 +104,12 @@ def main() -> int:
             "lenses given and refined": (given, True, True, 0.0),
             "lenses from the same views, board 0.1 mm off": (from_views, True, False, BOARD_OFF_M)}
     for way, (starts, lenses_too, refine, board_off_m) in ways.items():
-        began = time.monotonic()
         tally = run(starts, args, lenses_too=lenses_too, refine=refine, board_off_m=board_off_m)
         kept[way] = {"pooled": tally.pooled, **{name: tally.inside(name) for name in tally.ratios}}
-        print(f"{way}: {100 * tally.pooled:.1f} % pooled over {args.seeds} seeds ({time.monotonic() - began:.0f} s)")
-        print("  " + "  ".join(f"{name} {100 * tally.inside(name):.0f}" for name in tally.ratios), flush=True)
-    if args.json is not None:
-        args.json.write_text(json.dumps(kept, indent=1) + "\n")
+    columns = ["pooled", *dict.fromkeys(name for figures in kept.values() for name in figures if name != "pooled")]
+    publish(args, kept, table(["lenses; % inside", *columns], [
+        [way, *(f"{100.0 * figures[name]:.1f}" if name in figures else None for name in columns)]
+        for way, figures in kept.items()]))
     return 0 if all(0.92 <= each["pooled"] <= 0.98 for each in kept.values()) else 1
 
 

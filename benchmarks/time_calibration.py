@@ -8,7 +8,6 @@ made to say other times than the true ones, in several ways, and the calibration
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import tempfile
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tables import arguments, publish, table
 
 from rhot_app.calibration.observations import ObservationCollector
 from rhot_app.calibration.time.offset import calibrate_times
@@ -90,11 +90,10 @@ def ask(rig: Rig, films: list[tuple[CameraObservations, ...]], offset_ms: float,
 
 
 def main() -> int:
-    """Print one line per case."""
-    parser = argparse.ArgumentParser(description="Time calibration on rendered pictures, against the truth.")
+    """Print a row per case."""
+    parser = arguments(__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--row-times", type=float, nargs=2, default=(48.0, 30.0), metavar="US")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     scene = make_scene(twin_defaults(), 1)
     rig = build_rig(scene, (NodePorts(1, 2, 3), NodePorts(4, 5, 6)))
@@ -103,16 +102,12 @@ def main() -> int:
         motion = motion_file(Path(work))
         films = [film(scene, motion, camera, true[camera], args.seconds) for camera in (0, 1)]
     figures = [ask(rig, films, offset, said, true) for offset in OFFSETS_MS for said in (true, (0.0, 0.0))]
-    print(f"{args.seconds:g} s of waving, {scene.preset.fps:g} fps, rows {true[0]:g} and {true[1]:g} µs apart")
-    print("true ms   nodes say µs   found ms          error ms   rows found µs                 off")
-    for one in figures:
-        both = zip(one["row_times_us"], one["row_time_sd_us"], strict=True)
-        rows = ", ".join(f"{row:.1f} ± {sd:.1f}" for row, sd in both)
-        print(f"{one['offset_ms']:7.1f}{one['said_us'][0]:9.0f},{one['said_us'][1]:4.0f}{one['found_ms']:11.3f} ± "
-              f"{one['sd_ms']:.3f}{one['error_ms']:+12.3f}   {rows:<28}"
-              + ", ".join(f"{100 * error:+.1f} %" for error in one["row_time_error"]))
-    if args.json is not None:
-        args.json.write_text(json.dumps(figures, indent=1) + "\n")
+    publish(args, figures, table(
+        ["true offset, ms", "row times reported, µs", "offset found, ms", "error, ms", "row times found, µs", "off, %"],
+        [[one["offset_ms"], ", ".join(f"{us:g}" for us in one["said_us"]),
+          f"{one['found_ms']:.3f} ± {one['sd_ms']:.3f}",
+          one["error_ms"], ", ".join(f"{us:.2f}" for us in one["row_times_us"]),
+          ", ".join(f"{100 * error:+.2f}" for error in one["row_time_error"])] for one in figures]))
     return 0
 
 
