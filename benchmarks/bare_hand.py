@@ -15,7 +15,6 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import argparse
 import dataclasses
 import sys
 import time
@@ -29,6 +28,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand")]
 
 from bare_scenes import rig_of, right_hand  # noqa: E402
 from pictures import picture, two_cameras, wall  # noqa: E402
+from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, surface_of  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
@@ -128,22 +128,26 @@ def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
             "ms": float(np.median(taken)), "p99 ms": float(np.percentile(taken, 99)), "found": float(found)}
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+def main() -> int:
+    """Run all cases and print their table."""
+    parser = arguments(__doc__)
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--only", default="matched,feature,shape,mismatched,one,lost")
-    arguments = parser.parse_args()
-    print("case         figure       median     p95   worst (seed)")
-    for case in arguments.only.split(","):
-        runs = [run(case, MOTIONS[seed % len(MOTIONS)], seed, arguments.frames) for seed in range(arguments.seeds)]
+    args = parser.parse_args()
+    found = {case: [run(case, MOTIONS[seed % len(MOTIONS)], seed, args.frames) for seed in range(args.seeds)]
+             for case in args.only.split(",")}
+    rows = []
+    for case, runs in found.items():
         for figure in runs[0]:
             values = np.array([one[figure] for one in runs])
             low = figure in ("in 3 sigma", "found")
             worst = int(np.argmin(values) if low else np.argmax(values))
-            print(f"{case:12s} {figure:11s} {np.median(values):8.2f} {np.percentile(values, 5 if low else 95):7.2f} "
-                  f"{values[worst]:7.2f} ({worst})", flush=True)
+            rows.append([case, figure, float(np.median(values)), float(np.percentile(values, 5 if low else 95)),
+                         float(values[worst]), worst])
+    publish(args, found, table(["case", "figure", "median", "p95", "worst", "its seed"], rows))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -11,8 +11,6 @@ the time of the clock, `x cpu` by that of the processor, which other programs on
 
 from __future__ import annotations
 
-import argparse
-import json
 import shutil
 import subprocess
 import sys
@@ -22,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from distributed import LocalCluster
+from tables import arguments, publish, table
 
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set, data_sets_folder
 from rhot_app.export.export import FORMATS
@@ -60,8 +59,6 @@ def measured(command: list[str]) -> tuple[float, float, float]:
 def exports(log: Path, seconds: float, trackers: list[str], formats: list[str]) -> list[dict[str, Any]]:
     """One row per tracker and format."""
     rows = []
-    print(f"{seconds:g} s of two cameras\n{'tracker':8} {'format':8} {'s':>7} {'x':>6} {'x cpu':>6} {'MB':>5} "
-          f"{'file MB':>8}")
     for tracker in trackers:
         for name in formats:
             with tempfile.TemporaryDirectory() as folder:
@@ -71,12 +68,6 @@ def exports(log: Path, seconds: float, trackers: list[str], formats: list[str]) 
                        "times_real_time_cpu": seconds / cpu_s, "peak_mb": peak_mb,
                        "file_mb": out.stat().st_size / 1e6}
             rows.append(row)
-            print(f"{tracker:8} {name:8} {wall_s:7.1f} {row['times_real_time']:6.1f} {row['times_real_time_cpu']:6.1f} "
-                  f"{peak_mb:5.0f} {row['file_mb']:8.1f}", flush=True)
-    for tracker in trackers:
-        slowest = min(row["times_real_time"] for row in rows if row["tracker"] == tracker)
-        print(f"{tracker}: slowest format {slowest:.1f} times real time (goal {GOALS.get(tracker, 0.0):g})")
-    print(f"most memory: {max(row['peak_mb'] for row in rows):.0f} MB (goal below {GOAL_MB:g})")
     return rows
 
 
@@ -96,34 +87,36 @@ def batches(log: Path, count: int) -> dict[str, float]:
             found[f"workers_{workers}_s"] = batch(f"own{workers}", "--workers", str(workers))
             with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
                 found[f"dask_{workers}_s"] = batch(f"dask{workers}", "--scheduler", cluster.scheduler_address)
-    for kind, name in (("workers", "own workers"), ("dask", "Dask cluster")):
-        one_s, two_s = found[f"{kind}_1_s"], found[f"{kind}_2_s"]
-        found[f"{kind}_gain"] = one_s / two_s
-        print(f"{count} logs, {name}: 1 worker {one_s:.1f} s, 2 workers {two_s:.1f} s, {one_s / two_s:.2f} times as "
-              f"fast (goal 1.7)")
+    for kind in ("workers", "dask"):
+        found[f"{kind}_gain"] = found[f"{kind}_1_s"] / found[f"{kind}_2_s"]
     return found
 
 
 def main() -> int:
     """Run, print, write the JSON."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--formats", default=",".join(FORMATS), help="which formats; none: the batch alone")
     parser.add_argument("--trackers", default="classic,estimator")
     parser.add_argument("--batch", type=int, default=8, metavar="N", help="logs in the batch, 0: no batch (default 8)")
     parser.add_argument("--logs", type=Path, default=None, help="where logs are kept (default ~/.cache/rhot/takes)")
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    options = parser.parse_args()
-    folder = options.logs or data_sets_folder()
-    order = Order(make_scene(twin_defaults(), 1), "grasp", options.seconds, sketched=True)
-    log = data_set(order, folder).folder / LOG_NAME
-    found: dict[str, Any] = {"seconds": options.seconds}
-    if options.formats != "none":
-        found["exports"] = exports(log, options.seconds, options.trackers.split(","), options.formats.split(","))
-    if options.batch:
-        found["batch"] = batches(log, options.batch)
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=1))
+    args = parser.parse_args()
+    order = Order(make_scene(twin_defaults(), 1), "grasp", args.seconds, sketched=True)
+    log = data_set(order, args.logs or data_sets_folder()).folder / LOG_NAME
+    found: dict[str, Any] = {"seconds": args.seconds}
+    printed = []
+    if args.formats != "none":
+        rows = found["exports"] = exports(log, args.seconds, args.trackers.split(","), args.formats.split(","))
+        printed.append(table(["tracker", "format", "s", "x real time", "x, processor", "MB", "file, MB"],
+                             [list(row.values()) for row in rows]))
+        goals = ", ".join(f"{goal:g} times real time ({tracker})" for tracker, goal in GOALS.items())
+        printed.append(f"Goals: {goals}; below {GOAL_MB:g} MB.")
+    if args.batch:
+        batch = found["batch"] = batches(log, args.batch)
+        printed.append(table([f"{args.batch} logs", "1 worker, s", "2 workers, s", "times as fast (goal 1.7)"],
+                             [[name, *(batch[f"{kind}_{end}"] for end in ("1_s", "2_s", "gain"))]
+                              for kind, name in (("workers", "own workers"), ("dask", "Dask cluster"))]))
+    publish(args, found, *printed)
     return 0
 
 

@@ -10,16 +10,14 @@ metacarpals. Printed: how far `tracking.markers.hand_size` is off, and what it s
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
+from tables import arguments, publish, table
 
 from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
@@ -55,27 +53,21 @@ GROUPS = (
 
 def main() -> int:
     """Print a line per group of people, write JSON."""
-    parser = argparse.ArgumentParser(description="How well a hand's size is learnt, of people who differ.")
+    parser = arguments(__doc__)
     parser.add_argument("--people", type=int, default=25, help="in each group (default 25)")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     args = parser.parse_args()
     rig, lines = synthetic_rig(), []
     markers = compile_markers(rig)
-    print(f"{'shapes':>6} {'bones':>6} {'habit':>6} {'within':>6}   error, worst, stated, %   in SD, worst")
     for group in GROUPS:
         rng = np.random.default_rng(args.seed)
         found = np.array([learnt(group, rig, markers, rng) for _ in range(args.people)])
         error, stated = found[:, 0] - found[:, 2], found[:, 1]
-        line = {"shapes": group.shapes, "bones": group.bones, "habit": group.habit, "within": group.within,
-                "error_percent": 100.0 * rms(error), "worst_percent": float(100.0 * np.abs(error).max()),
-                "stated_percent": 100.0 * rms(stated), "in_sd": rms(error / stated),
-                "worst_in_sd": float(np.abs(error / stated).max())}
-        lines.append(line)
-        print("{shapes:6d} {bones:6.2f} {habit:6.1f} {within:6.1f}   {error_percent:5.1f}  {worst_percent:5.1f}  "
-              "{stated_percent:5.1f}       {in_sd:5.2f}  {worst_in_sd:5.1f}".format(**line), flush=True)
-    if args.json is not None:
-        args.json.write_text(json.dumps(lines, indent=1) + "\n")
+        lines.append({"shapes": group.shapes, "bones": group.bones, "habit": group.habit, "within": group.within,
+                      "error_percent": 100.0 * rms(error), "worst_percent": float(100.0 * np.abs(error).max()),
+                      "stated_percent": 100.0 * rms(stated), "in_sd": rms(error / stated),
+                      "worst_in_sd": float(np.abs(error / stated).max())})
+    publish(args, lines, table([name.replace("_", " ") for name in lines[0]], [list(line.values()) for line in lines]))
     return 0
 
 

@@ -10,13 +10,14 @@ the sum of two observations nearest in time; `own` is each camera's alone: half 
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tables import arguments, publish, table
 
 from rhot_app.errors import RhotError
 from rhot_app.evaluation.compare import MOTIONS, orders
@@ -69,8 +70,8 @@ def _off(one: DataSet, markers: MarkerModel, seen: CameraObservations, times_s: 
     return out
 
 
-def table(takes: Iterable[list[Errors]], roles: tuple[str, ...]) -> list[str]:
-    """A line for each marker, of all takes of a motion."""
+def summary(takes: Iterable[list[Errors]], roles: tuple[str, ...]) -> list[list[Any]]:
+    """A row for each marker, of all takes of a motion."""
     common, own, lasting, stated = [], [], [], []
     for one, other in takes:
         nearest = np.abs(other.times_s[None] - one.times_s[:, None]).argmin(axis=1)
@@ -79,18 +80,19 @@ def table(takes: Iterable[list[Errors]], roles: tuple[str, ...]) -> list[str]:
         frames = max(1, round(LATER_S / np.diff(one.times_s).mean()))
         lasting.append(own[-1][frames:] * own[-1][:-frames])
         stated.append(one.stated)
-    lines = []
+    rows = []
     for m, role in enumerate(roles):
         both, alone, later = (np.concatenate([part[:, m] for part in parts]) for parts in (common, own, lasting))
         variance, said = np.nanmean(alone**2), np.nanmean(np.concatenate([part[:, m] for part in stated]))
-        lines.append(f"  {role:14s}{np.sqrt(said):9.3f}{np.sqrt(np.nanmean(both**2)):9.3f}{np.sqrt(variance):9.3f}"
-                     f"{variance / said:9.2f}{np.nanmean(later) / variance:9.2f}")
-    return lines
+        rows.append([role, *(float(figure) for figure in (
+            np.sqrt(said), np.sqrt(np.nanmean(both**2)), np.sqrt(variance), variance / said,
+            np.nanmean(later) / variance))])
+    return rows
 
 
 def main() -> int:
-    """Print a table of each motion as it is done."""
-    parser = argparse.ArgumentParser(description="Errors of image positions beside what nodes state of them.")
+    """Print a row for each motion and marker."""
+    parser = arguments(__doc__)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=8.0, help="length of a take (default 8)")
     parser.add_argument("--motions", default=",".join(MOTIONS))
@@ -100,19 +102,18 @@ def main() -> int:
         parser.error("--seeds must be 1 or more")
     if not 2.0 <= args.seconds < float("inf") or not all(args.motions.split(",")):
         parser.error("--seconds must be 2 or more, and --motions names with commas between them")
-    print(f"{'px':16s}{'stated':>9s}{'common':>9s}{'own':>9s}{'share':>9s}{'lasts':>9s}")
+    rows = []
     try:
         for motion in args.motions.split(","):
             takes = [data_set(order, data_sets_folder(), lambda title: ProgressLine(f"filming {title}"))
-                     for order in orders(
-                make_scene(twin_defaults(), 1), [motion], range(1, args.seeds + 1), args.seconds,
-                sketched=args.sketched)]
+                     for order in orders(make_scene(twin_defaults(), 1), [motion], range(1, args.seeds + 1),
+                                         args.seconds, sketched=args.sketched)]
             markers = compile_markers(takes[0].rig)
-            print(motion)
-            print("\n".join(table([errors_of(one, markers) for one in takes], markers.roles)), flush=True)
+            rows += [[motion, *row] for row in summary([errors_of(one, markers) for one in takes], markers.roles)]
     except RhotError as exc:
         print(exc, file=sys.stderr)
         return 2
+    publish(args, rows, table(["motion", "marker; px", "stated", "common", "own", "share", "lasts"], rows))
     return 0
 
 

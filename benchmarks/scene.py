@@ -21,7 +21,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, HandPose
 from rhot_app.project import Rig, load_rig
-from rhot_app.state import Condition, HandState, Knowledge
+from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.ui.app import cap_software_gl, choose_gl_platform
 from rhot_node.files import resource_path
 
@@ -66,9 +66,10 @@ def _state(rig: Rig, points, number: int) -> HandState:  # type: ignore[no-untyp
         joint_knowledge=np.arange(21, dtype=np.uint8) % 3, fingertip_positions=points.marker_centres,
         angles=np.zeros(21), angle_knowledge=np.zeros(21, np.uint8), world_from_palm=_palm(),
         palm_knowledge=Knowledge.INFERRED, epipolar_error_px=np.zeros(count),
-        joint_covariances=np.tile(9 * covariance, (21, 1, 1)), fingertip_covariances=np.tile(covariance, (5, 1, 1)),
-        angle_sd=np.full(21, 0.02), palm_covariance=np.eye(6) * 1e-6, hand_scale=1.0, hand_scale_sd=0.01,
-        latency_s={})
+        latency_s={}, **UNESTIMATED | {
+            "joint_covariances": np.tile(9 * covariance, (21, 1, 1)),
+            "fingertip_covariances": np.tile(covariance, (5, 1, 1)), "angle_sd": np.full(21, 0.02),
+            "palm_covariance": np.eye(6) * 1e-6})
 
 
 def costs(redraws: int) -> Iterator[Cost]:

@@ -11,14 +11,12 @@ A Raspberry Pi 4 is taken to be as many times slower as --slower says (default 6
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
-from pathlib import Path
 
 import cv2
 import numpy as np
 from independent_drawing import MARKERS, build_scene
+from tables import arguments, publish, table
 
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage
@@ -46,10 +44,9 @@ def pictures(count: int) -> list[YuvImage]:
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = arguments(__doc__)
     parser.add_argument("--frames", type=int, default=200)
     parser.add_argument("--slower", type=float, default=6.0, help="of a Pi 4 (default 6)")
-    parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     cv2.setNumThreads(1)
     rows = []
@@ -71,12 +68,7 @@ def main() -> int:
         rows.append({"tags": count, "found_per_frame": seen / args.frames, "markers_ms": 1e3 * one,
                      "tags_ms": 1e3 * other, "together_hz": 1.0 / (one + other), "ratio": (one + other) / one,
                      "pi4_markers_hz": 1.0 / (args.slower * one), "pi4_tags_hz": 1.0 / (args.slower * other)})
-    names = list(rows[0])
-    print("  ".join(names))
-    for row in rows:
-        print("  ".join(f"{row[name]:{len(name)}.2f}" for name in names))
-    if args.json is not None:
-        args.json.write_text(json.dumps(rows, indent=2) + "\n")
+    publish(args, rows, table(list(rows[0]), [list(row.values()) for row in rows]))
     return 0
 
 
