@@ -11,8 +11,6 @@ errors within three sigma. The jitter is the rms of third differences, divided b
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import sys
 import tempfile
@@ -23,6 +21,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from tables import arguments, publish, table
 
 from rhot_app.calibration.hand.bundle_model import POSE, expected
 from rhot_app.calibration.hand.fit import fit_hand
@@ -52,20 +51,20 @@ SETTLED_S = 1.0
 
 def main() -> int:
     """Print the tables, write JSON."""
-    parser = argparse.ArgumentParser(description="How landmarks err, and what the estimator makes of them.")
+    parser = arguments(__doc__)
     parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--unit-mm", type=float, default=40.0, help="a unit of the recording's calibration")
     parser.add_argument("--seeds", type=int, default=2, help="synthetic hands per row (default 2)")
-    parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     figures: dict[str, Any] = {}
     if args.data.is_dir():
         figures |= recorded(args.data, 1e-3 * args.unit_mm)
     else:
-        print(f"{args.data} is not there: the recorded hand is left out.")
-    figures["synthetic"] = synthetic(args.seeds)
-    if args.json is not None:
-        args.json.write_text(json.dumps(figures, indent=1))
+        print(f"{args.data} is not there: the recorded hand is left out.", file=sys.stderr)
+    rows = figures["synthetic"] = synthetic(args.seeds)
+    publish(args, figures,
+            *(table([name, ""], part.items()) for name, part in figures.items() if name != "synthetic"),
+            table([name.replace("_", " ") for name in rows[0]], [list(row.values()) for row in rows]))
     return 0
 
 
@@ -118,15 +117,9 @@ def recorded(folder: Path, unit_m: float) -> dict[str, Any]:
     cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     places = triangulated(cameras, pixels)
     errors, hand = landmark_errors(rig, cameras, both / FPS, pixels, places)
-    print("Errors of the recorded landmarks, per axis at the hand:")
-    for name, value in errors.items():
-        print(f"  {name:<44} {value:8.3f}")
-    found = {"errors": errors}
+    found = {"errors of the recorded landmarks, per axis at the hand": errors}
     for name, one in (("shipped hand", rig), ("fitted hand", msgspec.structs.replace(rig, hand=hand))):
-        found[name] = tracked(one, tables, both, places)
-        print(f"The recorded hand, tracked with the {name}:")
-        for key, value in found[name].items():
-            print(f"  {key:<44} {value:8.3f}")
+        found[f"the recorded hand, tracked with the {name}"] = tracked(one, tables, both, places)
     return found
 
 
@@ -257,16 +250,12 @@ def lag(points: Array, reference: Array) -> float:
 
 def synthetic(seeds: int) -> list[dict[str, Any]]:
     """Joint errors of synthetic hands against their triangulated landmarks."""
-    print(f"{'motion':<8} {'bones':>6} {'joints mm':>10} {'triangulated':>13} {'stated mm':>10} {'NEES':>6} "
-          f"{'in 3 sigma %':>13}")
     rows = []
     for motion in ("rest", "grasp", "pinch"):
         for bone_sd in (0.0, 0.05):
             runs = [study(motion, bone_sd, seed) for seed in range(1, seeds + 1)]
-            row = {key: float(np.mean([run[key] for run in runs])) for key in runs[0]}
-            rows.append({"motion": motion, "bone_sd": bone_sd} | row)
-            print(f"{motion:<8} {100 * bone_sd:5.0f}% {row['joints_mm']:10.2f} {row['triangulated_mm']:13.2f} "
-                  f"{row['stated_mm']:10.2f} {row['nees']:6.2f} {100 * row['within']:13.1f}", flush=True)
+            rows.append({"motion": motion, "bone_sd": bone_sd}
+                        | {key: float(np.mean([run[key] for run in runs])) for key in runs[0]})
     return rows
 
 

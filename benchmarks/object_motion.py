@@ -8,13 +8,13 @@ are those of a cubic fitted to 90 ms (Savitzky and Golay 1964).
 
 from __future__ import annotations
 
-import argparse
 import sys
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from scipy.signal import savgol_filter
+from tables import arguments, publish, table
 
 from rhot_app.errors import RhotError
 from rhot_app.geometry.transforms import fit_rigid, log_so3
@@ -38,7 +38,7 @@ def rates(points: np.ndarray, step_s: float) -> list[tuple[np.ndarray, np.ndarra
 
 def main() -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("file", type=Path)
     parser.add_argument("names", nargs="+", metavar="NAME")
     args = parser.parse_args()
@@ -47,6 +47,7 @@ def main() -> int:
     except RhotError as exc:
         print(exc, file=sys.stderr)
         return 2
+    rows = []
     step_s = float(np.median(np.diff(recording.times_s)))
     for name in args.names:
         columns = [recording.names.index(f"{name}_{side}") for side in ("top", "left", "right")]
@@ -57,7 +58,8 @@ def main() -> int:
                 chosen = (speed >= low) & (speed < high)
                 if chosen.sum() >= 20:
                     rms = np.sqrt(np.mean(acceleration[chosen] ** 2))
-                    print(f"{name}: {low:g} to {high:g} {units[0]}: {rms:.2f} {units[1]} rms of {chosen.sum()}")
+                    rows.append([name, f"{low:g} to {high:g} {units[0]}", f"{rms:.2f} {units[1]}", int(chosen.sum())])
+    publish(args, rows, table(["object", "speed", "acceleration, rms", "samples"], rows))
     return 0
 
 

@@ -17,9 +17,7 @@ chains of points with a parabola at the root, both through Python.
 
 from __future__ import annotations
 
-import argparse
 import gc
-import json
 import sys
 import time
 from collections.abc import Iterator
@@ -30,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from solvers_chart import draw_chart
+from tables import arguments, publish, table
 
 from rhot_app.hand.anatomy import DIP_PER_PIP, load_hand
 from rhot_app.hand.kinematics import forward
@@ -146,8 +145,8 @@ def follow(method: Method, model: HandModel, path: Iterator[Array]) -> dict[str,
     return {"jump_deg": float(np.degrees(max(jumps))), "missed_mm": float(1e3 * max(misses))}
 
 
-def table(model: HandModel, hands: int) -> dict[str, dict[str, dict[str, float]]]:
-    """Every method's figures, printed as they come."""
+def all_figures(model: HandModel, hands: int) -> dict[str, dict[str, dict[str, float]]]:
+    """Every method's figures."""
     figures: dict[str, dict[str, dict[str, float]]] = {}
     cases = {case: problems(model, case, hands, np.random.default_rng(1)) for case in ("near", "far", "any")}
     shaped = {f"FABRIK, {shape.name.lower()} knuckles":
@@ -158,24 +157,9 @@ def table(model: HandModel, hands: int) -> dict[str, dict[str, dict[str, float]]
         figures[method.name] = {case: measure(method, drawn) for case, drawn in cases.items()}
         figures[method.name]["stretch"] = follow(method, model, stretch_path(model))
         figures[method.name]["axis"] = follow(method, model, axis_path(model))
-        show(method.name, figures[method.name])
     for name, drawn in shaped.items():
         figures[name] = {case: measure(Method.FABRIK, own) for case, own in drawn.items()}
-        show(name, figures[name])
     return figures
-
-
-def show(name: str, of: dict[str, dict[str, float]]) -> None:
-    """One method's lines of the table."""
-    for case in ("near", "far", "any"):
-        row = of[case]
-        print(f"{name:26} {case:5} {row['median_us']:7.1f} {row['p99_us']:8.1f} µs {row['iterations']:4.0f} "
-              f"{row['most_iterations']:4.0f} it  {row['residual_mm']:.1e} {row['worst_mm']:.1e} mm "
-              f"{row['missed_percent']:6.2f} % missed {row['handed_percent']:5.1f} % handed over "
-              f"{row['excess_deg']:6.2f} deg", flush=True)
-    for path in ("stretch", "axis"):
-        if path in of:
-            print(f"{'':26} {path:8} {of[path]['jump_deg']:6.1f} deg  {of[path]['missed_mm']:.1e} mm", flush=True)
 
 
 def neighbours(model: HandModel, hands: int) -> dict[str, float]:
@@ -239,21 +223,23 @@ def shortfalls(figures: dict[str, dict[str, dict[str, float]]]) -> list[str]:
 
 def main() -> int:
     """Print the table; 1 when a target is missed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--hands", type=int, default=2000, help="per case and method")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
     parser.add_argument("--chart", type=Path, help="draw the chart into this SVG file")
     options = parser.parse_args()
     model = build_model(load_hand(resource_path("hands", "right.json")))
-    figures = table(model, options.hands)
+    figures = all_figures(model, options.hands)
     missed = shortfalls(figures)
     others = {"neighbouring fingers": neighbours(model, options.hands),
               "a chain with a parabola": border_chains(model, options.hands)}
-    for name, row in others.items():
-        print(f"{name:26}", *(f"{field} {value:.3g}" for field, value in row.items()), sep="  ")
-    print("\n".join(missed) or f"all targets met (times of near and far, medians; FABRIK to {1e3 * COARSE:g} mm)")
-    if options.json:
-        options.json.write_text(json.dumps(figures | {"others": others}, indent=2) + "\n")
+    cases = {f"{name}, {case}": of[case] for name, of in figures.items() for case in ("near", "far", "any")}
+    paths = {f"{name}, {path}": of[path] for name, of in figures.items() for path in ("stretch", "axis") if path in of}
+    publish(options, figures | {"others": others},
+            *(table([head, *(name.replace("_", " ") for name in next(iter(rows.values())))],
+                    [[name, *row.values()] for name, row in rows.items()])
+              for head, rows in (("solver, case", cases), ("solver, path", paths))),
+            *(table([name, ""], row.items()) for name, row in others.items()),
+            "\n".join(missed) or f"All targets are met (medians of near and far; FABRIK to {1e3 * COARSE:g} mm).")
     if options.chart:
         options.chart.write_text(draw_chart(figures), encoding="utf-8")
     return 1 if missed else 0

@@ -8,8 +8,6 @@ calibration of 40 shots again and again in the solver's process, as the wizards 
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import tempfile
 import threading
@@ -19,6 +17,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from tables import arguments, publish, table
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.board.corners import BoardView
@@ -115,21 +114,18 @@ def measure(seconds: float, shots: int) -> dict[str, Any]:
 
 def main() -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--shots", type=int, default=40)
-    parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     try:
         found = measure(args.seconds, args.shots)
     except RhotError as exc:
         print(f"wizard_preview: {exc}", file=sys.stderr)
         return 2
-    for name in ("alone", "solving"):
-        print(f"{name:8s} {found[name]}")
-    print(f"solving {args.shots} shots took {found['solve_s']} s")
-    if args.json is not None:
-        args.json.write_text(json.dumps(found, indent=2))
+    publish(args, found, table(["", *found["alone"]], [[name, *map(str, found[name].values())]
+                                                      for name in ("alone", "solving")]),
+            f"Solving {args.shots} shots took {found['solve_s']} s.")
     return 0
 
 
