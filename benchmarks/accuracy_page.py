@@ -90,7 +90,7 @@ def write_block(path: Path, name: str, content: str) -> None:
     """Replace one block on the page as it is now; `content` is Markdown."""
     text, count = block(name).subn(lambda _: f"{content.strip()}\n", path.read_text())
     if count != 1:
-        raise SystemExit(f"{path}: the block {name} stands there {count} times; it must stand there once.")
+        raise RuntimeError(f"has {count} blocks in {path}, not one")
     write_atomically(path, text.encode())
 
 
@@ -171,10 +171,14 @@ def main() -> int:
         print(f"{name}: {SECTIONS[name].command}", flush=True)
         try:
             write_block(PAGE, name, measure(SECTIONS[name]))
+            renew_readme()
         except (RuntimeError, OSError) as exc:
             failed.append(f"{name}: the old figures stay, `{SECTIONS[name].command}` {exc}.")
-    renew_readme()
-    print("\n".join(failed), file=sys.stderr)
+        except KeyboardInterrupt:
+            failed.append(f"{name}: interrupted; its figures and those of the sections after it stay.")
+            break
+    if failed:
+        print("\n".join(failed), file=sys.stderr)
     return 2 if failed else 0
 
 

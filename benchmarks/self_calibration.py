@@ -130,8 +130,8 @@ def main() -> int:
         [[name, float(np.median(noticed[name])), float(noticed[name].max()), one["alarms"],
           ", ".join(f"{error:.4f}" for error in one["errors_deg"]), f"{one['errors_mm']:.3f}",
           f"{100.0 * one['inside']:.0f} %"] for name, one in kept.items()]),
-        f"{args.seeds} seeds. Frames take {turned['frames_ms_per_s']:.1f} ms of the processor per second, a refinement "
-        f"{turned['refinement_ms']:.0f} ms.")
+        f"Seeds: {args.seeds}. Frames take {turned['frames_ms_per_s']:.1f} ms of the processor per second, a "
+        f"refinement {turned['refinement_ms']:.0f} ms.")
     return int(max(noticed[next(iter(kept))]) > 60.0 or max(turned["errors_deg"]) > 0.03
                or any(one["alarms"] for one in (turned, *others)))
 
