@@ -22,12 +22,13 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from tables import WIDTH
+
 from rhot_node.files import write_atomically
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, README = ROOT / "docs" / "accuracy.md", ROOT / "README.md"
 README_BLOCK = "times"
-WIDTH = 100  # characters of a line of Markdown
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def main() -> int:
                   [[key, *(float(figure(one[key])) for one in of for figure in (np.median, max)), target]
                    for key, target in TARGETS.items()]),
             f"{args.seconds:g} s, {RIG_HZ:g} and {FOREIGN_HZ:g} Hz, {100 * OUTLIERS:g} % outliers of "
-            f"{1e3 * OUTLIER_M:g} mm, {args.seeds} seeds, {np.median(durations):.2f} s each.\n"
+            f"{1e3 * OUTLIER_M:g} mm, {args.seeds} seeds, {np.median(durations):.2f} s each. "
             f"NEES per parameter: {np.mean(of[0]['NEES']):.2f} and {np.mean(of[1]['NEES']):.2f}.")
     return int(any(max(one[key]) > target for one in of for key, target in TARGETS.items()))
 

@@ -166,7 +166,7 @@ def main() -> int:
     publish(args, {"costs": [asdict(cost) for cost in costs], "target_us": TARGET_US, "worst": worst},
             table(["µs per call", "called from Python", "inside compiled code", "plain numpy"],
                   [list(asdict(cost).values()) for cost in costs]),
-            f"The largest difference of `digiteyes` from the numpy twin is {worst[0]:.1e} m. Its Jacobian differs by\n"
+            f"The largest difference of `digiteyes` from the numpy twin is {worst[0]:.1e} m. Its Jacobian differs by "
             f"{worst[1]:.1e} from the twin's, and by {worst[2]:.1e} from central differences.")
     return 0 if costs[0].python_us <= TARGET_US else 1
 

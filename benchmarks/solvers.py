@@ -239,7 +239,7 @@ def main() -> int:
                     [[name, *row.values()] for name, row in rows.items()])
               for head, rows in (("solver, case", cases), ("solver, path", paths))),
             *(table([name, ""], row.items()) for name, row in others.items()),
-            "\n".join(missed) or f"All targets are met (medians of near and far; FABRIK to {1e3 * COARSE:g} mm).")
+            "; ".join(missed) or f"All targets are met (medians of near and far; FABRIK to {1e3 * COARSE:g} mm).")
     if options.chart:
         options.chart.write_text(draw_chart(figures), encoding="utf-8")
     return 1 if missed else 0

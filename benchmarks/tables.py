@@ -9,11 +9,14 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+WIDTH = 100  # characters of a line of Markdown
 
 
 def arguments(doc: str | None) -> argparse.ArgumentParser:
@@ -45,7 +48,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 
 def publish(args: argparse.Namespace, figures: Any, *parts: str) -> None:
-    """Print tables and sentences, a blank line between them; write the figures where `--json` says."""
-    print("\n\n".join(parts), flush=True)
+    """Print tables and paragraphs, a blank line between them; write the figures where `--json` says."""
+    print("\n\n".join(part if part.startswith("|") else textwrap.fill(part, WIDTH) for part in parts), flush=True)
     if args.json is not None:
         args.json.write_text(json.dumps(figures, indent=1) + "\n")

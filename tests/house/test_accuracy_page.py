@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import re
 import sys
 from itertools import pairwise
@@ -15,14 +15,10 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
-def page() -> ModuleType:
-    """benchmarks/accuracy_page.py, a fresh module for each test."""
-    spec = importlib.util.spec_from_file_location("accuracy_page", ROOT / "benchmarks" / "accuracy_page.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+def page(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """benchmarks/accuracy_page.py."""
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    return importlib.import_module("accuracy_page")
 
 
 @pytest.fixture
