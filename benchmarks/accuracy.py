@@ -87,8 +87,8 @@ def main() -> int:
         return 2
     publish(args, dict(results), table(
         [f"{args.seconds:g} s", *(head for _, head, _ in COLUMNS), "age p50, ms"],
-        [[name, *(figures[key] for key, _, _ in COLUMNS), figures["state_age_ms"]["p50"]]
-         for name, figures in results]))
+        [[name, *(figures[key] if figures[key] is None else form.format(figures[key]) for key, _, form in COLUMNS),
+          figures["state_age_ms"]["p50"]] for name, figures in results]))
     return 0
 
 

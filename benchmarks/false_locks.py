@@ -86,7 +86,7 @@ def main() -> int:
                 report[name] = case(background, bare, options.frames // 4, kinds, Path(folder))
     publish(options, report, table(["room, hand", "frames", "tracker", "states", "false locks", "measured"], [
         [name, found["frames"], kind, found[kind].get("states", 0), found[kind].get("false", 0),
-         found[kind].get("measured", 0) / worn if (worn := found[kind].get("worn", 0)) else None]
+         f"{found[kind].get('measured', 0) / worn:.3f}" if (worn := found[kind].get("worn", 0)) else None]
         for name, found in report.items() for kind in kinds]))
     return int(any(report[name][kind].get("false", 0) for name in report for kind in kinds))
 
